@@ -1,8 +1,14 @@
-//! The block index against a plain table: linear probes and deletion by shifting back, at no more bytes. The churn of a moving camera: blocks ahead are
-//! entered, those behind removed, and around each there are lookups. Besides the mean it prints how long single insertions take: cleaning in
+//! The block index against a plain table: linear probes and deletion by shifting back, at no more
+//! bytes. The churn of a moving camera: blocks ahead are entered, those behind removed, and around
+//! each there are lookups. Besides the mean it prints how long single insertions take: cleaning in
 //! home must not become a spike.
 
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a bench may stop at what it does not expect"
+)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
@@ -44,7 +50,8 @@ struct Plain(Vec<u32>);
 
 fn home(coord: BlockCoord) -> usize {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
-    let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
+    let mixed =
+        x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     (mixed ^ (mixed >> 29)) as usize & (SLOTS - 1)
 }
@@ -83,7 +90,9 @@ impl Table for Plain {
             at = (at + 1) & (SLOTS - 1);
             let Some(slot) = self.0[at].checked_sub(1) else { break };
             // It may move into the hole unless its own home lies behind the hole.
-            if (at.wrapping_sub(home(coords[slot as usize])) & (SLOTS - 1)) >= (at.wrapping_sub(hole) & (SLOTS - 1)) {
+            if (at.wrapping_sub(home(coords[slot as usize])) & (SLOTS - 1))
+                >= (at.wrapping_sub(hole) & (SLOTS - 1))
+            {
                 self.0[hole] = self.0[at];
                 hole = at;
             }
@@ -95,7 +104,12 @@ impl Table for Plain {
 /// The `number`th block of the street: 25 across, 8 high, 5 deep a slice.
 fn block(number: usize) -> BlockCoord {
     let (slice, within) = (number / SLICE, number % SLICE);
-    BlockCoord::new((within % 25) as i32 - 12, (within / 25 % 8) as i32 - 4, (slice * 5 + within / 200) as i32 % 30_000).unwrap()
+    BlockCoord::new(
+        (within % 25) as i32 - 12,
+        (within / 25 % 8) as i32 - 4,
+        (slice * 5 + within / 200) as i32 % 30_000,
+    )
+    .unwrap()
 }
 
 struct Drive<T> {
@@ -147,7 +161,9 @@ impl<T: Table> Drive<T> {
             bencher.iter_custom(|iterations| (0..iterations).map(|_| self.slice()).sum());
         });
         self.insertions_ns.sort_unstable();
-        let share = |share: f64| self.insertions_ns[(share * (self.insertions_ns.len() - 1) as f64) as usize];
+        let share = |share: f64| {
+            self.insertions_ns[(share * (self.insertions_ns.len() - 1) as f64) as usize]
+        };
         println!(
             "{name}: {} insertions, ns: median {}, p99.9 {}, p99.999 {}, worst {}",
             self.insertions_ns.len(),

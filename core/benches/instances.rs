@@ -1,7 +1,9 @@
-//! What objects add to a frame at KITTI size on one thread: CPU time of the stages `instances` and `segmentation` and of the whole step, with 0, 1, 4 and 8 cars
-//! detected in the same pictures. A street of textured boxes is rendered from a camera in motion; the cars map_frames along with it, 8 to 15 m away, so
-//! that in every frame measured every car detected is tracked, followed by its own matches and fused (the bench fails where one is not). Poses
-//! are given: undetected cars must not lead the camera astray.
+//! What objects add to a frame at KITTI size on one thread: CPU time of the stages `instances` and
+//! `segmentation` and of the whole step, with 0, 1, 4 and 8 cars detected in the same pictures. A
+//! street of textured boxes is rendered from a camera in motion; the cars map_frames along with it,
+//! 8 to 15 m away, so that in every frame measured every car detected is tracked, followed by its
+//! own matches and fused (the bench fails where one is not). Poses are given: undetected cars must
+//! not lead the camera astray.
 //!
 //! `cargo bench -p dynvox-core --bench instances`
 #![allow(
@@ -26,15 +28,17 @@ use std::{sync::Mutex, time::Duration};
 
 const WIDTH: usize = 1242;
 const HEIGHT: usize = 375;
-const RIG: StereoRig = StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
 /// Frames until each car has a map, and frames measured.
 const BEGINNING: usize = 8;
 const MEASURED: usize = 8;
 /// Way of the camera from frame to frame, m.
 const STEP_M: f64 = 0.8;
-/// Cars abreast: where the rear is before the camera in the first frame and what it gains a frame, how far the near side is to the right of the
-/// camera (below 0: the far side, to the left), m. Far enough from each other in the picture for all rears to be seen whole; the first four are
-/// like the last four.
+/// Cars abreast: where the rear is before the camera in the first frame and what it gains a frame,
+/// how far the near side is to the right of the camera (below 0: the far side, to the left), m. Far
+/// enough from each other in the picture for all rears to be seen whole; the first four are like
+/// the last four.
 const CARS: [(f64, f64, f64); 8] = [
     (10.0, 0.05, 3.0),
     (8.0, 0.05, 0.4),
@@ -52,7 +56,9 @@ const EYE_M: f64 = 1.65;
 /// A brightness at (a, b) m of a surface: three sizes of smooth noise.
 fn texture(surface: i64, a: f64, b: f64) -> u8 {
     let hash = |i: i64, j: i64| {
-        let mixed = (i.wrapping_mul(0x9E37_79B9) ^ j.wrapping_mul(0x85EB_CA6B) ^ surface.wrapping_mul(0xC2B2_AE35)) as u64;
+        let mixed = (i.wrapping_mul(0x9E37_79B9)
+            ^ j.wrapping_mul(0x85EB_CA6B)
+            ^ surface.wrapping_mul(0xC2B2_AE35)) as u64;
         (mixed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) as f64 / f64::from(1 << 24)
     };
     let noise = |cell_m: f64| {
@@ -64,7 +70,8 @@ fn texture(surface: i64, a: f64, b: f64) -> u8 {
     (40.0 + 70.0 * noise(0.07) + 60.0 * noise(0.25) + 60.0 * noise(0.9)) as u8
 }
 
-/// What a ray along (x, y, 1) from a camera `eye_x` to the right of the left one meets: the car (plus 1; 0 none) and its brightness.
+/// What a ray along (x, y, 1) from a camera `eye_x` to the right of the left one meets: the car
+/// (plus 1; 0 none) and its brightness.
 fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
     let along = frame as f64 * STEP_M;
     let mut nearest = (f64::INFINITY, 0, 0u8);
@@ -131,7 +138,12 @@ fn render(frame: usize) -> Frame {
     let pair = [0.0, RIG.baseline_m].map(|eye_x| {
         let pixel = |at: usize| {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
-            let (car, grey) = meet((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, eye_x, frame);
+            let (car, grey) = meet(
+                (u - RIG.center_u_px) / RIG.focal_px,
+                (v - RIG.center_v_px) / RIG.focal_px,
+                eye_x,
+                frame,
+            );
             if eye_x == 0.0 {
                 shown[at] = car;
             }
@@ -141,16 +153,24 @@ fn render(frame: usize) -> Frame {
     });
     let cars = (1..=CARS.len()).map(|car| {
         let its = || (0..WIDTH * HEIGHT).filter(|&at| shown[at] == car);
-        let (left, right) = (its().map(|at| at % WIDTH).min().unwrap(), its().map(|at| at % WIDTH).max().unwrap());
+        let (left, right) =
+            (its().map(|at| at % WIDTH).min().unwrap(), its().map(|at| at % WIDTH).max().unwrap());
         let (top, bottom) = (its().next().unwrap() / WIDTH, its().next_back().unwrap() / WIDTH);
         let rows = (top..=bottom).map(|v| v * WIDTH);
-        let mask = rows.flat_map(|row| shown[row + left..=row + right].iter().map(|&there| u8::from(there == car))).collect();
+        let mask = rows
+            .flat_map(|row| {
+                shown[row + left..=row + right].iter().map(|&there| u8::from(there == car))
+            })
+            .collect();
         Car { left, top, width: right + 1 - left, height: bottom + 1 - top, mask }
     });
     Frame {
         cars: cars.collect(),
         pair,
-        t_world_camera: Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, frame as f64 * STEP_M)),
+        t_world_camera: Transform::new(
+            Vector3::zeros(),
+            Vector3::new(0.0, 0.0, frame as f64 * STEP_M),
+        ),
     }
 }
 
@@ -162,23 +182,27 @@ impl Executor for Timed {
     fn stage<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
         let begin = ThreadTime::now();
         let result = work();
-        if let Some(which) = [Stage::Instances, Stage::Segmentation].iter().position(|one| *one == stage) {
+        if let Some(which) =
+            [Stage::Instances, Stage::Segmentation].iter().position(|one| *one == stage)
+        {
             self.0.lock().unwrap()[which] += begin.elapsed();
         }
         result
     }
 }
 
-/// Drives past, `count` cars detected or, with `by_motion`, all found by their motion; CPU time of the two stages and of the step, summed over
-/// the frames measured.
+/// Drives past, `count` cars detected or, with `by_motion`, all found by their motion; CPU time of
+/// the two stages and of the step, summed over the frames measured.
 fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) -> [Duration; 3] {
     let mut config = Config::for_rig(RIG);
     config.tracking.segmentation.enabled = by_motion;
     let mut mapper = Mapper::new(&Capacity::ONBOARD, &config, slab).unwrap();
     let mut spent = [Duration::ZERO; 3];
     for (at, frame) in frames.iter().enumerate() {
-        let detections: Vec<Detection<'_>> = frame.cars.iter().take(if by_motion { 0 } else { count }).map(Car::detection).collect();
-        let [left, right] = frame.pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
+        let detections: Vec<Detection<'_>> =
+            frame.cars.iter().take(if by_motion { 0 } else { count }).map(Car::detection).collect();
+        let [left, right] =
+            frame.pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
         let seen = StereoFrame {
             t_world_camera: Some(frame.t_world_camera),
             detections: &detections,
@@ -188,11 +212,22 @@ fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) 
         let report = mapper.step(&seen, &timed).unwrap();
         if at >= BEGINNING {
             spent[2] += begin.elapsed();
-            spent.iter_mut().zip(timed.0.into_inner().unwrap()).for_each(|(sum, time)| *sum += time);
+            spent
+                .iter_mut()
+                .zip(timed.0.into_inner().unwrap())
+                .for_each(|(sum, time)| *sum += time);
             if by_motion {
-                assert!(report.instances.segmentation.instances >= 4, "frame {at}: {:?}", report.instances);
+                assert!(
+                    report.instances.segmentation.instances >= 4,
+                    "frame {at}: {:?}",
+                    report.instances
+                );
             } else {
-                assert_eq!(report.instances.objects.fused as usize, count, "frame {at}: {:?}", report.instances);
+                assert_eq!(
+                    report.instances.objects.fused as usize, count,
+                    "frame {at}: {:?}",
+                    report.instances
+                );
             }
         }
     }
@@ -203,11 +238,21 @@ fn bench(criterion: &mut Criterion) {
     let frames: Vec<Frame> = (0..BEGINNING + MEASURED).map(render).collect();
     let mut slab = vec![0u8; Capacity::ONBOARD.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
-    let all = [("instances", 0), ("instances", 1), ("instances", 4), ("instances", 8), ("segmentation", 8), ("step", 0), ("step", 8)];
+    let all = [
+        ("instances", 0),
+        ("instances", 1),
+        ("instances", 4),
+        ("instances", 8),
+        ("segmentation", 8),
+        ("step", 0),
+        ("step", 8),
+    ];
     for (what, count) in all {
         criterion.bench_function(&format!("{what}/{count} cars"), |bencher| {
             bencher.iter_custom(|times| {
-                let runs = (0..times).map(|_| map_frames(&frames, &mut slab[start..], count, what == "segmentation"));
+                let runs = (0..times).map(|_| {
+                    map_frames(&frames, &mut slab[start..], count, what == "segmentation")
+                });
                 let of = |[instances, segmentation, step]: [Duration; 3]| match what {
                     "step" => step,
                     "segmentation" => segmentation,

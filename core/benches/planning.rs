@@ -1,7 +1,12 @@
-//! Maps for planners, CPU time of one thread: distance fields of streets and of scattered obstacles; a frame's free space; an update of the
-//! window from the map, by size.
+//! Maps for planners, CPU time of one thread: distance fields of streets and of scattered
+//! obstacles; a frame's free space; an update of the window from the map, by size.
 
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a bench may stop at what it does not expect"
+)]
 
 use cpu_time::ThreadTime;
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -19,7 +24,8 @@ use std::{hint::black_box, time::Duration};
 
 const WIDTH: usize = 620;
 const HEIGHT: usize = 188;
-const RIG: StereoRig = StereoRig { focal_px: 354.0, center_u_px: 300.0, center_v_px: 91.0, baseline_m: 0.54 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 354.0, center_u_px: 300.0, center_v_px: 91.0, baseline_m: 0.54 };
 
 /// Houses on both sides, cars between them; or one obstacle in `one_in` cells.
 fn obstacles([width, length, height]: [usize; 3], one_in: Option<u32>) -> Vec<u8> {
@@ -38,13 +44,23 @@ fn obstacles([width, length, height]: [usize; 3], one_in: Option<u32>) -> Vec<u8
 }
 
 fn distances(criterion: &mut Criterion) {
-    for (name, size) in [("400x400 slice", [400, 400, 1]), ("200x200 slice", [200, 200, 1]), ("100x100x20 window", [100, 100, 20])] {
-        for (scene, one_in) in [("street", None), ("one in 200", Some(200)), ("one in 3", Some(3)), ("one in 20000", Some(20_000))] {
+    for (name, size) in [
+        ("400x400 slice", [400, 400, 1]),
+        ("200x200 slice", [200, 200, 1]),
+        ("100x100x20 window", [100, 100, 20]),
+    ] {
+        for (scene, one_in) in [
+            ("street", None),
+            ("one in 200", Some(200)),
+            ("one in 3", Some(3)),
+            ("one in 20000", Some(20_000)),
+        ] {
             let is_obstacle = obstacles(size, one_in);
             let (cells, longest) = (is_obstacle.len(), *size.iter().max().unwrap());
             let bytes = DistanceField::bytes(cells, longest);
             let mut slab = vec![0u8; bytes + SLAB_ALIGN];
-            let mut field = DistanceField::new_in(cells, longest, &mut Carver::new(&mut slab, bytes).unwrap());
+            let mut field =
+                DistanceField::new_in(cells, longest, &mut Carver::new(&mut slab, bytes).unwrap());
             criterion.bench_function(&format!("distance {name}, {scene}"), |bencher| {
                 bencher.iter_custom(|rounds| {
                     let begin = ThreadTime::now();
@@ -62,7 +78,8 @@ fn distances(criterion: &mut Criterion) {
 fn canyon() -> Vec<f32> {
     (0..WIDTH * HEIGHT)
         .map(|i| {
-            let (x, y) = (((i % WIDTH) as f32 - 300.0) / 354.0, ((i / WIDTH) as f32 - 91.0) / 354.0);
+            let (x, y) =
+                (((i % WIDTH) as f32 - 300.0) / 354.0, ((i / WIDTH) as f32 - 91.0) / 354.0);
             let road = if y > 0.0 { 1.65 / y } else { 99.0 };
             let wall = if x > 0.0 { 6.0 / x } else { -8.0 / x };
             let nearest = if road < wall { road } else { wall };
@@ -72,7 +89,9 @@ fn canyon() -> Vec<f32> {
 }
 
 fn windows(criterion: &mut Criterion) {
-    for (sides, distance_3d) in [([100, 100, 20], true), ([200, 200, 20], false), ([400, 400, 20], false)] {
+    for (sides, distance_3d) in
+        [([100, 100, 20], true), ([200, 200, 20], false), ([400, 400, 20], false)]
+    {
         let capacity = Capacity {
             blocks: 40_000,
             visible_blocks: 40_000,
@@ -87,13 +106,20 @@ fn windows(criterion: &mut Criterion) {
         let mut carver = Carver::new(&mut slab, bytes).unwrap();
         let config = VolumeConfig::default();
         let mut volume = Volume::new_in(&capacity, &config, &mut carver);
-        let mut planning =
-            Planning::new_in(&capacity, &PlanningConfig { min_weight: 1, ..PlanningConfig::default() }, config.voxel_size_m, &mut carver);
+        let mut planning = Planning::new_in(
+            &capacity,
+            &PlanningConfig { min_weight: 1, ..PlanningConfig::default() },
+            config.voxel_size_m,
+            &mut carver,
+        );
         let (grey, depth_m) = (vec![128; WIDTH * HEIGHT], canyon());
         let focal_baseline = RIG.focal_baseline_px_m() as f32;
-        let disparity_q8: Vec<u16> =
-            depth_m.iter().map(|depth| if *depth > 0.0 { (256.0 * focal_baseline / depth) as u16 } else { 0 }).collect();
-        let pose = |n: u32| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.8 * f64::from(n)));
+        let disparity_q8: Vec<u16> = depth_m
+            .iter()
+            .map(|depth| if *depth > 0.0 { (256.0 * focal_baseline / depth) as u16 } else { 0 })
+            .collect();
+        let pose =
+            |n: u32| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.8 * f64::from(n)));
         let sight = |t_world_camera| Sight {
             rig: &RIG,
             t_world_camera,
@@ -118,9 +144,18 @@ fn windows(criterion: &mut Criterion) {
     }
 }
 
-fn measure(criterion: &mut Criterion, capacity: &Capacity, (planning, volume): (&mut Planning<'_>, &Volume<'_>), sight: &Sight<'_>) {
+fn measure(
+    criterion: &mut Criterion,
+    capacity: &Capacity,
+    (planning, volume): (&mut Planning<'_>, &Volume<'_>),
+    sight: &Sight<'_>,
+) {
     let [width, length, height] = planning.size();
-    let name = format!("{width}x{length}x{height}, {} blocks, {} bytes", volume.pool().len(), Planning::bytes(capacity));
+    let name = format!(
+        "{width}x{length}x{height}, {} blocks, {} bytes",
+        volume.pool().len(),
+        Planning::bytes(capacity)
+    );
     let mut bench = |what: &str, run: &mut dyn FnMut()| {
         criterion.bench_function(&format!("{what} {name}"), |bencher| {
             bencher.iter_custom(|rounds| {

@@ -1,7 +1,13 @@
-//! Pruning, per 10,000 blocks visited, at `onboard`'s block layout (with colour): blocks without a voxel of low weight, blocks with some voxels
-//! go, and blocks that go as a whole. CPU time of one thread.
+//! Pruning, per 10,000 blocks visited, at `onboard`'s block layout (with colour): blocks without a
+//! voxel of low weight, blocks with some voxels go, and blocks that go as a whole. CPU time of one
+//! thread.
 
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a bench may stop at what it does not expect"
+)]
 
 use cpu_time::ThreadTime;
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -22,7 +28,8 @@ const HEIGHT: usize = 188;
 fn canyon(shift_m: f32) -> Vec<f32> {
     (0..WIDTH * HEIGHT)
         .map(|i| {
-            let (x, y) = (((i % WIDTH) as f32 - 300.0) / 354.0, ((i / WIDTH) as f32 - 91.0) / 354.0);
+            let (x, y) =
+                (((i % WIDTH) as f32 - 300.0) / 354.0, ((i / WIDTH) as f32 - 91.0) / 354.0);
             let road = if y > 0.0 { 1.65 / y } else { 99.0 };
             let wall = (if x > 0.0 { 6.0 / x } else { -8.0 / x }) + shift_m;
             let nearest = if road < wall { road } else { wall };
@@ -33,7 +40,8 @@ fn canyon(shift_m: f32) -> Vec<f32> {
 
 fn bench(criterion: &mut Criterion) {
     let capacity = Capacity { blocks: 40_000, visible_blocks: 40_000, ..Capacity::ONBOARD };
-    let rig = StereoRig { focal_px: 354.0, center_u_px: 300.0, center_v_px: 91.0, baseline_m: 0.54 };
+    let rig =
+        StereoRig { focal_px: 354.0, center_u_px: 300.0, center_v_px: 91.0, baseline_m: 0.54 };
     let view = Viewpoint {
         rig,
         width: WIDTH,
@@ -45,7 +53,8 @@ fn bench(criterion: &mut Criterion) {
     let start = slab.as_ptr().align_offset(64);
     // Voxels small enough that one view holds more than 10,000 blocks.
     let config = VolumeConfig { voxel_size_m: 0.03, ..VolumeConfig::default() };
-    let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    let mut volume =
+        Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
     let grey = vec![128; WIDTH * HEIGHT];
     let fuse = |volume: &mut Volume<'_>, shift_m: f32| {
         let depth_m = canyon(shift_m);
@@ -61,7 +70,11 @@ fn bench(criterion: &mut Criterion) {
         volume.fuse(&view, seen, &Serial);
     };
     // Shifts of the walls fused before each pruning; what only one frame saw goes.
-    for (name, shifts) in [("no_low_weight", &[0.0, 0.0][..]), ("some_low_weight", &[0.0, 0.0, 0.8]), ("all_freed", &[0.0])] {
+    for (name, shifts) in [
+        ("no_low_weight", &[0.0, 0.0][..]),
+        ("some_low_weight", &[0.0, 0.0, 0.8]),
+        ("all_freed", &[0.0]),
+    ] {
         criterion.bench_function(&format!("prune_10000_blocks/{name}"), |bencher| {
             bencher.iter_custom(|iterations| {
                 let mut spent = Duration::ZERO;
@@ -70,7 +83,11 @@ fn bench(criterion: &mut Criterion) {
                     let begin = ThreadTime::now();
                     let report = volume.prune_whole(1);
                     spent += begin.elapsed() * 10_000 / report.visited.max(1);
-                    assert!(report.visited > 10_000 && (report.voxels_reset > 0) == (name != "no_low_weight"), "{report:?}");
+                    assert!(
+                        report.visited > 10_000
+                            && (report.voxels_reset > 0) == (name != "no_low_weight"),
+                        "{report:?}"
+                    );
                     volume.prune_whole(u8::MAX);
                 }
                 spent

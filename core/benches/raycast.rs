@@ -1,5 +1,6 @@
-//! Looking at and meshing a street of some 60,000 blocks at KITTI size: 5 cm, truncation 0.75 m, colour. The street (a road, two facades with
-//! recesses, parked cars) is seen by a camera that drives along it and fused from exact depth, so no data set is needed.
+//! Looking at and meshing a street of some 60,000 blocks at KITTI size: 5 cm, truncation 0.75 m,
+//! colour. The street (a road, two facades with recesses, parked cars) is seen by a camera that
+//! drives along it and fused from exact depth, so no data set is needed.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +23,8 @@ use nalgebra::Vector3;
 
 const WIDTH: usize = 1242;
 const HEIGHT: usize = 375;
-const RIG: StereoRig = StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
 const FRAMES: usize = 60;
 /// Way from frame to frame, m.
 const STEP_M: f64 = 1.7;
@@ -62,7 +64,10 @@ fn depth(x: f64, y: f64, z: f64) -> f64 {
 
 fn view(frame: usize) -> Viewpoint {
     let yaw_rad = 0.05 * (frame as f64 * 0.2).sin();
-    let t_world_camera = Transform::new(Vector3::new(0.0, yaw_rad, 0.0), Vector3::new(0.0, 0.0, frame as f64 * STEP_M));
+    let t_world_camera = Transform::new(
+        Vector3::new(0.0, yaw_rad, 0.0),
+        Vector3::new(0.0, 0.0, frame as f64 * STEP_M),
+    );
     Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera }
 }
 
@@ -73,7 +78,11 @@ fn fill(volume: &mut Volume<'_>) {
         let view = view(frame);
         for (at, (depth_m, grey)) in depth_m.iter_mut().zip(&mut grey).enumerate() {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
-            let ray = Vector3::new((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, 1.0);
+            let ray = Vector3::new(
+                (u - RIG.center_u_px) / RIG.focal_px,
+                (v - RIG.center_v_px) / RIG.focal_px,
+                1.0,
+            );
             let world = view.t_world_camera.rotate(ray);
             // Depth in the camera is depth along the street over the ray's share of it.
             let met = depth(world.x / world.z, world.y / world.z, frame as f64 * STEP_M) / world.z;
@@ -117,7 +126,9 @@ fn bench(criterion: &mut Criterion) {
     criterion.bench_function("triangles", |bencher| {
         bencher.iter(|| {
             let mut sum = 0.0;
-            triangles = volume.triangles(&MeshConfig::default(), &mut |triangle| sum += triangle.vertices[0].position_m[0]);
+            triangles = volume.triangles(&MeshConfig::default(), &mut |triangle| {
+                sum += triangle.vertices[0].position_m[0]
+            });
             sum
         });
     });

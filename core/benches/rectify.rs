@@ -10,7 +10,9 @@ use dynvox_core::{
     image::View,
     memory::{Carver, SLAB_ALIGN},
     random::Random,
-    rectify::{Lens, LensModel, Pair, RawCamera, RawRig, Rectification, RectifiedImages, Rectifier, Sizing},
+    rectify::{
+        Lens, LensModel, Pair, RawCamera, RawRig, Rectification, RectifiedImages, Rectifier, Sizing,
+    },
 };
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
@@ -19,7 +21,11 @@ const CAPACITY: Capacity = Capacity { raw_width: 1_392, raw_height: 512, ..Capac
 
 fn raw_rig() -> RawRig {
     let radial = [-0.37, 0.2, -0.07, 0.0, 0.0, 0.0];
-    let lens = Lens::new([984.0, 981.0], [690.0, 233.0], LensModel::RadialTangential { radial, tangential: [2e-3, 1e-3] });
+    let lens = Lens::new(
+        [984.0, 981.0],
+        [690.0, 233.0],
+        LensModel::RadialTangential { radial, tangential: [2e-3, 1e-3] },
+    );
     let camera = RawCamera { lens: lens.expect("a lens"), width: 1_392, height: 512 };
     RawRig {
         left: camera,
@@ -47,9 +53,13 @@ fn rectify(criterion: &mut Criterion) {
     let with_colour = Pair { colour: View::new(&colour, 1_392, 512), ..grey };
     let mut group = criterion.benchmark_group("rectify");
     for (name, pair) in [("grey pair", grey), ("grey pair and colour", with_colour)] {
-        group.bench_function(name, |bencher| bencher.iter(|| black_box(rectifier.rectify(&pair, &mut images, &Serial).is_some())));
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| black_box(rectifier.rectify(&pair, &mut images, &Serial).is_some()))
+        });
     }
-    group.bench_function("maps, once", |bencher| bencher.iter(|| rectifier.prepare(&rectification, &rig)));
+    group.bench_function("maps, once", |bencher| {
+        bencher.iter(|| rectifier.prepare(&rectification, &rig))
+    });
     group.finish();
 }
 

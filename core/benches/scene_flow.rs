@@ -1,5 +1,5 @@
-//! Time of scene flow and egomotion at KITTI size, on the first frames of odometry 06 where they are there, else on smooth noise that
-//! moves alike.
+//! Time of scene flow and egomotion at KITTI size, on the first frames of odometry 06 where they
+//! are there, else on smooth noise that moves alike.
 //!
 //! `cargo bench -p dynvox-core --bench scene_flow`
 #![allow(missing_docs, reason = "criterion's macros write functions without")]
@@ -39,12 +39,19 @@ impl Picture {
 /// Two stereo pairs.
 fn pairs() -> [[Picture; 2]; 2] {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let clip = std::env::var_os("DYNVOX_DATA").map_or_else(beside, Into::into).join("kitti-odometry/sequences/06");
-    [0, 1].map(|frame| [0, 1].map(|camera| read(&clip, frame, camera).unwrap_or_else(|| noise(8 * frame + 20 * camera))))
+    let clip = std::env::var_os("DYNVOX_DATA")
+        .map_or_else(beside, Into::into)
+        .join("kitti-odometry/sequences/06");
+    [0, 1].map(|frame| {
+        [0, 1].map(|camera| {
+            read(&clip, frame, camera).unwrap_or_else(|| noise(8 * frame + 20 * camera))
+        })
+    })
 }
 
 fn read(clip: &Path, frame: usize, camera: usize) -> Option<Picture> {
-    let picture = image::open(clip.join(format!("image_{camera}/{frame:06}.png"))).ok()?.into_luma8();
+    let picture =
+        image::open(clip.join(format!("image_{camera}/{frame:06}.png"))).ok()?.into_luma8();
     let (width, height) = picture.dimensions();
     Some(Picture { pixels: picture.into_raw(), width: width as usize, height: height as usize })
 }
@@ -54,7 +61,9 @@ fn noise(shift: usize) -> Picture {
     let (width, height, wide) = (1226, 370, 1300);
     let mut random = Random::new(1);
     let raw: Vec<u32> = (0..wide * (height + 2)).map(|_| random.below(256)).collect();
-    let mean = |u: usize, v: usize| (0..9).map(|i| raw[(v + i / 3) * wide + u + shift + i % 3]).sum::<u32>() / 9;
+    let mean = |u: usize, v: usize| {
+        (0..9).map(|i| raw[(v + i / 3) * wide + u + shift + i % 3]).sum::<u32>() / 9
+    };
     let pixels = (0..width * height).map(|i| mean(i % width, i / width) as u8).collect();
     Picture { pixels, width, height }
 }
@@ -77,7 +86,9 @@ fn bench(criterion: &mut Criterion) {
             black_box(matcher.push(&config, before[0].view(), before[1].view(), &Serial))
         });
     });
-    for (name, refine) in [("scene_flow/frame without refinement", false), ("scene_flow/frame", true)] {
+    for (name, refine) in
+        [("scene_flow/frame without refinement", false), ("scene_flow/frame", true)]
+    {
         let config = SceneFlowConfig { refine, ..config };
         let mut odd = false;
         criterion.bench_function(name, |bencher| {
@@ -94,7 +105,15 @@ fn bench(criterion: &mut Criterion) {
     }
     criterion.bench_function("egomotion/estimate", |bencher| {
         let config = EgomotionConfig::default();
-        bencher.iter(|| black_box(estimator.estimate(&config, &RIG, matcher.bucketed(), &mut Random::new(1), None)));
+        bencher.iter(|| {
+            black_box(estimator.estimate(
+                &config,
+                &RIG,
+                matcher.bucketed(),
+                &mut Random::new(1),
+                None,
+            ))
+        });
     });
 }
 

@@ -1,7 +1,8 @@
 //! The stereo matcher at KITTI size on one thread: the whole, and each of its steps.
 //!
-//! On a synthetic textured pair, and on the first pair of KITTI odometry 06 where the clips are (folder `DYNVOX_DATA`, else
-//! `../shared/data` beside the checkout). Steps are timed from within whole runs, so their caches are as warm as they are at work.
+//! On a synthetic textured pair, and on the first pair of KITTI odometry 06 where the clips are
+//! (folder `DYNVOX_DATA`, else `../shared/data` beside the checkout). Steps are timed from within
+//! whole runs, so their caches are as warm as they are at work.
 #![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -25,13 +26,20 @@ struct Pair {
     right: Vec<u8>,
 }
 
-/// A wall of smoothed noise at 12 px over a road that comes nearer, up to 90 px, with pillars in front.
+/// A wall of smoothed noise at 12 px over a road that comes nearer, up to 90 px, with pillars in
+/// front.
 fn synthetic() -> Pair {
     let (width, height) = (1242, 375);
     let mut random = Random::new(1);
     let mut texture = || -> Vec<f32> {
-        let noise: Vec<f32> = (0..(width + 256) * height).map(|_| random.below(256) as f32).collect();
-        (0..noise.len()).map(|i| (0..9).filter_map(|k| noise.get(i + k % 3 + k / 3 * (width + 256))).sum::<f32>() / 9.0).collect()
+        let noise: Vec<f32> =
+            (0..(width + 256) * height).map(|_| random.below(256) as f32).collect();
+        (0..noise.len())
+            .map(|i| {
+                (0..9).filter_map(|k| noise.get(i + k % 3 + k / 3 * (width + 256))).sum::<f32>()
+                    / 9.0
+            })
+            .collect()
     };
     let (far, near) = (texture(), texture());
     let render = |shift: f32| -> Vec<u8> {
@@ -43,7 +51,8 @@ fn synthetic() -> Pair {
             let (u, v) = ((i % width) as f32, i / width);
             let ground = 12.0 + 78.0 * v.saturating_sub(180) as f32 / 195.0;
             let pillar = (v > 60 && (u + shift * 40.0) % 300.0 < 40.0).then_some(40.0);
-            let (texture, disparity) = pillar.filter(|&d| d > ground).map_or((&far, ground), |d| (&near, d));
+            let (texture, disparity) =
+                pillar.filter(|&d| d > ground).map_or((&far, ground), |d| (&near, d));
             at(texture, u + shift * disparity, v) as u8
         };
         (0..width * height).map(pixel).collect()
@@ -52,9 +61,13 @@ fn synthetic() -> Pair {
 }
 
 fn kitti() -> Option<Pair> {
-    let data = std::env::var_os("DYNVOX_DATA")
-        .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")), PathBuf::from);
-    let image = |folder: &str| image::open(data.join("kitti-odometry/sequences/06").join(folder).join("000000.png")).ok();
+    let data = std::env::var_os("DYNVOX_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
+        PathBuf::from,
+    );
+    let image = |folder: &str| {
+        image::open(data.join("kitti-odometry/sequences/06").join(folder).join("000000.png")).ok()
+    };
     let (left, right) = (image("image_0")?.into_luma8(), image("image_1")?.into_luma8());
     Some(Pair {
         name: "kitti_06",
@@ -77,8 +90,13 @@ fn stereo(criterion: &mut Criterion) {
         let left = View::new(&pair.left, pair.width, pair.height).unwrap();
         let right = View::new(&pair.right, pair.width, pair.height).unwrap();
         let mut group = criterion.benchmark_group(format!("stereo/{}", pair.name));
-        group.sample_size(20).measurement_time(Duration::from_secs(4)).warm_up_time(Duration::from_millis(500));
-        group.bench_function("whole", |bencher| bencher.iter(|| matcher.compute(&config, left, right, &Serial)));
+        group
+            .sample_size(20)
+            .measurement_time(Duration::from_secs(4))
+            .warm_up_time(Duration::from_millis(500));
+        group.bench_function("whole", |bencher| {
+            bencher.iter(|| matcher.compute(&config, left, right, &Serial))
+        });
         group.measurement_time(Duration::from_secs(2)).sample_size(10);
         for step in StereoStep::ALL {
             group.bench_function(step.name(), |bencher| {

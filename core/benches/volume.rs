@@ -1,7 +1,13 @@
-//! Allocation and fusion at KITTI size: 5 cm, truncation 0.75 m, 20 m, colour. On odometry 06 with given disparities and true poses where
-//! the clip is there (`DYNVOX_DATA`, else `../shared/data`), else on a plain synthetic street canyon.
+//! Allocation and fusion at KITTI size: 5 cm, truncation 0.75 m, 20 m, colour. On odometry 06 with
+//! given disparities and true poses where the clip is there (`DYNVOX_DATA`, else `../shared/data`),
+//! else on a plain synthetic street canyon.
 
-#![allow(clippy::unwrap_used, clippy::indexing_slicing, missing_docs, reason = "a bench may stop at what it does not expect")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::indexing_slicing,
+    missing_docs,
+    reason = "a bench may stop at what it does not expect"
+)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
@@ -21,7 +27,10 @@ struct Frame {
 }
 
 fn data() -> PathBuf {
-    std::env::var_os("DYNVOX_DATA").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from)
+    std::env::var_os("DYNVOX_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        PathBuf::from,
+    )
 }
 
 fn kitti() -> Option<Vec<Frame>> {
@@ -35,15 +44,24 @@ fn kitti() -> Option<Vec<Frame>> {
     };
     let mut frames = Vec::new();
     for (i, line) in poses.lines().enumerate() {
-        let disparity = image::open(root.join(format!("sequences/06/disp_elas/{i:06}.png"))).ok()?.into_luma16();
-        let grey = image::open(root.join(format!("sequences/06/image_0/{i:06}.png"))).ok()?.into_luma8();
+        let disparity = image::open(root.join(format!("sequences/06/disp_elas/{i:06}.png")))
+            .ok()?
+            .into_luma16();
+        let grey =
+            image::open(root.join(format!("sequences/06/image_0/{i:06}.png"))).ok()?.into_luma8();
         let (width, height) = (disparity.width() as usize, disparity.height() as usize);
         let p: Vec<f64> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
         let rotation = [[p[0], p[1], p[2]], [p[4], p[5], p[6]], [p[8], p[9], p[10]]];
         let t_world_camera = Transform::from_rotation_matrix(&rotation, [p[3], p[7], p[11]]);
         let mut depth_m = vec![0.0; width * height];
         let disparity = View::new(disparity.as_raw(), width, height)?;
-        depth_from_disparity(&rig, 0.5, 20.0, disparity, &mut ViewMut::new(&mut depth_m, width, height)?);
+        depth_from_disparity(
+            &rig,
+            0.5,
+            20.0,
+            disparity,
+            &mut ViewMut::new(&mut depth_m, width, height)?,
+        );
         frames.push(Frame {
             depth_m,
             grey: grey.into_raw(),
@@ -55,7 +73,8 @@ fn kitti() -> Option<Vec<Frame>> {
 
 /// A road between two walls, driven along.
 fn canyon() -> Vec<Frame> {
-    let rig = StereoRig { focal_px: 707.0, center_u_px: 601.0, center_v_px: 183.0, baseline_m: 0.54 };
+    let rig =
+        StereoRig { focal_px: 707.0, center_u_px: 601.0, center_v_px: 183.0, baseline_m: 0.54 };
     let (width, height) = (1226, 370);
     let mut depth_m = vec![0.0; width * height];
     for (i, depth) in depth_m.iter_mut().enumerate() {
@@ -87,7 +106,8 @@ fn bench(criterion: &mut Criterion) {
     let bytes = Volume::bytes(&capacity);
     let mut slab = vec![0u8; bytes + 64];
     let start = slab.as_ptr().align_offset(64);
-    let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    let mut volume =
+        Volume::new_in(&capacity, &config, &mut Carver::new(&mut slab[start..], bytes).unwrap());
 
     let mut bench = |criterion: &mut Criterion, name: &str, only_fuse: bool| {
         let mut at = 0;
@@ -97,9 +117,11 @@ fn bench(criterion: &mut Criterion) {
                 for _ in 0..iterations {
                     let frame = &frames[at % frames.len()];
                     at += 1;
-                    let depth_m = View::new(&frame.depth_m, frame.view.width, frame.view.height).unwrap();
+                    let depth_m =
+                        View::new(&frame.depth_m, frame.view.width, frame.view.height).unwrap();
                     let grey = View::new(&frame.grey, frame.view.width, frame.view.height).unwrap();
-                    let seen = Observation { depth_m, grey, colour: None, class: None, noted: false };
+                    let seen =
+                        Observation { depth_m, grey, colour: None, class: None, noted: false };
                     let begin = std::time::Instant::now();
                     volume.allocate(&frame.view, depth_m, &mut NoStore, &Serial);
                     let middle = std::time::Instant::now();
@@ -112,7 +134,11 @@ fn bench(criterion: &mut Criterion) {
     };
     bench(criterion, "allocate", false);
     bench(criterion, "fuse", true);
-    println!("blocks {}, visible in the last frame {}", volume.pool().len(), volume.visible().slots().len());
+    println!(
+        "blocks {}, visible in the last frame {}",
+        volume.pool().len(),
+        volume.visible().slots().len()
+    );
 }
 
 criterion_group! { name = benches; config = Criterion::default().sample_size(20); targets = bench }

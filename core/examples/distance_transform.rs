@@ -1,9 +1,11 @@
-//! How far is the nearest obstacle from every cell of a map? The exact distance transform alone, on a PGM file.
+//! How far is the nearest obstacle from every cell of a map? The exact distance transform alone, on
+//! a PGM file.
 //!
 //! `cargo run --release -p dynvox-core --example distance_transform -- out/run/planning/map.pgm > squared.bin`
 //!
-//! Pixels below 100 are obstacles. Writes the squared distance of each pixel to the nearest one of the other kind, in pixels, as little-endian 32-bit
-//! numbers; 4,294,967,295 where all are of one kind. Tells on standard error how long a transform takes.
+//! Pixels below 100 are obstacles. Writes the squared distance of each pixel to the nearest one of
+//! the other kind, in pixels, as little-endian 32-bit numbers; 4,294,967,295 where all are of one
+//! kind. Tells on standard error how long a transform takes.
 
 use cpu_time::ThreadTime;
 use dynvox_core::memory::{Carver, SLAB_ALIGN};
@@ -29,8 +31,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for _ in 0..ROUNDS {
         field.transform(&is_obstacle, [width, height, 1]);
     }
-    eprintln!("{width} x {height}: {:.3} ms of CPU", begin.elapsed().as_secs_f64() * 1e3 / f64::from(ROUNDS));
-    let squared = (0..pixels.len()).flat_map(|at| field.get(at).map_or(NO_OBSTACLE, |(squared, _)| squared).to_le_bytes());
+    eprintln!(
+        "{width} x {height}: {:.3} ms of CPU",
+        begin.elapsed().as_secs_f64() * 1e3 / f64::from(ROUNDS)
+    );
+    let squared = (0..pixels.len())
+        .flat_map(|at| field.get(at).map_or(NO_OBSTACLE, |(squared, _)| squared).to_le_bytes());
     std::io::stdout().write_all(&squared.collect::<Vec<u8>>())?;
     Ok(())
 }
@@ -38,7 +44,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// Width, height and pixels of a binary PGM.
 fn pgm(bytes: &[u8]) -> Option<([usize; 2], &[u8])> {
     let mut fields = bytes.splitn(4, |byte| *byte == b'\n');
-    let (magic, size, greatest, pixels) = (fields.next()?, fields.next()?, fields.next()?, fields.next()?);
+    let (magic, size, greatest, pixels) =
+        (fields.next()?, fields.next()?, fields.next()?, fields.next()?);
     let mut sides = std::str::from_utf8(size).ok()?.split(' ').map(str::parse);
     let (width, height) = (sides.next()?.ok()?, sides.next()?.ok()?);
     (magic == b"P5" && greatest == b"255").then_some(([width, height], pixels))

@@ -1,7 +1,8 @@
-//! How does firmware hold a mapper? Its slab is a `static`, its frames lie in the camera's buffers, and nothing else is allocated.
+//! How does firmware hold a mapper? Its slab is a `static`, its frames lie in the camera's buffers,
+//! and nothing else is allocated.
 //!
-//! `cargo run -p dynvox-core --example firmware`. `tests/targets/firmware` is the same for a Cortex-M7, with start-up code and proofs of
-//! heap, stack and panics.
+//! `cargo run -p dynvox-core --example firmware`. `tests/targets/firmware` is the same for a
+//! Cortex-M7, with start-up code and proofs of heap, stack and panics.
 
 mod wall;
 
@@ -18,7 +19,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let buffers = wall::Pair::new(number);
         let report = mapper.step(&buffers.frame()?, &Serial)?;
         let note = if report.severity() == Severity::Info { "ok" } else { "look at the report" };
-        println!("frame {number}: {} of {} blocks, {note}", report.blocks.used, report.blocks.capacity);
+        println!(
+            "frame {number}: {} of {} blocks, {note}",
+            report.blocks.used, report.blocks.capacity
+        );
     }
     println!("{} bytes of memory, all of them the slab", mapper.footprint().bytes());
     Ok(())

@@ -14,9 +14,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let t_world_camera = *mapper.t_world_camera();
     let view = mapper.raycast(&t_world_camera, &Serial)?;
-    let mut depth_m: Vec<f32> = view.depth_m().into_iter().flat_map(|image| image.pixels()).copied().filter(|&depth| depth > 0.0).collect();
+    let mut depth_m: Vec<f32> = view
+        .depth_m()
+        .into_iter()
+        .flat_map(|image| image.pixels())
+        .copied()
+        .filter(|&depth| depth > 0.0)
+        .collect();
     depth_m.sort_by(f32::total_cmp);
     let median = depth_m.get(depth_m.len() / 2).ok_or("the map is empty")?;
-    println!("{} pixels show the map, their median depth is {median:.2} m (the wall is 8.20 m away)", depth_m.len());
+    println!(
+        "{} pixels show the map, their median depth is {median:.2} m (the wall is 8.20 m away)",
+        depth_m.len()
+    );
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! How is a mapper saved and restored? The restored one computes the same bits as the one that never stopped.
+//! How is a mapper saved and restored? The restored one computes the same bits as the one that
+//! never stopped.
 //!
 //! `cargo run -p dynvox-core --example snapshot`
 
@@ -21,10 +22,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Ok::<(), io::Error>(())
     })?;
     let mut file = &bytes[..];
-    let mut restored = Mapper::restore(&capacity, &config, second, &mut |piece: &mut [u8]| file.read_exact(piece))?;
+    let mut restored = Mapper::restore(&capacity, &config, second, &mut |piece: &mut [u8]| {
+        file.read_exact(piece)
+    })?;
     let next = wall::Pair::new(3);
-    let digests = [mapper.step(&next.frame()?, &Serial)?.digest, restored.step(&next.frame()?, &Serial)?.digest];
-    println!("a snapshot of {} bytes; digests of the next frame: {:016x} and {:016x}", bytes.len(), digests[0], digests[1]);
+    let digests = [
+        mapper.step(&next.frame()?, &Serial)?.digest,
+        restored.step(&next.frame()?, &Serial)?.digest,
+    ];
+    println!(
+        "a snapshot of {} bytes; digests of the next frame: {:016x} and {:016x}",
+        bytes.len(),
+        digests[0],
+        digests[1]
+    );
     assert_eq!(digests[0], digests[1]);
     Ok(())
 }

@@ -20,7 +20,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let pair = wall::Pair::new(0);
     let frame = pair.frame()?;
     matcher.compute(&StereoConfig::default(), frame.left, frame.right, &Serial);
-    let disparity = f64::from(matcher.disparity_q8().get(160, 48).unwrap_or(0)) / f64::from(DISPARITY_ONE_PX);
-    println!("the middle pixel's disparity is {disparity:.2} px, its depth {:.2} m", wall::RIG.focal_px * wall::RIG.baseline_m / disparity);
+    let disparity =
+        f64::from(matcher.disparity_q8().get(160, 48).unwrap_or(0)) / f64::from(DISPARITY_ONE_PX);
+    println!(
+        "the middle pixel's disparity is {disparity:.2} px, its depth {:.2} m",
+        wall::RIG.focal_px * wall::RIG.baseline_m / disparity
+    );
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! How does a map outgrow its memory? Blocks that leave the pool go to a store of the caller's and come back when they are visible again.
+//! How does a map outgrow its memory? Blocks that leave the pool go to a store of the caller's and
+//! come back when they are visible again.
 //!
 //! `cargo run -p dynvox-core --example stream_blocks`
 
@@ -23,7 +24,9 @@ impl BlockStore for Memory {
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        let Some((sdf, weight)) = self.0.get(&[block.coord.x, block.coord.y, block.coord.z]) else { return false };
+        let Some((sdf, weight)) = self.0.get(&[block.coord.x, block.coord.y, block.coord.z]) else {
+            return false;
+        };
         (*block.sdf, *block.weight) = (*sdf, *weight);
         true
     }
@@ -35,8 +38,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut mapper = Mapper::new(&capacity, &Config::for_rig(wall::RIG), &mut slab)?;
     let mut store = Memory::default();
     for number in 0..10 {
-        let report = mapper.step_with(&wall::Pair::new(number).frame()?, &Serial, &mut store, &mut NoSink)?;
-        println!("frame {number}: {} of {} blocks used, {} in the store", report.blocks.used, report.blocks.capacity, store.0.len());
+        let report = mapper.step_with(
+            &wall::Pair::new(number).frame()?,
+            &Serial,
+            &mut store,
+            &mut NoSink,
+        )?;
+        println!(
+            "frame {number}: {} of {} blocks used, {} in the store",
+            report.blocks.used,
+            report.blocks.capacity,
+            store.0.len()
+        );
     }
     mapper.stream_out(&mut store);
     println!("{} blocks in all", store.0.len());

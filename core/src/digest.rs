@@ -1,16 +1,18 @@
 //! A 64-bit digest of values, the same on every machine.
 //!
-//! Values go in as integers, never as bytes of memory, so byte order cannot matter; floats go in by their bits with NaN made canonical.
-//! Not cryptographic: it notices a flipped bit, not an adversary.
+//! Values go in as integers, never as bytes of memory, so byte order cannot matter; floats go in by
+//! their bits with NaN made canonical. Not cryptographic: it notices a flipped bit, not an
+//! adversary.
 //!
-//! Single values are chained through one word of state, runs of values through eight such words, the lanes, 64 bytes at a time. A word takes 64
-//! bits in by `x = word ^ bits`,
+//! Single values are chained through one word of state, runs of values through eight such words,
+//! the lanes, 64 bytes at a time. A word takes 64 bits in by `x = word ^ bits`,
 //!
 //! `word = low half of x * high half of x + x with its halves swapped`
 //!
-//! Where only one half of x differs the outcome does, so no flipped bit is lost on its way in; what it does depends on the other half, so
-//! that a second flip does not undo it but by chance. The product is the widest that processors without 64-bit ones have, and with the sum one
-//! instruction on a Cortex-M7.
+//! Where only one half of x differs the outcome does, so no flipped bit is lost on its way in; what
+//! it does depends on the other half, so that a second flip does not undo it but by chance. The
+//! product is the widest that processors without 64-bit ones have, and with the sum one instruction
+//! on a Cortex-M7.
 
 /// The fraction of the golden ratio, in 1/2^64.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -63,16 +65,22 @@ impl Digest {
 
     /// Takes in a float by its bits; all NaNs are one.
     pub fn f64(&mut self, value: f64) {
-        self.u64(if value.is_nan() { f64::NAN.to_bits() & 0x7FFF_FFFF_FFFF_FFFF } else { value.to_bits() });
+        self.u64(if value.is_nan() {
+            f64::NAN.to_bits() & 0x7FFF_FFFF_FFFF_FFFF
+        } else {
+            value.to_bits()
+        });
     }
 
     /// Takes in two floats at once by their bits; all NaNs are one.
     pub fn f32s(&mut self, values: [f32; 2]) {
-        let [a, b] = values.map(|value| u64::from(if value.is_nan() { 0x7FC0_0000 } else { value.to_bits() }));
+        let [a, b] = values
+            .map(|value| u64::from(if value.is_nan() { 0x7FC0_0000 } else { value.to_bits() }));
         self.u64(a << 32 | b);
     }
 
-    /// Takes in a run of bytes. Its last stripe is filled up with zeros; the length goes in as well.
+    /// Takes in a run of bytes. Its last stripe is filled up with zeros; the length goes in as
+    /// well.
     pub fn bytes(&mut self, bytes: &[u8]) {
         let (stripes, rest) = bytes.as_chunks();
         self.stripes(stripes);
@@ -137,19 +145,23 @@ impl Digest {
         self.i16s(bytemuck::try_cast_slice(values).unwrap_or(&[]));
     }
 
-    /// Ends a run. Its length tells where among the single values it stood; its bits are turned so that no value is taken for one.
+    /// Ends a run. Its length tells where among the single values it stood; its bits are turned so
+    /// that no value is taken for one.
     fn end_run(&mut self, bytes: usize) {
         self.u64(!(bytes as u64));
     }
 
     /// The 64 bits.
     pub fn finish(self) -> u64 {
-        let sum = self.lanes.iter().zip(KEYS).fold(self.state, |sum, (&lane, key)| sum.wrapping_add((lane ^ lane >> 32).wrapping_mul(key)));
+        let sum = self.lanes.iter().zip(KEYS).fold(self.state, |sum, (&lane, key)| {
+            sum.wrapping_add((lane ^ lane >> 32).wrapping_mul(key))
+        });
         finished(sum)
     }
 }
 
-/// A stripe of 16-bit integers as bytes. Where memory is laid out that way already, compilers leave nothing of it.
+/// A stripe of 16-bit integers as bytes. Where memory is laid out that way already, compilers leave
+/// nothing of it.
 #[inline(always)]
 fn low_bytes_first(values: &[i16; STRIPE_BYTES / 2]) -> [u8; STRIPE_BYTES] {
     let mut stripe = [0; STRIPE_BYTES];
@@ -165,7 +177,8 @@ fn take(lanes: &mut [u64; LANES], stripe: &[u8; STRIPE_BYTES]) {
     }
 }
 
-/// The product of both halves, and the halves swapped. Two shifts in place of one rotation: that, compilers put into vectors.
+/// The product of both halves, and the halves swapped. Two shifts in place of one rotation: that,
+/// compilers put into vectors.
 #[inline(always)]
 const fn mixed(x: u64) -> u64 {
     let (low, high) = (x & 0xFFFF_FFFF, x >> 32);

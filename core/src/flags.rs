@@ -26,7 +26,9 @@ fn bits_of_word(word: u64) -> u64 {
 /// At most 64 flags as bits, the first lowest.
 #[inline(always)]
 pub(crate) fn bits(flags: &[u8]) -> u64 {
-    (0u32..8).zip(flags.chunks(8)).fold(0, |bits, (i, eight)| bits | bits_of_word(word(eight)) << (8 * i))
+    (0u32..8)
+        .zip(flags.chunks(8))
+        .fold(0, |bits, (i, eight)| bits | bits_of_word(word(eight)) << (8 * i))
 }
 
 /// Calls `each` with the position of every flag that is set, in ascending order.
@@ -51,7 +53,8 @@ mod tests {
     #[test]
     fn every_set_flag_is_found_once_and_in_order() {
         let mut random = Random::new(17);
-        for (length, of) in [(0, 2), (1, 1), (7, 2), (8, 3), (41, 1), (64, 9), (100, 30), (200, 1)] {
+        for (length, of) in [(0, 2), (1, 1), (7, 2), (8, 3), (41, 1), (64, 9), (100, 30), (200, 1)]
+        {
             let flags: Vec<u8> = (0..length).map(|_| u8::from(random.below(of) == 0)).collect();
             let mut found = Vec::new();
             for_each_set(&flags, |position| found.push(position));

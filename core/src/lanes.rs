@@ -5,7 +5,8 @@ pub(crate) const LANES: usize = 8;
 /// One value for each of them.
 pub(crate) type Eight<T> = [T; LANES];
 
-/// All bits of eight lanes, and none of eight more. Read from memory, for what is known of single lanes keeps compilers from vectors.
+/// All bits of eight lanes, and none of eight more. Read from memory, for what is known of single
+/// lanes keeps compilers from vectors.
 static BITS: [i16; 2 * LANES] = [-1, -1, -1, -1, -1, -1, -1, -1, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// All bits of the first `count` lanes, and none of the others.
@@ -27,7 +28,10 @@ pub(crate) fn set<T: Copy, const N: usize>(all: &mut [Eight<T>; N], lane: usize,
 /// One lane's figures.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
-pub(crate) fn at_lane<T: Copy + Default, const N: usize>(all: &[Eight<T>; N], lane: usize) -> [T; N] {
+pub(crate) fn at_lane<T: Copy + Default, const N: usize>(
+    all: &[Eight<T>; N],
+    lane: usize,
+) -> [T; N] {
     let mut one = [T::default(); N];
     for i in 0..N {
         one[i] = all[i][lane];

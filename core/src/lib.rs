@@ -1,14 +1,18 @@
 //! Stereo dense mapping for streets full of moving cars, for machines without a heap.
 //!
-//! The caller hands over one slab of bytes; the core never uses other memory, never panics on what the world sends it and gives the
-//! same bits on every machine. The pipeline is that of Bârsan, Liu, Pollefeys, Geiger, *Robust Dense Mapping for Large-Scale Dynamic
-//! Environments* (ICRA 2018).
+//! The caller hands over one slab of bytes; the core never uses other memory, never panics on what
+//! the world sends it and gives the same bits on every machine. The pipeline is that of Bârsan,
+//! Liu, Pollefeys, Geiger, *Robust Dense Mapping for Large-Scale Dynamic Environments* (ICRA 2018).
 //!
-//! Dependencies run one way: [`memory`], [`image`] and [`geometry`] depend on no stage; [`stereo`], [`scene_flow`] and [`volume`]
-//! depend on them; [`egomotion`] on `scene_flow`; [`tracking`] on `egomotion` and [`masks`]; [`objects`] on `tracking` and `volume`.
-//! Only [`mapper`] depends on every stage.
+//! Dependencies run one way: [`memory`], [`image`] and [`geometry`] depend on no stage; [`stereo`],
+//! [`scene_flow`] and [`volume`] depend on them; [`egomotion`] on `scene_flow`; [`tracking`] on
+//! `egomotion` and [`masks`]; [`objects`] on `tracking` and `volume`. Only [`mapper`] depends on
+//! every stage.
 #![no_std]
-#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing))]
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
 
 #[cfg(test)]
 extern crate std;
@@ -39,8 +43,9 @@ pub mod view;
 pub mod volume;
 
 pub use mapper::{
-    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest,
-    ObjectDigests, PoseOrigin, Report, RestoreError, SetError, Severity, StageDigests, StepError, StereoFrame,
+    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, Mapper,
+    MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
+    RestoreError, SetError, Severity, StageDigests, StepError, StereoFrame,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial, Stage};

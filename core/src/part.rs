@@ -1,7 +1,8 @@
-//! Parts of slices that the core itself says are there: the used entries of a buffer, a row of an image.
+//! Parts of slices that the core itself says are there: the used entries of a buffer, a row of an
+//! image.
 //!
-//! A part that is missing is an internal fault. A test stops at it; every other build goes on with an
-//! empty part, so that the core never panics.
+//! A part that is missing is an internal fault. A test stops at it; every other build goes on with
+//! an empty part, so that the core never panics.
 
 use core::slice::SliceIndex;
 
@@ -25,9 +26,15 @@ pub(crate) fn part_mut<T, R: SliceIndex<[T], Output = [T]>>(slice: &mut [T], ran
     found.unwrap_or(&mut [])
 }
 
-/// `N` entries of `row` from `start` on, after `skip` times `none`; those beyond the row are `none`.
+/// `N` entries of `row` from `start` on, after `skip` times `none`; those beyond the row are
+/// `none`.
 #[inline(always)]
-pub(crate) fn padded<T: Copy, const N: usize>(row: &[T], start: usize, skip: usize, none: T) -> [T; N] {
+pub(crate) fn padded<T: Copy, const N: usize>(
+    row: &[T],
+    start: usize,
+    skip: usize,
+    none: T,
+) -> [T; N] {
     match row.get(start..).and_then(|rest| rest.first_chunk()) {
         Some(all) if skip == 0 => *all,
         _ => padded_at_border(row, start, skip, none),
@@ -37,7 +44,12 @@ pub(crate) fn padded<T: Copy, const N: usize>(row: &[T], start: usize, skip: usi
 /// As [`padded`], where a border of the row is among them.
 #[cold]
 #[inline(never)]
-fn padded_at_border<T: Copy, const N: usize>(row: &[T], start: usize, skip: usize, none: T) -> [T; N] {
+fn padded_at_border<T: Copy, const N: usize>(
+    row: &[T],
+    start: usize,
+    skip: usize,
+    none: T,
+) -> [T; N] {
     let mut entries = [none; N];
     entries.iter_mut().skip(skip).zip(row.iter().skip(start)).for_each(|(to, from)| *to = *from);
     entries

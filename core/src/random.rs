@@ -1,9 +1,10 @@
-//! Seeded random numbers: one generator per purpose, handed in, so that one user's draws never shift another's.
+//! Seeded random numbers: one generator per purpose, handed in, so that one user's draws never
+//! shift another's.
 
 use crate::state::Visitor;
 
-/// PCG-XSH-RR 64/32 (O'Neill, *PCG: A Family of Simple Fast Space-Efficient Statistically Good Algorithms*, 2014): 8 bytes of state,
-/// integers only.
+/// PCG-XSH-RR 64/32 (O'Neill, *PCG: A Family of Simple Fast Space-Efficient Statistically Good
+/// Algorithms*, 2014): 8 bytes of state, integers only.
 ///
 /// ```
 /// use dynvox_core::random::Random;
@@ -32,12 +33,14 @@ impl Random {
     /// 32 uniform bits.
     pub fn next_u32(&mut self) -> u32 {
         let old = self.state;
-        self.state = old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.state =
+            old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let xorshifted = (((old >> 18) ^ old) >> 27) as u32;
         xorshifted.rotate_right((old >> 59) as u32)
     }
 
-    /// Uniform in `0..bound`; 0 when `bound` is 0. One draw, by multiplication: the bias is at most `bound` / 2^32.
+    /// Uniform in `0..bound`; 0 when `bound` is 0. One draw, by multiplication: the bias is at most
+    /// `bound` / 2^32.
     pub fn below(&mut self, bound: u32) -> u32 {
         ((u64::from(self.next_u32()) * u64::from(bound)) >> 32) as u32
     }

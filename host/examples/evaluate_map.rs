@@ -1,11 +1,14 @@
-//! How true is a merged map? It is viewed from each pose of a trajectory and compared with LiDAR or the street's exact depth, as
-//! `dynvox run --evaluate` does; pixels of instance masks are left out.
+//! How true is a merged map? It is viewed from each pose of a trajectory and compared with LiDAR or
+//! the street's exact depth, as `dynvox run --evaluate` does; pixels of instance masks are left
+//! out.
 //!
 //! `cargo run --release -p dynvox --example evaluate_map -- MAP TRAJECTORY lidar|exact [arguments of dynvox run ...]`
 
 use anyhow::Context;
 use dynvox::cli::plan_of;
-use dynvox::evaluate::reference::{Field, PendingFrame, ReferenceFigures, Region, project_scan, sample_exact_depth};
+use dynvox::evaluate::reference::{
+    Field, PendingFrame, ReferenceFigures, Region, project_scan, sample_exact_depth,
+};
 use dynvox::fleet::Averages;
 use dynvox::formats::read_poses;
 use dynvox::run::Plan;
@@ -22,12 +25,14 @@ fn main() -> anyhow::Result<()> {
     let [map, trajectory, reference, run @ ..] = arguments.as_slice() else {
         anyhow::bail!("evaluate_map MAP TRAJECTORY lidar|exact [arguments of dynvox run ...]")
     };
-    let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(run.iter().cloned()).collect();
+    let line: Vec<String> =
+        ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(run.iter().cloned()).collect();
     let plan = plan_of(&line)?;
     let poses = read_poses(trajectory.as_ref())?.poses;
     let mut map = Averages::of(map.as_ref(), &std::env::temp_dir().join("evaluate_map"))?;
     let blocks = map.blocks as usize;
-    let capacity = Capacity { blocks, visible_blocks: blocks, colour: map.lattice.colour, ..plan.capacity };
+    let capacity =
+        Capacity { blocks, visible_blocks: blocks, colour: map.lattice.colour, ..plan.capacity };
     let bytes = Volume::bytes(&capacity) + Raycaster::bytes(&capacity);
     let mut slab = HostSlab::map(bytes).context("the map does not fit this machine's memory")?;
     let mut carver = Carver::new(slab.bytes_mut(), bytes)?;
@@ -46,22 +51,38 @@ fn main() -> anyhow::Result<()> {
     }
     let mut frames = Vec::new();
     for (&index, t_world_camera) in plan.frames.listed().iter().zip(&poses) {
-        let Some(frame) = scan(&plan, index, t_world_camera, reference == "lidar")? else { continue };
+        let Some(frame) = scan(&plan, index, t_world_camera, reference == "lidar")? else {
+            continue;
+        };
         let (width, height) = plan.dataset.size();
-        let view = Viewpoint { rig: plan.config.rig, width, height, t_world_camera: *t_world_camera };
-        raycaster.cast(&volume, &view, &Serial).map_err(|error| anyhow::anyhow!("frame {index}: {error}"))?;
+        let view =
+            Viewpoint { rig: plan.config.rig, width, height, t_world_camera: *t_world_camera };
+        raycaster
+            .cast(&volume, &view, &Serial)
+            .map_err(|error| anyhow::anyhow!("frame {index}: {error}"))?;
         let Some(depth_m) = raycaster.depth_m() else { continue };
         frames.push(frame.compare(&depth_m, plan.config.rig.focal_baseline_px_m(), 1.0).0);
     }
-    let figures = ReferenceFigures::of("reference", 0, &frames, None).context("no frame has a reference")?;
+    let figures =
+        ReferenceFigures::of("reference", 0, &frames, None).context("no frame has a reference")?;
     let fused = figures.still.fused;
-    let (accuracy, completeness) = (fused.accuracy_alone.unwrap_or_default(), fused.completeness.unwrap_or_default());
-    println!("{} frames, {} points, {blocks} blocks: accuracy {accuracy:.4}, completeness {completeness:.4}", frames.len(), fused.points);
+    let (accuracy, completeness) =
+        (fused.accuracy_alone.unwrap_or_default(), fused.completeness.unwrap_or_default());
+    println!(
+        "{} frames, {} points, {blocks} blocks: accuracy {accuracy:.4}, completeness {completeness:.4}",
+        frames.len(),
+        fused.points
+    );
     Ok(())
 }
 
 /// The points of a frame.
-fn scan(plan: &Plan, index: usize, t_world_camera: &Transform, lidar: bool) -> anyhow::Result<Option<PendingFrame>> {
+fn scan(
+    plan: &Plan,
+    index: usize,
+    t_world_camera: &Transform,
+    lidar: bool,
+) -> anyhow::Result<Option<PendingFrame>> {
     let (width, height) = plan.dataset.size();
     let volume = &plan.config.volume;
     let field = Field { width, height, near_m: volume.near_m.into(), far_m: volume.far_m.into() };
@@ -69,10 +90,17 @@ fn scan(plan: &Plan, index: usize, t_world_camera: &Transform, lidar: bool) -> a
     let scan = if lidar {
         plan.dataset.lidar(index)?.map(|scan| project_scan(&scan, &field))
     } else {
-        images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, &plan.config.rig, &field))
+        images
+            .exact
+            .as_ref()
+            .map(|exact| sample_exact_depth(&exact.depth_m, &plan.config.rig, &field))
     };
     let region = |u: i32, v: i32| {
-        let is_object = images.masks.instances.iter().any(|one| one.class.treatment() != Treatment::Ignore && one.contains(u, v));
+        let is_object = images
+            .masks
+            .instances
+            .iter()
+            .any(|one| one.class.treatment() != Treatment::Ignore && one.contains(u, v));
         if is_object { Region::Ignored } else { Region::Static }
     };
     // The input's disparity takes no part in what is counted for the map alone.

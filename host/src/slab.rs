@@ -1,4 +1,5 @@
-//! The slab as the host owns it: mapped by the allocator, aligned, all zero. It never touches the stack.
+//! The slab as the host owns it: mapped by the allocator, aligned, all zero. It never touches the
+//! stack.
 
 use bytemuck::{Pod, Zeroable};
 use dynvox_core::memory::SLAB_ALIGN;
@@ -31,7 +32,11 @@ mod tests {
     fn is_aligned_zeroed_and_long_enough_and_refuses_what_no_machine_has() {
         let mut slab = HostSlab::map(1_000).unwrap();
         let bytes = slab.bytes_mut();
-        assert!(bytes.len() >= 1_000 && (bytes.as_ptr() as usize).is_multiple_of(SLAB_ALIGN) && bytes.iter().all(|&byte| byte == 0));
+        assert!(
+            bytes.len() >= 1_000
+                && (bytes.as_ptr() as usize).is_multiple_of(SLAB_ALIGN)
+                && bytes.iter().all(|&byte| byte == 0)
+        );
         assert!(HostSlab::map(usize::MAX / 2).is_none());
     }
 }

@@ -1,6 +1,8 @@
-//! SIGKILL at random moments of runs that stream blocks to disk and meet cars, also while they resume: the finished run equals the one never killed.
+//! SIGKILL at random moments of runs that stream blocks to disk and meet cars, also while they
+//! resume: the finished run equals the one never killed.
 //!
-//! `DYNVOX_KILL_TRIALS` says how many runs are killed; every second one is killed again while it resumes.
+//! `DYNVOX_KILL_TRIALS` says how many runs are killed; every second one is killed again while it
+//! resumes.
 #![allow(missing_docs)]
 #![cfg(unix)]
 
@@ -54,7 +56,13 @@ struct Counts {
 
 /// Starts the binary without waiting for its end.
 fn started(root: &Path, args: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(root).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_dynvox"))
+        .args(args)
+        .current_dir(root)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 /// Sends SIGKILL, after which a run cannot clean up. Whether that ended it.
@@ -91,7 +99,11 @@ fn complete(root: &Path, start: &[&str], counts: &mut Counts) {
     let resumed = dynvox(root, &["run", "--resume", "killed", "--quiet"]);
     if !resumed.status.success() {
         let text = output_text(&resumed);
-        assert!(text.contains("there is no such run") || text.contains("it was interrupted before its first snapshot"), "{text}");
+        assert!(
+            text.contains("there is no such run")
+                || text.contains("it was interrupted before its first snapshot"),
+            "{text}"
+        );
         counts.started_again += 1;
         let again = dynvox(root, start);
         assert!(again.status.success(), "{}", output_text(&again));
@@ -101,15 +113,23 @@ fn complete(root: &Path, start: &[&str], counts: &mut Counts) {
 #[dynvox_needs::long("DYNVOX_KILL_TRIALS")]
 #[test]
 fn runs_killed_at_any_moment_equal_the_run_never_killed() {
-    let trials = std::env::var("DYNVOX_KILL_TRIALS").ok().and_then(|text| text.parse().ok()).unwrap_or(TRIALS);
+    let trials = std::env::var("DYNVOX_KILL_TRIALS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(TRIALS);
     let root = TempDir::new().unwrap();
     let root = root.path();
     let begin = Instant::now();
-    let args = |out: &'static str| [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat();
+    let args = |out: &'static str| {
+        [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat()
+    };
     assert!(dynvox(root, &args("whole")).status.success());
     let longest = begin.elapsed();
     let of = summary(&root.join("whole"));
-    assert!(of["evict"]["out"].as_u64() > Some(0) && of["evict"]["back"].as_u64() > Some(0), "{of}");
+    assert!(
+        of["evict"]["out"].as_u64() > Some(0) && of["evict"]["back"].as_u64() > Some(0),
+        "{of}"
+    );
     assert!(of["objects"].as_array().unwrap().len() > 1, "{of}");
     let (mut random, mut counts) = (Random::new(17), Counts::default());
     let start = args("killed");
@@ -121,7 +141,8 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
         }
         counts.killed += 1;
         if counts.killed_again < counts.killed / 2 {
-            counts.killed_again += u32::from(killed_after(root, &["run", "--resume", "killed", "--quiet"], delay()));
+            counts.killed_again +=
+                u32::from(killed_after(root, &["run", "--resume", "killed", "--quiet"], delay()));
         }
         if !is_complete(root) {
             complete(root, &start, &mut counts);
@@ -138,17 +159,24 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
 fn a_run_killed_while_it_removes_its_snapshots_is_complete_once_resumed() {
     let root = TempDir::new().unwrap();
     let root = root.path();
-    let args = |out: &'static str| [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat();
+    let args = |out: &'static str| {
+        [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat()
+    };
     assert!(dynvox(root, &args("whole")).status.success());
     let snapshot = root.join(".killed.partial/run.snapshot");
     killed_once_written(root, &args("killed"), &snapshot);
-    // As if it had come to its end, and was killed when its store and its last snapshot were removed.
+    // As if it had come to its end, and was killed when its store and its last snapshot were
+    // removed.
     let kept = std::fs::read(&snapshot).unwrap();
     assert!(dynvox(root, &["run", "--resume", "killed", "--quiet"]).status.success());
     std::fs::write(root.join("killed/run.snapshot.previous"), kept).unwrap();
     assert!(!is_complete(root));
     let resumed = dynvox(root, &["run", "--resume", "killed"]);
-    assert!(resumed.status.success() && output_text(&resumed).contains("was complete"), "{}", output_text(&resumed));
+    assert!(
+        resumed.status.success() && output_text(&resumed).contains("was complete"),
+        "{}",
+        output_text(&resumed)
+    );
     assert!(is_complete(root));
     assert_same(root, "whole", "killed");
 }

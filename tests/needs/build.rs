@@ -1,5 +1,5 @@
-//! Compiles the attributes anew, and so the tests that have them, when the clips change or come from another folder, and when long
-//! tests are asked for.
+//! Compiles the attributes anew, and so the tests that have them, when the clips change or come
+//! from another folder, and when long tests are asked for.
 
 use std::path::{Path, PathBuf};
 

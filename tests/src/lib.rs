@@ -1,4 +1,5 @@
-//! What the integration tests share: a slab for a mapper, clips of the synthetic street, and the repository's own source.
+//! What the integration tests share: a slab for a mapper, clips of the synthetic street, and the
+//! repository's own source.
 //!
 //! The README's example is compiled and run with the doc tests of this package.
 #![cfg_attr(doctest, doc = include_str!("../../README.md"))]
@@ -8,7 +9,10 @@ pub mod source;
 
 use dynvox::input::InstanceMask;
 use dynvox::synth::{Street, StreetConfig, SynthFrame};
-use dynvox_core::{Capacity, Config, Mapper, StereoFrame, image::View, masks::PixelBox, memory::SLAB_ALIGN, tracking::Class};
+use dynvox_core::{
+    Capacity, Config, Mapper, StereoFrame, image::View, masks::PixelBox, memory::SLAB_ALIGN,
+    tracking::Class,
+};
 
 /// A slab on the heap.
 pub struct HeapSlab(Vec<u8>);
@@ -34,7 +38,8 @@ pub struct Clip {
 impl Clip {
     /// The first `frames` frames at `width` x `height`, with default traffic.
     pub fn street(width: u32, height: u32, frames: u32) -> Self {
-        let street = Street::new(StreetConfig { width, height, frames, ..StreetConfig::default() }).expect("the default street is sound");
+        let street = Street::new(StreetConfig { width, height, frames, ..StreetConfig::default() })
+            .expect("the default street is sound");
         let frames = (0..frames).map(|i| street.frame(i)).collect();
         Self { street, frames }
     }
@@ -46,7 +51,8 @@ impl Clip {
 
     /// Its frames as the core takes them.
     pub fn stereo(&self) -> impl Iterator<Item = StereoFrame<'_>> {
-        let (width, height) = (self.street.config().width as usize, self.street.config().height as usize);
+        let (width, height) =
+            (self.street.config().width as usize, self.street.config().height as usize);
         self.frames.iter().map(move |frame| {
             let view = |pixels| View::new(pixels, width, height).expect("a image image");
             StereoFrame::pair(view(&frame.left_grey), view(&frame.right_grey))
@@ -56,10 +62,20 @@ impl Clip {
     /// What a detector without faults would see in each frame.
     pub fn sightings(&self) -> Vec<Vec<InstanceMask>> {
         let of = |frame: &SynthFrame| {
-            let image = PixelBox { left: 0, top: 0, width: frame.width as i32, height: frame.height as i32 };
-            let holds = |car: usize, u: i32, v: i32| usize::from(frame.instances[v as usize * frame.width + u as usize]) == car + 1;
+            let image = PixelBox {
+                left: 0,
+                top: 0,
+                width: frame.width as i32,
+                height: frame.height as i32,
+            };
+            let holds = |car: usize, u: i32, v: i32| {
+                usize::from(frame.instances[v as usize * frame.width + u as usize]) == car + 1
+            };
             let cars = frame.objects.iter().enumerate();
-            cars.filter_map(|(car, _)| InstanceMask::from_predicate(Class::Car, 0.9, image, |u, v| holds(car, u, v))).collect()
+            cars.filter_map(|(car, _)| {
+                InstanceMask::from_predicate(Class::Car, 0.9, image, |u, v| holds(car, u, v))
+            })
+            .collect()
         };
         self.frames.iter().map(of).collect()
     }
@@ -72,6 +88,7 @@ impl Clip {
     /// Runs `run` with a mapper of that capacity.
     pub fn with_mapper<R>(&self, capacity: &Capacity, run: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
         let mut slab = HeapSlab::of(capacity);
-        run(&mut Mapper::new(capacity, &self.config(), slab.bytes()).expect("the slab fits the capacity"))
+        run(&mut Mapper::new(capacity, &self.config(), slab.bytes())
+            .expect("the slab fits the capacity"))
     }
 }

@@ -1,7 +1,9 @@
-//! Dependencies point downwards: each folder of the core and of the host imports what the table allows, and nothing else.
+//! Dependencies point downwards: each folder of the core and of the host imports what the table
+//! allows, and nothing else.
 //!
-//! The `crate::`, `super::` and `self::` paths of every file are read from its text, tests left out, and each is compared with the table. A new
-//! edge is a decision: add it here, with the reason in the commit, or move what is imported.
+//! The `crate::`, `super::` and `self::` paths of every file are read from its text, tests left
+//! out, and each is compared with the table. A new edge is a decision: add it here, with the reason
+//! in the commit, or move what is imported.
 
 use dynvox_tests::source::{files, parts, text};
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,18 +28,67 @@ const CORE: Layers = &[
     ("state", &["digest", "geometry"]),
     ("random", &["state"]),
     ("rectify", &["digest", "geometry", "image", "memory", "parallel", "part", "problem", "state"]),
-    ("stereo", &["digest", "flags", "geometry", "image", "lanes", "memory", "parallel", "part", "problem", "sad"]),
-    ("scene_flow", &["audit", "digest", "geometry", "image", "lanes", "memory", "parallel", "part", "problem", "sad", "state"]),
-    ("egomotion", &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"]),
+    (
+        "stereo",
+        &[
+            "digest", "flags", "geometry", "image", "lanes", "memory", "parallel", "part",
+            "problem", "sad",
+        ],
+    ),
+    (
+        "scene_flow",
+        &[
+            "audit", "digest", "geometry", "image", "lanes", "memory", "parallel", "part",
+            "problem", "sad", "state",
+        ],
+    ),
+    (
+        "egomotion",
+        &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"],
+    ),
     ("masks", &["digest", "image", "memory", "part", "state"]),
     (
         "tracking",
-        &["audit", "digest", "egomotion", "geometry", "image", "masks", "memory", "part", "problem", "random", "scene_flow", "state"],
+        &[
+            "audit",
+            "digest",
+            "egomotion",
+            "geometry",
+            "image",
+            "masks",
+            "memory",
+            "part",
+            "problem",
+            "random",
+            "scene_flow",
+            "state",
+        ],
     ),
-    ("volume", &["audit", "digest", "flags", "geometry", "image", "memory", "parallel", "part", "problem", "state"]),
-    ("view", &["flags", "geometry", "image", "lanes", "memory", "parallel", "part", "problem", "volume"]),
-    ("objects", &["audit", "digest", "geometry", "image", "masks", "memory", "parallel", "part", "problem", "state", "tracking", "volume"]),
-    ("planning", &["digest", "geometry", "image", "memory", "part", "problem", "state", "tracking", "view", "volume"]),
+    (
+        "volume",
+        &[
+            "audit", "digest", "flags", "geometry", "image", "memory", "parallel", "part",
+            "problem", "state",
+        ],
+    ),
+    (
+        "view",
+        &["flags", "geometry", "image", "lanes", "memory", "parallel", "part", "problem", "volume"],
+    ),
+    (
+        "objects",
+        &[
+            "audit", "digest", "geometry", "image", "masks", "memory", "parallel", "part",
+            "problem", "state", "tracking", "volume",
+        ],
+    ),
+    (
+        "planning",
+        &[
+            "digest", "geometry", "image", "memory", "part", "problem", "state", "tracking",
+            "view", "volume",
+        ],
+    ),
     (
         "mapper",
         &[
@@ -77,7 +128,13 @@ const HOST: Layers = &[
     ("sweep", &["evaluate", "formats", "observe", "report", "run"]),
     ("fixtures", &["formats", "input", "run", "slab"]),
     ("fleet", &["formats", "run"]),
-    ("cli", &["evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "run", "scene", "slab", "sweep", "synth"]),
+    (
+        "cli",
+        &[
+            "evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "run",
+            "scene", "slab", "sweep", "synth",
+        ],
+    ),
 ];
 
 #[test]
@@ -102,7 +159,11 @@ fn a_forbidden_import_is_found_however_it_is_written() {
     ];
     for line in written {
         let planted = Crate::of([("lib.rs", LIB), ("volume/fuse/row.rs", line)]);
-        assert_eq!(faults(CORE, &planted), ["volume imports mapper (volume/fuse/row.rs)"], "{line}");
+        assert_eq!(
+            faults(CORE, &planted),
+            ["volume imports mapper (volume/fuse/row.rs)"],
+            "{line}"
+        );
     }
 }
 
@@ -120,7 +181,11 @@ fn what_is_allowed_or_no_import_is_not_a_fault() {
         let planted = Crate::of([("lib.rs", LIB), ("volume/fuse/row.rs", line)]);
         assert_eq!(faults(CORE, &planted), Vec::<String>::new(), "{line}");
     }
-    let test_only = [("lib.rs", LIB), ("volume/mod.rs", "#[cfg(test)]\nmod scene;"), ("volume/scene.rs", "use crate::mapper::Mapper;")];
+    let test_only = [
+        ("lib.rs", LIB),
+        ("volume/mod.rs", "#[cfg(test)]\nmod scene;"),
+        ("volume/scene.rs", "use crate::mapper::Mapper;"),
+    ];
     assert_eq!(faults(CORE, &Crate::of(test_only)), Vec::<String>::new(), "a module for tests");
 }
 
@@ -129,18 +194,23 @@ fn a_folder_that_the_table_does_not_know_and_a_cycle_in_the_table_are_faults() {
     let unknown = Crate::of([("lib.rs", "mod helpers;"), ("helpers.rs", "fn help() {}")]);
     assert_eq!(faults(CORE, &unknown), ["helpers is not in the table"]);
     let cycle: Layers = &[("a", &["b"]), ("b", &["a"])];
-    assert_eq!(faults(cycle, &Crate::of([("lib.rs", "")])), ["a may import b, which stands after it: order the table, or break the cycle"]);
+    assert_eq!(
+        faults(cycle, &Crate::of([("lib.rs", "")])),
+        ["a may import b, which stands after it: order the table, or break the cycle"]
+    );
 }
 
 /// The root of a planted crate.
 const LIB: &str = "pub mod mapper;\npub mod memory;\npub use mapper::{Mapper, Report};\npub use memory::Capacity;";
 
-/// What breaks the rules: every folder stands in the table, imports only what its line names, and a line names only lines before it, so that
-/// there can be no cycle.
+/// What breaks the rules: every folder stands in the table, imports only what its line names, and a
+/// line names only lines before it, so that there can be no cycle.
 fn faults(layers: Layers, read: &Crate) -> Vec<String> {
     let mut faults = Vec::new();
     for (at, (name, allowed)) in layers.iter().enumerate() {
-        for below in allowed.iter().filter(|below| !layers[..at].iter().any(|(name, _)| name == *below)) {
+        for below in
+            allowed.iter().filter(|below| !layers[..at].iter().any(|(name, _)| name == *below))
+        {
             faults.push(format!("{name} may import {below}, which stands after it: order the table, or break the cycle"));
         }
     }
@@ -166,9 +236,14 @@ struct Crate {
 impl Crate {
     /// Reads the files below a folder of the repository.
     fn read(src: &str) -> Self {
-        let inside =
-            |path: &std::path::PathBuf| path.strip_prefix(src).ok().map(|inside| inside.to_str().expect("a plain name").to_owned());
-        let found = files(&["rs"]).into_iter().filter_map(|path| inside(&path).map(|inside| (inside, text(Path::new(&path)))));
+        let inside = |path: &std::path::PathBuf| {
+            path.strip_prefix(src)
+                .ok()
+                .map(|inside| inside.to_str().expect("a plain name").to_owned())
+        };
+        let found = files(&["rs"])
+            .into_iter()
+            .filter_map(|path| inside(&path).map(|inside| (inside, text(Path::new(&path)))));
         let found: Vec<(String, String)> = found.collect();
         Self::of(found.iter().map(|(path, text)| (path.as_str(), text.as_str())))
     }
@@ -177,11 +252,19 @@ impl Crate {
     fn of<'t>(files: impl IntoIterator<Item = (&'t str, &'t str)>) -> Self {
         let files: Vec<(Vec<String>, &str, Source)> =
             files.into_iter().map(|(path, text)| (module(path), path, Source::of(text))).collect();
-        let exported: BTreeMap<&str, &str> =
-            files.iter().filter(|(module, ..)| module.is_empty()).flat_map(|(.., lib)| lib.exports()).collect();
+        let exported: BTreeMap<&str, &str> = files
+            .iter()
+            .filter(|(module, ..)| module.is_empty())
+            .flat_map(|(.., lib)| lib.exports())
+            .collect();
         let only_tests: Vec<Vec<String>> = files
             .iter()
-            .flat_map(|(module, _, source)| source.test_modules.iter().map(|name| [module.as_slice(), std::slice::from_ref(name)].concat()))
+            .flat_map(|(module, _, source)| {
+                source
+                    .test_modules
+                    .iter()
+                    .map(|name| [module.as_slice(), std::slice::from_ref(name)].concat())
+            })
             .collect();
         let mut read = Self { folders: BTreeSet::new(), edges: BTreeMap::new() };
         for (module, path, source) in &files {
@@ -191,9 +274,13 @@ impl Crate {
             }
             read.folders.insert(folder.clone());
             for target in source.paths.iter().filter_map(|path| absolute(module, path)) {
-                let target = exported.get(target.as_str()).map_or(target.clone(), |module| (*module).to_owned());
+                let target = exported
+                    .get(target.as_str())
+                    .map_or(target.clone(), |module| (*module).to_owned());
                 if target != *folder {
-                    read.edges.entry((folder.clone(), target)).or_insert_with(|| (*path).to_owned());
+                    read.edges
+                        .entry((folder.clone(), target))
+                        .or_insert_with(|| (*path).to_owned());
                 }
             }
         }
@@ -203,7 +290,8 @@ impl Crate {
 
 /// The module a file is, by its path below `src`: none for `lib.rs`.
 fn module(path: &str) -> Vec<String> {
-    let mut module: Vec<String> = path.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
+    let mut module: Vec<String> =
+        path.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
     if module.last().is_some_and(|last| last == "mod" || last == "lib") {
         module.pop();
     }
@@ -237,7 +325,10 @@ impl Source {
         let begins = |at: usize| {
             let before = code[..at].chars().next_back();
             let alone = before.is_none_or(|char| !(char.is_alphanumeric() || "_:$".contains(char)));
-            alone && ["crate::", "super::", "self::"].iter().any(|start| code[at..].starts_with(start))
+            alone
+                && ["crate::", "super::", "self::"]
+                    .iter()
+                    .any(|start| code[at..].starts_with(start))
         };
         let starts = code.char_indices().map(|(at, _)| at).filter(|&at| begins(at));
         let paths = starts.flat_map(|at| paths(&code, at).0).collect();
@@ -251,7 +342,8 @@ impl Source {
             let end = self.code[at..].find(';').map_or(self.code.len(), |len| at + len);
             let line = &self.code[at + USE.len()..end];
             let module = line.split("::").next().unwrap_or(line).trim();
-            line.split(|char: char| !(char.is_alphanumeric() || char == '_')).map(move |name| (name, module))
+            line.split(|char: char| !(char.is_alphanumeric() || char == '_'))
+                .map(move |name| (name, module))
         });
         uses.filter(|(name, module)| !name.is_empty() && name != module).collect()
     }
@@ -263,7 +355,9 @@ fn paths(code: &str, at: usize) -> (Vec<Vec<String>>, usize) {
     if rest.starts_with('{') {
         let (mut all, mut at) = (Vec::new(), at + 1);
         loop {
-            at += code[at..].find(|char: char| !(char.is_whitespace() || char == ',')).unwrap_or(code.len() - at);
+            at += code[at..]
+                .find(|char: char| !(char.is_whitespace() || char == ','))
+                .unwrap_or(code.len() - at);
             if at >= code.len() || code[at..].starts_with('}') {
                 return (all, (at + 1).min(code.len()));
             }
@@ -272,9 +366,12 @@ fn paths(code: &str, at: usize) -> (Vec<Vec<String>>, usize) {
             at = end + code[end..].find([',', '}']).unwrap_or(code.len() - end);
         }
     }
-    let len = rest.find(|char: char| !(char.is_alphanumeric() || char == '_')).unwrap_or(rest.len());
+    let len =
+        rest.find(|char: char| !(char.is_alphanumeric() || char == '_')).unwrap_or(rest.len());
     let (name, end) = (rest[..len].to_owned(), at + len);
-    let goes_on = |code: &str| code.starts_with(|char: char| char.is_alphanumeric() || char == '_' || char == '{');
+    let goes_on = |code: &str| {
+        code.starts_with(|char: char| char.is_alphanumeric() || char == '_' || char == '{')
+    };
     match code[end..].strip_prefix("::") {
         Some(more) if goes_on(more) => {
             let (inner, end) = paths(code, end + 2);
@@ -284,7 +381,8 @@ fn paths(code: &str, at: usize) -> (Vec<Vec<String>>, usize) {
     }
 }
 
-/// Code without the items that only tests have, and the names of the modules among them that lie in files of their own.
+/// Code without the items that only tests have, and the names of the modules among them that lie in
+/// files of their own.
 fn without_tests(code: &str) -> (String, Vec<String>) {
     const TEST: &str = "#[cfg(test)]";
     let (mut kept, mut modules, mut rest) = (String::new(), Vec::new(), code);
@@ -292,7 +390,9 @@ fn without_tests(code: &str) -> (String, Vec<String>) {
         kept += &rest[..at];
         let item = &rest[at + TEST.len()..];
         let head = item.find(['{', ';']).unwrap_or(item.len());
-        if let Some(name) = item[..head].trim().rsplit_once("mod ").filter(|_| item[head..].starts_with(';')) {
+        if let Some(name) =
+            item[..head].trim().rsplit_once("mod ").filter(|_| item[head..].starts_with(';'))
+        {
             modules.push(name.1.trim().to_owned());
         }
         rest = &item[item_len(item, head)..];

@@ -9,7 +9,12 @@ use std::path::Path;
 fn digests(clip: &Clip, executor: &impl Executor) -> Vec<(u64, u64)> {
     clip.with_mapper(&Capacity::SMALL, |mapper| {
         clip.stereo()
-            .map(|frame| mapper.step(&frame, executor).map(|report| (report.digests.input, report.digest)).expect("a good frame"))
+            .map(|frame| {
+                mapper
+                    .step(&frame, executor)
+                    .map(|report| (report.digests.input, report.digest))
+                    .expect("a good frame")
+            })
             .collect()
     })
 }
@@ -20,7 +25,11 @@ fn one_two_and_eight_threads_give_the_same_digests_in_every_frame() {
     let clip = Clip::street(416, 128, 15);
     let serial = digests(&clip, &Serial);
     for threads in [1, 2, 8] {
-        assert_eq!(serial, digests(&clip, &Threads::new(threads).expect("a pool")), "{threads} threads");
+        assert_eq!(
+            serial,
+            digests(&clip, &Threads::new(threads).expect("a pool")),
+            "{threads} threads"
+        );
     }
     assert!(serial.windows(2).all(|pair| pair[0].1 != pair[1].1));
 }
@@ -38,10 +47,16 @@ fn one_pixel_changes_the_digest() {
 
 #[test]
 fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
-    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"))).expect("there are fixtures") {
+    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")))
+        .expect("there are fixtures")
+    {
         let verify = |executor: &dyn Fn() -> Result<Verdict, FixtureError>| {
             let verdict = executor().expect("the fixture is whole");
-            assert_eq!(verdict.differences, [], "bits have changed: fixtures/README.md says what to do when that is meant");
+            assert_eq!(
+                verdict.differences,
+                [],
+                "bits have changed: fixtures/README.md says what to do when that is meant"
+            );
         };
         verify(&|| fixtures::verify(&fixture, &Serial));
         for threads in [1, 2, 8] {
@@ -61,10 +76,19 @@ impl Executor for Level {
 
 #[test]
 fn the_fixtures_give_the_digests_on_file_at_every_level_of_vector_instructions() {
-    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures"))).expect("there are fixtures") {
+    for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")))
+        .expect("there are fixtures")
+    {
         for vectors in Vectors::available() {
-            let verdict = fixtures::verify(&fixture, &Level(vectors)).expect("the fixture is whole");
-            assert_eq!(verdict.differences, [], "{} with {} kernels", fixture.display(), vectors.name());
+            let verdict =
+                fixtures::verify(&fixture, &Level(vectors)).expect("the fixture is whole");
+            assert_eq!(
+                verdict.differences,
+                [],
+                "{} with {} kernels",
+                fixture.display(),
+                vectors.name()
+            );
         }
     }
 }
@@ -86,15 +110,25 @@ fn a_changed_pixel_of_a_fixture_is_named_and_a_blessing_keeps_its_reason_beside_
     for name in ["calib.txt", "fixture.toml", "digests.txt", "blessings.txt"] {
         std::fs::copy(from.join(name), copy.join(name)).expect("a copy");
     }
-    let differences = |path: &Path| fixtures::verify(path, &Serial).expect("a whole fixture").differences;
+    let differences =
+        |path: &Path| fixtures::verify(path, &Serial).expect("a whole fixture").differences;
     let found = differences(&copy);
-    assert_eq!(found.iter().map(|one| one.frame).collect::<Vec<_>>(), [2], "pairs are matched each by itself");
+    assert_eq!(
+        found.iter().map(|one| one.frame).collect::<Vec<_>>(),
+        [2],
+        "pairs are matched each by itself"
+    );
     assert_eq!(found[0].columns, ["input", "disparity", "digest"]);
     assert!(matches!(fixtures::bless(&copy, " \n ", &Serial), Err(FixtureError::NoReason)));
-    assert_eq!(fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"), Blessing::Written);
+    assert_eq!(
+        fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"),
+        Blessing::Written
+    );
     assert_eq!(differences(&copy), []);
     assert_eq!(fixtures::bless(&copy, "Again", &Serial).expect("a blessing"), Blessing::Unchanged);
-    let log = |fixture: &Path| std::fs::read_to_string(fixture.join("blessings.txt")).expect("a log");
-    let added = log(&copy).strip_prefix(&log(&from)).map(str::to_owned).expect("what stood there before");
+    let log =
+        |fixture: &Path| std::fs::read_to_string(fixture.join("blessings.txt")).expect("a log");
+    let added =
+        log(&copy).strip_prefix(&log(&from)).map(str::to_owned).expect("what stood there before");
     assert_eq!(added.split_once(' ').map(|(_, reason)| reason), Some("The image is shown twice\n"));
 }

@@ -12,12 +12,20 @@ use std::{
 fn library() -> PathBuf {
     let deps = std::env::current_exe().expect("this test has a path");
     let deps = deps.parent().expect("in a folder");
-    let libraries = fs::read_dir(deps).expect("that can be read").filter_map(Result::ok).map(|entry| entry.path());
+    let libraries = fs::read_dir(deps)
+        .expect("that can be read")
+        .filter_map(Result::ok)
+        .map(|entry| entry.path());
     let named = |path: &PathBuf| {
         path.extension().is_some_and(|end| end == "a")
-            && path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("libdynvox_capi"))
+            && path
+                .file_name()
+                .is_some_and(|name| name.to_string_lossy().starts_with("libdynvox_capi"))
     };
-    libraries.filter(named).max_by_key(|path| path.metadata().and_then(|about| about.modified()).ok()).expect("the library is there")
+    libraries
+        .filter(named)
+        .max_by_key(|path| path.metadata().and_then(|about| about.modified()).ok())
+        .expect("the library is there")
 }
 
 /// Builds an example with the system's compiler.
@@ -62,12 +70,20 @@ fn the_part_of_the_ros_node_that_needs_no_ros_maps_a_pair() {
 fn mapped_by_c(fixture: &Path, bytes: usize, settings: &[String]) -> String {
     let folder = tempfile::TempDir::new().expect("a folder");
     let clip = folder.path().join("clip.bin");
-    fs::write(&clip, dynvox::fixtures::pack(fixture).expect("the fixture can be packed")).expect("the clip can be written");
+    fs::write(&clip, dynvox::fixtures::pack(fixture).expect("the fixture can be packed"))
+        .expect("the clip can be written");
     let program = build("map_fixture", folder.path());
-    let ran = Command::new(&program).arg(&clip).arg(bytes.to_string()).args(settings).output().expect("the program can be run");
+    let ran = Command::new(&program)
+        .arg(&clip)
+        .arg(bytes.to_string())
+        .args(settings)
+        .output()
+        .expect("the program can be run");
     let output_text = String::from_utf8_lossy(&ran.stderr).into_owned();
     assert!(
-        ran.status.success() && !output_text.contains(" 0 objects") && !output_text.contains("of 0 triangles"),
+        ran.status.success()
+            && !output_text.contains(" 0 objects")
+            && !output_text.contains("of 0 triangles"),
         "objects leave: {output_text}"
     );
     String::from_utf8_lossy(&ran.stdout).into_owned()
@@ -84,8 +100,13 @@ fn on_file(fixture: &Path) -> String {
 fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
     let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/street-320x96");
     let bytes = dynvox::fixtures::pack(&fixture).expect("the fixture can be packed");
-    let volume = dynvox_clip::config(&dynvox_clip::Clip::new(&bytes).expect("what was packed is a clip")).volume;
-    let settings = [format!("volume.voxel_size_m={}", volume.voxel_size_m), format!("volume.prune_lag={}", volume.prune_lag)];
+    let volume =
+        dynvox_clip::config(&dynvox_clip::Clip::new(&bytes).expect("what was packed is a clip"))
+            .volume;
+    let settings = [
+        format!("volume.voxel_size_m={}", volume.voxel_size_m),
+        format!("volume.prune_lag={}", volume.prune_lag),
+    ];
     assert_eq!(mapped_by_c(&fixture, 0, &settings), on_file(&fixture));
     assert_eq!(on_file(&fixture).lines().count(), 24);
 }
@@ -97,7 +118,9 @@ fn a_fixture_with_bounds_and_settings_of_its_own_has_the_same_digests_in_c() {
     let fixture = root.path().join("own");
     for name in ["left", "right", "instances"] {
         fs::create_dir_all(fixture.join(name)).expect("a folder");
-        for entry in fs::read_dir(from.join(name)).expect("the fixture is there").filter_map(Result::ok) {
+        for entry in
+            fs::read_dir(from.join(name)).expect("the fixture is there").filter_map(Result::ok)
+        {
             fs::copy(entry.path(), fixture.join(name).join(entry.file_name())).expect("a copy");
         }
     }
@@ -106,9 +129,13 @@ fn a_fixture_with_bounds_and_settings_of_its_own_has_the_same_digests_in_c() {
     let options = BudgetOptions { voxel_size_m: Some(0.1), ..BudgetOptions::default() };
     let capacity = Capacity::for_budget(budget, 320, 96, &options).expect("enough");
     fs::write(fixture.join("fixture.toml"), description(&capacity)).expect("a file");
-    fs::write(fixture.join("settings.toml"), "[volume]\nvoxel_size_m = 0.1\nprune_lag = 6\n\n[tracking.motion]\nsamples = 77\n")
-        .expect("a file");
-    dynvox::fixtures::bless(&fixture, "Made of the street", &dynvox_core::Serial).expect("a blessing");
+    fs::write(
+        fixture.join("settings.toml"),
+        "[volume]\nvoxel_size_m = 0.1\nprune_lag = 6\n\n[tracking.motion]\nsamples = 77\n",
+    )
+    .expect("a file");
+    dynvox::fixtures::bless(&fixture, "Made of the street", &dynvox_core::Serial)
+        .expect("a blessing");
     assert_ne!(on_file(&fixture), on_file(&from));
     // A buffer of C holds the mapper's own fields, too.
     let mut tiny = 0;
@@ -116,12 +143,16 @@ fn a_fixture_with_bounds_and_settings_of_its_own_has_the_same_digests_in_c() {
         let mut of_profile = std::mem::MaybeUninit::uninit();
         // SAFETY: both pointers are to values of the test's own.
         unsafe {
-            dynvox_capi::dynvox_capacity_of_profile(dynvox_capi::DYNVOX_PROFILE_TINY, of_profile.as_mut_ptr());
+            dynvox_capi::dynvox_capacity_of_profile(
+                dynvox_capi::DYNVOX_PROFILE_TINY,
+                of_profile.as_mut_ptr(),
+            );
             dynvox_capi::dynvox_bytes(of_profile.as_ptr(), &raw mut tiny);
         }
         tiny - Capacity::TINY.bytes()
     };
-    let settings = ["volume.voxel_size_m=0.1", "volume.prune_lag=6", "tracking.motion.samples=77"].map(str::to_owned);
+    let settings = ["volume.voxel_size_m=0.1", "volume.prune_lag=6", "tracking.motion.samples=77"]
+        .map(str::to_owned);
     assert_eq!(mapped_by_c(&fixture, budget + head, &settings), on_file(&fixture));
 }
 
@@ -142,14 +173,20 @@ fn description(of: &Capacity) -> String {
         ("object_blocks", of.object_blocks),
         ("crop_pixels", of.crop_pixels),
     ];
-    let lines: String = numbers.iter().map(|(name, number)| format!("{name} = {number}\n")).collect();
+    let lines: String =
+        numbers.iter().map(|(name, number)| format!("{name} = {number}\n")).collect();
     format!("kind = \"mapper\"\n\n[capacity]\n{lines}colour = {}\n", of.colour)
 }
 
 #[test]
 fn the_short_example_maps_a_pair() {
     let folder = tempfile::TempDir::new().expect("a folder");
-    let ran = Command::new(build("map_pair", folder.path())).output().expect("the program can be run");
+    let ran =
+        Command::new(build("map_pair", folder.path())).output().expect("the program can be run");
     let text = String::from_utf8_lossy(&ran.stdout).into_owned();
-    assert!(ran.status.success() && text.starts_with("frame 2: "), "{text}{}", String::from_utf8_lossy(&ran.stderr));
+    assert!(
+        ran.status.success() && text.starts_with("frame 2: "),
+        "{text}{}",
+        String::from_utf8_lossy(&ran.stderr)
+    );
 }

@@ -1,4 +1,5 @@
-//! Each fuzz target on mutations of valid inputs: a fixed number of them by seed, or for `DYNVOX_FUZZ_SECONDS` a target.
+//! Each fuzz target on mutations of valid inputs: a fixed number of them by seed, or for
+//! `DYNVOX_FUZZ_SECONDS` a target.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +7,8 @@ use dynvox_tests::fuzz::{Mutator, TARGETS, Target};
 
 /// Mutations of a target in an ordinary run.
 const MUTATIONS: u32 = 1_000;
-/// Longest time one input may take. It is far above what any takes: it tells a hang from a slow machine.
+/// Longest time one input may take. It is far above what any takes: it tells a hang from a slow
+/// machine.
 const INPUT_MAX: Duration = Duration::from_secs(20);
 
 /// Runs a target on mutations, and prints how many there were and how many it took.
@@ -25,7 +27,12 @@ fn fuzz(target: &Target) {
         let run = || (target.run)(&bytes);
         match std::panic::catch_unwind(run) {
             Ok(took) => taken += u32::from(took),
-            Err(_) => panic!("{} panics at run {runs} on {} bytes: {:02x?}", target.name, bytes.len(), &bytes[..bytes.len().min(4_000)]),
+            Err(_) => panic!(
+                "{} panics at run {runs} on {} bytes: {:02x?}",
+                target.name,
+                bytes.len(),
+                &bytes[..bytes.len().min(4_000)]
+            ),
         }
         assert!(at.elapsed() < INPUT_MAX, "{} takes {:?} at run {runs}", target.name, at.elapsed());
         runs += 1;
@@ -37,7 +44,12 @@ fn fuzz(target: &Target) {
 fn valid_inputs_are_taken() {
     for target in TARGETS {
         for (at, seed) in (target.seeds)().iter().enumerate() {
-            assert!((target.run)(seed), "{} refuses input {at}: {:?}", target.name, String::from_utf8_lossy(seed));
+            assert!(
+                (target.run)(seed),
+                "{} refuses input {at}: {:?}",
+                target.name,
+                String::from_utf8_lossy(seed)
+            );
         }
     }
 }
@@ -66,4 +78,18 @@ macro_rules! targets {
         }
     };
 }
-targets!(calibration, poses, times, recording, pictures, depth, masks, store, stream, clip, snapshot, settings, calls);
+targets!(
+    calibration,
+    poses,
+    times,
+    recording,
+    pictures,
+    depth,
+    masks,
+    store,
+    stream,
+    clip,
+    snapshot,
+    settings,
+    calls
+);

@@ -1,7 +1,9 @@
 //! Depth and poses from outside take the place of the core's own, within its limits.
 
 use dynvox_core::stereo::StereoStatus;
-use dynvox_core::{Capacity, Mapper, PoseOrigin, Report, Serial, StepError, geometry::Transform, image::View};
+use dynvox_core::{
+    Capacity, Mapper, PoseOrigin, Report, Serial, StepError, geometry::Transform, image::View,
+};
 use dynvox_tests::{Clip, HeapSlab};
 
 const SIZE: (usize, usize) = (320, 96);
@@ -9,11 +11,14 @@ const SIZE: (usize, usize) = (320, 96);
 /// Steps the street's frames with the given disparities, all of one image.
 fn reports(frames: usize, disparity: impl Fn(usize, usize) -> u16) -> Vec<Report> {
     let clip = Clip::street(SIZE.0 as u32, SIZE.1 as u32, frames as u32);
-    let given: Vec<u16> = (0..SIZE.0 * SIZE.1).map(|at| disparity(at % SIZE.0, at / SIZE.0)).collect();
+    let given: Vec<u16> =
+        (0..SIZE.0 * SIZE.1).map(|at| disparity(at % SIZE.0, at / SIZE.0)).collect();
     clip.with_mapper(&Capacity::TINY, |mapper| {
         let steps = clip.stereo().map(|frame| {
             let disparity_q8 = View::new(&given, SIZE.0, SIZE.1);
-            mapper.step(&dynvox_core::StereoFrame { disparity_q8, ..frame }, &Serial).expect("a good frame")
+            mapper
+                .step(&dynvox_core::StereoFrame { disparity_q8, ..frame }, &Serial)
+                .expect("a good frame")
         });
         steps.collect()
     })
@@ -23,9 +28,20 @@ fn reports(frames: usize, disparity: impl Fn(usize, usize) -> u16) -> Vec<Report
 fn given_disparity_is_fused_in_place_of_the_pairs_own_within_near_and_far() {
     let rig = Clip::street(SIZE.0 as u32, SIZE.1 as u32, 1).config().rig;
     let at_m = |depth_m: f64| (rig.focal_baseline_px_m() / depth_m * 256.0) as u16;
-    let wall = reports(1, |u, v| if (100..140).contains(&u) && (40..60).contains(&v) { at_m(10.0) } else { 0 })[0];
-    assert_eq!((wall.stereo.status, wall.stereo.valid, wall.stereo.refused), (StereoStatus::Given, 800, 0));
-    assert!((5..200).contains(&wall.blocks.used), "{} blocks: only the wall is there", wall.blocks.used);
+    let wall =
+        reports(
+            1,
+            |u, v| if (100..140).contains(&u) && (40..60).contains(&v) { at_m(10.0) } else { 0 },
+        )[0];
+    assert_eq!(
+        (wall.stereo.status, wall.stereo.valid, wall.stereo.refused),
+        (StereoStatus::Given, 800, 0)
+    );
+    assert!(
+        (5..200).contains(&wall.blocks.used),
+        "{} blocks: only the wall is there",
+        wall.blocks.used
+    );
     for (depth_m, why) in [(0.4, "nearer than near"), (25.0, "beyond far")] {
         let beyond = reports(1, |_, _| at_m(depth_m))[0];
         assert_eq!((beyond.stereo.valid > 0, beyond.blocks.used), (true, 0), "{why}");
@@ -39,16 +55,25 @@ fn disparities_wider_than_the_image_are_refused_and_counted() {
     (given[10], given[11]) = (64 * 256 - 1, 64 * 256);
     let report = clip.with_mapper(&Capacity::TINY, |mapper| {
         let frame = clip.stereo().next().expect("a frame");
-        mapper.step(&dynvox_core::StereoFrame { disparity_q8: View::new(&given, 64, 64), ..frame }, &Serial).expect("a good frame")
+        mapper
+            .step(
+                &dynvox_core::StereoFrame { disparity_q8: View::new(&given, 64, 64), ..frame },
+                &Serial,
+            )
+            .expect("a good frame")
     });
     assert_eq!((report.stereo.refused, report.stereo.valid), (1, 1));
 }
 
 #[test]
 fn what_is_given_is_part_of_the_inputs_digest_and_motion_goes_on_without_it() {
-    let [a, b] = [0, 1].map(|more| reports(3, move |u, v| if (u, v) == (100, 50) { 2_000 + more } else { 2_000 }));
+    let [a, b] = [0, 1]
+        .map(|more| reports(3, move |u, v| if (u, v) == (100, 50) { 2_000 + more } else { 2_000 }));
     assert!(a.iter().zip(&b).all(|(a, b)| a.digests.input != b.digests.input));
-    assert!(a[2].pose == PoseOrigin::Estimated && a[2].t_world_camera.translation_m[2] > 0.5, "the camera is followed on the images");
+    assert!(
+        a[2].pose == PoseOrigin::Estimated && a[2].t_world_camera.translation_m[2] > 0.5,
+        "the camera is followed on the images"
+    );
 }
 
 #[test]
@@ -57,10 +82,21 @@ fn wrong_sizes_and_poses_that_are_none_are_refused_and_change_nothing() {
     let small = vec![0u16; 100 * 96];
     clip.with_mapper(&Capacity::TINY, |mapper| {
         let frames: Vec<_> = clip.stereo().collect();
-        let wrong = dynvox_core::StereoFrame { disparity_q8: View::new(&small, 100, 96), ..frames[0] };
+        let wrong =
+            dynvox_core::StereoFrame { disparity_q8: View::new(&small, 100, 96), ..frames[0] };
         assert_eq!(mapper.step(&wrong, &Serial).err(), Some(StepError::SizesDiffer));
-        let mut with_pose = |pose| mapper.step(&dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frames[0] }, &Serial).err();
-        assert_eq!(with_pose(Transform::from_translation([f64::NAN, 0.0, 0.0])), Some(StepError::PoseNotFinite));
+        let mut with_pose = |pose| {
+            mapper
+                .step(
+                    &dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frames[0] },
+                    &Serial,
+                )
+                .err()
+        };
+        assert_eq!(
+            with_pose(Transform::from_translation([f64::NAN, 0.0, 0.0])),
+            Some(StepError::PoseNotFinite)
+        );
         for length in [0.0, 1e-200, 1e200] {
             let pose = Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
             assert_eq!(with_pose(pose), Some(StepError::PoseNotRotation), "{length}");
@@ -74,15 +110,21 @@ fn given_poses_are_where_the_camera_is_and_change_what_the_map_holds() {
     let clip = Clip::street(SIZE.0 as u32, SIZE.1 as u32, 3);
     let run = |shift_m: f64| -> Vec<Report> {
         let mut slab = HeapSlab::of(&Capacity::TINY);
-        let mut mapper = Mapper::new(&Capacity::TINY, &clip.config(), slab.bytes()).expect("a slab that fits");
+        let mut mapper =
+            Mapper::new(&Capacity::TINY, &clip.config(), slab.bytes()).expect("a slab that fits");
         let steps = (0i32..).zip(clip.stereo()).map(|(at, frame)| {
             let pose = Transform::from_translation([7.0, 0.0, shift_m * f64::from(at)]);
-            mapper.step(&dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frame }, &Serial).expect("a good frame")
+            mapper
+                .step(&dynvox_core::StereoFrame { t_world_camera: Some(pose), ..frame }, &Serial)
+                .expect("a good frame")
         });
         steps.collect()
     };
     let (slow, fast) = (run(0.8), run(0.9));
-    assert_eq!(slow.iter().map(|report| report.pose).collect::<Vec<_>>(), [PoseOrigin::First, PoseOrigin::Given, PoseOrigin::Given]);
+    assert_eq!(
+        slow.iter().map(|report| report.pose).collect::<Vec<_>>(),
+        [PoseOrigin::First, PoseOrigin::Given, PoseOrigin::Given]
+    );
     assert_eq!(slow[2].t_world_camera.translation_m, [7.0, 0.0, 1.6]);
     assert!(slow.iter().all(|report| report.egomotion.is_none() && report.fused));
     assert!(slow[2].digest != fast[2].digest && slow[2].digests.input != fast[2].digests.input);

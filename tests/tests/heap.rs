@@ -56,8 +56,9 @@ fn a_hundred_steps_a_look_and_a_mesh_make_no_heap_call() {
             steps += u32::from(pose.is_some());
         }
         mapper.finish();
-        let pixels =
-            pose.and_then(|pose| mapper.raycast(&pose, &Serial).ok()).map_or(0, |view| view.depth_m().map_or(0, |depth| depth.height()));
+        let pixels = pose
+            .and_then(|pose| mapper.raycast(&pose, &Serial).ok())
+            .map_or(0, |view| view.depth_m().map_or(0, |depth| depth.height()));
         let triangles = mapper.triangles(&mut |_| ());
         (calls() - before, steps, pixels, triangles)
     });
@@ -69,21 +70,28 @@ fn a_hundred_steps_a_look_and_a_mesh_make_no_heap_call() {
 fn detections_objects_and_a_look_at_them_make_no_heap_call() {
     let clip = Clip::street(480, 144, 12);
     let sightings = clip.sightings();
-    let detections: Vec<Vec<_>> = sightings.iter().map(|seen| seen.iter().map(InstanceMask::detection).collect()).collect();
+    let detections: Vec<Vec<_>> =
+        sightings.iter().map(|seen| seen.iter().map(InstanceMask::detection).collect()).collect();
     let (calls, objects, shown, handed) = clip.with_mapper(&Capacity::SMALL, |mapper| {
         let before = calls();
         let (mut objects, mut shown) = (0, 0);
         for (frame, detections) in clip.stereo().zip(&detections) {
             let frame = StereoFrame { detections, ..frame };
-            let Ok(report) = mapper.step_with(&frame, &Serial, &mut NoStore, &mut NoSink) else { continue };
+            let Ok(report) = mapper.step_with(&frame, &Serial, &mut NoStore, &mut NoSink) else {
+                continue;
+            };
             objects += report.instances.objects.fused;
-            shown +=
-                mapper.raycast_composed(&report.t_world_camera, &Serial).map_or(0, |seen| seen.layer().map_or(0, |image| image.height()));
+            shown += mapper
+                .raycast_composed(&report.t_world_camera, &Serial)
+                .map_or(0, |seen| seen.layer().map_or(0, |image| image.height()));
         }
         let handed = mapper.objects().count();
         mapper.finish_with(&mut NoSink);
         (calls() - before, objects, shown, handed)
     });
     assert_eq!((calls, shown), (0, 12 * 144));
-    assert!(objects > 10 && handed > 0, "and yet there are objects: {objects} fused, {handed} at the end");
+    assert!(
+        objects > 10 && handed > 0,
+        "and yet there are objects: {objects} fused, {handed} at the end"
+    );
 }

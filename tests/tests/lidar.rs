@@ -1,8 +1,10 @@
-//! A map made of exact depth and poses passes the evaluation; one that is off by a known disparity loses what it must.
+//! A map made of exact depth and poses passes the evaluation; one that is off by a known disparity
+//! loses what it must.
 #![allow(missing_docs)]
 
 use dynvox::evaluate::reference::{
-    EvaluatedFrame, Field, PendingFrame, ProjectedScan, ReferenceFigures, Region, Rule, project_scan, sample_exact_depth,
+    EvaluatedFrame, Field, PendingFrame, ProjectedScan, ReferenceFigures, Region, Rule,
+    project_scan, sample_exact_depth,
 };
 use dynvox::formats::Image;
 use dynvox::input::LidarScan;
@@ -14,7 +16,13 @@ use dynvox_tests::HeapSlab;
 const FRAMES: u32 = 6;
 
 fn street() -> Street {
-    Street::new(StreetConfig { width: 640, height: 192, frames: FRAMES, ..StreetConfig::static_street() }).unwrap()
+    Street::new(StreetConfig {
+        width: 640,
+        height: 192,
+        frames: FRAMES,
+        ..StreetConfig::static_street()
+    })
+    .unwrap()
 }
 
 fn field(config: &Config) -> Field {
@@ -29,7 +37,11 @@ fn field(config: &Config) -> Field {
 /// The exact disparity in 1/256 px.
 fn disparity_q8(street: &Street, frame: &SynthFrame) -> Vec<u16> {
     let scale = street.rig().focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX);
-    frame.depth_m.iter().map(|&depth_m| if depth_m > 0.0 { (scale / f64::from(depth_m)).round() as u16 } else { 0 }).collect()
+    frame
+        .depth_m
+        .iter()
+        .map(|&depth_m| if depth_m > 0.0 { (scale / f64::from(depth_m)).round() as u16 } else { 0 })
+        .collect()
 }
 
 fn scan(street: &Street, index: u32) -> LidarScan {
@@ -72,25 +84,56 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
         mapper.step(&stereo, &Serial).unwrap();
         let bf = street.rig().focal_baseline_px_m();
         let exact = Image::new(640, 192, frame.depth_m.clone()).unwrap();
-        let mut scans = [project_scan(&scan(&street, index), &field(&config)), sample_exact_depth(&exact, &street.rig(), &field(&config))];
-        // The sensor stands above and behind the camera and sees past edges: what it sees there is hidden from the camera, and no map can show it.
+        let mut scans = [
+            project_scan(&scan(&street, index), &field(&config)),
+            sample_exact_depth(&exact, &street.rig(), &field(&config)),
+        ];
+        // The sensor stands above and behind the camera and sees past edges: what it sees there is
+        // hidden from the camera, and no map can show it.
         let all = scans[0].points.len();
-        let bare = |u: u16, v: u16| f32::from(exact_q8[usize::from(v) * 640 + usize::from(u)]) / f32::from(DISPARITY_ONE_PX);
-        scans[0].points.retain(|point| !Rule::KITTI.is_error(bare(point.u, point.v), point.disparity_px));
-        assert!(scans[0].points.len() as f64 > 0.97 * all as f64, "{} of {all}", scans[0].points.len());
+        let bare = |u: u16, v: u16| {
+            f32::from(exact_q8[usize::from(v) * 640 + usize::from(u)]) / f32::from(DISPARITY_ONE_PX)
+        };
+        scans[0]
+            .points
+            .retain(|point| !Rule::KITTI.is_error(bare(point.u, point.v), point.disparity_px));
+        assert!(
+            scans[0].points.len() as f64 > 0.97 * all as f64,
+            "{} of {all}",
+            scans[0].points.len()
+        );
         let map = mapper.raycast(&frame.t_world_camera, &Serial).unwrap().depth_m().unwrap();
-        let input = |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
+        let input =
+            |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
         let evaluate = |scanned: &ProjectedScan, map: &View<'_, f32>| -> EvaluatedFrame {
-            PendingFrame::new(index as usize, frame.t_world_camera, scanned, input, |_, _| Region::Static).compare(map, bf, 1.0).0
+            PendingFrame::new(index as usize, frame.t_world_camera, scanned, input, |_, _| {
+                Region::Static
+            })
+            .compare(map, bf, 1.0)
+            .0
         };
         by_scan.push(evaluate(&scans[0], &map));
         by_pixel.push(evaluate(&scans[1], &map));
         // A map whose every surface is 4 px off: wrong wherever 4 px are more than 5 %.
         let off: Vec<f32> =
-            frame.depth_m.iter().map(|&depth_m| if depth_m > 0.0 { (bf / (bf / f64::from(depth_m) + 4.0)) as f32 } else { 0.0 }).collect();
+            frame
+                .depth_m
+                .iter()
+                .map(|&depth_m| {
+                    if depth_m > 0.0 { (bf / (bf / f64::from(depth_m) + 4.0)) as f32 } else { 0.0 }
+                })
+                .collect();
         let off = evaluate(&scans[1], &view_f32(&off));
-        let large = scans[1].points.iter().filter(|point| 4.0 <= Rule::KITTI.share * point.disparity_px).count() as u32;
-        assert_eq!(off.regions[0].sources[1].errors[0], off.regions[0].total - large, "frame {index}");
+        let large = scans[1]
+            .points
+            .iter()
+            .filter(|point| 4.0 <= Rule::KITTI.share * point.disparity_px)
+            .count() as u32;
+        assert_eq!(
+            off.regions[0].sources[1].errors[0],
+            off.regions[0].total - large,
+            "frame {index}"
+        );
         (near, compared) = (near + large, compared + off.regions[0].total);
         shifted.push(off);
     }
@@ -98,11 +141,15 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
     for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
         let fused = ReferenceFigures::of("exact", 0, frames, None).unwrap().still.fused;
         assert!(fused.points > 10_000);
-        assert!(fused.accuracy.unwrap() > 0.99 && fused.completeness.unwrap() > 0.99, "{name}: {fused:?}");
+        assert!(
+            fused.accuracy.unwrap() > 0.99 && fused.completeness.unwrap() > 0.99,
+            "{name}: {fused:?}"
+        );
     }
     let fused = ReferenceFigures::of("exact", 0, &shifted, None).unwrap().still.fused;
     assert_eq!(fused.completeness, Some(1.0));
-    let kept = shifted.iter().map(|frame| frame.regions[0].accuracy(1, 0).unwrap()).sum::<f64>() / f64::from(FRAMES);
+    let kept = shifted.iter().map(|frame| frame.regions[0].accuracy(1, 0).unwrap()).sum::<f64>()
+        / f64::from(FRAMES);
     assert!((fused.accuracy.unwrap() - kept).abs() < 1e-12 && kept < 0.5, "{kept}");
 }
 

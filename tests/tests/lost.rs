@@ -1,10 +1,12 @@
-//! A camera that was covered for long: found again in its own street, and in a segment of its own in another one.
+//! A camera that was covered for long: found again in its own street, and in a segment of its own
+//! in another one.
 #![allow(unsafe_code)]
 
 use dynvox::synth::{Street, StreetConfig, Traffic};
 use dynvox_capi::{
-    DynvoxCapacity, DynvoxConfig, DynvoxFrame, DynvoxImage, DynvoxReport, DynvoxRig, DynvoxSeverity, DynvoxStatus, dynvox_alignment,
-    dynvox_bytes, dynvox_config_default, dynvox_config_set, dynvox_create, dynvox_step,
+    DynvoxCapacity, DynvoxConfig, DynvoxFrame, DynvoxImage, DynvoxReport, DynvoxRig,
+    DynvoxSeverity, DynvoxStatus, dynvox_alignment, dynvox_bytes, dynvox_config_default,
+    dynvox_config_set, dynvox_create, dynvox_step,
 };
 use dynvox_core::egomotion::{REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
 use dynvox_core::geometry::Transform;
@@ -43,7 +45,9 @@ fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
     (0..FRAMES)
         .map(|index| {
             let images = images(before, after, index);
-            let [left, right] = images.each_ref().map(|grey| View::new(grey, SIZE[0], SIZE[1]).expect("pixels of the street's size"));
+            let [left, right] = images.each_ref().map(|grey| {
+                View::new(grey, SIZE[0], SIZE[1]).expect("pixels of the street's size")
+            });
             mapper.step(&StereoFrame::pair(left, right), &Serial).expect("a good frame")
         })
         .collect()
@@ -52,17 +56,32 @@ fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
 /// The same through the C interface.
 fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
     let (rig, capacity) = (DynvoxRig::from(&before.rig()), DynvoxCapacity::from(&CAPACITY));
-    let (mut len, mut mapper, mut config) = (0, std::ptr::null_mut(), std::mem::MaybeUninit::<DynvoxConfig>::uninit());
+    let (mut len, mut mapper, mut config) =
+        (0, std::ptr::null_mut(), std::mem::MaybeUninit::<DynvoxConfig>::uninit());
     // SAFETY: both pointers are to values that outlive the call.
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
     let mut buffer = vec![0; len + dynvox_alignment()];
     let start = buffer.as_ptr().align_offset(dynvox_alignment());
     let slab = &mut buffer[start..];
-    // SAFETY: every pointer is to a value that outlives its call; the first call writes the configuration; the slab outlives the mapper.
+    // SAFETY: every pointer is to a value that outlives its call; the first call writes the
+    // configuration; the slab outlives the mapper.
     unsafe {
         assert_eq!(dynvox_config_default(&raw const rig, config.as_mut_ptr()), DynvoxStatus::Ok);
-        assert_eq!(dynvox_config_set(config.as_mut_ptr(), c"volume.voxel_size_m".as_ptr(), c"0.1".as_ptr()), DynvoxStatus::Ok);
-        let created = dynvox_create(&raw const capacity, config.as_ptr(), slab.as_mut_ptr(), slab.len(), &raw mut mapper);
+        assert_eq!(
+            dynvox_config_set(
+                config.as_mut_ptr(),
+                c"volume.voxel_size_m".as_ptr(),
+                c"0.1".as_ptr()
+            ),
+            DynvoxStatus::Ok
+        );
+        let created = dynvox_create(
+            &raw const capacity,
+            config.as_ptr(),
+            slab.as_mut_ptr(),
+            slab.len(),
+            &raw mut mapper,
+        );
         assert_eq!(created, DynvoxStatus::Ok);
     }
     let no_image = DynvoxImage { pixels: std::ptr::null(), stride: 0 };
@@ -83,9 +102,13 @@ fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
                 disparity_q8: std::ptr::null(),
             };
             let mut report = std::mem::MaybeUninit::uninit();
-            // SAFETY: the mapper and the images are there; a step that succeeds has written the report.
+            // SAFETY: the mapper and the images are there; a step that succeeds has written the
+            // report.
             unsafe {
-                assert_eq!(dynvox_step(mapper, &raw const frame, std::ptr::null(), report.as_mut_ptr()), DynvoxStatus::Ok);
+                assert_eq!(
+                    dynvox_step(mapper, &raw const frame, std::ptr::null(), report.as_mut_ptr()),
+                    DynvoxStatus::Ok
+                );
                 report.assume_init()
             }
         })
@@ -111,7 +134,10 @@ fn a_covered_camera_is_found_again_in_its_map() {
     let reports = map_covered(&street, &street);
     assert_eq!(segments(&reports), vec![0; FRAMES as usize]);
     let found = &reports[UNCOVERED as usize + 1];
-    assert_eq!((found.pose, found.fused, found.severity()), (PoseOrigin::Relocalized, true, Severity::Recovered));
+    assert_eq!(
+        (found.pose, found.fused, found.severity()),
+        (PoseOrigin::Relocalized, true, Severity::Recovered)
+    );
     let t_truth_camera = street.t_world_camera(UNCOVERED + 1).inverse() * found.t_world_camera;
     assert!(t_truth_camera.distance_m() < 0.3, "{} m off", t_truth_camera.distance_m());
     assert_eq!(reports.last().map(Report::severity), Some(Severity::Info));
@@ -133,9 +159,14 @@ fn a_camera_that_sees_another_street_begins_a_segment_apart() {
     let reports = map_covered(&street(3), &street(4));
     let began = UNCOVERED as usize + 1;
     assert_eq!(segments(&reports), [vec![0; began], vec![1; FRAMES as usize - began]].concat());
-    assert!(reports[COVERED as usize..].iter().all(|report| report.severity() == Severity::MapAffected), "all of it is told");
+    assert!(
+        reports[COVERED as usize..].iter().all(|report| report.severity() == Severity::MapAffected),
+        "all of it is told"
+    );
     let pose = |index: usize| reports[index].t_world_camera;
     let height_m = |pose: Transform| -pose.translation_m[1];
     assert!((height_m(pose(began)) - height_m(pose(began - 1)) - SEGMENT_GAP_M).abs() < 1.0);
-    assert!(!reports[began - 1].fused && reports[began].fused && reports[began].allocation.made > 0);
+    assert!(
+        !reports[began - 1].fused && reports[began].fused && reports[began].allocation.made > 0
+    );
 }

@@ -20,12 +20,18 @@ fn the_footprint_matches_the_formula_to_the_byte() {
 fn a_slab_too_small_is_refused_with_the_bytes_it_lacks() {
     let clip = Clip::street(320, 96, 1);
     let mut slab = HeapSlab::of(&Capacity::TINY);
-    let mut refusal = |len: usize| Mapper::new(&Capacity::TINY, &clip.config(), &mut slab.bytes()[..len]).err();
+    let mut refusal =
+        |len: usize| Mapper::new(&Capacity::TINY, &clip.config(), &mut slab.bytes()[..len]).err();
     let short = Capacity::TINY.bytes() - 77;
-    let Some(NewError::Slab(SlabError::TooSmall { missing })) = refusal(short) else { panic!("too small by 77 bytes") };
+    let Some(NewError::Slab(SlabError::TooSmall { missing })) = refusal(short) else {
+        panic!("too small by 77 bytes")
+    };
     // Up to an alignment's bytes more, where the allocator put the slab.
     assert!((77..77 + SLAB_ALIGN).contains(&missing), "{missing}");
-    assert_eq!(refusal(short + missing - 1), Some(NewError::Slab(SlabError::TooSmall { missing: 1 })));
+    assert_eq!(
+        refusal(short + missing - 1),
+        Some(NewError::Slab(SlabError::TooSmall { missing: 1 }))
+    );
     assert_eq!(refusal(short + missing), None);
 }
 
@@ -49,13 +55,22 @@ fn use_grows_with_the_map_and_never_beyond_its_regions() {
 #[test]
 fn a_block_takes_the_bytes_promised_and_finding_and_remembering_it_little_beside_them() {
     let clip = Clip::street(320, 96, 1);
-    for (capacity, voxel_bytes) in [(Capacity::ONBOARD, 3_072), (Capacity { colour: false, ..Capacity::ONBOARD }, 1_536)] {
+    for (capacity, voxel_bytes) in
+        [(Capacity::ONBOARD, 3_072), (Capacity { colour: false, ..Capacity::ONBOARD }, 1_536)]
+    {
         clip.with_mapper(&capacity, |mapper| {
             let footprint = mapper.footprint();
-            let bytes = |names: &[&str]| names.iter().filter_map(|name| footprint.region(name)).map(|region| region.bytes).sum::<usize>();
+            let bytes = |names: &[&str]| {
+                names
+                    .iter()
+                    .filter_map(|name| footprint.region(name))
+                    .map(|region| region.bytes)
+                    .sum::<usize>()
+            };
             let voxels = bytes(&["volume.voxels", "volume.colour"]);
             assert_eq!(voxels, voxel_bytes * capacity.blocks);
-            let beside = bytes(&["volume.index", "volume.history", "volume.history_due", "volume.born"]);
+            let beside =
+                bytes(&["volume.index", "volume.history", "volume.history_due", "volume.born"]);
             assert!(beside > 0 && 20 * beside <= voxels, "{beside} bytes beside {voxels}");
         });
     }

@@ -1,4 +1,5 @@
-//! What moves stays out of the static map, is followed and reconstructed apart; shown on the synthetic street with exact masks.
+//! What moves stays out of the static map, is followed and reconstructed apart; shown on the
+//! synthetic street with exact masks.
 
 use dynvox::evaluate::surfaces::{SeenSide, TrueView};
 use dynvox::input::TrueObject;
@@ -46,13 +47,29 @@ impl Seen {
 /// The exact masks of a frame.
 fn seen(frame: &SynthFrame) -> Vec<Seen> {
     let of = |k: usize| {
-        let pixels = || frame.instances.iter().enumerate().filter(|(_, p)| usize::from(**p) == k).map(|(at, _)| at);
-        let (left, right) = (pixels().map(|at| at % frame.width).min()?, pixels().map(|at| at % frame.width).max()?);
+        let pixels = || {
+            frame
+                .instances
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| usize::from(**p) == k)
+                .map(|(at, _)| at)
+        };
+        let (left, right) = (
+            pixels().map(|at| at % frame.width).min()?,
+            pixels().map(|at| at % frame.width).max()?,
+        );
         let (top, bottom) = (pixels().min()? / frame.width, pixels().max()? / frame.width);
-        let inside = |v: usize, u: usize| u8::from(usize::from(frame.instances[v * frame.width + u]) == k);
+        let inside =
+            |v: usize, u: usize| u8::from(usize::from(frame.instances[v * frame.width + u]) == k);
         let mask = (top..=bottom).flat_map(|v| (left..=right).map(move |u| inside(v, u))).collect();
         let pixels = [left, top, right + 1 - left, bottom + 1 - top].map(|px| px as i32);
-        Some(Seen { class: Class::from_name(frame.objects[k - 1].class)?, pixels, mask, truth: k - 1 })
+        Some(Seen {
+            class: Class::from_name(frame.objects[k - 1].class)?,
+            pixels,
+            mask,
+            truth: k - 1,
+        })
     };
     (1..=frame.objects.len()).filter_map(of).collect()
 }
@@ -67,17 +84,38 @@ static SEQUENCE: LazyLock<Sequence> = LazyLock::new(Sequence::new);
 
 impl Sequence {
     fn new() -> Self {
-        let street = Street::new(StreetConfig { width: SIZE[0], height: SIZE[1], frames: FRAMES, ..StreetConfig::default() }).unwrap();
-        let frames = (0..FRAMES).map(|index| street.frame(index)).map(|frame| (seen(&frame), frame)).map(|(s, f)| (f, s)).collect();
+        let street = Street::new(StreetConfig {
+            width: SIZE[0],
+            height: SIZE[1],
+            frames: FRAMES,
+            ..StreetConfig::default()
+        })
+        .unwrap();
+        let frames = (0..FRAMES)
+            .map(|index| street.frame(index))
+            .map(|frame| (seen(&frame), frame))
+            .map(|(s, f)| (f, s))
+            .collect();
         Self { street, frames }
     }
 
     /// Runs all frames; `inspect` sees the mapper after each.
-    fn run(&self, dynamic: bool, backwards: bool, inspect: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+    fn run(
+        &self,
+        dynamic: bool,
+        backwards: bool,
+        inspect: impl FnMut(usize, &Report, &mut Mapper<'_>),
+    ) {
         self.run_within(&CAPACITY, dynamic, backwards, inspect);
     }
 
-    fn run_within(&self, capacity: &Capacity, dynamic: bool, backwards: bool, mut inspect: impl FnMut(usize, &Report, &mut Mapper<'_>)) {
+    fn run_within(
+        &self,
+        capacity: &Capacity,
+        dynamic: bool,
+        backwards: bool,
+        mut inspect: impl FnMut(usize, &Report, &mut Mapper<'_>),
+    ) {
         let mut config = Config::for_rig(self.street.rig());
         config.tracking.dynamic = dynamic;
         let mut slab = HeapSlab::of(capacity);
@@ -95,17 +133,24 @@ impl Sequence {
         }
     }
 
-    /// Triangles of the static map within what the moving cars swept, 20 cm off their boxes' faces so that the road stays out.
+    /// Triangles of the static map within what the moving cars swept, 20 cm off their boxes' faces
+    /// so that the road stays out.
     fn swept(&self, mapper: &Mapper<'_>) -> u64 {
         let origin = self.frames[0].0.t_world_camera;
-        let cars = || self.frames.iter().flat_map(|(frame, _)| &frame.objects).filter(|object| object.moving);
+        let cars = || {
+            self.frames.iter().flat_map(|(frame, _)| &frame.objects).filter(|object| object.moving)
+        };
         let mut count = 0;
-        let boxes: Vec<(Transform, [f64; 3])> = cars().map(|car| (car.t_world_object.inverse() * origin, car.dimensions_m)).collect();
+        let boxes: Vec<(Transform, [f64; 3])> =
+            cars().map(|car| (car.t_world_object.inverse() * origin, car.dimensions_m)).collect();
         mapper.triangles(&mut |triangle| {
             let corner = triangle.vertices[0].position_m.map(f64::from);
             count += u64::from(boxes.iter().any(|(t_object_map, [width, height, length])| {
                 let [x, y, z] = t_object_map.transform_point(corner);
-                x.abs() < width / 2.0 - 0.2 && z.abs() < length / 2.0 - 0.2 && y < -0.3 && y > 0.2 - height
+                x.abs() < width / 2.0 - 0.2
+                    && z.abs() < length / 2.0 - 0.2
+                    && y < -0.3
+                    && y > 0.2 - height
             }));
         });
         count
@@ -113,8 +158,14 @@ impl Sequence {
 }
 
 /// Which true car a track follows.
-fn truth<'f>(frame: &'f SynthFrame, seen: &[Seen], track: &TrackReport) -> Option<&'f dynvox::synth::ObjectTruth> {
-    let near = |seen: &&Seen| (seen.pixels[0] - track.pixels.left).abs() + (seen.pixels[1] - track.pixels.top).abs();
+fn truth<'f>(
+    frame: &'f SynthFrame,
+    seen: &[Seen],
+    track: &TrackReport,
+) -> Option<&'f dynvox::synth::ObjectTruth> {
+    let near = |seen: &&Seen| {
+        (seen.pixels[0] - track.pixels.left).abs() + (seen.pixels[1] - track.pixels.top).abs()
+    };
     frame.objects.get(seen.iter().min_by_key(near)?.truth)
 }
 
@@ -147,38 +198,57 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
     sequence.run(true, false, |index, report, mapper| {
         digests.push(report.digest);
         let (frame, seen) = &sequence.frames[index];
-        let Some((last, _)) = index.checked_sub(1).map(|last| &sequence.frames[last]) else { return };
-        // The truth, as seen from the estimated camera: the camera's own drift is not the object's error.
+        let Some((last, _)) = index.checked_sub(1).map(|last| &sequence.frames[last]) else {
+            return;
+        };
+        // The truth, as seen from the estimated camera: the camera's own drift is not the object's
+        // error.
         let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
         for track in mapper.tracks().filter(|track| track.detected && track.sightings > 4) {
             let Some(car) = truth(frame, seen, &track) else { continue };
             states.entry(track.id).or_default().push((car.moving, track.state));
             let distance_m = (frame.t_world_camera.inverse() * car.t_world_object).translation_m[2];
-            let Some(before) = last.objects.iter().find(|other| other.id == car.id) else { continue };
+            let Some(before) = last.objects.iter().find(|other| other.id == car.id) else {
+                continue;
+            };
             if !(track.measured && car.moving && distance_m < 35.0) {
                 continue;
             }
-            let moved = t_map_world * car.t_world_object * before.t_world_object.inverse() * t_map_world.inverse();
-            let [a, b] = [track.motion_world, moved].map(|motion| motion.transform_point(track.center_world_m));
+            let moved = t_map_world
+                * car.t_world_object
+                * before.t_world_object.inverse()
+                * t_map_world.inverse();
+            let [a, b] = [track.motion_world, moved]
+                .map(|motion| motion.transform_point(track.center_world_m));
             errors_m.push((0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt());
             errors_deg.push((track.motion_world.inverse() * moved).angle_rad().to_degrees());
         }
     });
     for (id, states) in &states {
-        let wrong = states
-            .iter()
-            .filter(|(moving, state)| (*moving && *state == MotionState::Static) || (!moving && *state == MotionState::Dynamic));
+        let wrong = states.iter().filter(|(moving, state)| {
+            (*moving && *state == MotionState::Static)
+                || (!moving && *state == MotionState::Dynamic)
+        });
         assert_eq!(wrong.count(), 0, "track {id}: {states:?}");
     }
-    let known = states.values().flatten().filter(|(moving, state)| *moving && *state == MotionState::Dynamic).count();
+    let known = states
+        .values()
+        .flatten()
+        .filter(|(moving, state)| *moving && *state == MotionState::Dynamic)
+        .count();
     let moving = states.values().flatten().filter(|(moving, _)| *moving).count();
-    assert!(moving > 15 && known * 10 >= moving * 8, "{known} of {moving} sightings of moving cars");
+    assert!(
+        moving > 15 && known * 10 >= moving * 8,
+        "{known} of {moving} sightings of moving cars"
+    );
     let median = |values: &mut Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
     };
     let [error_m, error_deg] = [median(&mut errors_m), median(&mut errors_deg)];
-    println!("motion error of moving cars up to 35 m: median {error_m:.4} m, {error_deg:.3} deg a frame");
+    println!(
+        "motion error of moving cars up to 35 m: median {error_m:.4} m, {error_deg:.3} deg a frame"
+    );
     assert!(error_m < 0.05 && error_deg < 0.25, "{error_m} m, {error_deg} deg");
 
     let mut again = Vec::new();
@@ -190,13 +260,21 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
 type Picture = Vec<(f32, [u8; 3], u8)>;
 
 fn picture(seen: &Raycaster<'_>) -> Picture {
-    let (depth_m, colour, layer) = (seen.depth_m().unwrap(), seen.colour().unwrap(), seen.layer().unwrap());
-    depth_m.rows().flatten().zip(colour.rows().flatten()).zip(layer.rows().flatten()).map(|((d, c), l)| (*d, *c, *l)).collect()
+    let (depth_m, colour, layer) =
+        (seen.depth_m().unwrap(), seen.colour().unwrap(), seen.layer().unwrap());
+    depth_m
+        .rows()
+        .flatten()
+        .zip(colour.rows().flatten())
+        .zip(layer.rows().flatten())
+        .map(|((d, c), l)| (*d, *c, *l))
+        .collect()
 }
 
 #[dynvox_needs::long]
 #[test]
-fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are() {
+fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are()
+{
     let sequence = &*SEQUENCE;
     let (mut cars, mut totals) = (Vec::new(), [0u32; 3]);
     sequence.run(true, false, |index, report, mapper| {
@@ -248,7 +326,9 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
     });
     assert!(cars.contains(&"static") && cars.contains(&"dynamic"), "{cars:?}");
     let [all, shown, right] = totals;
-    println!("of {all} pixels of cars with a volume {shown} show an object, {right} at its distance");
+    println!(
+        "of {all} pixels of cars with a volume {shown} show an object, {right} at its distance"
+    );
     assert!(shown * 10 > all * 8 && right * 10 > shown * 9);
 }
 
@@ -261,14 +341,22 @@ fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
         let (mut begun, mut refused, mut blocks) = (0, 0, 0);
         sequence.run_within(&capacity, true, false, |_, report, mapper| {
             let seen = &report.instances;
-            assert!(seen.tracks.tracks <= 1 && mapper.tracks().count() <= 1 && seen.objects.objects as usize <= objects);
+            assert!(
+                seen.tracks.tracks <= 1
+                    && mapper.tracks().count() <= 1
+                    && seen.objects.objects as usize <= objects
+            );
             assert!(seen.objects.blocks as usize <= objects * object_blocks);
             refused += seen.tracks.refused;
             begun += seen.objects.begun;
             blocks += seen.objects.blocks_refused;
         });
         assert!(refused > 0, "cars beyond the first are counted");
-        assert_eq!((begun > 0, blocks > 0), (objects > 0, objects > 0), "{objects} objects of {object_blocks} blocks");
+        assert_eq!(
+            (begun > 0, blocks > 0),
+            (objects > 0, objects > 0),
+            "{objects} objects of {object_blocks} blocks"
+        );
     }
 }
 
@@ -282,9 +370,15 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
     sequence.run(true, false, |index, report, mapper| {
         let (frame, seen) = &sequence.frames[index];
         let t_map_world = report.t_world_camera * frame.t_world_camera.inverse();
-        let tracks: BTreeMap<u32, TrackReport> = mapper.tracks().map(|track| (track.id, track)).collect();
-        for (summary, _) in mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame) {
-            let Some(car) = tracks.get(&summary.id).and_then(|track| truth(frame, seen, track)) else { continue };
+        let tracks: BTreeMap<u32, TrackReport> =
+            mapper.tracks().map(|track| (track.id, track)).collect();
+        for (summary, _) in
+            mapper.objects().filter(|(summary, _)| summary.last_frame == report.frame)
+        {
+            let Some(car) = tracks.get(&summary.id).and_then(|track| truth(frame, seen, track))
+            else {
+                continue;
+            };
             let truth = TrueObject {
                 id: car.id,
                 instance: 0,
@@ -300,7 +394,8 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
                 t_world_camera: frame.t_world_camera,
                 far_m: 20.0,
             };
-            let t_truth_object = car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
+            let t_truth_object =
+                car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
             sides.entry(summary.id).or_default().add(&view, &truth, &t_truth_object);
         }
         if index + 1 < sequence.frames.len() {
@@ -308,8 +403,14 @@ fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_
         }
         for (summary, object) in mapper.objects() {
             let mut triangles = Vec::new();
-            object.volume().triangles(&MeshConfig::default(), &mut |triangle| triangles.push(triangle));
-            let Some(figures) = sides.get(&summary.id).and_then(|side| side.compare(&triangles, 0.05)) else { continue };
+            object
+                .volume()
+                .triangles(&MeshConfig::default(), &mut |triangle| triangles.push(triangle));
+            let Some(figures) =
+                sides.get(&summary.id).and_then(|side| side.compare(&triangles, 0.05))
+            else {
+                continue;
+            };
             println!("object {}, {}: {figures:?}", summary.id, summary.state.name());
             // One seen more seldom, or from farther away, is not done yet.
             if figures.nearest_m < 12.0 && figures.frames >= 9 {

@@ -1,6 +1,7 @@
-//! Runs with nothing right about them: bounds down to 0, settings at their ends, faulty images, absurd poses, times and detections, and a store that hands
-//! back anything. Each mapper refuses what it is given or maps it; its poses stay finite, its slab stays its own, it is restored to the same bits,
-//! and it counts what its store counts.
+//! Runs with nothing right about them: bounds down to 0, settings at their ends, faulty images,
+//! absurd poses, times and detections, and a store that hands back anything. Each mapper refuses
+//! what it is given or maps it; its poses stay finite, its slab stays its own, it is restored to
+//! the same bits, and it counts what its store counts.
 //!
 //! `DYNVOX_RANDOM_RUNS` says how many runs there are.
 
@@ -93,7 +94,12 @@ impl BlockStore for Store {
         if loads {
             block.sdf.iter_mut().for_each(|sdf| *sdf = random.next_u32() as i16);
             block.weight.iter_mut().for_each(|weight| *weight = random.next_u32() as u8);
-            block.colour.into_iter().flatten().flatten().for_each(|channel| *channel = random.next_u32() as u8);
+            block
+                .colour
+                .into_iter()
+                .flatten()
+                .flatten()
+                .for_each(|channel| *channel = random.next_u32() as u8);
         }
         self.returned += u32::from(loads);
         loads
@@ -108,8 +114,9 @@ fn number(random: &mut Random) -> f64 {
 
 fn pose(random: &mut Random) -> Transform {
     let mut pose = Transform::IDENTITY;
-    pose.translation_m =
-        pose.translation_m.map(|_| if random.below(3) == 0 { number(random) } else { f64::from(random.below(100)) / 50.0 });
+    pose.translation_m = pose.translation_m.map(|_| {
+        if random.below(3) == 0 { number(random) } else { f64::from(random.below(100)) / 50.0 }
+    });
     if random.below(3) == 0 {
         pose.rotation[random.below(4) as usize] = number(random);
     }
@@ -144,18 +151,26 @@ fn capacity(random: &mut Random) -> Capacity {
 
 /// The keys of all settings of the core, from their documentation.
 fn keys() -> Vec<&'static str> {
-    let rows = include_str!("../../docs/settings.md").lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let rows = include_str!("../../docs/settings.md")
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split('`').next());
     rows.filter(|key| !key.starts_with("street.") && key.contains('.')).collect()
 }
 
 fn config(street: &Street, keys: &[&str], random: &mut Random) -> Config {
     let mut config = Config::for_rig(street.rig());
-    (config.volume.voxel_size_m, config.volume.truncation_m, config.volume.prune_lag) = (0.25, 1.0, 2);
+    (config.volume.voxel_size_m, config.volume.truncation_m, config.volume.prune_lag) =
+        (0.25, 1.0, 2);
     for _ in 0..random.below(4) {
         let mut changed = config;
-        let (key, value) = (keys[random.below(keys.len() as u32) as usize], VALUES[random.below(VALUES.len() as u32) as usize]);
+        let (key, value) = (
+            keys[random.below(keys.len() as u32) as usize],
+            VALUES[random.below(VALUES.len() as u32) as usize],
+        );
         // One that is refused alone is left out mostly, so that most runs begin.
-        if changed.set(key, value).is_ok() && (changed.validate().is_empty() || random.below(20) == 0) {
+        if changed.set(key, value).is_ok()
+            && (changed.validate().is_empty() || random.below(20) == 0)
+        {
             config = changed;
         }
     }
@@ -177,7 +192,9 @@ struct Inputs {
 impl Inputs {
     fn new(frames: &[[Vec<u8>; 2]], at: usize, random: &mut Random) -> Self {
         let [left, right] = &frames[at];
-        let noise = |random: &mut Random| (0..SIZE[0] * SIZE[1]).map(|_| random.next_u32() as u8).collect::<Vec<_>>();
+        let noise = |random: &mut Random| {
+            (0..SIZE[0] * SIZE[1]).map(|_| random.next_u32() as u8).collect::<Vec<_>>()
+        };
         let mut images = match random.below(12) {
             0 => [right.clone(), left.clone()],
             1 => [vec![0; left.len()], vec![0; left.len()]],
@@ -186,7 +203,11 @@ impl Inputs {
             4 => frames[random.below(frames.len() as u32) as usize].clone(),
             _ => [left.clone(), right.clone()],
         };
-        let size = if random.below(10) == 0 { [1 + random.below(96) as usize, 1 + random.below(48) as usize] } else { SIZE };
+        let size = if random.below(10) == 0 {
+            [1 + random.below(96) as usize, 1 + random.below(48) as usize]
+        } else {
+            SIZE
+        };
         images.iter_mut().for_each(|image| image.truncate(size[0] * size[1]));
         let pixels = size[0] * size[1];
         let mask = |random: &mut Random| {
@@ -195,7 +216,11 @@ impl Inputs {
                 class: Class::from_code(random.below(14)),
                 score: number(random) as f32,
                 left: random.below(200) as i32 - 50,
-                top: if random.below(8) == 0 { random.next_u32() as i32 } else { random.below(60) as i32 - 10 },
+                top: if random.below(8) == 0 {
+                    random.next_u32() as i32
+                } else {
+                    random.below(60) as i32 - 10
+                },
                 width,
                 height,
                 mask: &[],
@@ -205,11 +230,17 @@ impl Inputs {
         };
         Self {
             colour: (0..pixels).map(|i| [i as u8, 3, 255 - i as u8]).collect(),
-            disparity_q8: (0..pixels).map(|_| if random.below(3) == 0 { random.next_u32() as u16 } else { 2_000 }).collect(),
+            disparity_q8: (0..pixels)
+                .map(|_| if random.below(3) == 0 { random.next_u32() as u16 } else { 2_000 })
+                .collect(),
             masks: (0..random.below(6)).map(|_| mask(random)).collect(),
             given: random.next_u32(),
             pose: pose(random),
-            time_ns: if random.below(4) == 0 { u64::from(random.next_u32()) } else { at as u64 * 100_000_000 },
+            time_ns: if random.below(4) == 0 {
+                u64::from(random.next_u32())
+            } else {
+                at as u64 * 100_000_000
+            },
             images,
             size,
         }
@@ -219,12 +250,16 @@ impl Inputs {
     fn step(&self, mapper: &mut Mapper<'_>, store: &mut Store) -> Option<Report> {
         let [width, height] = self.size;
         let view = |pixels| View::new(pixels, width, height).expect("pixels of this size");
-        let detections: Vec<_> = self.masks.iter().map(|(detection, mask)| Detection { mask, ..*detection }).collect();
+        let detections: Vec<_> =
+            self.masks.iter().map(|(detection, mask)| Detection { mask, ..*detection }).collect();
         let given = |bit: u32, of: u32| self.given >> bit & (of - 1) == 0;
         let frame = StereoFrame {
-            colour: given(0, 4).then(|| View::new(&self.colour, width, height).expect("pixels of this size")),
+            colour: given(0, 4)
+                .then(|| View::new(&self.colour, width, height).expect("pixels of this size")),
             class: given(2, 8).then(|| view(&self.images[1])),
-            disparity_q8: given(5, 8).then(|| View::new(&self.disparity_q8, width, height).expect("pixels of this size")),
+            disparity_q8: given(5, 8).then(|| {
+                View::new(&self.disparity_q8, width, height).expect("pixels of this size")
+            }),
             t_world_camera: given(8, 4).then_some(self.pose),
             time_ns: given(10, 2).then_some(self.time_ns),
             detections: &detections,
@@ -237,9 +272,14 @@ impl Inputs {
 fn assert_sound(report: &Report, mapper: &Mapper<'_>, seed: u64) {
     let frame = report.frame;
     assert_eq!(report.internal_faults, 0, "run {seed}, frame {frame}");
-    assert!(report.t_world_camera.is_finite(), "run {seed}, frame {frame}: {:?}", report.t_world_camera);
+    assert!(
+        report.t_world_camera.is_finite(),
+        "run {seed}, frame {frame}: {:?}",
+        report.t_world_camera
+    );
     for track in mapper.tracks() {
-        let poses = track.t_world_object.iter().chain([&track.motion_world]).all(Transform::is_finite);
+        let poses =
+            track.t_world_object.iter().chain([&track.motion_world]).all(Transform::is_finite);
         let numbers = track.center_world_m.iter().all(|number| number.is_finite());
         assert!(poses && numbers, "run {seed}, frame {frame}: {track:?}");
     }
@@ -262,7 +302,11 @@ fn assert_restored(
     let seed = store.seed;
     let Ok(mut restored) = restored else { panic!("run {seed}: its own snapshot is refused") };
     for (inputs, digest) in after {
-        assert_eq!(inputs.step(&mut restored, store).map(|report| report.digest), *digest, "run {seed} restored");
+        assert_eq!(
+            inputs.step(&mut restored, store).map(|report| report.digest),
+            *digest,
+            "run {seed} restored"
+        );
     }
 }
 
@@ -299,10 +343,17 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
             let report = inputs.step(&mut mapper, &mut store);
             if let Some(report) = &report {
                 assert_sound(report, &mapper, seed);
-                let stored = [store.kept - before[0], store.lost - before[1], store.returned - before[2]];
+                let stored =
+                    [store.kept - before[0], store.lost - before[1], store.returned - before[2]];
                 let of = report.allocation.eviction;
-                assert_eq!([of.kept, of.lost, of.returned], stored, "run {seed}, frame {}", report.frame);
-                (counts.fused, counts.steps) = (counts.fused + u64::from(report.fused), counts.steps + 1);
+                assert_eq!(
+                    [of.kept, of.lost, of.returned],
+                    stored,
+                    "run {seed}, frame {}",
+                    report.frame
+                );
+                (counts.fused, counts.steps) =
+                    (counts.fused + u64::from(report.fused), counts.steps + 1);
             } else {
                 counts.refused_steps += 1;
             }
@@ -311,26 +362,49 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
             }
         }
         mapper.triangles(&mut |triangle| {
-            assert!(triangle.vertices.iter().flat_map(|vertex| vertex.position_m).all(f32::is_finite), "run {seed}")
+            assert!(
+                triangle.vertices.iter().flat_map(|vertex| vertex.position_m).all(f32::is_finite),
+                "run {seed}"
+            )
         });
         if let Ok(view) = mapper.raycast(&pose(&mut random), &Serial) {
-            assert!(view.depth_m().into_iter().flat_map(|depth_m| depth_m.pixels()).all(|depth_m| depth_m.is_finite()), "run {seed}");
+            assert!(
+                view.depth_m()
+                    .into_iter()
+                    .flat_map(|depth_m| depth_m.pixels())
+                    .all(|depth_m| depth_m.is_finite()),
+                "run {seed}"
+            );
         }
-        (counts.kept, counts.returned) = (counts.kept + u64::from(store.kept), counts.returned + u64::from(store.returned));
+        (counts.kept, counts.returned) =
+            (counts.kept + u64::from(store.kept), counts.returned + u64::from(store.returned));
         assert_restored((&capacity, &config), second, &saved, &after, &mut store);
         counts.restored += 1;
     }
     for memory in &memory {
-        assert!(memory[..GUARD].iter().chain(&memory[GUARD + len..]).all(|&byte| byte == GUARDED), "run {seed} left its slab");
+        assert!(
+            memory[..GUARD].iter().chain(&memory[GUARD + len..]).all(|&byte| byte == GUARDED),
+            "run {seed} left its slab"
+        );
     }
 }
 
 #[test]
 fn random_runs_end_in_a_sound_map_or_an_error() {
-    let runs = std::env::var("DYNVOX_RANDOM_RUNS").ok().and_then(|text| text.parse().ok()).unwrap_or(RUNS);
+    let runs =
+        std::env::var("DYNVOX_RANDOM_RUNS").ok().and_then(|text| text.parse().ok()).unwrap_or(RUNS);
     let [width, height] = SIZE.map(|side| side as u32);
-    let street = Street::new(StreetConfig { width, height, frames: FRAMES as u32, ..StreetConfig::default() }).expect("a sound street");
-    let frames: Vec<_> = (0..FRAMES as u32).map(|at| street.frame(at)).map(|frame| [frame.left_grey, frame.right_grey]).collect();
+    let street = Street::new(StreetConfig {
+        width,
+        height,
+        frames: FRAMES as u32,
+        ..StreetConfig::default()
+    })
+    .expect("a sound street");
+    let frames: Vec<_> = (0..FRAMES as u32)
+        .map(|at| street.frame(at))
+        .map(|frame| [frame.left_grey, frame.right_grey])
+        .collect();
     let keys = keys();
     assert!(keys.len() > 80, "{} keys", keys.len());
     let mut counts = Counts::default();
@@ -339,6 +413,12 @@ fn random_runs_end_in_a_sound_map_or_an_error() {
     }
     println!("{counts:?}");
     let Counts { runs, refused, steps, refused_steps, fused, kept, returned, restored } = counts;
-    assert!(2 * refused < runs && 2 * refused_steps < steps && restored == runs - refused, "most runs begin");
-    assert!([fused, kept, returned].into_iter().all(|count| count > runs / 10), "they map, and use the store");
+    assert!(
+        2 * refused < runs && 2 * refused_steps < steps && restored == runs - refused,
+        "most runs begin"
+    );
+    assert!(
+        [fused, kept, returned].into_iter().all(|count| count > runs / 10),
+        "they map, and use the store"
+    );
 }

@@ -1,4 +1,5 @@
-//! A sequence with traffic that is saved at a frame and restored in another slab gives the digests on file.
+//! A sequence with traffic that is saved at a frame and restored in another slab gives the digests
+//! on file.
 
 use dynvox::fixtures::pack;
 use dynvox_clip::{CAPACITY, Clip, Frame, FrameDigests, Pair, config};
@@ -6,7 +7,8 @@ use dynvox_core::{Mapper, Report, Serial};
 use dynvox_tests::HeapSlab;
 use std::path::Path;
 
-/// Every third frame, the first excepted: before and after the pruning window is full, tracks are known, blocks leave and objects begin.
+/// Every third frame, the first excepted: before and after the pruning window is full, tracks are
+/// known, blocks leave and objects begin.
 const STOPS: [usize; 8] = [1, 4, 7, 10, 13, 16, 19, 22];
 
 fn step(mapper: &mut Mapper<'_>, pair: &Pair<'_>) -> Report {
@@ -15,16 +17,23 @@ fn step(mapper: &mut Mapper<'_>, pair: &Pair<'_>) -> Report {
 
 /// The line of a frame as it stands on file.
 fn line(report: &Report) -> String {
-    FrameDigests { frame: report.frame, digest: report.digest, stages: report.digests, blocks: 0 }.to_string()
+    FrameDigests { frame: report.frame, digest: report.digest, stages: report.digests, blocks: 0 }
+        .to_string()
 }
 
 #[test]
 fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
     let fixture = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures/street-320x96"));
-    let (bytes, golden) = (pack(fixture).expect("a whole fixture"), std::fs::read_to_string(fixture.join("digests.txt")).expect("digests"));
+    let (bytes, golden) = (
+        pack(fixture).expect("a whole fixture"),
+        std::fs::read_to_string(fixture.join("digests.txt")).expect("digests"),
+    );
     let golden: Vec<&str> = golden.lines().filter(|line| !line.starts_with('#')).collect();
     let clip = Clip::new(&bytes).expect("a clip");
-    let pairs: Vec<Pair<'_>> = clip.frames().filter_map(|frame| if let Frame::Pair(pair) = frame { Some(pair) } else { None }).collect();
+    let pairs: Vec<Pair<'_>> = clip
+        .frames()
+        .filter_map(|frame| if let Frame::Pair(pair) = frame { Some(pair) } else { None })
+        .collect();
     assert_eq!(pairs.len(), golden.len());
     let (mut snapshots, mut slab) = (Vec::new(), HeapSlab::of(&CAPACITY));
     let mut mapper = Mapper::new(&CAPACITY, &config(&clip), slab.bytes()).expect("a mapper");
@@ -44,7 +53,10 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
         }
         assert_eq!(line(&step(&mut mapper, pair)), golden[at]);
     }
-    assert!(tracks >= 5 && objects >= 2 && waiting >= 8, "{tracks} tracks, {objects} objects, {waiting} frames of history are in flight");
+    assert!(
+        tracks >= 5 && objects >= 2 && waiting >= 8,
+        "{tracks} tracks, {objects} objects, {waiting} frames of history are in flight"
+    );
     for (stop, bytes) in &snapshots {
         let (mut slab, mut rest) = (HeapSlab::of(&CAPACITY), &bytes[..]);
         slab.bytes().fill(0xA5);
@@ -54,10 +66,15 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
             rest = behind;
             Ok(())
         };
-        let mut mapper = Mapper::restore(&CAPACITY, &config(&clip), slab.bytes(), &mut source).expect("a whole snapshot");
+        let mut mapper = Mapper::restore(&CAPACITY, &config(&clip), slab.bytes(), &mut source)
+            .expect("a whole snapshot");
         assert!(rest.is_empty());
         for (at, pair) in pairs.iter().enumerate().skip(*stop) {
-            assert_eq!(line(&step(&mut mapper, pair)), golden[at], "frame {at} after stopping before frame {stop}");
+            assert_eq!(
+                line(&step(&mut mapper, pair)),
+                golden[at],
+                "frame {at} after stopping before frame {stop}"
+            );
         }
     }
 }

@@ -1,4 +1,5 @@
-//! P1: making a mapper, a step on one thread, saving and restoring each stay within 32 KiB of stack, measured by painting it.
+//! P1: making a mapper, a step on one thread, saving and restoring each stay within 32 KiB of
+//! stack, measured by painting it.
 #![expect(unsafe_code, reason = "the stack below a frame can only be written to through a pointer")]
 
 use dynvox::input::InstanceMask;
@@ -22,7 +23,8 @@ fn stack_pointer() -> *mut u8 {
 fn paint() {
     let top = stack_pointer();
     for below in MARGIN..PAINTED {
-        // SAFETY: the thread's stack is 4 MiB; these bytes lie below every live frame and above the guard page.
+        // SAFETY: the thread's stack is 4 MiB; these bytes lie below every live frame and above the
+        // guard page.
         unsafe { top.wrapping_sub(below).write_volatile(PAINT) };
     }
 }
@@ -34,7 +36,10 @@ fn used() -> usize {
     // This frame may begin a little below the painter's.
     let deepest = PAINTED - MARGIN;
     // SAFETY: as in `paint`; the bytes were written there.
-    let kept = (MARGIN..deepest).rev().take_while(|&below| unsafe { top.wrapping_sub(below).read_volatile() } == PAINT).count();
+    let kept = (MARGIN..deepest)
+        .rev()
+        .take_while(|&below| unsafe { top.wrapping_sub(below).read_volatile() } == PAINT)
+        .count();
     deepest - kept
 }
 
@@ -57,7 +62,8 @@ fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
         let mut step = 0;
         for (frame, seen) in clip.stereo().zip(clip.sightings()) {
             let detections: Vec<_> = seen.iter().map(InstanceMask::detection).collect();
-            let (report, bytes) = painted(|| mapper.step(&StereoFrame { detections: &detections, ..frame }, &Serial));
+            let (report, bytes) =
+                painted(|| mapper.step(&StereoFrame { detections: &detections, ..frame }, &Serial));
             assert!(report.is_ok());
             step = step.max(bytes);
         }
@@ -74,11 +80,17 @@ fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
             bytes.copy_from_slice(rest.split_off(..bytes.len()).expect("as many as were saved"));
             Ok(())
         };
-        let (restored, restoring) = painted(|| Mapper::restore(&Capacity::TINY, &config, slab.bytes(), &mut source));
+        let (restored, restoring) =
+            painted(|| Mapper::restore(&Capacity::TINY, &config, slab.bytes(), &mut source));
         assert!(restored.is_ok());
         [("making", making), ("a step", step), ("saving", saving), ("restoring", restoring)]
     };
-    let peaks = thread::Builder::new().stack_size(4 << 20).spawn(measured).expect("a thread").join().expect("no panic");
+    let peaks = thread::Builder::new()
+        .stack_size(4 << 20)
+        .spawn(measured)
+        .expect("a thread")
+        .join()
+        .expect("no panic");
     println!("stack, bytes at most: {peaks:?}; the mapper itself: {}", size_of::<Mapper<'_>>());
     for (what, peak) in peaks {
         assert!(peak > 1_000, "{what}: the paint shows something");

@@ -24,7 +24,8 @@ fn config(clip: &Clip) -> Config {
 }
 
 fn file(folder: &tempfile::TempDir) -> BlockFile<std::fs::File> {
-    let (file, _) = BlockFile::open(&folder.path().join("map.blocks"), VOXEL_M, 0.75).expect("a fresh folder takes a file");
+    let (file, _) = BlockFile::open(&folder.path().join("map.blocks"), VOXEL_M, 0.75)
+        .expect("a fresh folder takes a file");
     file
 }
 
@@ -39,7 +40,9 @@ fn bits(corners: [([f32; 3], [u8; 3]); 3]) -> Bits {
 }
 
 fn map_clip<S: BlockStore>(clip: &Clip, mapper: &mut Mapper<'_>, store: &mut S) -> Vec<Report> {
-    clip.stereo().map(|frame| mapper.step_with(&frame, &Serial, store, &mut NoSink).expect("a good frame")).collect()
+    clip.stereo()
+        .map(|frame| mapper.step_with(&frame, &Serial, store, &mut NoSink).expect("a good frame"))
+        .collect()
 }
 
 fn sum(reports: &[Report], of: fn(&Report) -> u32) -> u32 {
@@ -53,8 +56,14 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut slab = HeapSlab::of(&LARGE);
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut NoStore);
-    assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0, "the large pool holds it all");
-    mapper.triangles(&mut |triangle| unbounded.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour)))));
+    assert_eq!(
+        sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused),
+        0,
+        "the large pool holds it all"
+    );
+    mapper.triangles(&mut |triangle| {
+        unbounded.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))))
+    });
 
     let folder = tempfile::TempDir::new().expect("a folder for the blocks");
     let (mut store, mut streamed) = (file(&folder), Vec::new());
@@ -63,13 +72,22 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let reports = map_clip(clip, &mut mapper, &mut store);
     let evicted = sum(&reports, |report| report.allocation.eviction.kept);
     assert!(evicted > 1_000, "{evicted} blocks left: the pool is outgrown");
-    assert_eq!(sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused), 0);
+    assert_eq!(
+        sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused),
+        0
+    );
     let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
     let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
     let mut source = PoolAndFile::new(mapper.background(), &mut store);
-    let count = mesh::triangles(&mut source, how, memory, &hashbrown::HashSet::new(), &mut |triangle: Triangle| {
-        in_place.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))));
-    });
+    let count = mesh::triangles(
+        &mut source,
+        how,
+        memory,
+        &hashbrown::HashSet::new(),
+        &mut |triangle: Triangle| {
+            in_place.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))));
+        },
+    );
     assert_eq!(count.ok(), Some(in_place.len() as u64));
     mapper.stream_out(&mut store);
     drop(mapper);
@@ -78,11 +96,16 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
         (&config.volume, &config.mesh),
         (slab.bytes(), false),
         &hashbrown::HashSet::new(),
-        &mut |triangle: Triangle| streamed.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour)))),
+        &mut |triangle: Triangle| {
+            streamed.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))))
+        },
     );
     assert_eq!(count.ok(), Some(streamed.len() as u64));
     assert!(unbounded.len() > 50_000, "{} triangles", unbounded.len());
-    assert!(in_place == streamed, "the pool's blocks where they are, and stored first, in one order");
+    assert!(
+        in_place == streamed,
+        "the pool's blocks where they are, and stored first, in one order"
+    );
     unbounded.sort_unstable();
     streamed.sort_unstable();
     assert!(unbounded == streamed, "{} triangles against {}", unbounded.len(), streamed.len());
@@ -105,7 +128,8 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
         let harmed = report.severity() == Severity::MapAffected;
         assert_eq!(harmed, report.allocation.eviction.lost > 0, "frame {}", report.frame);
     }
-    let stored: BTreeSet<_> = store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
+    let stored: BTreeSet<_> =
+        store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
     assert!(!stored.is_empty() && stored.len() <= kept as usize, "what was kept can still be read");
 }
 
@@ -124,13 +148,27 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let pruned = mapper.finish();
         let last = reports.last().expect("frames were taken");
         let made = sum(&reports, |report| report.allocation.made);
-        let left = sum(&reports, |report| report.allocation.eviction.kept + report.allocation.eviction.empty + report.prune.blocks_freed);
+        let left = sum(&reports, |report| {
+            report.allocation.eviction.kept
+                + report.allocation.eviction.empty
+                + report.prune.blocks_freed
+        });
         let now = mapper.background().pool().len() as u32;
-        assert_eq!(made, left + pruned.blocks_freed + now, "{blocks} blocks, weight {prune_weight}");
-        assert!(last.blocks.peak as usize <= blocks && sum(&reports, |report| report.allocation.refused) > 0);
+        assert_eq!(
+            made,
+            left + pruned.blocks_freed + now,
+            "{blocks} blocks, weight {prune_weight}"
+        );
+        assert!(
+            last.blocks.peak as usize <= blocks
+                && sum(&reports, |report| report.allocation.refused) > 0
+        );
         assert_eq!(sum(&reports, |report| report.allocation.eviction.lost), 0);
         if prune_weight > 0 {
-            assert!(sum(&reports, |report| report.prune.early) > 0, "a history of one frame is cut short, and says so");
+            assert!(
+                sum(&reports, |report| report.prune.early) > 0,
+                "a history of one frame is cut short, and says so"
+            );
         }
         let mut triangles = 0;
         assert_eq!(mapper.triangles(&mut |_| triangles += 1), triangles);

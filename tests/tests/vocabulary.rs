@@ -1,6 +1,8 @@
-//! Code, messages and documents use the field's words: `tests/vocabulary.txt` lists those they do not use, and what stands in their place.
+//! Code, messages and documents use the field's words: `tests/vocabulary.txt` lists those they do
+//! not use, and what stands in their place.
 //!
-//! `cargo test -p dynvox-tests --test vocabulary -- --nocapture` prints how many there are, folder by folder, and where.
+//! `cargo test -p dynvox-tests --test vocabulary -- --nocapture` prints how many there are, folder
+//! by folder, and where.
 
 use dynvox_tests::source::{files, parts, text};
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,7 +31,8 @@ impl Rule {
     /// A folder with `-` before it is left out.
     fn covers(&self, path: &Path) -> bool {
         let within = |folder: &str| folder == "*" || path.starts_with(folder);
-        let excluded = self.folders.iter().filter_map(|folder| folder.strip_prefix('-')).any(within);
+        let excluded =
+            self.folders.iter().filter_map(|folder| folder.strip_prefix('-')).any(within);
         !excluded && self.folders.iter().any(|folder| within(folder))
     }
 }
@@ -46,7 +49,11 @@ fn rules(list: &str) -> Vec<Rule> {
             other => panic!("an unknown kind: {other}"),
         };
         assert!(kind == Kind::Word || !columns[3].is_empty(), "something to write instead: {line}");
-        let words = columns[1].split(separator).map(|word| word.trim().to_owned()).filter(|word| !word.is_empty()).collect();
+        let words = columns[1]
+            .split(separator)
+            .map(|word| word.trim().to_owned())
+            .filter(|word| !word.is_empty())
+            .collect();
         Rule { kind, words, folders: columns[2].split(' ').map(str::to_owned).collect() }
     };
     lines.map(rule).collect()
@@ -60,7 +67,9 @@ fn names(text: &str) -> impl Iterator<Item = (usize, &str)> {
         *within = in_name(char);
         Some(begins.then_some(at))
     });
-    starts.flatten().map(move |at| (at, text[at..].split(|char| !in_name(char)).next().unwrap_or_default()))
+    starts
+        .flatten()
+        .map(move |at| (at, text[at..].split(|char| !in_name(char)).next().unwrap_or_default()))
 }
 
 /// The words a name is made of, in lower case: `mask_room` and `MaskRoom` are mask and room.
@@ -79,13 +88,15 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// Names that are methods, or belong to another path, are of their owner's choosing: `iterator.chain()`.
+/// Names that are methods, or belong to another path, are of their owner's choosing:
+/// `iterator.chain()`.
 fn is_defined_here(code: &str, at: usize) -> bool {
     let before = code[..at].trim_end();
     !(before.ends_with('.') && !before.ends_with("..") || before.ends_with("::"))
 }
 
-/// Text in lower case with the marks of comments left out and every run of blanks made one, and where each byte stood.
+/// Text in lower case with the marks of comments left out and every run of blanks made one, and
+/// where each byte stood.
 fn joined(prose: &str) -> (String, Vec<usize>) {
     let (mut joined, mut places) = (String::from(" "), vec![0]);
     for (at, char) in prose.char_indices() {
@@ -114,22 +125,32 @@ fn banned(path: &Path, content: &str, rules: &[Rule]) -> Vec<(String, usize)> {
     let (joined, places) = joined(&prose);
     let code_names: Vec<(usize, &str)> = names(&code).collect();
     let words_of = |(at, name)| words(name).into_iter().map(move |word| (word, at));
-    let all_words: Vec<(String, usize)> = code_names.iter().copied().chain(names(&prose)).flat_map(words_of).collect();
+    let all_words: Vec<(String, usize)> =
+        code_names.iter().copied().chain(names(&prose)).flat_map(words_of).collect();
     let mut found = Vec::new();
     for rule in rules.iter().filter(|rule| rule.covers(path)) {
         match rule.kind {
-            Kind::Word => found.extend(all_words.iter().filter(|(word, _)| rule.words.contains(word)).cloned()),
+            Kind::Word => found
+                .extend(all_words.iter().filter(|(word, _)| rule.words.contains(word)).cloned()),
             Kind::Name => {
-                let of_code = code_names.iter().filter(|&&(at, name)| rule.words.contains(name) && is_defined_here(&code, at));
+                let of_code = code_names
+                    .iter()
+                    .filter(|&&(at, name)| rule.words.contains(name) && is_defined_here(&code, at));
                 found.extend(of_code.map(|&(at, name)| (name.to_owned(), at)));
             }
             Kind::Phrase => {
                 for phrase in &rule.words {
                     let whole = |&(at, _): &(usize, &str)| {
                         let edge = |char: Option<char>| !char.is_some_and(char::is_alphanumeric);
-                        edge(joined[..at].chars().next_back()) && edge(joined[at + phrase.len()..].chars().next())
+                        edge(joined[..at].chars().next_back())
+                            && edge(joined[at + phrase.len()..].chars().next())
                     };
-                    found.extend(joined.match_indices(phrase.as_str()).filter(whole).map(|(at, _)| (phrase.clone(), places[at])));
+                    found.extend(
+                        joined
+                            .match_indices(phrase.as_str())
+                            .filter(whole)
+                            .map(|(at, _)| (phrase.clone(), places[at])),
+                    );
                 }
             }
         }
@@ -160,16 +181,30 @@ fn only_words_of_the_field_are_used() {
         }
         let content = without_renamed(&text(&path));
         for (word, at) in banned(&path, &content, &rules) {
-            let folder: Vec<_> =
-                path.parent().into_iter().flat_map(Path::components).take(3).map(|part| part.as_os_str().to_string_lossy()).collect();
+            let folder: Vec<_> = path
+                .parent()
+                .into_iter()
+                .flat_map(Path::components)
+                .take(3)
+                .map(|part| part.as_os_str().to_string_lossy())
+                .collect();
             *folders.entry(folder.join("/")).or_default() += 1;
-            list.push(format!("{}:{}: {word}", path.display(), 1 + content[..at.min(content.len())].matches('\n').count()));
+            list.push(format!(
+                "{}:{}: {word}",
+                path.display(),
+                1 + content[..at.min(content.len())].matches('\n').count()
+            ));
         }
     }
     list.sort();
-    let counts: Vec<_> = folders.iter().map(|(folder, count)| format!("{count:5}  {folder}")).collect();
+    let counts: Vec<_> =
+        folders.iter().map(|(folder, count)| format!("{count:5}  {folder}")).collect();
     println!("{}\n{}\n{:5}  in all", list.join("\n"), counts.join("\n"), list.len());
-    assert!(list.is_empty(), "{} words of our own; see tests/vocabulary.txt for what to write instead", list.len());
+    assert!(
+        list.is_empty(),
+        "{} words of our own; see tests/vocabulary.txt for what to write instead",
+        list.len()
+    );
 }
 
 #[test]

@@ -18,7 +18,8 @@ pub struct DynvoxBlock {
     pub colour: *const u8,
 }
 
-/// A block that becomes visible again, all zero, to be filled from the store. Valid during the call.
+/// A block that becomes visible again, all zero, to be filled from the store. Valid during the
+/// call.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxLoadedBlock {
@@ -32,15 +33,15 @@ pub struct DynvoxLoadedBlock {
     pub colour: *mut u8,
 }
 
-/// The caller's store of blocks. Called on the thread of the step, which waits for it; must not call the same mapper, which answers
-/// DYNVOX_STATUS_BUSY then.
+/// The caller's store of blocks. Called on the thread of the step, which waits for it; must not
+/// call the same mapper, which answers DYNVOX_STATUS_BUSY then.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxStore {
     /// Handed to both functions.
     pub context: *mut c_void,
-    /// Stores an evicted block; the last one stored at its coordinates counts. False when it cannot: the block is lost, and counted. Null: all
-    /// are lost.
+    /// Stores an evicted block; the last one stored at its coordinates counts. False when it
+    /// cannot: the block is lost, and counted. Null: all are lost.
     pub store: Option<extern "C" fn(context: *mut c_void, block: *const DynvoxBlock) -> bool>,
     /// Fills a block; false when none is stored at its coordinates. Null: none is.
     pub load: Option<extern "C" fn(context: *mut c_void, block: *const DynvoxLoadedBlock) -> bool>,
@@ -95,10 +96,14 @@ pub struct DynvoxTriangle {
 impl From<Triangle> for DynvoxTriangle {
     fn from(triangle: Triangle) -> Self {
         Self {
-            vertices: triangle.vertices.map(|vertex| DynvoxVertex { position_m: vertex.position_m, colour: vertex.colour }),
+            vertices: triangle.vertices.map(|vertex| DynvoxVertex {
+                position_m: vertex.position_m,
+                colour: vertex.colour,
+            }),
         }
     }
 }
 
 /// Takes triangles one by one. Must not call the same mapper.
-pub type DynvoxTriangleSink = Option<extern "C" fn(context: *mut c_void, triangle: *const DynvoxTriangle)>;
+pub type DynvoxTriangleSink =
+    Option<extern "C" fn(context: *mut c_void, triangle: *const DynvoxTriangle)>;

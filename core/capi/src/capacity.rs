@@ -18,7 +18,8 @@ pub const DYNVOX_PROFILE_ONBOARD: DynvoxProfile = 2;
 /// Below 2 GiB, images up to 1920 x 1088, colour.
 pub const DYNVOX_PROFILE_DESKTOP: DynvoxProfile = 3;
 
-/// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and dynvox_capacity_for_budget fill it.
+/// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and
+/// dynvox_capacity_for_budget fill it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxCapacity {
@@ -52,7 +53,8 @@ pub struct DynvoxCapacity {
     pub object_blocks: usize,
     /// Pixels of crops that wait for their object's motion.
     pub crop_pixels: usize,
-    /// Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no byte.
+    /// Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no
+    /// byte.
     pub planning_width: usize,
     /// Length of the planner's window, cells.
     pub planning_length: usize,
@@ -125,8 +127,13 @@ impl DynvoxCapacity {
 /// # Safety
 /// `capacity` is null or points to a capacity.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_capacity_of_profile(profile: DynvoxProfile, capacity: *mut DynvoxCapacity) -> DynvoxStatus {
-    let Some((_, of)) = Capacity::PROFILES.get(profile as usize) else { return DynvoxStatus::Unknown };
+pub unsafe extern "C" fn dynvox_capacity_of_profile(
+    profile: DynvoxProfile,
+    capacity: *mut DynvoxCapacity,
+) -> DynvoxStatus {
+    let Some((_, of)) = Capacity::PROFILES.get(profile as usize) else {
+        return DynvoxStatus::Unknown;
+    };
     // SAFETY: only looked at.
     match unsafe { output(capacity) } {
         Ok(capacity) => {
@@ -138,8 +145,9 @@ pub unsafe extern "C" fn dynvox_capacity_of_profile(profile: DynvoxProfile, capa
     }
 }
 
-/// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to the rules: colour where 20,000 blocks with
-/// colour fit, objects in a fifth of what the image leaves.
+/// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to
+/// the rules: colour where 20,000 blocks with colour fit, objects in a fifth of what the image
+/// leaves.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxBudget {
@@ -172,11 +180,13 @@ impl DynvoxBudget {
     }
 }
 
-/// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at most `budget->bytes`. Of too few bytes
-/// DYNVOX_STATUS_TOO_SMALL, and the least that works is written to `least`, which may be null.
+/// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at
+/// most `budget->bytes`. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is
+/// written to `least`, which may be null.
 ///
 /// # Safety
-/// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is null or points to a number.
+/// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is
+/// null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_capacity_for_budget(
     budget: *const DynvoxBudget,
@@ -188,7 +198,12 @@ pub unsafe extern "C" fn dynvox_capacity_for_budget(
         (Ok(budget), Ok(capacity)) => (budget, capacity),
         (Err(status), _) | (_, Err(status)) => return status,
     };
-    match Capacity::for_budget(budget.bytes.saturating_sub(HEAD_BYTES), budget.width, budget.height, &budget.options()) {
+    match Capacity::for_budget(
+        budget.bytes.saturating_sub(HEAD_BYTES),
+        budget.width,
+        budget.height,
+        &budget.options(),
+    ) {
         Ok(solved) => {
             // SAFETY: checked; of the right type by the caller's promise.
             unsafe { capacity.write((&solved).into()) };

@@ -25,7 +25,8 @@ pub struct DynvoxRig {
     pub baseline_m: f64,
 }
 
-/// Everything a mapper can be told, beside its bounds: the defaults for a rig, and what dynvox_config_set changed of them.
+/// Everything a mapper can be told, beside its bounds: the defaults for a rig, and what
+/// dynvox_config_set changed of them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxConfig {
@@ -46,10 +47,12 @@ impl From<&StereoRig> for DynvoxRig {
 }
 
 impl DynvoxConfig {
-    /// The defaults with all settings; refused where the lines are not what dynvox_config_set wrote.
+    /// The defaults with all settings; refused where the lines are not what dynvox_config_set
+    /// wrote.
     pub(crate) fn resolved(&self) -> Result<Config, DynvoxStatus> {
         let DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
-        let mut config = defaults(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, &self.raw)?;
+        let mut config =
+            defaults(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, &self.raw)?;
         let lines = self.settings.get(..self.settings_len).ok_or(DynvoxStatus::Config)?;
         let lines = core::str::from_utf8(lines).map_err(|_| DynvoxStatus::Config)?;
         for line in lines.split_terminator('\n') {
@@ -78,7 +81,10 @@ impl DynvoxConfig {
 /// # Safety
 /// `rig` is null or points to a rig, `config` is null or points to a configuration.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *mut DynvoxConfig) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_config_default(
+    rig: *const DynvoxRig,
+    config: *mut DynvoxConfig,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     let (rig, config) = match unsafe { (read(rig), output(config)) } {
         (Ok(rig), Ok(config)) => (rig, config),
@@ -96,19 +102,26 @@ pub unsafe extern "C" fn dynvox_config_default(rig: *const DynvoxRig, config: *m
     DynvoxStatus::Ok
 }
 
-/// Sets one setting by its dotted key: dynvox_config_set(&config, "volume.voxel_size_m", "0.05"). Keys and values are those of a run's
-/// config.toml; choices stand without quotes. The time between two frames is "tracking.frame_interval_s". Whether a value is in its range,
+/// Sets one setting by its dotted key: dynvox_config_set(&config, "volume.voxel_size_m", "0.05").
+/// Keys and values are those of a run's config.toml; choices stand without quotes. The time between
+/// two frames is "tracking.frame_interval_s". Whether a value is in its range,
 /// dynvox_config_problem says.
 ///
 /// # Safety
-/// `config` is null or points to a configuration from dynvox_config_default, `key` and `value` are null or text that ends in a zero byte.
+/// `config` is null or points to a configuration from dynvox_config_default, `key` and `value` are
+/// null or text that ends in a zero byte.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_set(config: *mut DynvoxConfig, key: *const c_char, value: *const c_char) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_config_set(
+    config: *mut DynvoxConfig,
+    key: *const c_char,
+    value: *const c_char,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    let (mut changed, key, value) = match unsafe { (read(config.cast_const()), text(key), text(value)) } {
-        (Ok(config), Ok(key), Ok(value)) => (config, key, value),
-        (Err(status), ..) | (_, Err(status), _) | (_, _, Err(status)) => return status,
-    };
+    let (mut changed, key, value) =
+        match unsafe { (read(config.cast_const()), text(key), text(value)) } {
+            (Ok(config), Ok(key), Ok(value)) => (config, key, value),
+            (Err(status), ..) | (_, Err(status), _) | (_, _, Err(status)) => return status,
+        };
     let mut resolved = match changed.resolved() {
         Ok(resolved) => resolved,
         Err(status) => return status,
@@ -141,13 +154,17 @@ unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, DynvoxStatus> {
     unsafe { CStr::from_ptr(text) }.to_str().map_err(|_| DynvoxStatus::Value)
 }
 
-/// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
-/// problem.
+/// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len`
+/// bytes; the empty text without a problem.
 ///
 /// # Safety
 /// `config` is null or points to a configuration, `text` is null or to `len` bytes.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_problem(config: *const DynvoxConfig, text: *mut c_char, len: usize) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_config_problem(
+    config: *const DynvoxConfig,
+    text: *mut c_char,
+    len: usize,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     let config = match unsafe { read(config) }.and_then(|config| config.resolved()) {
         Ok(config) => config,

@@ -1,4 +1,5 @@
-//! Reading a caller's pointers: every pointer is checked for null and alignment here, and nowhere else.
+//! Reading a caller's pointers: every pointer is checked for null and alignment here, and nowhere
+//! else.
 
 use crate::DynvoxStatus;
 use core::{ops::Range, slice};
@@ -39,7 +40,11 @@ pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
 ///
 /// # Safety
 /// `pointer` is null, misaligned or points to `len` items that nothing writes to for 'a.
-pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usize>) -> Result<&'a [T], DynvoxStatus> {
+pub unsafe fn items<'a, T>(
+    pointer: *const T,
+    len: usize,
+    forbidden: &Range<usize>,
+) -> Result<&'a [T], DynvoxStatus> {
     if len == 0 {
         return Ok(&[]);
     }
@@ -49,13 +54,15 @@ pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usiz
     if !pointer.is_aligned() {
         return Err(DynvoxStatus::Misaligned);
     }
-    let bytes = len.checked_mul(size_of::<T>()).filter(|&bytes| bytes <= MOST).ok_or(DynvoxStatus::Size)?;
+    let bytes =
+        len.checked_mul(size_of::<T>()).filter(|&bytes| bytes <= MOST).ok_or(DynvoxStatus::Size)?;
     let start = pointer as usize;
     let end = start.checked_add(bytes).ok_or(DynvoxStatus::Size)?;
     if start < forbidden.end && forbidden.start < end {
         return Err(DynvoxStatus::Overlap);
     }
-    // SAFETY: not null, aligned, no longer than a slice can be; as long as it says, and left alone, by the caller's promise.
+    // SAFETY: not null, aligned, no longer than a slice can be; as long as it says, and left alone,
+    // by the caller's promise.
     Ok(unsafe { slice::from_raw_parts(pointer, len) })
 }
 
@@ -63,7 +70,11 @@ pub unsafe fn items<'a, T>(pointer: *const T, len: usize, forbidden: &Range<usiz
 ///
 /// # Safety
 /// `pointer` is null, misaligned or points to `len` items that nothing else reads or writes for 'a.
-pub unsafe fn items_mut<'a, T>(pointer: *mut T, len: usize, forbidden: &Range<usize>) -> Result<&'a mut [T], DynvoxStatus> {
+pub unsafe fn items_mut<'a, T>(
+    pointer: *mut T,
+    len: usize,
+    forbidden: &Range<usize>,
+) -> Result<&'a mut [T], DynvoxStatus> {
     // SAFETY: the same promise, and more.
     unsafe { items(pointer.cast_const(), len, forbidden)? };
     if len == 0 {

@@ -1,7 +1,8 @@
 //! A mapper in a caller's buffer.
 //!
-//! The buffer begins with a [`Head`], behind which, at the next multiple of the alignment, lies the slab. A handle points to the head. The
-//! two never overlap, so the mapper's exclusive hold on the slab and a handle's access to the head do not meet.
+//! The buffer begins with a [`Head`], behind which, at the next multiple of the alignment, lies the
+//! slab. A handle points to the head. The two never overlap, so the mapper's exclusive hold on the
+//! slab and a handle's access to the head do not meet.
 
 use crate::{
     DynvoxCapacity, DynvoxConfig, DynvoxStatus,
@@ -46,7 +47,10 @@ pub extern "C" fn dynvox_alignment() -> usize {
 /// # Safety
 /// `capacity` is null or points to a capacity, `bytes` is null or points to a number.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_bytes(capacity: *const DynvoxCapacity, bytes: *mut usize) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_bytes(
+    capacity: *const DynvoxCapacity,
+    bytes: *mut usize,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     match unsafe { (given(capacity), output(bytes)) } {
         (Ok(capacity), Ok(bytes)) => {
@@ -58,12 +62,14 @@ pub unsafe extern "C" fn dynvox_bytes(capacity: *const DynvoxCapacity, bytes: *m
     }
 }
 
-/// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nothing else may read,
-/// write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
+/// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until
+/// dynvox_destroy: nothing else may read, write, move or free it. What it holds before does not
+/// matter. Takes less than 32 KiB of stack, as a step does.
 ///
 /// # Safety
-/// `capacity` is null or points to a capacity, `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by
-/// nothing else, `mapper` is null or points to a pointer.
+/// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+/// `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to a
+/// pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_create(
     capacity: *const DynvoxCapacity,
@@ -91,7 +97,9 @@ pub unsafe fn make(
     new: impl FnOnce(&Capacity, &Config, &'static mut [u8]) -> Result<Mapper<'static>, DynvoxStatus>,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    let given = unsafe { (given(capacity), read(config).and_then(|config| config.resolved()), output(mapper)) };
+    let given = unsafe {
+        (given(capacity), read(config).and_then(|config| config.resolved()), output(mapper))
+    };
     let (capacity, config, handle) = match given {
         (Ok(capacity), Ok(config), Ok(handle)) => (capacity, config, handle),
         (Err(status), ..) | (_, Err(status), _) | (_, _, Err(status)) => return status,
@@ -105,8 +113,10 @@ pub unsafe fn make(
     if len < bytes(&capacity) {
         return DynvoxStatus::TooSmall;
     }
-    // SAFETY: within the buffer, behind the head, which nothing but the mapper made here will use until it is destroyed.
-    let slab: &'static mut [u8] = unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
+    // SAFETY: within the buffer, behind the head, which nothing but the mapper made here will use
+    // until it is destroyed.
+    let slab: &'static mut [u8] =
+        unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
     let made = match new(&capacity, &config, slab) {
         Ok(made) => made,
         Err(status) => return status,
@@ -152,8 +162,11 @@ unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut Head, DynvoxStatus> {
     let head = mapper.cast::<Head>();
     // SAFETY: only looked at.
     unsafe { output(head)? };
-    // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to either field is ever made.
-    let (alive, busy) = unsafe { (ptr::addr_of!((*head).alive).read(), ptr::addr_of!((*head).busy).cast::<u8>().read()) };
+    // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to either
+    // field is ever made.
+    let (alive, busy) = unsafe {
+        (ptr::addr_of!((*head).alive).read(), ptr::addr_of!((*head).busy).cast::<u8>().read())
+    };
     if alive != ALIVE {
         Err(DynvoxStatus::NoMapper)
     } else if busy != 0 {
@@ -166,7 +179,8 @@ unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut Head, DynvoxStatus> {
 /// Does `work` with the mapper and the addresses of its buffer, while no callback can.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it.
 pub unsafe fn with(
     mapper: *mut DynvoxMapper,
     work: impl FnOnce(&mut Mapper<'static>, &Range<usize>) -> Result<(), DynvoxStatus>,
@@ -176,7 +190,8 @@ pub unsafe fn with(
         Ok(head) => head,
         Err(status) => return status,
     };
-    // SAFETY: alive, hence written in whole; the one reference made is to the mapper alone, and busy keeps a second one from being made.
+    // SAFETY: alive, hence written in whole; the one reference made is to the mapper alone, and
+    // busy keeps a second one from being made.
     let done = unsafe {
         ptr::addr_of_mut!((*head).busy).write(true);
         let buffer = head as usize..head as usize + ptr::addr_of!((*head).bytes).read();

@@ -1,9 +1,11 @@
 //! The mapper for C.
 //!
-//! Every function checks what it is given and answers with a [`DynvoxStatus`]; what it cannot check (that a pointer is to as many bytes as
-//! it says) stands in the comments, which become the header's (`include/dynvox.h`, written by cbindgen and compared in the tests).
+//! Every function checks what it is given and answers with a [`DynvoxStatus`]; what it cannot check
+//! (that a pointer is to as many bytes as it says) stands in the comments, which become the
+//! header's (`include/dynvox.h`, written by cbindgen and compared in the tests).
 //!
-//! Memory: none but the caller's buffer. It holds a small head (what a handle points to: the mapper's own fields) and, behind it, the slab.
+//! Memory: none but the caller's buffer. It holds a small head (what a handle points to: the
+//! mapper's own fields) and, behind it, the slab.
 #![no_std]
 
 // A library by itself must name a panic handler and an allocator, though neither is ever reached.
@@ -25,24 +27,37 @@ mod step;
 mod tracks;
 mod types;
 
-pub use callback::{DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex};
-pub use capacity::{
-    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY, DynvoxBudget, DynvoxCapacity, DynvoxProfile,
-    dynvox_capacity_for_budget, dynvox_capacity_of_profile,
+pub use callback::{
+    DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex,
 };
-pub use config::{DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem, dynvox_config_set};
+pub use capacity::{
+    DYNVOX_PROFILE_DESKTOP, DYNVOX_PROFILE_ONBOARD, DYNVOX_PROFILE_SMALL, DYNVOX_PROFILE_TINY,
+    DynvoxBudget, DynvoxCapacity, DynvoxProfile, dynvox_capacity_for_budget,
+    dynvox_capacity_of_profile,
+};
+pub use config::{
+    DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem,
+    dynvox_config_set,
+};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
-pub use map::{DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast, dynvox_stream_out, dynvox_triangles};
+pub use map::{
+    DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast,
+    dynvox_stream_out, dynvox_triangles,
+};
 pub use plan::{
-    DynvoxMovingBox, DynvoxRobot, DynvoxWay, DynvoxWayEnd, DynvoxWindow, dynvox_moving_boxes, dynvox_plan, dynvox_ray, dynvox_sweep,
+    DynvoxMovingBox, DynvoxRobot, DynvoxWay, DynvoxWayEnd, DynvoxWindow, dynvox_moving_boxes,
+    dynvox_plan, dynvox_ray, dynvox_sweep,
 };
 pub use raw::{
-    DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED, DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel,
-    DynvoxRawCamera, DynvoxRawRig, dynvox_config_raw,
+    DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED,
+    DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel, DynvoxRawCamera, DynvoxRawRig,
+    dynvox_config_raw,
 };
 pub use retired::{DynvoxObjectSink, DynvoxRetired, dynvox_retired_triangles};
 pub use snapshot::{DynvoxRead, DynvoxWrite, dynvox_restore, dynvox_save};
 pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step, dynvox_step_with};
 pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
-pub use types::{DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxReport, DynvoxSeverity};
+pub use types::{
+    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxReport, DynvoxSeverity,
+};

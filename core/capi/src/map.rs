@@ -1,7 +1,8 @@
 //! Rendering the map and reading it out.
 
 use crate::{
-    DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink,
+    DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle,
+    DynvoxTriangleSink,
     given::{items_mut, output, read},
     handle::with,
     retired::Retiring,
@@ -9,8 +10,8 @@ use crate::{
 use core::{ffi::c_void, ops::Range};
 use dynvox_core::{Serial, image::View, view::Triangle};
 
-/// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
-/// without padding.
+/// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the
+/// frames; its rows follow each other without padding.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxPicture {
@@ -33,10 +34,15 @@ pub struct DynvoxPicture {
 /// Renders the static map from a pose.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to a
-/// pose; `picture` is null or points to a picture whose buffers are as large as it says and overlap nothing.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `pose` is null or points to a pose; `picture` is null or points to a picture whose
+/// buffers are as large as it says and overlap nothing.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_raycast(mapper: *mut DynvoxMapper, pose: *const DynvoxPose, picture: *mut DynvoxPicture) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_raycast(
+    mapper: *mut DynvoxMapper,
+    pose: *const DynvoxPose,
+    picture: *mut DynvoxPicture,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, buffer| {
@@ -62,7 +68,11 @@ pub unsafe extern "C" fn dynvox_raycast(mapper: *mut DynvoxMapper, pose: *const 
 ///
 /// # Safety
 /// `output` is null or points to as many pixels as the image has, which nothing else uses.
-unsafe fn fill<T: Copy>(image: Option<View<'_, T>>, output: *mut T, mapper: &Range<usize>) -> Result<(), DynvoxStatus> {
+unsafe fn fill<T: Copy>(
+    image: Option<View<'_, T>>,
+    output: *mut T,
+    mapper: &Range<usize>,
+) -> Result<(), DynvoxStatus> {
     let Some(image) = image.filter(|_| !output.is_null()) else { return Ok(()) };
     // SAFETY: the caller's promise.
     let output = unsafe { items_mut(output, image.width() * image.height(), mapper)? };
@@ -70,11 +80,12 @@ unsafe fn fill<T: Copy>(image: Option<View<'_, T>>, output: *mut T, mapper: &Ran
     Ok(())
 }
 
-/// Hands every triangle of the static map to `sink`, and writes how many there were to `count`, which may be null.
+/// Hands every triangle of the static map to `sink`, and writes how many there were to `count`,
+/// which may be null.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
-/// a number.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `count` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_triangles(
     mapper: *mut DynvoxMapper,
@@ -83,10 +94,15 @@ pub unsafe extern "C" fn dynvox_triangles(
     count: *mut u64,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    unsafe { with(mapper, |mapper, _| hand_over((sink, context, count), |mut sink| Ok(mapper.triangles(&mut sink)))) }
+    unsafe {
+        with(mapper, |mapper, _| {
+            hand_over((sink, context, count), |mut sink| Ok(mapper.triangles(&mut sink)))
+        })
+    }
 }
 
-/// Hands every triangle of `mesh` to a caller's sink, with its context, and writes how many there were to the count, which may be null.
+/// Hands every triangle of `mesh` to a caller's sink, with its context, and writes how many there
+/// were to the count, which may be null.
 ///
 /// # Safety
 /// The count is null or points to a number.
@@ -108,12 +124,14 @@ pub(crate) unsafe fn hand_over(
     Ok(())
 }
 
-/// Evicts every block of the static map into `store`, which holds the entire map then. Writes the number of stored blocks to `stored` and
-/// of those the store refused to `lost`; either may be null.
+/// Evicts every block of the static map into `store`, which holds the entire map then. Writes the
+/// number of stored blocks to `stored` and of those the store refused to `lost`; either may be
+/// null.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `store` is null or points to a
-/// store; `stored` and `lost` are null or point to a number.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `store` is null or points to a store; `stored` and `lost` are null or point to a
+/// number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_stream_out(
     mapper: *mut DynvoxMapper,
@@ -139,10 +157,12 @@ pub unsafe extern "C" fn dynvox_stream_out(
     }
 }
 
-/// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with. The map can be rendered and read out as before.
+/// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with.
+/// The map can be rendered and read out as before.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatus {
     // SAFETY: the caller's promise.
@@ -154,17 +174,22 @@ pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatu
     }
 }
 
-/// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be null.
+/// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be
+/// null.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `objects` is null or points to a
-/// sink.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `objects` is null or points to a sink.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_finish_with(mapper: *mut DynvoxMapper, objects: *const DynvoxObjectSink) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_finish_with(
+    mapper: *mut DynvoxMapper,
+    objects: *const DynvoxObjectSink,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
-            let mut retiring = Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
+            let mut retiring =
+                Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
             mapper.finish_with(&mut retiring);
             Ok(())
         })
@@ -176,12 +201,16 @@ pub unsafe extern "C" fn dynvox_finish_with(mapper: *mut DynvoxMapper, objects: 
 /// # Safety
 /// `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_pose_matrix(pose: *const DynvoxPose, matrix: *mut f64) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_pose_matrix(
+    pose: *const DynvoxPose,
+    matrix: *mut f64,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
-    let (pose, matrix) = match unsafe { (read(pose).and_then(|pose| pose.transform()), output(matrix)) } {
-        (Ok(pose), Ok(matrix)) => (pose, matrix),
-        (Err(status), _) | (_, Err(status)) => return status,
-    };
+    let (pose, matrix) =
+        match unsafe { (read(pose).and_then(|pose| pose.transform()), output(matrix)) } {
+            (Ok(pose), Ok(matrix)) => (pose, matrix),
+            (Err(status), _) | (_, Err(status)) => return status,
+        };
     for (at, &number) in pose.matrix_3x4().as_flattened().iter().enumerate() {
         // SAFETY: three rows of four.
         unsafe { matrix.add(at).write(number) };

@@ -8,8 +8,9 @@ use crate::{
 use core::ops::Range;
 use dynvox_core::planning::{CellState, MovingBox, Planning, Sweep, Way, WayEnd};
 
-/// The planner's window from above: buffers of the caller, any may be null. Columns are in rows from the nearest ahead to the farthest, in
-/// each row from left to right; cells of a column follow each other upwards.
+/// The planner's window from above: buffers of the caller, any may be null. Columns are in rows
+/// from the nearest ahead to the farthest, in each row from left to right; cells of a column follow
+/// each other upwards.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxWindow {
@@ -19,7 +20,8 @@ pub struct DynvoxWindow {
     pub cells_capacity: usize,
     /// Of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
     pub state: *mut u8,
-    /// Distance to the nearest obstacle, m, below 0 inside one; the largest float without an obstacle.
+    /// Distance to the nearest obstacle, m, below 0 inside one; the largest float without an
+    /// obstacle.
     pub distance_m: *mut f32,
     /// Height of the ground, m; the largest float where none was found.
     pub height_m: *mut f32,
@@ -33,7 +35,8 @@ pub struct DynvoxWindow {
     pub size: [usize; 3],
     /// Written: a cell's side, m.
     pub cell_m: f64,
-    /// Written: where the first cell begins, m to the right, ahead and upwards of the world's origin.
+    /// Written: where the first cell begins, m to the right, ahead and upwards of the world's
+    /// origin.
     pub origin_m: [f64; 3],
     /// Written: the world's coordinates of a metre to the right, ahead and upwards, in this order.
     pub axes_world: [[f64; 3]; 3],
@@ -99,7 +102,16 @@ pub struct DynvoxRobot {
 
 impl From<&MovingBox> for DynvoxMovingBox {
     fn from(of: &MovingBox) -> Self {
-        let &MovingBox { id, unseen_frames, center_m, half_m, heading, velocity_m_s, sigma_m, sigma_m_s } = of;
+        let &MovingBox {
+            id,
+            unseen_frames,
+            center_m,
+            half_m,
+            heading,
+            velocity_m_s,
+            sigma_m,
+            sigma_m_s,
+        } = of;
         Self { id, unseen_frames, center_m, half_m, heading, velocity_m_s, sigma_m, sigma_m_s }
     }
 }
@@ -123,14 +135,20 @@ const fn code(state: CellState) -> u8 {
     }
 }
 
-/// Reads the map into the planner's window, with moving objects where they will be `ahead_s` seconds after the last frame, and copies it
-/// to `window`. Of a capacity without a window its size is 0.
+/// Reads the map into the planner's window, with moving objects where they will be `ahead_s`
+/// seconds after the last frame, and copies it to `window`. Of a capacity without a window its size
+/// is 0.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `window` is null or points to a
-/// window whose buffers are as large as it says and overlap nothing.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `window` is null or points to a window whose buffers are as large as it says and
+/// overlap nothing.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_plan(mapper: *mut DynvoxMapper, ahead_s: f32, window: *mut DynvoxWindow) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_plan(
+    mapper: *mut DynvoxMapper,
+    ahead_s: f32,
+    window: *mut DynvoxWindow,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, buffer| {
@@ -140,8 +158,8 @@ pub unsafe extern "C" fn dynvox_plan(mapper: *mut DynvoxMapper, ahead_s: f32, wi
             let (grid, cell_m) = (planning.grid(), planning.grid().cell_m());
             (to.size, to.cell_m) = (planning.size(), cell_m);
             to.origin_m = planning.origin().map(|c| f64::from(c) * cell_m);
-            to.axes_world =
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis: [f64; 3]| grid.to_world(axis.map(|c| c / cell_m)));
+            to.axes_world = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|axis: [f64; 3]| grid.to_world(axis.map(|c| c / cell_m)));
             copy_window(planning, &to, buffer)?;
             window.write(to);
             Ok(())
@@ -153,21 +171,33 @@ pub unsafe extern "C" fn dynvox_plan(mapper: *mut DynvoxMapper, ahead_s: f32, wi
 ///
 /// # Safety
 /// Each buffer is null or as large as the window says, and nothing else uses it.
-unsafe fn copy_window(planning: &Planning<'_>, to: &DynvoxWindow, buffer: &Range<usize>) -> Result<(), DynvoxStatus> {
+unsafe fn copy_window(
+    planning: &Planning<'_>,
+    to: &DynvoxWindow,
+    buffer: &Range<usize>,
+) -> Result<(), DynvoxStatus> {
     let [width, length, height] = planning.size();
     let [x, y, z] = planning.origin();
-    let at = move |column: usize| [x + (column % width.max(1)) as i32, y + (column / width.max(1)) as i32, z];
+    let at = move |column: usize| {
+        [x + (column % width.max(1)) as i32, y + (column / width.max(1)) as i32, z]
+    };
     let columns = width * length;
     let column = |at| planning.column(at).unwrap_or_default();
     let none = |value: Option<f32>| value.unwrap_or(f32::MAX);
-    let has_columns = [to.distance_m, to.height_m, to.slope, to.step_m].iter().any(|of| !of.is_null()) || !to.state.is_null();
-    if (has_columns && to.columns_capacity < columns) || (!to.cells.is_null() && to.cells_capacity < columns * height) {
+    let has_columns =
+        [to.distance_m, to.height_m, to.slope, to.step_m].iter().any(|of| !of.is_null())
+            || !to.state.is_null();
+    if (has_columns && to.columns_capacity < columns)
+        || (!to.cells.is_null() && to.cells_capacity < columns * height)
+    {
         return Err(DynvoxStatus::TooSmall);
     }
     // SAFETY: the caller's promise; sizes were checked.
     unsafe {
         fill(to.state, columns, buffer, |n| code(planning.slice_state(at(n))))?;
-        fill(to.distance_m, columns, buffer, |n| none(planning.slice_distance(at(n)).map(|distance| distance.distance_m)))?;
+        fill(to.distance_m, columns, buffer, |n| {
+            none(planning.slice_distance(at(n)).map(|distance| distance.distance_m))
+        })?;
         fill(to.height_m, columns, buffer, |n| none(column(at(n)).ground_m()))?;
         fill(to.slope, columns, buffer, |n| none(column(at(n)).slope()))?;
         fill(to.step_m, columns, buffer, |n| column(at(n)).step_m)?;
@@ -182,7 +212,12 @@ unsafe fn copy_window(planning: &Planning<'_>, to: &DynvoxWindow, buffer: &Range
 ///
 /// # Safety
 /// `output` is null or points to as many items, which nothing else uses.
-unsafe fn fill<T>(output: *mut T, count: usize, mapper: &Range<usize>, value: impl Fn(usize) -> T) -> Result<(), DynvoxStatus> {
+unsafe fn fill<T>(
+    output: *mut T,
+    count: usize,
+    mapper: &Range<usize>,
+    value: impl Fn(usize) -> T,
+) -> Result<(), DynvoxStatus> {
     if output.is_null() {
         return Ok(());
     }
@@ -192,12 +227,12 @@ unsafe fn fill<T>(output: *mut T, count: usize, mapper: &Range<usize>, value: im
     Ok(())
 }
 
-/// Writes the moving objects of the last dynvox_plan, where they were in the last frame, at most `capacity` of them, and to `count` how many
-/// there are.
+/// Writes the moving objects of the last dynvox_plan, where they were in the last frame, at most
+/// `capacity` of them, and to `count` how many there are.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `boxes` is null or points to
-/// `capacity` boxes, `count` is null or points to a number.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `boxes` is null or points to `capacity` boxes, `count` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_moving_boxes(
     mapper: *mut DynvoxMapper,
@@ -218,12 +253,13 @@ pub unsafe extern "C" fn dynvox_moving_boxes(
     }
 }
 
-/// Follows a ray of the world from `origin_m` in `direction` (three numbers each, the direction of any length), at most `far_m`, to the
-/// first surface or unknown place.
+/// Follows a ray of the world from `origin_m` in `direction` (three numbers each, the direction of
+/// any length), at most `far_m`, to the first surface or unknown place.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `origin_m` and `direction` are null
-/// or point to three numbers, `way` is null or points to a way.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `origin_m` and `direction` are null or point to three numbers, `way` is null or points
+/// to a way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_ray(
     mapper: *mut DynvoxMapper,
@@ -236,18 +272,23 @@ pub unsafe extern "C" fn dynvox_ray(
     unsafe {
         with(mapper, |mapper, _| {
             let way = output(way)?;
-            let (origin_m, direction) = (read(origin_m.cast::<[f64; 3]>())?, read(direction.cast::<[f64; 3]>())?);
-            way.write(mapper.planning().ray(mapper.background(), origin_m, direction, far_m).into());
+            let (origin_m, direction) =
+                (read(origin_m.cast::<[f64; 3]>())?, read(direction.cast::<[f64; 3]>())?);
+            way.write(
+                mapper.planning().ray(mapper.background(), origin_m, direction, far_m).into(),
+            );
             Ok(())
         })
     }
 }
 
-/// How far a robot may follow a polyline of `count` world points on the ground, three numbers each, before it touches a surface.
+/// How far a robot may follow a polyline of `count` world points on the ground, three numbers each,
+/// before it touches a surface.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `points_m` is null or points to
-/// three times `count` numbers, `robot` is null or points to a robot, `way` is null or points to a way.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `points_m` is null or points to three times `count` numbers, `robot` is null or points
+/// to a robot, `way` is null or points to a way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_sweep(
     mapper: *mut DynvoxMapper,

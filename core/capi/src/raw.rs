@@ -49,13 +49,16 @@ impl DynvoxRawCamera {
     fn camera(&self) -> Result<RawCamera, DynvoxStatus> {
         let [a, b, c, d, e, f, g, h] = self.parameters;
         let model = match self.model {
-            DYNVOX_LENS_RADIAL_TANGENTIAL => LensModel::RadialTangential { radial: [a, b, c, d, e, f], tangential: [g, h] },
+            DYNVOX_LENS_RADIAL_TANGENTIAL => {
+                LensModel::RadialTangential { radial: [a, b, c, d, e, f], tangential: [g, h] }
+            }
             DYNVOX_LENS_EQUIDISTANT => LensModel::Equidistant { radial: [a, b, c, d] },
             DYNVOX_LENS_DOUBLE_SPHERE => LensModel::DoubleSphere { xi: a, alpha: b },
             DYNVOX_LENS_EXTENDED_UNIFIED => LensModel::ExtendedUnified { alpha: a, beta: b },
             _ => return Err(DynvoxStatus::Unknown),
         };
-        let lens = Lens::new(self.focal_px, self.center_px, model).map_err(|_| DynvoxStatus::Config)?;
+        let lens =
+            Lens::new(self.focal_px, self.center_px, model).map_err(|_| DynvoxStatus::Config)?;
         Ok(RawCamera { lens, width: self.width, height: self.height })
     }
 }
@@ -109,13 +112,17 @@ impl DynvoxRawRig {
     }
 }
 
-/// Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size of the raw images, and the capacity's
-/// `raw_width` and `raw_height` bound it. The rectified rig is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
+/// Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size
+/// of the raw images, and the capacity's `raw_width` and `raw_height` bound it. The rectified rig
+/// is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
 ///
 /// # Safety
 /// `rig` is null or points to a rig, `config` is null or points to a configuration.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_config_raw(rig: *const DynvoxRawRig, config: *mut DynvoxConfig) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_config_raw(
+    rig: *const DynvoxRawRig,
+    config: *mut DynvoxConfig,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     let (raw, to) = match unsafe { (read(rig), output(config)) } {
         (Ok(raw), Ok(to)) => (raw, to),
@@ -138,7 +145,9 @@ pub unsafe extern "C" fn dynvox_config_raw(rig: *const DynvoxRawRig, config: *mu
 /// The defaults for a rig, or for raw cameras where there are any.
 pub(crate) fn defaults(rig: StereoRig, raw: &DynvoxRawRig) -> Result<Config, DynvoxStatus> {
     Ok(match raw.rectification()? {
-        Some((rectification, rig)) => Config { rectification: Some(rectification), ..Config::for_rig(rig) },
+        Some((rectification, rig)) => {
+            Config { rectification: Some(rectification), ..Config::for_rig(rig) }
+        }
         None => Config::for_rig(rig),
     })
 }

@@ -35,7 +35,8 @@ pub struct DynvoxRetired {
     pub volume: *const c_void,
 }
 
-/// The caller's sink for objects that leave. Called on the thread of the step, which waits for it; must not call the same mapper.
+/// The caller's sink for objects that leave. Called on the thread of the step, which waits for it;
+/// must not call the same mapper.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxObjectSink {
@@ -52,7 +53,11 @@ impl DynvoxObjectSink {
     /// `sink` is null or points to a sink.
     pub(crate) unsafe fn given(sink: *const Self) -> Result<Self, DynvoxStatus> {
         // SAFETY: the caller's promise.
-        if sink.is_null() { Ok(Self { context: core::ptr::null_mut(), retire: None }) } else { unsafe { read(sink) } }
+        if sink.is_null() {
+            Ok(Self { context: core::ptr::null_mut(), retire: None })
+        } else {
+            unsafe { read(sink) }
+        }
     }
 }
 
@@ -71,7 +76,8 @@ pub(crate) struct Retiring {
 impl ObjectSink for Retiring {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
         let Some(retire) = self.sink.retire else { return };
-        let (summary, volume) = (&object.summary, RetiredVolume { volume: object.volume, mesh: self.mesh });
+        let (summary, volume) =
+            (&object.summary, RetiredVolume { volume: object.volume, mesh: self.mesh });
         let object = DynvoxRetired {
             id: summary.id,
             segment_id: summary.segment_id,
@@ -88,11 +94,12 @@ impl ObjectSink for Retiring {
     }
 }
 
-/// Hands every triangle of an object that leaves to `sink`, in the object's own frame, and writes how many there were to `count`, which may be
-/// null. Only within the call that reports the object.
+/// Hands every triangle of an object that leaves to `sink`, in the object's own frame, and writes
+/// how many there were to `count`, which may be null. Only within the call that reports the object.
 ///
 /// # Safety
-/// `object` is null or what the caller's DynvoxObjectSink was handed, within that call; `count` is null or points to a number.
+/// `object` is null or what the caller's DynvoxObjectSink was handed, within that call; `count` is
+/// null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_retired_triangles(
     object: *const DynvoxRetired,

@@ -8,31 +8,43 @@ use core::ffi::c_void;
 use dynvox_core::{Mapper, RestoreError};
 
 /// Takes the next bytes of a snapshot; false when it cannot. Must not call the same mapper.
-pub type DynvoxWrite = Option<extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize) -> bool>;
+pub type DynvoxWrite =
+    Option<extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize) -> bool>;
 
 /// Fills `bytes` with the next `len` bytes of a snapshot; false when there are not as many.
-pub type DynvoxRead = Option<extern "C" fn(context: *mut c_void, bytes: *mut u8, len: usize) -> bool>;
+pub type DynvoxRead =
+    Option<extern "C" fn(context: *mut c_void, bytes: *mut u8, len: usize) -> bool>;
 
-/// Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as before. DYNVOX_STATUS_CALLBACK when
-/// `write` refused.
+/// Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as
+/// before. DYNVOX_STATUS_CALLBACK when `write` refused.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_save(mapper: *mut DynvoxMapper, write: DynvoxWrite, context: *mut c_void) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_save(
+    mapper: *mut DynvoxMapper,
+    write: DynvoxWrite,
+    context: *mut c_void,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
             let write = write.ok_or(DynvoxStatus::Null)?;
             mapper.save(&mut |bytes: &[u8]| {
-                if write(context, bytes.as_ptr(), bytes.len()) { Ok(()) } else { Err(DynvoxStatus::Callback) }
+                if write(context, bytes.as_ptr(), bytes.len()) {
+                    Ok(())
+                } else {
+                    Err(DynvoxStatus::Callback)
+                }
             })
         })
     }
 }
 
-/// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and configuration must be those of the saved one. No
-/// mapper is made from a damaged snapshot (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
+/// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and
+/// configuration must be those of the saved one. No mapper is made from a damaged snapshot
+/// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
 ///
 /// # Safety
 /// As dynvox_create.
@@ -48,7 +60,11 @@ pub unsafe extern "C" fn dynvox_restore(
 ) -> DynvoxStatus {
     let Some(read) = read else { return DynvoxStatus::Null };
     let mut source = |bytes: &mut [u8]| {
-        if read(context, bytes.as_mut_ptr(), bytes.len()) { Ok(()) } else { Err(DynvoxStatus::Callback) }
+        if read(context, bytes.as_mut_ptr(), bytes.len()) {
+            Ok(())
+        } else {
+            Err(DynvoxStatus::Callback)
+        }
     };
     // SAFETY: the caller's promise.
     unsafe {

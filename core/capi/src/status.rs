@@ -11,7 +11,8 @@ pub enum DynvoxStatus {
     Ok = 0,
     /// A pointer that must not be null is.
     Null,
-    /// The buffer does not begin at a multiple of dynvox_alignment(), or another pointer not at one of its type's.
+    /// The buffer does not begin at a multiple of dynvox_alignment(), or another pointer not at one
+    /// of its type's.
     Misaligned,
     /// The buffer or an output is too small.
     TooSmall,
@@ -23,11 +24,13 @@ pub enum DynvoxStatus {
     Overlap,
     /// An unknown profile, class, track or setting.
     Unknown,
-    /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
+    /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not
+    /// finite is one reason.
     Config,
     /// A pose is not finite, its rotation is not of length 1, or it lies beyond the map.
     Pose,
-    /// An image is larger than the profile allows, too small to match, or its stride is below its width.
+    /// An image is larger than the profile allows, too small to match, or its stride is below its
+    /// width.
     Size,
     /// A frame's size differs from that of the frames before.
     SizeChanged,
@@ -89,9 +92,10 @@ impl From<StepError> for DynvoxStatus {
     fn from(error: StepError) -> Self {
         match error {
             StepError::SizeChanged => Self::SizeChanged,
-            StepError::SizesDiffer | StepError::RawSizeDiffers { .. } | StepError::TooLarge { .. } | StepError::TooSmall { .. } => {
-                Self::Size
-            }
+            StepError::SizesDiffer
+            | StepError::RawSizeDiffers { .. }
+            | StepError::TooLarge { .. }
+            | StepError::TooSmall { .. } => Self::Size,
             StepError::TimeNotLater => Self::Time,
             StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
             _ => Self::Unknown,

@@ -1,7 +1,8 @@
 //! Taking frames.
 
 use crate::{
-    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxReport, DynvoxStatus, DynvoxStore,
+    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose,
+    DynvoxReport, DynvoxStatus, DynvoxStore,
     given::{items, output, read},
     handle::with,
     retired::Retiring,
@@ -13,13 +14,14 @@ use dynvox_core::{
     tracking::{Class, Detection, MAX_DETECTIONS},
 };
 
-/// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or are lost and counted where it is null.
-/// What was refused is counted in `report`, which may be null.
+/// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or
+/// are lost and counted where it is null. What was refused is counted in `report`, which may be
+/// null.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `frame` is null or points to a
-/// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or points to
-/// a report.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `frame` is null or points to a frame whose images, detections and masks are as large as
+/// it says; `store` is null or points to a store; `report` is null or points to a report.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_step(
     mapper: *mut DynvoxMapper,
@@ -31,7 +33,8 @@ pub unsafe extern "C" fn dynvox_step(
     unsafe { dynvox_step_with(mapper, frame, store, ptr::null(), report) }
 }
 
-/// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be null.
+/// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be
+/// null.
 ///
 /// # Safety
 /// As dynvox_step; `objects` is null or points to a sink.
@@ -48,7 +51,8 @@ pub unsafe extern "C" fn dynvox_step_with(
         with(mapper, |mapper, buffer| {
             let frame = read(frame)?;
             let mut store = if store.is_null() { DynvoxStore::NONE } else { read(store)? };
-            let mut retiring = Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
+            let mut retiring =
+                Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
             let report = if report.is_null() { None } else { Some(output(report)?) };
             let mut buffered = [NOTHING; MAX_DETECTIONS];
             let frame_in_core = StereoFrame {
@@ -59,7 +63,11 @@ pub unsafe extern "C" fn dynvox_step_with(
                 detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: disparity(&frame, buffer)?,
                 time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
-                t_world_camera: if frame.t_world_camera.is_null() { None } else { Some(read(frame.t_world_camera)?.transform()?) },
+                t_world_camera: if frame.t_world_camera.is_null() {
+                    None
+                } else {
+                    Some(read(frame.t_world_camera)?.transform()?)
+                },
             };
             let done = mapper.step_with(&frame_in_core, &Serial, &mut store, &mut retiring)?;
             if let Some(report) = report {
@@ -73,10 +81,13 @@ pub unsafe extern "C" fn dynvox_step_with(
 /// Writes the left camera's pose in the last frame; the identity before the first.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to
-/// a pose.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `pose` is null or points to a pose.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_pose(mapper: *mut DynvoxMapper, pose: *mut DynvoxPose) -> DynvoxStatus {
+pub unsafe extern "C" fn dynvox_pose(
+    mapper: *mut DynvoxMapper,
+    pose: *mut DynvoxPose,
+) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
@@ -90,22 +101,32 @@ pub unsafe extern "C" fn dynvox_pose(mapper: *mut DynvoxMapper, pose: *mut Dynvo
 ///
 /// # Safety
 /// The image is as large as the frame says.
-unsafe fn image<'a, T>(frame: &DynvoxFrame, image: DynvoxImage, buffer: &Range<usize>) -> Result<Option<View<'a, T>>, DynvoxStatus> {
+unsafe fn image<'a, T>(
+    frame: &DynvoxFrame,
+    image: DynvoxImage,
+    buffer: &Range<usize>,
+) -> Result<Option<View<'a, T>>, DynvoxStatus> {
     if image.pixels.is_null() {
         return Ok(None);
     }
     let before_last = frame.height.checked_sub(1).and_then(|rows| rows.checked_mul(image.stride));
-    let len = before_last.and_then(|pixels| pixels.checked_add(frame.width)).ok_or(DynvoxStatus::Size)?;
+    let len =
+        before_last.and_then(|pixels| pixels.checked_add(frame.width)).ok_or(DynvoxStatus::Size)?;
     // SAFETY: the caller's promise; a pixel is bytes, so that no alignment is asked of it.
     let pixels = unsafe { items(image.pixels.cast::<T>(), len, buffer)? };
-    View::with_stride(pixels, frame.width, frame.height, image.stride).map(Some).ok_or(DynvoxStatus::Size)
+    View::with_stride(pixels, frame.width, frame.height, image.stride)
+        .map(Some)
+        .ok_or(DynvoxStatus::Size)
 }
 
 /// The frame's own disparity; none where it is null.
 ///
 /// # Safety
 /// It is as large as the frame says.
-unsafe fn disparity<'a>(frame: &DynvoxFrame, buffer: &Range<usize>) -> Result<Option<View<'a, u16>>, DynvoxStatus> {
+unsafe fn disparity<'a>(
+    frame: &DynvoxFrame,
+    buffer: &Range<usize>,
+) -> Result<Option<View<'a, u16>>, DynvoxStatus> {
     if frame.disparity_q8.is_null() {
         return Ok(None);
     }
@@ -115,7 +136,8 @@ unsafe fn disparity<'a>(frame: &DynvoxFrame, buffer: &Range<usize>) -> Result<Op
     View::new(pixels, frame.width, frame.height).map(Some).ok_or(DynvoxStatus::Size)
 }
 
-const NOTHING: Detection<'static> = Detection { class: Class::Other, score: 0.0, left: 0, top: 0, width: 0, height: 0, mask: &[] };
+const NOTHING: Detection<'static> =
+    Detection { class: Class::Other, score: 0.0, left: 0, top: 0, width: 0, height: 0, mask: &[] };
 
 /// The frame's detections, copied to `buffered`.
 ///
@@ -127,9 +149,12 @@ unsafe fn detections<'a>(
     buffer: &Range<usize>,
 ) -> Result<&'a [Detection<'a>], DynvoxStatus> {
     // SAFETY: the caller's promise.
-    let given: &[DynvoxDetection] = unsafe { items(frame.detections, frame.detection_count, buffer)? };
+    let given: &[DynvoxDetection] =
+        unsafe { items(frame.detections, frame.detection_count, buffer)? };
     let buffered = buffered.get_mut(..given.len()).ok_or(DynvoxStatus::TooMany)?;
-    for (slot, &DynvoxDetection { class_code, score, left, top, width, height, mask }) in buffered.iter_mut().zip(given) {
+    for (slot, &DynvoxDetection { class_code, score, left, top, width, height, mask }) in
+        buffered.iter_mut().zip(given)
+    {
         let class = *Class::ALL.get(usize::from(class_code)).ok_or(DynvoxStatus::Unknown)?;
         let len = (width as usize).checked_mul(height as usize).ok_or(DynvoxStatus::Size)?;
         // SAFETY: the caller's promise.

@@ -105,11 +105,12 @@ impl From<&TrackReport> for DynvoxTrack {
     }
 }
 
-/// Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there are.
+/// Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there
+/// are.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `tracks` is null or points to
-/// `capacity` tracks; `count` is null or points to a number.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `tracks` is null or points to `capacity` tracks; `count` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_tracks(
     mapper: *mut DynvoxMapper,
@@ -129,12 +130,13 @@ pub unsafe extern "C" fn dynvox_tracks(
     }
 }
 
-/// Hands every triangle of a reconstructed object to `sink`, in the object's own frame (`t_world_object` of its track brings it to the world), and
-/// writes how many there were to `count`, which may be null. DYNVOX_STATUS_UNKNOWN where the track is not reconstructed now.
+/// Hands every triangle of a reconstructed object to `sink`, in the object's own frame
+/// (`t_world_object` of its track brings it to the world), and writes how many there were to
+/// `count`, which may be null. DYNVOX_STATUS_UNKNOWN where the track is not reconstructed now.
 ///
 /// # Safety
-/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
-/// a number.
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `count` is null or points to a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_object_triangles(
     mapper: *mut DynvoxMapper,
@@ -148,7 +150,9 @@ pub unsafe extern "C" fn dynvox_object_triangles(
         with(mapper, |mapper, _| {
             hand_over((sink, context, count), |mut sink| {
                 let of_track = mapper.objects().filter(|(summary, _)| summary.id == track_id);
-                let (_, object) = of_track.max_by_key(|(summary, _)| summary.segment_id).ok_or(DynvoxStatus::Unknown)?;
+                let (_, object) = of_track
+                    .max_by_key(|(summary, _)| summary.segment_id)
+                    .ok_or(DynvoxStatus::Unknown)?;
                 Ok(object.volume().triangles(&mapper.config().mesh, &mut sink))
             })
         })

@@ -3,7 +3,8 @@
 use crate::DynvoxStatus;
 use dynvox_core::{Report, Severity, geometry::Transform};
 
-/// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
+/// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
+/// Camera axes: x right, y down, z forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct DynvoxPose {
@@ -33,7 +34,8 @@ impl From<&Transform> for DynvoxPose {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxImage {
-    /// The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from here on. Null: there is no such image.
+    /// The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from
+    /// here on. Null: there is no such image.
     pub pixels: *const u8,
     /// Pixels from one row to the next.
     pub stride: usize,
@@ -43,7 +45,8 @@ pub struct DynvoxImage {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxDetection {
-    /// 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal, 11 moving object.
+    /// 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle,
+    /// 10 animal, 11 moving object.
     pub class_code: u8,
     /// How sure the detector is, 0 to 1.
     pub score: f32,
@@ -55,11 +58,13 @@ pub struct DynvoxDetection {
     pub width: u32,
     /// Rows of the box, px.
     pub height: u32,
-    /// `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is 0.
+    /// `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is
+    /// 0.
     pub mask: *const u8,
 }
 
-/// A stereo pair and what is known of it, rectified, or raw where the configuration is dynvox_config_raw's. Everything is read during the call alone.
+/// A stereo pair and what is known of it, rectified, or raw where the configuration is
+/// dynvox_config_raw's. Everything is read during the call alone.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxFrame {
@@ -79,11 +84,12 @@ pub struct DynvoxFrame {
     pub detection_count: usize,
     /// Where the camera is, for those who know; null lets the mapper find out.
     pub t_world_camera: *const DynvoxPose,
-    /// When the pair was taken, ns since any moment that stays the same, rising from frame to frame; null where nothing tells: then
-    /// "tracking.frame_interval_s" has passed since the frame before.
+    /// When the pair was taken, ns since any moment that stays the same, rising from frame to
+    /// frame; null where nothing tells: then "tracking.frame_interval_s" has passed since the frame
+    /// before.
     pub time_ns: *const u64,
-    /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height` values without padding; null lets the mapper
-    /// match the pair.
+    /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
+    /// values without padding; null lets the mapper match the pair.
     pub disparity_q8: *const u16,
 }
 
@@ -111,7 +117,8 @@ pub struct DynvoxReport {
     pub t_world_camera: DynvoxPose,
     /// Whether the frame went into the map.
     pub fused: bool,
-    /// Number of the map's segment, from 0: another one begins, 100 m above, where the camera was lost and not found again.
+    /// Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
+    /// lost and not found again.
     pub segment: u32,
     /// Pixels with a disparity.
     pub disparities: u32,
@@ -133,7 +140,8 @@ pub struct DynvoxReport {
     pub voxels_pruned: u32,
     /// Digest of what went in: the same pictures give the same number everywhere.
     pub input_digest: u64,
-    /// Digest of all that came of the step: the same frames and configuration give the same number everywhere.
+    /// Digest of all that came of the step: the same frames and configuration give the same number
+    /// everywhere.
     pub digest: u64,
 }
 

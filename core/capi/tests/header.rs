@@ -6,12 +6,16 @@ use std::{env, fs, path::Path, process::Command};
 #[test]
 fn the_header_is_what_the_source_says() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).expect("the configuration can be read");
-    let modules =
-        ["status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks", "plan", "raw", "retired", "snapshot"];
-    let builder = modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {
-        builder.with_src(here.join("src").join(module).with_extension("rs"))
-    });
+    let config = cbindgen::Config::from_file(here.join("cbindgen.toml"))
+        .expect("the configuration can be read");
+    let modules = [
+        "status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks",
+        "plan", "raw", "retired", "snapshot",
+    ];
+    let builder =
+        modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {
+            builder.with_src(here.join("src").join(module).with_extension("rs"))
+        });
     let mut bytes = Vec::new();
     builder.generate().expect("the source can be read").write(&mut bytes);
     let written = String::from_utf8(bytes).expect("text");
@@ -20,7 +24,10 @@ fn the_header_is_what_the_source_says() {
         fs::write(&path, &written).expect("the header can be written");
     }
     let committed = fs::read_to_string(&path).expect("the header is there");
-    assert!(committed == written, "include/dynvox.h is old: DYNVOX_BLESS=1 cargo test -p dynvox-capi --test header");
+    assert!(
+        committed == written,
+        "include/dynvox.h is old: DYNVOX_BLESS=1 cargo test -p dynvox-capi --test header"
+    );
 }
 
 /// Whether a compiler takes the header, alone and with all warnings as errors.
@@ -29,16 +36,26 @@ fn compiles(variable: &str, default: &str, language: &str, standard: &str) {
     let folder = env::temp_dir().join(format!("dynvox-header-{}-{language}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
     let source = folder.join("alone");
-    let text =
-        "#include \"dynvox.h\"\nint main(void) { DynvoxConfig config; return config.settings_len == 0 ? 0 : (int)sizeof(DynvoxTrack); }\n";
+    let text = "#include \"dynvox.h\"\nint main(void) { DynvoxConfig config; return config.settings_len == 0 ? 0 : (int)sizeof(DynvoxTrack); }\n";
     fs::write(
         &source,
-        text.replace("DynvoxConfig config;", "DynvoxConfig config = {0};").replace("{0}", if language == "c" { "{0}" } else { "{}" }),
+        text.replace("DynvoxConfig config;", "DynvoxConfig config = {0};")
+            .replace("{0}", if language == "c" { "{0}" } else { "{}" }),
     )
     .expect("a source");
     let compiler = env::var_os(variable).unwrap_or_else(|| default.into());
     let built = Command::new(compiler)
-        .args(["-x", language, standard, "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only", "-I"])
+        .args([
+            "-x",
+            language,
+            standard,
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-fsyntax-only",
+            "-I",
+        ])
         .args([&include, &source])
         .output()
         .expect("there is a compiler: install cc and c++, or name them in CC and CXX");

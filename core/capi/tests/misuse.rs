@@ -1,6 +1,9 @@
 //! What is done wrong comes back as a status.
 #![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing)]
-#![expect(clippy::undocumented_unsafe_blocks, reason = "each call keeps the header's promises, but for the one it breaks on purpose")]
+#![expect(
+    clippy::undocumented_unsafe_blocks,
+    reason = "each call keeps the header's promises, but for the one it breaks on purpose"
+)]
 
 use dynvox_capi::*;
 use std::{
@@ -35,7 +38,10 @@ impl Buffer {
 
 fn capacity() -> DynvoxCapacity {
     let mut capacity = unsafe { std::mem::zeroed() };
-    assert_eq!(unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) },
+        DynvoxStatus::Ok
+    );
     capacity
 }
 
@@ -54,14 +60,17 @@ fn config() -> DynvoxConfig {
 fn create(buffer: &mut Buffer, config: &DynvoxConfig) -> Result<*mut DynvoxMapper, DynvoxStatus> {
     let (len, mut mapper) = (buffer.len, ptr::null_mut());
     let capacity = capacity();
-    match unsafe { dynvox_create(&raw const capacity, config, buffer.at(0), len, &raw mut mapper) } {
+    match unsafe { dynvox_create(&raw const capacity, config, buffer.at(0), len, &raw mut mapper) }
+    {
         DynvoxStatus::Ok => Ok(mapper),
         status => Err(status),
     }
 }
 
 fn pixels() -> Vec<u8> {
-    (0..WIDTH * HEIGHT).map(|i| (i as u32).wrapping_mul(2_654_435_761).rotate_left(9) as u8).collect()
+    (0..WIDTH * HEIGHT)
+        .map(|i| (i as u32).wrapping_mul(2_654_435_761).rotate_left(9) as u8)
+        .collect()
 }
 
 fn frame(pixels: &[u8]) -> DynvoxFrame {
@@ -89,8 +98,9 @@ fn buffers_too_small_null_or_misaligned_are_refused() {
     let mut buffer = Buffer::new();
     let (config, len, mut mapper) = (config(), buffer.len, ptr::null_mut());
     let (tiny, none) = (capacity(), DynvoxCapacity { blocks: 0, ..capacity() });
-    let mut make =
-        |capacity: *const _, config: *const _, start, len| unsafe { dynvox_create(capacity, config, start, len, &raw mut mapper) };
+    let mut make = |capacity: *const _, config: *const _, start, len| unsafe {
+        dynvox_create(capacity, config, start, len, &raw mut mapper)
+    };
     let (good, config) = (&raw const tiny, &raw const config);
     assert_eq!(make(good, config, buffer.at(0), len - 1), DynvoxStatus::TooSmall);
     assert_eq!(make(good, config, buffer.at(8), len), DynvoxStatus::Misaligned);
@@ -111,8 +121,12 @@ fn a_calibration_that_is_not_a_number_is_refused_with_its_name() {
         config.rig.focal_px = value;
         assert_eq!(create(&mut buffer, &config), Err(DynvoxStatus::Config));
         let mut text = [1i8; 16];
-        assert_eq!(unsafe { dynvox_config_problem(&raw const config, text.as_mut_ptr().cast(), 16) }, DynvoxStatus::Ok);
-        let text: String = text.iter().take_while(|&&byte| byte != 0).map(|&byte| byte as u8 as char).collect();
+        assert_eq!(
+            unsafe { dynvox_config_problem(&raw const config, text.as_mut_ptr().cast(), 16) },
+            DynvoxStatus::Ok
+        );
+        let text: String =
+            text.iter().take_while(|&&byte| byte != 0).map(|&byte| byte as u8 as char).collect();
         assert_eq!(text, "rig.focal_px mu", "cut off to fit");
     }
 }
@@ -123,19 +137,40 @@ fn frames_that_are_not_what_they_should_be_are_refused_and_change_nothing() {
     let mapper = create(&mut buffer, &config()).unwrap();
     let pixels = pixels();
     let good = frame(&pixels);
-    assert_eq!(unsafe { dynvox_step(mapper, ptr::null(), ptr::null(), ptr::null_mut()) }, DynvoxStatus::Null);
+    assert_eq!(
+        unsafe { dynvox_step(mapper, ptr::null(), ptr::null(), ptr::null_mut()) },
+        DynvoxStatus::Null
+    );
     let image = |pixels, stride| DynvoxImage { pixels, stride };
-    assert_eq!(step(mapper, &DynvoxFrame { left: image(ptr::null(), WIDTH), ..good }), DynvoxStatus::Null);
-    assert_eq!(step(mapper, &DynvoxFrame { left: image(pixels.as_ptr(), WIDTH - 1), ..good }), DynvoxStatus::Size);
-    assert_eq!(step(mapper, &DynvoxFrame { left: image(pixels.as_ptr(), usize::MAX), ..good }), DynvoxStatus::Size);
+    assert_eq!(
+        step(mapper, &DynvoxFrame { left: image(ptr::null(), WIDTH), ..good }),
+        DynvoxStatus::Null
+    );
+    assert_eq!(
+        step(mapper, &DynvoxFrame { left: image(pixels.as_ptr(), WIDTH - 1), ..good }),
+        DynvoxStatus::Size
+    );
+    assert_eq!(
+        step(mapper, &DynvoxFrame { left: image(pixels.as_ptr(), usize::MAX), ..good }),
+        DynvoxStatus::Size
+    );
     assert_eq!(step(mapper, &DynvoxFrame { width: 16, ..good }), DynvoxStatus::Size);
     assert_eq!(step(mapper, &DynvoxFrame { height: 0, ..good }), DynvoxStatus::Size);
     let inside = buffer.at(4_096);
-    assert_eq!(step(mapper, &DynvoxFrame { right: image(inside, WIDTH), ..good }), DynvoxStatus::Overlap);
+    assert_eq!(
+        step(mapper, &DynvoxFrame { right: image(inside, WIDTH), ..good }),
+        DynvoxStatus::Overlap
+    );
     let pose = DynvoxPose { rotation: [1.0, 0.0, 0.0, 0.0], translation_m: [0.0, f64::NAN, 0.0] };
-    assert_eq!(step(mapper, &DynvoxFrame { t_world_camera: &raw const pose, ..good }), DynvoxStatus::Pose);
+    assert_eq!(
+        step(mapper, &DynvoxFrame { t_world_camera: &raw const pose, ..good }),
+        DynvoxStatus::Pose
+    );
     let pose = DynvoxPose { rotation: [2.0, 0.0, 0.0, 0.0], ..pose };
-    assert_eq!(step(mapper, &DynvoxFrame { t_world_camera: &raw const pose, ..good }), DynvoxStatus::Pose);
+    assert_eq!(
+        step(mapper, &DynvoxFrame { t_world_camera: &raw const pose, ..good }),
+        DynvoxStatus::Pose
+    );
     let seen = DynvoxDetection {
         class_code: 99,
         score: 1.0,
@@ -145,14 +180,30 @@ fn frames_that_are_not_what_they_should_be_are_refused_and_change_nothing() {
         height: 4,
         mask: pixels.as_ptr(),
     };
-    let detected = |seen: &[DynvoxDetection]| DynvoxFrame { detections: seen.as_ptr(), detection_count: seen.len(), ..good };
+    let detected = |seen: &[DynvoxDetection]| DynvoxFrame {
+        detections: seen.as_ptr(),
+        detection_count: seen.len(),
+        ..good
+    };
     assert_eq!(step(mapper, &detected(&[seen])), DynvoxStatus::Unknown);
-    assert_eq!(step(mapper, &detected(&[DynvoxDetection { class_code: 1, mask: ptr::null(), ..seen }])), DynvoxStatus::Null);
-    assert_eq!(step(mapper, &detected(&[DynvoxDetection { class_code: 1, ..seen }; 65])), DynvoxStatus::TooMany);
+    assert_eq!(
+        step(mapper, &detected(&[DynvoxDetection { class_code: 1, mask: ptr::null(), ..seen }])),
+        DynvoxStatus::Null
+    );
+    assert_eq!(
+        step(mapper, &detected(&[DynvoxDetection { class_code: 1, ..seen }; 65])),
+        DynvoxStatus::TooMany
+    );
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
-    assert_eq!(unsafe { dynvox_step(mapper, &raw const good, ptr::null(), &raw mut report) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_step(mapper, &raw const good, ptr::null(), &raw mut report) },
+        DynvoxStatus::Ok
+    );
     assert_eq!(report.frame, 0, "none of the above was taken");
-    assert_eq!(step(mapper, &detected(&[DynvoxDetection { class_code: 1, score: f32::NAN, ..seen }])), DynvoxStatus::Ok);
+    assert_eq!(
+        step(mapper, &detected(&[DynvoxDetection { class_code: 1, score: f32::NAN, ..seen }])),
+        DynvoxStatus::Ok
+    );
     let other = DynvoxFrame { height: HEIGHT - 1, ..good };
     assert_eq!(step(mapper, &other), DynvoxStatus::SizeChanged);
 }
@@ -164,11 +215,23 @@ fn handles_of_nothing_are_told_from_mappers() {
     let mut pose = DynvoxPose::default();
     let mut picture: DynvoxPicture = unsafe { std::mem::zeroed() };
     assert_eq!(unsafe { dynvox_pose(mapper, &raw mut pose) }, DynvoxStatus::Ok);
-    assert_eq!(unsafe { dynvox_raycast(mapper, &raw const pose, &raw mut picture) }, DynvoxStatus::NoFrame);
+    assert_eq!(
+        unsafe { dynvox_raycast(mapper, &raw const pose, &raw mut picture) },
+        DynvoxStatus::NoFrame
+    );
     assert_eq!(step(mapper, &frame(&pixels())), DynvoxStatus::Ok);
-    assert_eq!(unsafe { dynvox_raycast(mapper, &raw const pose, &raw mut picture) }, DynvoxStatus::TooSmall);
-    assert_eq!(unsafe { dynvox_triangles(mapper, None, ptr::null_mut(), ptr::null_mut()) }, DynvoxStatus::Null);
-    assert_eq!(unsafe { dynvox_stream_out(mapper, ptr::null(), ptr::null_mut(), ptr::null_mut()) }, DynvoxStatus::Null);
+    assert_eq!(
+        unsafe { dynvox_raycast(mapper, &raw const pose, &raw mut picture) },
+        DynvoxStatus::TooSmall
+    );
+    assert_eq!(
+        unsafe { dynvox_triangles(mapper, None, ptr::null_mut(), ptr::null_mut()) },
+        DynvoxStatus::Null
+    );
+    assert_eq!(
+        unsafe { dynvox_stream_out(mapper, ptr::null(), ptr::null_mut(), ptr::null_mut()) },
+        DynvoxStatus::Null
+    );
     assert_eq!(unsafe { dynvox_pose(ptr::null_mut(), &raw mut pose) }, DynvoxStatus::Null);
     assert_eq!(unsafe { dynvox_destroy(mapper) }, DynvoxStatus::Ok);
     assert_eq!(unsafe { dynvox_destroy(mapper) }, DynvoxStatus::NoMapper);
@@ -197,7 +260,9 @@ fn a_callback_cannot_call_its_own_mapper() {
     assert_eq!(step(mapper, &frame), DynvoxStatus::Ok);
     assert_eq!(step(mapper, &frame), DynvoxStatus::Ok);
     let (mut context, mut count) = ((mapper, 0u32), 0);
-    let status = unsafe { dynvox_triangles(mapper, Some(call_back), (&raw mut context).cast(), &raw mut count) };
+    let status = unsafe {
+        dynvox_triangles(mapper, Some(call_back), (&raw mut context).cast(), &raw mut count)
+    };
     assert_eq!((status, u64::from(context.1)), (DynvoxStatus::Ok, count));
     assert!(count > 0, "the callback was called");
 }
@@ -211,10 +276,17 @@ fn every_setting_has_a_key_and_a_wrong_one_changes_nothing() {
     assert_eq!(set(&mut config, c"volume.voxels", c"1"), DynvoxStatus::Unknown);
     assert_eq!(set(&mut config, c"volume.far_m", c"wide"), DynvoxStatus::Value);
     assert_eq!(set(&mut config, c"volume.far_m", c"1\n"), DynvoxStatus::Value);
-    assert_eq!(unsafe { dynvox_config_set(&raw mut config, ptr::null(), c"1".as_ptr()) }, DynvoxStatus::Null);
+    assert_eq!(
+        unsafe { dynvox_config_set(&raw mut config, ptr::null(), c"1".as_ptr()) },
+        DynvoxStatus::Null
+    );
     assert_eq!(config.settings_len, before);
     while set(&mut config, c"volume.far_m", c"20") == DynvoxStatus::Ok {}
-    assert_eq!(set(&mut config, c"volume.far_m", c"20"), DynvoxStatus::TooSmall, "no space is left");
+    assert_eq!(
+        set(&mut config, c"volume.far_m", c"20"),
+        DynvoxStatus::TooSmall,
+        "no space is left"
+    );
     config.settings_len = usize::MAX;
     assert_eq!(set(&mut config, c"volume.far_m", c"20"), DynvoxStatus::Config);
     assert_eq!(create(&mut Buffer::new(), &config), Err(DynvoxStatus::Config));
@@ -223,32 +295,59 @@ fn every_setting_has_a_key_and_a_wrong_one_changes_nothing() {
 #[test]
 fn a_budget_is_a_bound_on_the_buffer_and_a_refusal_names_the_least() {
     let (mut capacity, mut least, mut bytes) = (capacity(), 0, 0);
-    let for_752 = |bytes| DynvoxBudget { bytes, width: 752, height: 480, ..unsafe { std::mem::zeroed() } };
-    let solve_for = |budget: &DynvoxBudget, capacity: &mut _, least: &mut _| unsafe { dynvox_capacity_for_budget(budget, capacity, least) };
-    let solve = |bytes, capacity: &mut _, least: &mut _| solve_for(&for_752(bytes), capacity, least);
+    let for_752 =
+        |bytes| DynvoxBudget { bytes, width: 752, height: 480, ..unsafe { std::mem::zeroed() } };
+    let solve_for = |budget: &DynvoxBudget, capacity: &mut _, least: &mut _| unsafe {
+        dynvox_capacity_for_budget(budget, capacity, least)
+    };
+    let solve =
+        |bytes, capacity: &mut _, least: &mut _| solve_for(&for_752(bytes), capacity, least);
     assert_eq!(solve(48 << 20, &mut capacity, &mut least), DynvoxStatus::Ok);
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut bytes) }, DynvoxStatus::Ok);
     assert!(bytes <= 48 << 20 && bytes > 46 << 20, "{bytes}");
     assert_eq!(solve(1 << 20, &mut capacity, &mut least), DynvoxStatus::TooSmall);
-    assert_eq!(solve(least, &mut capacity, &mut bytes), DynvoxStatus::Ok, "{least} bytes are enough");
+    assert_eq!(
+        solve(least, &mut capacity, &mut bytes),
+        DynvoxStatus::Ok,
+        "{least} bytes are enough"
+    );
     assert_eq!(solve(least - 1, &mut capacity, &mut bytes), DynvoxStatus::TooSmall);
-    let raw = DynvoxBudget { raw_width: 800, raw_height: 500, objects: -1, colour: 1, ..for_752(48 << 20) };
+    let raw = DynvoxBudget {
+        raw_width: 800,
+        raw_height: 500,
+        objects: -1,
+        colour: 1,
+        ..for_752(48 << 20)
+    };
     assert_eq!(solve_for(&raw, &mut capacity, &mut least), DynvoxStatus::Ok);
-    assert_eq!((capacity.raw_width, capacity.raw_height, capacity.objects, capacity.colour), (800, 500, 0, 1));
+    assert_eq!(
+        (capacity.raw_width, capacity.raw_height, capacity.objects, capacity.colour),
+        (800, 500, 0, 1)
+    );
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut bytes) }, DynvoxStatus::Ok);
     assert!(bytes <= 48 << 20 && bytes > 46 << 20, "{bytes}");
-    assert_eq!(solve_for(&DynvoxBudget { objects: 1_000, ..raw }, &mut capacity, &mut least), DynvoxStatus::Capacity);
-    assert_eq!(unsafe { dynvox_capacity_for_budget(ptr::null(), &raw mut capacity, ptr::null_mut()) }, DynvoxStatus::Null);
+    assert_eq!(
+        solve_for(&DynvoxBudget { objects: 1_000, ..raw }, &mut capacity, &mut least),
+        DynvoxStatus::Capacity
+    );
+    assert_eq!(
+        unsafe { dynvox_capacity_for_budget(ptr::null(), &raw mut capacity, ptr::null_mut()) },
+        DynvoxStatus::Null
+    );
 }
 
 extern "C" fn write(context: *mut c_void, bytes: *const u8, len: usize) -> bool {
-    // SAFETY: the context is the test's snapshot, and there are as many bytes as the header promises.
-    unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len)) };
+    // SAFETY: the context is the test's snapshot, and there are as many bytes as the header
+    // promises.
+    unsafe {
+        (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len))
+    };
     true
 }
 
 extern "C" fn read(context: *mut c_void, bytes: *mut u8, len: usize) -> bool {
-    // SAFETY: the context is the test's rest of a snapshot, and there is space for as many bytes as the header promises.
+    // SAFETY: the context is the test's rest of a snapshot, and there is space for as many bytes as
+    // the header promises.
     unsafe {
         let rest = &mut *context.cast::<&[u8]>();
         let Some((front, behind)) = rest.split_at_checked(len) else { return false };
@@ -269,12 +368,24 @@ fn a_restored_mapper_continues_as_the_saved_one_and_a_damaged_snapshot_makes_non
     assert_eq!(step(mapper, &frame), DynvoxStatus::Time);
     frame.time_ns = &raw const times_ns[1];
     let mut bytes = Vec::new();
-    assert_eq!(unsafe { dynvox_save(mapper, Some(write), (&raw mut bytes).cast()) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_save(mapper, Some(write), (&raw mut bytes).cast()) },
+        DynvoxStatus::Ok
+    );
     let mut restore = |bytes: &[u8]| {
         let (len, mut rest, mut restored) = (other.len, bytes, ptr::null_mut());
         let context = (&raw mut rest).cast();
-        let status =
-            unsafe { dynvox_restore(&raw const capacity, &raw const config, other.at(0), len, Some(read), context, &raw mut restored) };
+        let status = unsafe {
+            dynvox_restore(
+                &raw const capacity,
+                &raw const config,
+                other.at(0),
+                len,
+                Some(read),
+                context,
+                &raw mut restored,
+            )
+        };
         (status, restored)
     };
     assert_eq!(restore(&bytes[..bytes.len() - 1]).0, DynvoxStatus::Callback);
@@ -285,11 +396,22 @@ fn a_restored_mapper_continues_as_the_saved_one_and_a_damaged_snapshot_makes_non
     assert_eq!(status, DynvoxStatus::Ok);
     let mut reports: [DynvoxReport; 2] = unsafe { std::mem::zeroed() };
     for (mapper, report) in [mapper, restored].into_iter().zip(&mut reports) {
-        assert_eq!(unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), report) }, DynvoxStatus::Ok);
+        assert_eq!(
+            unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), report) },
+            DynvoxStatus::Ok
+        );
     }
     assert_eq!((reports[0].frame, reports[0].digest), (1, reports[1].digest));
     let (mut tracks, mut count): ([DynvoxTrack; 2], usize) = (unsafe { std::mem::zeroed() }, 9);
-    assert_eq!(unsafe { dynvox_tracks(restored, tracks.as_mut_ptr(), 2, &raw mut count) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_tracks(restored, tracks.as_mut_ptr(), 2, &raw mut count) },
+        DynvoxStatus::Ok
+    );
     assert_eq!(count, 0);
-    assert_eq!(unsafe { dynvox_object_triangles(restored, 1, Some(call_back), ptr::null_mut(), ptr::null_mut()) }, DynvoxStatus::Unknown);
+    assert_eq!(
+        unsafe {
+            dynvox_object_triangles(restored, 1, Some(call_back), ptr::null_mut(), ptr::null_mut())
+        },
+        DynvoxStatus::Unknown
+    );
 }

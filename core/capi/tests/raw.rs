@@ -1,4 +1,5 @@
-//! Raw cameras through C: the digests of the core with the same rectification, and what cannot be rectified is a status.
+//! Raw cameras through C: the digests of the core with the same rectification, and what cannot be
+//! rectified is a status.
 #![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing)]
 #![expect(clippy::undocumented_unsafe_blocks, reason = "each call keeps the header's promises")]
 
@@ -45,12 +46,17 @@ fn config_of(rig: &DynvoxRawRig) -> Result<DynvoxConfig, DynvoxStatus> {
 }
 
 fn pixels(shift: usize) -> Vec<u8> {
-    (0..RAW[0] * RAW[1]).map(|i| (((i + shift) / 3) as u32).wrapping_mul(2_654_435_761).rotate_left(9) as u8).collect()
+    (0..RAW[0] * RAW[1])
+        .map(|i| (((i + shift) / 3) as u32).wrapping_mul(2_654_435_761).rotate_left(9) as u8)
+        .collect()
 }
 
 /// The digest that the core gives for two frames.
 fn digest_of_core(capacity: &Capacity) -> u64 {
-    let lens = LensModel::RadialTangential { radial: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0], tangential: [0.001, -0.001] };
+    let lens = LensModel::RadialTangential {
+        radial: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0],
+        tangential: [0.001, -0.001],
+    };
     let camera = RawCamera {
         lens: Lens::new([100.0, 101.0], [88.0, 40.0], lens).unwrap(),
         width: RAW[0] as u32,
@@ -78,15 +84,25 @@ fn digest_of_core(capacity: &Capacity) -> u64 {
 #[test]
 fn raw_pairs_give_the_digests_of_the_core() {
     let (mut capacity, mut len): (DynvoxCapacity, usize) = (unsafe { std::mem::zeroed() }, 0);
-    assert_eq!(unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) },
+        DynvoxStatus::Ok
+    );
     (capacity.raw_width, capacity.raw_height) = (RAW[0], RAW[1]);
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
     let mut buffer = vec![0u8; len + dynvox_alignment()];
     let start = buffer.as_ptr().align_offset(dynvox_alignment());
     let (config, mut mapper) = (config_of(&rig()).unwrap(), ptr::null_mut());
-    assert!((config.rig.baseline_m - 0.5).abs() < 1e-12 && config.rig.focal_px > 80.0, "{:?}", config.rig);
+    assert!(
+        (config.rig.baseline_m - 0.5).abs() < 1e-12 && config.rig.focal_px > 80.0,
+        "{:?}",
+        config.rig
+    );
     let at = buffer[start..].as_mut_ptr();
-    assert_eq!(unsafe { dynvox_create(&raw const capacity, &raw const config, at, len, &raw mut mapper) }, DynvoxStatus::Ok);
+    assert_eq!(
+        unsafe { dynvox_create(&raw const capacity, &raw const config, at, len, &raw mut mapper) },
+        DynvoxStatus::Ok
+    );
     let (left, right) = (pixels(0), pixels(4));
     let image = |pixels: &[u8]| DynvoxImage { pixels: pixels.as_ptr(), stride: RAW[0] };
     let frame = DynvoxFrame {
@@ -103,7 +119,10 @@ fn raw_pairs_give_the_digests_of_the_core() {
     };
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
     for _ in 0..2 {
-        assert_eq!(unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) }, DynvoxStatus::Ok);
+        assert_eq!(
+            unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) },
+            DynvoxStatus::Ok
+        );
     }
     let of_core = Capacity { raw_width: RAW[0], raw_height: RAW[1], ..Capacity::TINY };
     assert_eq!(report.digest, digest_of_core(&of_core));

@@ -1,8 +1,10 @@
-//! A textured wall and a stereo camera that drives towards it: frames for the examples, without files.
+//! A textured wall and a stereo camera that drives towards it: frames for the examples, without
+//! files.
 
 use dynvox_core::{StereoFrame, geometry::StereoRig, image::View};
 
-pub const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+pub const RIG: StereoRig =
+    StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
 const WIDTH: usize = 320;
 const HEIGHT: usize = 96;
 
@@ -16,7 +18,10 @@ impl Pair {
         let image = |camera_x_m: f64| {
             let pixel = |at: usize| {
                 let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
-                brightness((u - RIG.center_u_px) * m_per_px + camera_x_m, (v - RIG.center_v_px) * m_per_px)
+                brightness(
+                    (u - RIG.center_u_px) * m_per_px + camera_x_m,
+                    (v - RIG.center_v_px) * m_per_px,
+                )
             };
             (0..WIDTH * HEIGHT).map(pixel).collect()
         };
@@ -39,5 +44,6 @@ fn brightness(x_m: f64, y_m: f64) -> u8 {
         ((mixed ^ mixed >> 13).wrapping_mul(1_274_126_177) >> 16 & 0xFF) as f64
     };
     let (s, t) = (x - x.floor(), y - y.floor());
-    ((corner(0.0, 0.0) * (1.0 - s) + corner(1.0, 0.0) * s) * (1.0 - t) + (corner(0.0, 1.0) * (1.0 - s) + corner(1.0, 1.0) * s) * t) as u8
+    ((corner(0.0, 0.0) * (1.0 - s) + corner(1.0, 0.0) * s) * (1.0 - t)
+        + (corner(0.0, 1.0) * (1.0 - s) + corner(1.0, 1.0) * s) * t) as u8
 }

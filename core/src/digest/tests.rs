@@ -31,7 +31,10 @@ fn all_different(mut digests: Vec<u64>) -> usize {
         halves.sort_unstable();
         let same = halves.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64;
         let by_chance = (count as f64).powi(2) / 2.0 / 2f64.powi(32);
-        assert!(same <= 10.0 + 3.0 * by_chance, "{same} halves of {count} are the same, {by_chance} by chance");
+        assert!(
+            same <= 10.0 + 3.0 * by_chance,
+            "{same} halves of {count} are the same, {by_chance} by chance"
+        );
     }
     count
 }
@@ -65,7 +68,8 @@ fn equals_the_definition_at_every_length() {
         assert_eq!(of_bytes(&noise[..len]), plain(&noise[..len]), "{len} bytes");
     }
     for len in 0..=256 {
-        let values: Vec<i16> = noise[..2 * len].as_chunks().0.iter().map(|&pair| i16::from_le_bytes(pair)).collect();
+        let values: Vec<i16> =
+            noise[..2 * len].as_chunks().0.iter().map(|&pair| i16::from_le_bytes(pair)).collect();
         let unsigned: Vec<u16> = values.iter().map(|&value| value as u16).collect();
         assert_eq!(of(|digest| digest.i16s(&values)), plain(&noise[..2 * len]), "{len} integers");
         assert_eq!(of(|digest| digest.u16s(&unsigned)), plain(&noise[..2 * len]), "{len} integers");
@@ -114,7 +118,8 @@ fn notices_every_two_bits_of_a_run() {
 #[test]
 fn notices_the_same_change_at_two_places() {
     for plane in planes() {
-        let mut values: [i16; 256] = core::array::from_fn(|at| i16::from_le_bytes([plane[2 * at], plane[2 * at + 1]]));
+        let mut values: [i16; 256] =
+            core::array::from_fn(|at| i16::from_le_bytes([plane[2 * at], plane[2 * at + 1]]));
         let mut seen = Vec::new();
         for change in [1, -1, 2, 256, i16::MIN] {
             for one in 0..256 {
@@ -150,7 +155,8 @@ fn notices_any_two_elements_swapped() {
     }
     // Whole words and stripes as well.
     for size in [2, 4, 8, 16, 32, 64] {
-        for (one, other) in (0..256 / size).flat_map(|one| (0..one).map(move |other| (one, other))) {
+        for (one, other) in (0..256 / size).flat_map(|one| (0..one).map(move |other| (one, other)))
+        {
             let mut swapped = bytes;
             swapped[one * size..][..size].copy_from_slice(&bytes[other * size..][..size]);
             swapped[other * size..][..size].copy_from_slice(&bytes[one * size..][..size]);
@@ -171,7 +177,8 @@ fn millions_of_small_edits_meet_nowhere() {
                 let at = random.below(512) as usize;
                 bytes[at] = bytes[at].wrapping_add(random.below(3) as u8).wrapping_sub(1);
             }
-            let edit: Vec<(usize, u8)> = (0..512).filter(|&at| bytes[at] != plane[at]).map(|at| (at, bytes[at])).collect();
+            let edit: Vec<(usize, u8)> =
+                (0..512).filter(|&at| bytes[at] != plane[at]).map(|at| (at, bytes[at])).collect();
             if known.insert(edit) {
                 seen.push(of_bytes(&bytes));
             }
@@ -192,7 +199,10 @@ fn every_bit_moves_half_of_the_bits() {
             let before = of_bytes(&bytes);
             bytes[bit / 8] ^= 1 << (bit % 8);
             let difference = before ^ of_bytes(&bytes);
-            moved.iter_mut().enumerate().for_each(|(at, count)| *count += (difference >> at & 1) as u32);
+            moved
+                .iter_mut()
+                .enumerate()
+                .for_each(|(at, count)| *count += (difference >> at & 1) as u32);
         }
         // Six standard deviations.
         assert!(moved.iter().all(|count| (405..=595).contains(count)), "bit {bit}: {moved:?}");
@@ -237,8 +247,11 @@ fn tells_lengths_and_orders_apart_and_makes_nan_one() {
     let run: fn(&mut Digest) = |d| d.bytes(&[5; 64]);
     let value: fn(&mut Digest) = |d| d.u64(64);
     let orders = [[run, run, value], [run, value, run], [value, run, run]];
-    all_different(orders.iter().map(|order| of(|d| order.iter().for_each(|append| append(d)))).collect());
-    let splits = (0..=128).map(|at| of(|d| [&[5; 128][..at], &[5; 128][at..]].iter().for_each(|part| d.bytes(part))));
+    all_different(
+        orders.iter().map(|order| of(|d| order.iter().for_each(|append| append(d)))).collect(),
+    );
+    let splits = (0..=128)
+        .map(|at| of(|d| [&[5; 128][..at], &[5; 128][at..]].iter().for_each(|part| d.bytes(part))));
     all_different(splits.collect());
     assert_eq!(of(|d| d.f64(f64::NAN)), of(|d| d.f64(-f64::NAN)));
     assert_eq!(of(|d| d.f32s([f32::NAN, 1.0])), of(|d| d.f32s([-f32::NAN, 1.0])));
@@ -247,7 +260,8 @@ fn tells_lengths_and_orders_apart_and_makes_nan_one() {
 
 #[test]
 fn digests_are_those_that_files_hold() {
-    // Written down once, from another program after the same description: results of other versions and machines are compared by these.
+    // Written down once, from another program after the same description: results of other versions
+    // and machines are compared by these.
     let keys: [u64; LANES] = [
         0xE220_A839_7B1D_CDAF,
         0x6E78_9E6A_A1B9_65F5,

@@ -34,9 +34,11 @@ pub enum MotionStatus {
     TooFewInliers,
     /// The refinement did not come to rest.
     NotConverged,
-    /// The camera would have to accelerate too much ([`EgomotionConfig::acceleration_max_m_s2`]), and too few matches agree.
+    /// The camera would have to accelerate too much ([`EgomotionConfig::acceleration_max_m_s2`]),
+    /// and too few matches agree.
     Implausible,
-    /// The cameras of the pair do not seem to expose at the same time ([`EgomotionConfig::right_ahead_max_m`]), and too few matches agree.
+    /// The cameras of the pair do not seem to expose at the same time
+    /// ([`EgomotionConfig::right_ahead_max_m`]), and too few matches agree.
     Unsynchronized,
     /// The rig cannot be used.
     BadRig,
@@ -50,8 +52,8 @@ pub enum MotionStatus {
 pub struct MotionEstimate {
     /// How it went.
     pub status: MotionStatus,
-    /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is `Estimated`. Of the camera: from the last frame
-    /// whose pose is not a guess.
+    /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is
+    /// `Estimated`. Of the camera: from the last frame whose pose is not a guess.
     pub t_current_previous: Option<Transform>,
     /// Matches handed in that could be triangulated.
     pub matches: u32,
@@ -63,8 +65,8 @@ pub struct MotionEstimate {
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
-    /// Of the camera: how far ahead of where the calibration has it the right one seems to stand; far where both do not expose at the same
-    /// time. `None` where too few matches tell.
+    /// Of the camera: how far ahead of where the calibration has it the right one seems to stand;
+    /// far where both do not expose at the same time. `None` where too few matches tell.
     pub right_ahead: Option<RightAhead>,
 }
 
@@ -108,13 +110,18 @@ impl<'s> Estimator<'s> {
 
     /// Positions, in the order handed in, of the matches the last estimate explains.
     pub fn inliers(&self) -> impl Iterator<Item = u32> + Clone {
-        self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.source(index as usize))
+        self.inliers
+            .iter()
+            .take(self.inlier_len)
+            .filter_map(|&index| self.points.source(index as usize))
     }
 
-    /// Estimates the motion that carries the matches' points from the previous camera to the current one.
+    /// Estimates the motion that carries the matches' points from the previous camera to the
+    /// current one.
     ///
-    /// `initial` is where hypotheses begin, standing still where it is absent; it is also the first hypothesis. `random` belongs to this
-    /// purpose alone. Matches beyond `capacity.matches` are ignored.
+    /// `initial` is where hypotheses begin, standing still where it is absent; it is also the first
+    /// hypothesis. `random` belongs to this purpose alone. Matches beyond `capacity.matches` are
+    /// ignored.
     pub fn estimate<'m>(
         &mut self,
         config: &EgomotionConfig,
@@ -158,10 +165,15 @@ impl<'s> Estimator<'s> {
             sums.add(&point, &matrix, rig, |_| 1.0);
         }
         estimate.residual_rms_px = libm::sqrt(sums.error / (4.0 * sums.weight));
-        MotionEstimate { status: MotionStatus::Estimated, t_current_previous: Some(motion), ..estimate }
+        MotionEstimate {
+            status: MotionStatus::Estimated,
+            t_current_previous: Some(motion),
+            ..estimate
+        }
     }
 
-    /// Counts the matches that `motion` explains within `within_px`, and the matches that can be triangulated.
+    /// Counts the matches that `motion` explains within `within_px`, and the matches that can be
+    /// triangulated.
     pub fn count_inliers<'m>(
         &mut self,
         rig: &StereoRig,
@@ -175,7 +187,13 @@ impl<'s> Estimator<'s> {
     }
 
     /// RANSAC: the hypothesis with most inliers, the first of equals, and how many were drawn.
-    fn ransac(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> (Transform, u32) {
+    fn ransac(
+        &self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        random: &mut Random,
+        start: &Transform,
+    ) -> (Transform, u32) {
         let mut best = *start;
         let mut most = self.points.score(start, rig, config.inlier_px, 0);
         let mut required = required_iterations(config, most, self.points.len());
@@ -193,7 +211,13 @@ impl<'s> Estimator<'s> {
     }
 
     /// The motion of three points drawn at random, if they have one.
-    fn hypothesis(&self, config: &EgomotionConfig, rig: &StereoRig, random: &mut Random, start: &Transform) -> Option<Transform> {
+    fn hypothesis(
+        &self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        random: &mut Random,
+        start: &Transform,
+    ) -> Option<Transform> {
         let len = self.points.len() as u32;
         // Distinct by construction: each draw skips those before it.
         let a = random.below(len);
@@ -203,7 +227,11 @@ impl<'s> Estimator<'s> {
         let c = random.below(len - 2);
         let c = c + u32::from(c >= low);
         let c = c + u32::from(c >= high);
-        let points = [self.points.get(a as usize)?, self.points.get(b as usize)?, self.points.get(c as usize)?];
+        let points = [
+            self.points.get(a as usize)?,
+            self.points.get(b as usize)?,
+            self.points.get(c as usize)?,
+        ];
         let mut motion = *start;
         for _ in 0..config.sample_steps {
             let matrix = RotationMatrix::new(&motion);
@@ -221,11 +249,20 @@ impl<'s> Estimator<'s> {
     }
 
     fn inlier_points(&self) -> impl Iterator<Item = Point> {
-        self.inliers.iter().take(self.inlier_len).filter_map(|&index| self.points.get(index as usize))
+        self.inliers
+            .iter()
+            .take(self.inlier_len)
+            .filter_map(|&index| self.points.get(index as usize))
     }
 
-    /// Gauss-Newton on all inliers. Returns the motion, the steps taken and whether it came to rest.
-    fn refine(&self, config: &EgomotionConfig, rig: &StereoRig, motion: &Transform) -> (Transform, u32, bool) {
+    /// Gauss-Newton on all inliers. Returns the motion, the steps taken and whether it came to
+    /// rest.
+    fn refine(
+        &self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        motion: &Transform,
+    ) -> (Transform, u32, bool) {
         let mut motion = *motion;
         for taken in 1..=u32::from(config.refine_steps) {
             let matrix = RotationMatrix::new(&motion);
@@ -244,7 +281,8 @@ impl<'s> Estimator<'s> {
     }
 }
 
-/// Hypotheses to draw so that one is free of outliers with the configured probability, given the most inliers so far.
+/// Hypotheses to draw so that one is free of outliers with the configured probability, given the
+/// most inliers so far.
 fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     let share = f64::from(inliers) / points as f64;
     let clean = share * share * share;
@@ -271,7 +309,8 @@ fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 
     1.0 / (1.0 + fourth * fourth)
 }
 
-/// Weight by the squared error of a match, px² (Geman and McClure's, [`EgomotionConfig::robust_px`]).
+/// Weight by the squared error of a match, px² (Geman and McClure's,
+/// [`EgomotionConfig::robust_px`]).
 fn robust_weight(config: &EgomotionConfig, squared_px: f64) -> f64 {
     let share = 1.0 / (1.0 + squared_px / (config.robust_px * config.robust_px));
     share * share

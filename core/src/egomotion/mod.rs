@@ -1,20 +1,25 @@
-//! Motion from matches: of the camera, or of the object that the matches lie on (StereoScan, section III-B).
+//! Motion from matches: of the camera, or of the object that the matches lie on (StereoScan,
+//! section III-B).
 //!
-//! Each match's point in the previous camera follows from its disparity. Three matches drawn at random give a hypothesis by Gauss-Newton
-//! on the reprojection error of four coordinates (u and v in both current images); the one with most inliers is refined on them, with
-//! inliers chosen anew twice. Drawing stops as soon as one clean hypothesis is likely enough. The refinement gives
-//! matches robust weights (Geman, McClure: *Statistical Methods for Tomographic Image Reconstruction*, 1987), because an inlier may be two
-//! pixels off. Matches far from the middle column weigh less: what rectification leaves of the lenses' errors grows steeply there.
+//! Each match's point in the previous camera follows from its disparity. Three matches drawn at
+//! random give a hypothesis by Gauss-Newton on the reprojection error of four coordinates (u and v
+//! in both current images); the one with most inliers is refined on them, with inliers chosen anew
+//! twice. Drawing stops as soon as one clean hypothesis is likely enough. The refinement gives
+//! matches robust weights (Geman, McClure: *Statistical Methods for Tomographic Image
+//! Reconstruction*, 1987), because an inlier may be two pixels off. Matches far from the middle
+//! column weigh less: what rectification leaves of the lenses' errors grows steeply there.
 //!
 //! [`Estimator`] owns the scratch memory and estimates any set of matches; [`Egomotion`] tracks the camera and repeats its last motion
 //! where the estimate fails. [`icp`] estimates motion from depth alone.
 //!
 //! **Memory.** 36 bytes per match.
 //!
-//! **Time.** Hypotheses times matches, in single precision and without branches; the rest is small compared with it.
+//! **Time.** Hypotheses times matches, in single precision and without branches; the rest is small
+//! compared with it.
 //!
-//! **What can go wrong.** [`MotionStatus`] names it. A motion without enough inliers, or whose refinement did not converge, is never
-//! returned. Sums run in the order of the matches, so that other orders give other last bits.
+//! **What can go wrong.** [`MotionStatus`] names it. A motion without enough inliers, or whose
+//! refinement did not converge, is never returned. Sums run in the order of the matches, so that
+//! other orders give other last bits.
 //!
 //! ```
 //! use dynvox_core::{Capacity, egomotion::{EgomotionConfig, Estimator, MotionStatus}, geometry::StereoRig, memory::Carver, random::Random};

@@ -1,7 +1,8 @@
 //! The normal equations of a reprojection error, and their solution.
 //!
-//! The motion is moved by a small rotation vector and translation on its left: T <- T.retract(step). Per point three different rows: u in
-//! the left image, u in the right one, and v, which both images share and which therefore counts twice.
+//! The motion is moved by a small rotation vector and translation on its left: T <-
+//! T.retract(step). Per point three different rows: u in the left image, u in the right one, and v,
+//! which both images share and which therefore counts twice.
 
 use super::points::Point;
 use crate::geometry::{StereoObservation, StereoRig, Transform};
@@ -42,16 +43,31 @@ impl RotationMatrix {
 /// Errors of one point: predicted minus seen, as u left, u right, v left, v right.
 fn residual(predicted: &StereoObservation, point: &Point) -> [f64; 4] {
     let StereoObservation { u_left_px, v_px, u_right_px } = *predicted;
-    [u_left_px - point.left[0], u_right_px - point.right[0], v_px - point.left[1], v_px - point.right[1]]
+    [
+        u_left_px - point.left[0],
+        u_right_px - point.right[0],
+        v_px - point.left[1],
+        v_px - point.right[1],
+    ]
 }
 
 impl NormalEquations {
-    pub(super) const ZERO: Self = Self { matrix: [[0.0; N]; N], vector: [0.0; N], error: 0.0, weight: 0.0 };
+    pub(super) const ZERO: Self =
+        Self { matrix: [[0.0; N]; N], vector: [0.0; N], error: 0.0, weight: 0.0 };
 
     /// Adds a point; one behind the camera adds nothing.
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "both indices run below N, the length of every row")]
-    pub(super) fn add(&mut self, point: &Point, motion: &RotationMatrix, rig: &StereoRig, weight: impl Fn(f64) -> f64) {
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "both indices run below N, the length of every row"
+    )]
+    pub(super) fn add(
+        &mut self,
+        point: &Point,
+        motion: &RotationMatrix,
+        rig: &StereoRig,
+        weight: impl Fn(f64) -> f64,
+    ) {
         let p = motion.transform(point.xyz);
         let Some(predicted) = rig.project(p) else { return };
         let [x, y, z] = p;
@@ -68,7 +84,8 @@ impl NormalEquations {
         for i in 0..N {
             self.vector[i] += weight * (u_left[i] * left + u_right[i] * right + v[i] * both);
             for j in 0..=i {
-                self.matrix[i][j] += weight * (u_left[i] * u_left[j] + u_right[i] * u_right[j] + 2.0 * v[i] * v[j]);
+                self.matrix[i][j] +=
+                    weight * (u_left[i] * u_left[j] + u_right[i] * u_right[j] + 2.0 * v[i] * v[j]);
             }
         }
         self.error += weight * squared;
@@ -77,7 +94,10 @@ impl NormalEquations {
 
     /// Adds one row: how a residual changes with the step, the residual, its weight.
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "both indices run below N, the length of every row")]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "both indices run below N, the length of every row"
+    )]
     pub(super) fn add_row(&mut self, row: [f64; N], residual: f64, weight: f64) {
         for i in 0..N {
             self.vector[i] += weight * row[i] * residual;
@@ -89,8 +109,9 @@ impl NormalEquations {
         self.weight += weight;
     }
 
-    /// How well the translation held worst is held, as a share of what rows that all point its way would do; a bound from below, from the
-    /// trace of the translation's covariance. 0 where the rows do not determine a motion.
+    /// How well the translation held worst is held, as a share of what rows that all point its way
+    /// would do; a bound from below, from the trace of the translation's covariance. 0 where the
+    /// rows do not determine a motion.
     pub(super) fn min_eigen_share(&self) -> f64 {
         let variance = |axis: usize| {
             let unit = core::array::from_fn(|at| if at == axis { 1.0 } else { 0.0 });
@@ -102,7 +123,8 @@ impl NormalEquations {
         }
     }
 
-    /// The step (rotation vector, translation) to the minimum, by LDL'; `None` where the points do not determine one.
+    /// The step (rotation vector, translation) to the minimum, by LDL'; `None` where the points do
+    /// not determine one.
     pub(super) fn solve(&self) -> Option<[f64; N]> {
         self.solve_for(self.vector.map(|x| -x))
     }

@@ -1,4 +1,5 @@
-//! Matches as scene points in the previous camera and where the current cameras see them, one array per coordinate.
+//! Matches as scene points in the previous camera and where the current cameras see them, one array
+//! per coordinate.
 //!
 //! Memory: 28 bytes per match and 8 for the lists of inliers.
 
@@ -61,8 +62,13 @@ impl<'s> Points<'s> {
         self.len
     }
 
-    /// Triangulates the matches. Those without disparity, not finite or beyond the capacity are left out; returns how many were given.
-    pub(super) fn fill<'m>(&mut self, matches: impl IntoIterator<Item = &'m Match>, rig: &StereoRig) -> usize {
+    /// Triangulates the matches. Those without disparity, not finite or beyond the capacity are
+    /// left out; returns how many were given.
+    pub(super) fn fill<'m>(
+        &mut self,
+        matches: impl IntoIterator<Item = &'m Match>,
+        rig: &StereoRig,
+    ) -> usize {
         self.len = 0;
         let mut given = 0;
         for (index, m) in (0..).zip(matches) {
@@ -76,7 +82,8 @@ impl<'s> Points<'s> {
 
     fn push(&mut self, point: Point, source: u32) {
         let at = self.len;
-        let ([x, y, z], [left_u, left_v], [right_u, right_v]) = (point.xyz, point.left, point.right);
+        let ([x, y, z], [left_u, left_v], [right_u, right_v]) =
+            (point.xyz, point.left, point.right);
         let columns = [
             (&mut *self.x, x),
             (&mut *self.y, y),
@@ -111,21 +118,37 @@ impl<'s> Points<'s> {
         self.source.get(index).copied()
     }
 
-    /// Counts the points within `inlier_px` of where the motion puts them; gives up, with a smaller count, when `to_beat` is out of reach.
-    pub(super) fn score(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, to_beat: u32) -> u32 {
+    /// Counts the points within `inlier_px` of where the motion puts them; gives up, with a smaller
+    /// count, when `to_beat` is out of reach.
+    pub(super) fn score(
+        &self,
+        motion: &Transform,
+        rig: &StereoRig,
+        inlier_px: f32,
+        to_beat: u32,
+    ) -> u32 {
         let view = SinglePrecision::new(motion, rig);
         let mut count = 0;
         let mut first = 0;
         while first < self.len && count + ((self.len - first) as u32) > to_beat {
             let last = (first + STRIDE).min(self.len);
-            count += self.errors(&view, first..last, |hits, error| hits + u32::from(error < inlier_px * inlier_px));
+            count += self.errors(&view, first..last, |hits, error| {
+                hits + u32::from(error < inlier_px * inlier_px)
+            });
             first = last;
         }
         count
     }
 
-    /// Writes the positions of the points within `inlier_px` to `inliers`, in order. Returns how many there are.
-    pub(super) fn select(&self, motion: &Transform, rig: &StereoRig, inlier_px: f32, inliers: &mut [u32]) -> usize {
+    /// Writes the positions of the points within `inlier_px` to `inliers`, in order. Returns how
+    /// many there are.
+    pub(super) fn select(
+        &self,
+        motion: &Transform,
+        rig: &StereoRig,
+        inlier_px: f32,
+        inliers: &mut [u32],
+    ) -> usize {
         let view = SinglePrecision::new(motion, rig);
         let mut slots = inliers.iter_mut();
         let mut count = 0;
@@ -143,12 +166,19 @@ impl<'s> Points<'s> {
         count
     }
 
-    /// Folds the squared errors of a range of points, px²; infinite for points that would be behind the camera.
+    /// Folds the squared errors of a range of points, px²; infinite for points that would be behind
+    /// the camera.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "all columns are cut to n first")]
-    fn errors(&self, view: &SinglePrecision, range: core::ops::Range<usize>, mut fold: impl FnMut(u32, f32) -> u32) -> u32 {
+    fn errors(
+        &self,
+        view: &SinglePrecision,
+        range: core::ops::Range<usize>,
+        mut fold: impl FnMut(u32, f32) -> u32,
+    ) -> u32 {
         let n = range.len();
-        let columns = [&*self.x, self.y, self.z, self.left_u, self.left_v, self.right_u, self.right_v];
+        let columns =
+            [&*self.x, self.y, self.z, self.left_u, self.left_v, self.right_u, self.right_v];
         let [Some(x), Some(y), Some(z), Some(left_u), Some(left_v), Some(right_u), Some(right_v)] =
             columns.map(|column| column.get(range.start..)?.get(..n))
         else {
@@ -156,7 +186,8 @@ impl<'s> Points<'s> {
         };
         let mut state = 0;
         for i in 0..n {
-            let error = view.error([x[i], y[i], z[i]], [left_u[i], left_v[i]], [right_u[i], right_v[i]]);
+            let error =
+                view.error([x[i], y[i], z[i]], [left_u[i], left_v[i]], [right_u[i], right_v[i]]);
             state = fold(state, error);
         }
         state
@@ -192,7 +223,8 @@ impl SinglePrecision {
         let inverse = 1.0 / depth;
         let u = self.focal * row(rx, tx) * inverse;
         let v = self.focal * row(ry, ty) * inverse;
-        let [a, b, c, d] = [u - left[0], v - left[1], u - self.focal_baseline * inverse - right[0], v - right[1]];
+        let [a, b, c, d] =
+            [u - left[0], v - left[1], u - self.focal_baseline * inverse - right[0], v - right[1]];
         let error = a * a + b * b + c * c + d * d;
         if depth > DEPTH_MIN_M as f32 { error } else { f32::INFINITY }
     }

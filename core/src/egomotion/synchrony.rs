@@ -1,10 +1,11 @@
 //! Whether both cameras of a rig expose at the same time.
 //!
-//! A camera that exposes later, or delivers an older image, is not where the calibration says: while the rig moves forward it stands ahead
-//! of that, or behind. Seen from a right camera that stands `a` ahead, a point at depth z has its row farther
-//! from the middle by a factor of 1 / (1 - a / z): with y the row from the principal point, d the disparity, f and b the rig's,
-//! v_right - v_left = a y d / (f b). A shift of the rows and another focal length of one camera, which a calibration may leave, are
-//! estimated along with it: they do not depend on the disparity.
+//! A camera that exposes later, or delivers an older image, is not where the calibration says:
+//! while the rig moves forward it stands ahead of that, or behind. Seen from a right camera that
+//! stands `a` ahead, a point at depth z has its row farther from the middle by a factor of 1 / (1 -
+//! a / z): with y the row from the principal point, d the disparity, f and b the rig's, v_right -
+//! v_left = a y d / (f b). A shift of the rows and another focal length of one camera, which a
+//! calibration may leave, are estimated along with it: they do not depend on the disparity.
 //!
 //! **Memory.** None. **Time.** Linear in the matches.
 
@@ -32,18 +33,23 @@ pub struct RightAhead {
 }
 
 impl RightAhead {
-    /// Whether the cameras seem to expose at the same time, where synchronous ones show at most `most_m`. A distance four times as large is
-    /// enough to say no, and after a gap a distance as large; a smaller one where few matches agree with the motion; and after a gap one that
-    /// few matches leave open, too.
+    /// Whether the cameras seem to expose at the same time, where synchronous ones show at most
+    /// `most_m`. A distance four times as large is enough to say no, and after a gap a distance as
+    /// large; a smaller one where few matches agree with the motion; and after a gap one that few
+    /// matches leave open, too.
     pub fn is_synchronous(&self, most_m: f64, agree: bool, after_gap: bool) -> bool {
         let (distance_m, sigma_m) = (libm::fabs(self.distance_m), self.sigma_m);
         let is_far = distance_m - 4.0 * sigma_m > if after_gap { most_m } else { 4.0 * most_m };
-        let may_be_far = distance_m - sigma_m > most_m || after_gap && distance_m + sigma_m > 2.0 * most_m;
+        let may_be_far =
+            distance_m - sigma_m > most_m || after_gap && distance_m + sigma_m > 2.0 * most_m;
         !(is_far || !agree && may_be_far)
     }
 
     /// Estimates it from the current positions of matches; `None` where they do not determine it.
-    pub fn of<'m>(rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Option<Self> {
+    pub fn of<'m>(
+        rig: &StereoRig,
+        matches: impl Iterator<Item = &'m Match> + Clone,
+    ) -> Option<Self> {
         let rows = matches.filter_map(|m| row(rig, m));
         let count = rows.clone().count();
         if count < MATCHES_MIN {
@@ -58,18 +64,25 @@ impl RightAhead {
     }
 }
 
-/// What a match says: how the rows' difference changes with shift, focal length and distance, and that difference, px.
+/// What a match says: how the rows' difference changes with shift, focal length and distance, and
+/// that difference, px.
 fn row(rig: &StereoRig, m: &Match) -> Option<(Vector3<f64>, f64)> {
     let disparity_px = f64::from(m.current_left[0]) - f64::from(m.current_right[0]);
     let y_px = f64::from(m.current_left[1]) - rig.center_v_px;
     let near_per_m = disparity_px / (rig.focal_px * rig.baseline_m);
     let difference_px = f64::from(m.current_right[1]) - f64::from(m.current_left[1]);
-    (disparity_px > 0.0).then(|| (Vector3::new(1.0, y_px / rig.focal_px, y_px * near_per_m), difference_px))
+    (disparity_px > 0.0)
+        .then(|| (Vector3::new(1.0, y_px / rig.focal_px, y_px * near_per_m), difference_px))
 }
 
-/// Least squares with weights by the residuals of `before`; and the standard deviation of the third unknown.
-fn solve(rows: impl Iterator<Item = (Vector3<f64>, f64)>, before: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
-    let (mut matrix, mut vector, mut squares, mut weights) = (Matrix3::zeros(), Vector3::zeros(), 0.0, 0.0);
+/// Least squares with weights by the residuals of `before`; and the standard deviation of the third
+/// unknown.
+fn solve(
+    rows: impl Iterator<Item = (Vector3<f64>, f64)>,
+    before: &Vector3<f64>,
+) -> Option<(Vector3<f64>, f64)> {
+    let (mut matrix, mut vector, mut squares, mut weights) =
+        (Matrix3::zeros(), Vector3::zeros(), 0.0, 0.0);
     for (row, difference_px) in rows {
         let residual_px = difference_px - row.dot(before);
         let share = residual_px / HALF_WEIGHT_PX;
@@ -79,11 +92,13 @@ fn solve(rows: impl Iterator<Item = (Vector3<f64>, f64)>, before: &Vector3<f64>)
         squares += weight * residual_px * residual_px;
         weights += weight;
     }
-    let is_determined = matrix.determinant() > DETERMINANT_MIN * (matrix.m11 * matrix.m22 * matrix.m33);
+    let is_determined =
+        matrix.determinant() > DETERMINANT_MIN * (matrix.m11 * matrix.m22 * matrix.m33);
     let inverse = matrix.try_inverse().filter(|_| is_determined)?;
     let solution = inverse * vector;
     let variance = squares / weights * inverse.m33;
-    let is_known = solution.iter().all(|x| x.is_finite()) && variance.is_finite() && variance >= 0.0;
+    let is_known =
+        solution.iter().all(|x| x.is_finite()) && variance.is_finite() && variance >= 0.0;
     is_known.then(|| (solution, libm::sqrt(variance)))
 }
 
@@ -92,17 +107,20 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
 
-    /// Matches of points between 5 and 45 m whose right camera stands `ahead_m` ahead, has rows shifted by 1 px and a focal length half a
-    /// percent longer; every fifth is an outlier.
+    /// Matches of points between 5 and 45 m whose right camera stands `ahead_m` ahead, has rows
+    /// shifted by 1 px and a focal length half a percent longer; every fifth is an outlier.
     fn matches(ahead_m: f64, random: &mut Random) -> [Match; 200] {
         core::array::from_fn(|index| {
-            let mut within = |most: f64| f64::from(random.below(1 << 20)) / f64::from(1 << 20) * most;
+            let mut within =
+                |most: f64| f64::from(random.below(1 << 20)) / f64::from(1 << 20) * most;
             let (x, y, z) = (within(20.0) - 10.0, within(4.0) - 2.0, 5.0 + within(40.0));
             let noise_px = within(0.4) - 0.2 + if index % 5 == 0 { within(4.0) } else { 0.0 };
             let left = [600.0 + 700.0 * x / z, 180.0 + 700.0 * y / z];
-            let right = [600.0 + 700.0 * (x - 0.5) / z, 181.0 + 703.5 * y / (z - ahead_m) + noise_px];
+            let right =
+                [600.0 + 700.0 * (x - 0.5) / z, 181.0 + 703.5 * y / (z - ahead_m) + noise_px];
             let [left, right] = [left, right].map(|at| at.map(|px| px as f32));
             Match {
                 previous_left: left,
@@ -119,9 +137,20 @@ mod tests {
         for ahead_m in [-0.8, -0.1, 0.0, 0.05, 0.4] {
             let found = RightAhead::of(&RIG, matches(ahead_m, &mut random).iter()).unwrap();
             // To first order in the distance.
-            assert!((found.distance_m - ahead_m).abs() < 4.0 * found.sigma_m + 0.2 * ahead_m.abs(), "{ahead_m}: {found:?}");
-            assert_eq!(!found.is_synchronous(0.05, true, false), ahead_m.abs() > 0.2, "{ahead_m}: {found:?}");
-            assert_eq!(!found.is_synchronous(0.05, false, false), ahead_m.abs() > 0.07, "{ahead_m}: {found:?}");
+            assert!(
+                (found.distance_m - ahead_m).abs() < 4.0 * found.sigma_m + 0.2 * ahead_m.abs(),
+                "{ahead_m}: {found:?}"
+            );
+            assert_eq!(
+                !found.is_synchronous(0.05, true, false),
+                ahead_m.abs() > 0.2,
+                "{ahead_m}: {found:?}"
+            );
+            assert_eq!(
+                !found.is_synchronous(0.05, false, false),
+                ahead_m.abs() > 0.07,
+                "{ahead_m}: {found:?}"
+            );
         }
     }
 
@@ -145,33 +174,56 @@ mod tests {
     #[test]
     fn each_bound_on_the_distance_decides_by_itself() {
         let is_synchronous = |distance_m: f64, sigma_m: f64, agree: bool, after_gap: bool| {
-            let both =
-                [distance_m, -distance_m].map(|distance_m| RightAhead { distance_m, sigma_m }.is_synchronous(0.125, agree, after_gap));
+            let both = [distance_m, -distance_m].map(|distance_m| {
+                RightAhead { distance_m, sigma_m }.is_synchronous(0.125, agree, after_gap)
+            });
             assert_eq!(both[0], both[1], "ahead and behind are alike");
             both[0]
         };
-        // Four standard deviations beyond four times the most, and after a gap beyond the most, however many agree.
-        assert!(is_synchronous(0.75, 0.0625, true, false) && !is_synchronous(0.76, 0.0625, true, false));
+        // Four standard deviations beyond four times the most, and after a gap beyond the most,
+        // however many agree.
+        assert!(
+            is_synchronous(0.75, 0.0625, true, false) && !is_synchronous(0.76, 0.0625, true, false)
+        );
         assert!(is_synchronous(0.5, 0.0, true, false) && !is_synchronous(0.51, 0.0, true, false));
-        assert!(is_synchronous(0.375, 0.0625, true, true) && !is_synchronous(0.38, 0.0625, true, true));
+        assert!(
+            is_synchronous(0.375, 0.0625, true, true) && !is_synchronous(0.38, 0.0625, true, true)
+        );
         assert!(is_synchronous(0.125, 0.0, true, true) && !is_synchronous(0.13, 0.0, true, true));
         // One standard deviation beyond the most: where few agree.
-        assert!(is_synchronous(0.1875, 0.0625, false, false) && !is_synchronous(0.19, 0.0625, false, false));
+        assert!(
+            is_synchronous(0.1875, 0.0625, false, false)
+                && !is_synchronous(0.19, 0.0625, false, false)
+        );
         assert!(is_synchronous(0.19, 0.0625, true, false));
         // One standard deviation below twice the most: after a gap, where few agree.
-        assert!(is_synchronous(0.125, 0.125, false, true) && !is_synchronous(0.126, 0.125, false, true));
-        assert!(is_synchronous(0.126, 0.125, false, false) && is_synchronous(0.126, 0.125, true, true));
+        assert!(
+            is_synchronous(0.125, 0.125, false, true) && !is_synchronous(0.126, 0.125, false, true)
+        );
+        assert!(
+            is_synchronous(0.126, 0.125, false, false) && is_synchronous(0.126, 0.125, true, true)
+        );
     }
 
-    /// Matches that the model holds of exactly: rows shifted by `shift_px`, a focal length longer by a share, the right camera ahead; and each
-    /// row off by a noise.
-    fn modelled(shift_px: f64, longer: f64, ahead_m: f64, noise_px: impl Fn(usize) -> f64) -> [Match; 60] {
+    /// Matches that the model holds of exactly: rows shifted by `shift_px`, a focal length longer
+    /// by a share, the right camera ahead; and each row off by a noise.
+    fn modelled(
+        shift_px: f64,
+        longer: f64,
+        ahead_m: f64,
+        noise_px: impl Fn(usize) -> f64,
+    ) -> [Match; 60] {
         core::array::from_fn(|index| {
             let at = index as f64;
             let (y_px, disparity_px) = (12.0 * (at % 13.0) - 70.0, 8.0 + 3.0 * (at % 11.0));
             let (u_left, v_left) = (300.0 + 5.0 * at, RIG.center_v_px + y_px);
-            let v_right = v_left + shift_px + longer * y_px / 700.0 + ahead_m * y_px * disparity_px / 350.0 + noise_px(index);
-            let [left, right] = [[u_left, v_left], [u_left - disparity_px, v_right]].map(|at| at.map(|px| px as f32));
+            let v_right = v_left
+                + shift_px
+                + longer * y_px / 700.0
+                + ahead_m * y_px * disparity_px / 350.0
+                + noise_px(index);
+            let [left, right] = [[u_left, v_left], [u_left - disparity_px, v_right]]
+                .map(|at| at.map(|px| px as f32));
             Match {
                 previous_left: [0.0; 2],
                 previous_right: [0.0; 2],
@@ -183,13 +235,20 @@ mod tests {
 
     #[test]
     fn what_the_model_holds_of_exactly_is_found_exactly() {
-        for (shift_px, longer, ahead_m) in [(0.0, 0.0, 0.0), (0.5, -3.0, 0.2), (-1.5, 2.0, -0.7), (0.0, 0.0, 0.05)] {
-            let found = RightAhead::of(&RIG, modelled(shift_px, longer, ahead_m, |_| 0.0).iter()).unwrap();
-            assert!((found.distance_m - ahead_m).abs() < 1e-4 && found.sigma_m < 1e-4, "{ahead_m}: {found:?}");
+        for (shift_px, longer, ahead_m) in
+            [(0.0, 0.0, 0.0), (0.5, -3.0, 0.2), (-1.5, 2.0, -0.7), (0.0, 0.0, 0.05)]
+        {
+            let found =
+                RightAhead::of(&RIG, modelled(shift_px, longer, ahead_m, |_| 0.0).iter()).unwrap();
+            assert!(
+                (found.distance_m - ahead_m).abs() < 1e-4 && found.sigma_m < 1e-4,
+                "{ahead_m}: {found:?}"
+            );
         }
     }
 
-    /// The plain way: four rounds of weighted least squares by Gauss's elimination, each sum by itself.
+    /// The plain way: four rounds of weighted least squares by Gauss's elimination, each sum by
+    /// itself.
     fn plainly(matches: &[Match]) -> [f64; 2] {
         let rows = || {
             matches.iter().map(|m| {
@@ -201,22 +260,37 @@ mod tests {
         };
         let (mut solution, mut variance) = ([0.0; 3], 0.0);
         for _ in 0..4 {
-            let residual = |row: &[f64; 3], difference: f64| difference - (0..3).map(|at| row[at] * solution[at]).sum::<f64>();
-            let weight = |row: &[f64; 3], difference: f64| 1.0 / (1.0 + 4.0 * residual(row, difference).powi(2));
-            // The matrix, the right side, and the unit vector that gives the last entry of the inverse.
+            let residual = |row: &[f64; 3], difference: f64| {
+                difference - (0..3).map(|at| row[at] * solution[at]).sum::<f64>()
+            };
+            let weight = |row: &[f64; 3], difference: f64| {
+                1.0 / (1.0 + 4.0 * residual(row, difference).powi(2))
+            };
+            // The matrix, the right side, and the unit vector that gives the last entry of the
+            // inverse.
             let mut system: [[f64; 5]; 3] = core::array::from_fn(|i| {
-                let sum = |of: &dyn Fn(&[f64; 3], f64) -> f64| rows().map(|(row, d)| weight(&row, d) * row[i] * of(&row, d)).sum::<f64>();
-                [sum(&|row, _| row[0]), sum(&|row, _| row[1]), sum(&|row, _| row[2]), sum(&|_, d| d), f64::from(u8::from(i == 2))]
+                let sum = |of: &dyn Fn(&[f64; 3], f64) -> f64| {
+                    rows().map(|(row, d)| weight(&row, d) * row[i] * of(&row, d)).sum::<f64>()
+                };
+                [
+                    sum(&|row, _| row[0]),
+                    sum(&|row, _| row[1]),
+                    sum(&|row, _| row[2]),
+                    sum(&|_, d| d),
+                    f64::from(u8::from(i == 2)),
+                ]
             });
             for i in 0..3 {
                 system[i] = system[i].map(|entry| entry / system[i][i]);
                 for other in (0..3).filter(|other| *other != i) {
                     let factor = system[other][i];
-                    system[other] = core::array::from_fn(|at| system[other][at] - factor * system[i][at]);
+                    system[other] =
+                        core::array::from_fn(|at| system[other][at] - factor * system[i][at]);
                 }
             }
             let weights: f64 = rows().map(|(row, d)| weight(&row, d)).sum();
-            let squares: f64 = rows().map(|(row, d)| weight(&row, d) * residual(&row, d).powi(2)).sum();
+            let squares: f64 =
+                rows().map(|(row, d)| weight(&row, d) * residual(&row, d).powi(2)).sum();
             variance = squares / weights * system[2][4];
             solution = system.map(|row| row[3]);
         }
@@ -227,11 +301,20 @@ mod tests {
     fn distance_and_deviation_are_those_of_weighted_least_squares() {
         let mut random = Random::new(6);
         for most_px in [0.1, 0.5, 3.0] {
-            let noise: [f64; 60] = core::array::from_fn(|_| (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * most_px);
+            let noise: [f64; 60] = core::array::from_fn(|_| {
+                (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * most_px
+            });
             let all = modelled(0.4, 1.0, 0.3, |index| noise[index]);
-            let (found, [distance_m, sigma_m]) = (RightAhead::of(&RIG, all.iter()).unwrap(), plainly(&all));
-            assert!((found.distance_m - distance_m).abs() < 1e-9, "{most_px} px: {found:?} {distance_m}");
-            assert!((found.sigma_m - sigma_m).abs() < 1e-9 && sigma_m > 0.0, "{most_px} px: {found:?} {sigma_m}");
+            let (found, [distance_m, sigma_m]) =
+                (RightAhead::of(&RIG, all.iter()).unwrap(), plainly(&all));
+            assert!(
+                (found.distance_m - distance_m).abs() < 1e-9,
+                "{most_px} px: {found:?} {distance_m}"
+            );
+            assert!(
+                (found.sigma_m - sigma_m).abs() < 1e-9 && sigma_m > 0.0,
+                "{most_px} px: {found:?} {sigma_m}"
+            );
         }
     }
 
@@ -240,11 +323,13 @@ mod tests {
         let all = modelled(0.4, 1.0, 0.3, |_| 0.0);
         assert!(RightAhead::of(&RIG, all.iter().take(MATCHES_MIN)).is_some());
         // Matches without disparity are none.
-        let some =
-            core::array::from_fn::<_, 21, _>(|at| if at < 2 { Match { current_right: all[at].current_left, ..all[at] } } else { all[at] });
+        let some = core::array::from_fn::<_, 21, _>(|at| {
+            if at < 2 { Match { current_right: all[at].current_left, ..all[at] } } else { all[at] }
+        });
         assert_eq!(RightAhead::of(&RIG, some.iter()), None);
         // All of one disparity: distance and focal length cannot be told apart.
-        let alike = all.map(|m| Match { current_right: [m.current_left[0] - 9.0, m.current_right[1]], ..m });
+        let alike = all
+            .map(|m| Match { current_right: [m.current_left[0] - 9.0, m.current_right[1]], ..m });
         assert_eq!(RightAhead::of(&RIG, alike.iter()), None);
     }
 }

@@ -1,6 +1,9 @@
 mod clip;
 
-use super::{Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus, REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
+use super::{
+    Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionStatus, REFERENCE_FRAMES_MAX,
+    SEGMENT_GAP_M,
+};
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
@@ -31,7 +34,10 @@ fn between(a: &Transform, b: &Transform) -> (f64, f64) {
 /// Moves a camera through the scene and returns estimate and truth of every frame after the first.
 fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
     let mut t_world_camera = Transform::IDENTITY;
@@ -41,7 +47,13 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(&right), &Serial);
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
+            let estimate = camera.step(
+                &EgomotionConfig::default(),
+                &RIG,
+                0.1,
+                matcher.bucketed(),
+                &mut estimator,
+            );
             estimates.push((estimate, motions[frame - 1].inverse()));
         }
         if let Some(motion) = motions.get(frame) {
@@ -49,14 +61,21 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
         }
     }
     let (distance, angle) = between(camera.t_world_camera(), &t_world_camera);
-    assert!(distance < 0.05 && angle < 0.5, "the trajectory is the product of the motions: {distance} m, {angle} degrees");
+    assert!(
+        distance < 0.05 && angle < 0.5,
+        "the trajectory is the product of the motions: {distance} m, {angle} degrees"
+    );
     estimates
 }
 
 #[test]
 fn estimates_the_trajectory_through_a_textured_scene() {
-    let motion =
-        |metres: f64, turn: f64, tilt: f64| Transform::new(Vector3::new(tilt, turn, 0.3 * turn), Vector3::new(0.1 * metres, -0.02, metres));
+    let motion = |metres: f64, turn: f64, tilt: f64| {
+        Transform::new(
+            Vector3::new(tilt, turn, 0.3 * turn),
+            Vector3::new(0.1 * metres, -0.02, metres),
+        )
+    };
     let motions = [
         motion(0.5, 0.02, 0.0),
         motion(0.5, 0.02, 0.004),
@@ -79,7 +98,8 @@ fn turning_on_the_spot_and_standing_still_are_motions_too() {
     let estimates = walk(&[turn, Transform::IDENTITY]);
     let (distance, angle) = between(&estimates[0].0.t_current_previous.unwrap(), &turn.inverse());
     assert!(distance < 0.01 && angle < 0.1, "{distance} m, {angle} degrees");
-    let (distance, angle) = between(&estimates[1].0.t_current_previous.unwrap(), &Transform::IDENTITY);
+    let (distance, angle) =
+        between(&estimates[1].0.t_current_previous.unwrap(), &Transform::IDENTITY);
     assert!(distance < 1e-6 && angle < 1e-5, "equal images: {distance} m, {angle} degrees");
 }
 
@@ -92,16 +112,20 @@ fn project(point: &Point3<f64>) -> [[f32; 2]; 2] {
 
 /// Exact matches of random points; the first `outliers` of them get random pixels.
 fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Random) -> Vec<Match> {
-    let uniform = |random: &mut Random, low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
+    let uniform = |random: &mut Random, low: f64, high: f64| {
+        low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
+    };
     (0..count)
         .map(|i| {
             let z = uniform(random, 4.0, 30.0);
-            let point = Point3::new(uniform(random, -0.7, 0.7) * z, uniform(random, -0.3, 0.3) * z, z);
+            let point =
+                Point3::new(uniform(random, -0.7, 0.7) * z, uniform(random, -0.3, 0.3) * z, z);
             let ([previous_left, previous_right], [mut current_left, mut current_right]) =
                 (project(&point), project(&motion.transform_point(point)));
             if i < outliers {
                 for pixel in [&mut current_left, &mut current_right] {
-                    *pixel = [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
+                    *pixel =
+                        [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
                 }
             }
             Match { previous_left, previous_right, current_left, current_right }
@@ -116,7 +140,8 @@ fn motion() -> Transform {
 fn estimate(matches: &[Match], rig: &StereoRig, seed: u64) -> (MotionEstimate, Vec<u32>) {
     let mut slab = Box::new(Slab([0; BYTES]));
     let mut estimator = estimator(&mut slab);
-    let estimate = estimator.estimate(&EgomotionConfig::default(), rig, matches, &mut Random::new(seed), None);
+    let estimate =
+        estimator.estimate(&EgomotionConfig::default(), rig, matches, &mut Random::new(seed), None);
     (estimate, estimator.inliers().collect())
 }
 
@@ -145,7 +170,8 @@ fn inliers_that_are_off_together_pull_a_robust_refinement_less() {
     let turn_off = |robust_px: f64| {
         let mut slab = Box::new(Slab([0; BYTES]));
         let config = EgomotionConfig { robust_px, side_knee: 10.0, ..EgomotionConfig::default() };
-        let found = estimator(&mut slab).estimate(&config, &RIG, &matches, &mut Random::new(1), None);
+        let found =
+            estimator(&mut slab).estimate(&config, &RIG, &matches, &mut Random::new(1), None);
         assert!(found.inliers > 590, "{found:?}");
         between(&found.t_current_previous.unwrap(), &motion()).1
     };
@@ -159,9 +185,16 @@ fn equal_seeds_give_equal_bits_and_a_warm_start_the_same_answer() {
     assert_eq!(estimate(&matches, &RIG, 7), estimate(&matches, &RIG, 7));
     let mut slab = Box::new(Slab([0; BYTES]));
     let mut estimator = estimator(&mut slab);
-    let warm = estimator.estimate(&EgomotionConfig::default(), &RIG, &matches, &mut Random::new(7), Some(&motion()));
+    let warm = estimator.estimate(
+        &EgomotionConfig::default(),
+        &RIG,
+        &matches,
+        &mut Random::new(7),
+        Some(&motion()),
+    );
     let cold = estimate(&matches, &RIG, 7).0;
-    let (distance, angle) = between(&warm.t_current_previous.unwrap(), &cold.t_current_previous.unwrap());
+    let (distance, angle) =
+        between(&warm.t_current_previous.unwrap(), &cold.t_current_previous.unwrap());
     assert!(distance < 1e-9 && angle < 1e-9);
     assert!(warm.samples <= cold.samples, "the first hypothesis is already right");
 }
@@ -170,23 +203,35 @@ fn equal_seeds_give_equal_bits_and_a_warm_start_the_same_answer() {
 fn too_little_gives_a_status_and_no_motion() {
     let good = matches(5, 0, &motion(), &mut Random::new(5));
     let (estimate_of_few, _) = estimate(&good, &RIG, 1);
-    assert_eq!((estimate_of_few.status, estimate_of_few.t_current_previous), (MotionStatus::TooFewMatches, None));
+    assert_eq!(
+        (estimate_of_few.status, estimate_of_few.t_current_previous),
+        (MotionStatus::TooFewMatches, None)
+    );
     assert_eq!(estimate(&[], &RIG, 1).0.status, MotionStatus::TooFewMatches);
     let (lost, inliers) = estimate(&matches(60, 60, &motion(), &mut Random::new(6)), &RIG, 1);
     assert_ne!(lost.status, MotionStatus::TooFewMatches);
     assert!(lost.t_current_previous.is_none() || lost.inliers >= 6);
     assert_eq!(inliers.len(), lost.inliers as usize);
     let same_point = vec![good[0]; 50];
-    assert_eq!(estimate(&same_point, &RIG, 1).0.t_current_previous, None, "one point determines no motion");
+    assert_eq!(
+        estimate(&same_point, &RIG, 1).0.t_current_previous,
+        None,
+        "one point determines no motion"
+    );
     for rig in [StereoRig { baseline_m: 0.0, ..RIG }, StereoRig { focal_px: f64::NAN, ..RIG }] {
-        assert_eq!(estimate(&matches(60, 0, &motion(), &mut Random::new(6)), &rig, 1).0.status, MotionStatus::BadRig);
+        assert_eq!(
+            estimate(&matches(60, 0, &motion(), &mut Random::new(6)), &rig, 1).0.status,
+            MotionStatus::BadRig
+        );
     }
 }
 
 #[test]
 fn what_is_not_finite_or_behind_is_left_out() {
     let mut matches = matches(80, 0, &motion(), &mut Random::new(9));
-    for (i, value) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e30].into_iter().enumerate() {
+    for (i, value) in
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e30].into_iter().enumerate()
+    {
         matches[i].previous_left[0] = value;
         matches[i + 10].previous_right[1] = value;
         matches[i + 20].current_left[1] = value;
@@ -209,7 +254,10 @@ fn matches_beyond_the_capacity_are_ignored() {
 #[test]
 fn a_dark_right_camera_repeats_the_last_motion() {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
     let step = Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.4));
@@ -221,21 +269,34 @@ fn a_dark_right_camera_repeats_the_last_motion() {
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(right), &Serial);
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
-            let expected = if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
+            let estimate = camera.step(
+                &EgomotionConfig::default(),
+                &RIG,
+                0.1,
+                matcher.bucketed(),
+                &mut estimator,
+            );
+            let expected =
+                if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
             assert_eq!((estimate.status, camera.held_frames()), (expected, frame - 1));
             let (distance, _) = between(camera.t_current_previous(), &step.inverse());
             assert!(distance < 0.02);
         }
         t_world_camera = t_world_camera * step;
     }
-    assert!((camera.t_world_camera().translation().z - 1.2).abs() < 0.05, "three steps, two of them extrapolated");
+    assert!(
+        (camera.t_world_camera().translation().z - 1.2).abs() < 0.05,
+        "three steps, two of them extrapolated"
+    );
 }
 
 #[test]
 fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen() {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
-    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
     let mut estimator = estimator(&mut slab);
     let mut camera = Egomotion::default();
     let dark = vec![0; WIDTH * HEIGHT];
@@ -243,7 +304,8 @@ fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen
     for (frame, metres) in [0.0, 0.3, 0.3, 0.1, 0.1].into_iter().enumerate() {
         t_world_camera = t_world_camera * Transform::from_translation([0.0, 0.0, metres]);
         let seen = see(&t_world_camera);
-        let [left, right] = if frame == 2 || frame == 3 { [&dark, &dark] } else { [&seen[0], &seen[1]] };
+        let [left, right] =
+            if frame == 2 || frame == 3 { [&dark, &dark] } else { [&seen[0], &seen[1]] };
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(left), view(right), &Serial);
         if frame > 0 {
@@ -257,29 +319,42 @@ fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen
         assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
         assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
     }
-    assert!((camera.t_current_previous().distance_m() - 0.5 / 3.0).abs() < 0.02, "a frame's share of the motion since then");
+    assert!(
+        (camera.t_current_previous().distance_m() - 0.5 / 3.0).abs() < 0.02,
+        "a frame's share of the motion since then"
+    );
 }
 
 #[test]
 fn the_time_of_frames_without_matches_counts_in_the_motion_over_them() {
     let mut slab = Box::new(Slab([0; BYTES]));
-    let (mut estimator, mut camera, mut random) = (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let (mut estimator, mut camera, mut random) =
+        (estimator(&mut slab), Egomotion::default(), Random::new(5));
     let config = EgomotionConfig::default();
     camera.step(&config, &RIG, 0.1, &matches(60, 0, &motion(), &mut random), &mut estimator);
     camera.hold(0.1);
     let over_two = matches(60, 30, &(motion() * motion()), &mut random);
     let estimate = camera.step(&config, &RIG, 0.1, &over_two, &mut estimator);
-    assert_eq!((estimate.status, camera.held_frames()), (MotionStatus::Estimated, 0), "half of the matches agree with what was expected");
+    assert_eq!(
+        (estimate.status, camera.held_frames()),
+        (MotionStatus::Estimated, 0),
+        "half of the matches agree with what was expected"
+    );
     assert!(between(camera.t_current_previous(), &motion()).0 < 0.05);
 }
 
-/// A camera that moved by `motion()` a frame, and what it makes of one of another motion with `outliers` among 60 matches.
+/// A camera that moved by `motion()` a frame, and what it makes of one of another motion with
+/// `outliers` among 60 matches.
 fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomotion) {
     let mut slab = Box::new(Slab([0; BYTES]));
-    let (mut estimator, mut camera, mut random) = (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let (mut estimator, mut camera, mut random) =
+        (estimator(&mut slab), Egomotion::default(), Random::new(5));
     let config = EgomotionConfig::default();
     let first = matches(60, 0, &motion(), &mut random);
-    assert_eq!(camera.step(&config, &RIG, 0.1, &first, &mut estimator).status, MotionStatus::Estimated);
+    assert_eq!(
+        camera.step(&config, &RIG, 0.1, &first, &mut estimator).status,
+        MotionStatus::Estimated
+    );
     let second = matches(60, outliers, then, &mut random);
     (camera.step(&config, &RIG, 0.1, &second, &mut estimator), camera)
 }
@@ -288,10 +363,17 @@ fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomot
 fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
     let leap = motion() * Transform::from_translation([0.0, 0.0, -1.0]);
     let (estimate, camera) = after_one_frame(&leap, 30);
-    assert_eq!((estimate.status, estimate.t_current_previous, camera.held_frames()), (MotionStatus::Implausible, None, 1));
+    assert_eq!(
+        (estimate.status, estimate.t_current_previous, camera.held_frames()),
+        (MotionStatus::Implausible, None, 1)
+    );
     assert!(between(camera.t_current_previous(), &motion()).0 < 1e-3, "it moves on as before");
     assert_eq!(after_one_frame(&leap, 5).0.status, MotionStatus::Estimated);
-    assert_eq!(after_one_frame(&motion(), 30).0.status, MotionStatus::Estimated, "half of the matches are enough for what was expected");
+    assert_eq!(
+        after_one_frame(&motion(), 30).0.status,
+        MotionStatus::Estimated,
+        "half of the matches are enough for what was expected"
+    );
     assert_eq!(after_one_frame(&motion(), 50).0.status, MotionStatus::TooFewInliers);
 }
 
@@ -315,12 +397,21 @@ fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_ab
     }
     for frame in 0..20 {
         assert_eq!((camera.is_lost(), camera.segment(), camera.since_reference()), (true, 0, 0));
-        assert!((camera.t_world_camera().translation_m[2] - 1.0 - f64::from(REFERENCE_FRAMES_MAX + frame)).abs() < 1e-9);
+        assert!(
+            (camera.t_world_camera().translation_m[2]
+                - 1.0
+                - f64::from(REFERENCE_FRAMES_MAX + frame))
+            .abs()
+                < 1e-9
+        );
         camera.hold(0.1);
     }
     let guess = camera.t_world_camera().translation_m;
     camera.begin_segment();
-    assert_eq!((camera.t_world_camera().translation_m, camera.segment()), ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1));
+    assert_eq!(
+        (camera.t_world_camera().translation_m, camera.segment()),
+        ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1)
+    );
     let pose = Transform::from_translation([3.0, 0.0, 2.0]);
     camera.relocalize(&pose);
     assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, 1));
@@ -335,7 +426,8 @@ fn allocates_exactly_the_bytes_it_names() {
 }
 
 impl Egomotion {
-    /// Flips a bit of a component of the pose: x, y, z, w of the rotation, x, y, z of the translation.
+    /// Flips a bit of a component of the pose: x, y, z, w of the rotation, x, y, z of the
+    /// translation.
     pub(crate) fn flip(&mut self, component: usize, bit: u32) {
         let pose = self.pose_mut();
         let number = match component {

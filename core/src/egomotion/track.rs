@@ -11,17 +11,19 @@ use crate::{
 /// Seed of the camera's own draws.
 const SEED: u64 = 0x6361_6D65_7261;
 
-/// An estimate with so many times fewer inliers than the one before it is not strong, however large their share.
+/// An estimate with so many times fewer inliers than the one before it is not strong, however large
+/// their share.
 const FEWER_INLIERS_MAX: u32 = 4;
 
 /// Distance by which the estimate of one frame's motion may be wrong, m.
 const NOISE_M: f64 = 0.1;
 
-/// Frames without an estimate after which the camera is lost: matches are sought with the last frame, although its pose is a guess.
+/// Frames without an estimate after which the camera is lost: matches are sought with the last
+/// frame, although its pose is a guess.
 pub const REFERENCE_FRAMES_MAX: u32 = 8;
 
-/// Height by which a segment of the map stands above where its first pose was guessed, m: farther than any frame is fused, so that no block of it
-/// is one of another segment.
+/// Height by which a segment of the map stands above where its first pose was guessed, m: farther
+/// than any frame is fused, so that no block of it is one of another segment.
 pub const SEGMENT_GAP_M: f64 = 100.0;
 
 /// Where the camera is and how it last moved.
@@ -64,8 +66,9 @@ impl Default for Egomotion {
 }
 
 impl Egomotion {
-    /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity). `matches` are with the reference: the last
-    /// frame whose pose is not a guess. The estimate is of the motion since then. `interval_s` is the time since the last frame.
+    /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity).
+    /// `matches` are with the reference: the last frame whose pose is not a guess. The estimate is
+    /// of the motion since then. `interval_s` is the time since the last frame.
     pub fn step<'m>(
         &mut self,
         config: &EgomotionConfig,
@@ -80,14 +83,18 @@ impl Egomotion {
         let mut estimate = MotionEstimate { right_ahead, ..found };
         self.reference_s += f64::from(interval_s);
         let frames = self.since_reference + 1;
-        let motion = estimate.t_current_previous.map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
+        let motion = estimate
+            .t_current_previous
+            .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
         if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
             estimate = MotionEstimate { status, t_current_previous: None, ..estimate };
         }
         match (&estimate.t_current_previous, motion) {
             (Some(t_current_reference), Some(motion)) => {
-                (self.t_current_previous, self.motion_s, self.inliers) = (motion, self.reference_s / f64::from(frames), estimate.inliers);
-                self.t_world_camera = (self.t_world_reference * t_current_reference.inverse()).normalized();
+                (self.t_current_previous, self.motion_s, self.inliers) =
+                    (motion, self.reference_s / f64::from(frames), estimate.inliers);
+                self.t_world_camera =
+                    (self.t_world_reference * t_current_reference.inverse()).normalized();
                 self.held = 0;
                 self.refer_to_last();
             }
@@ -96,7 +103,8 @@ impl Egomotion {
         estimate
     }
 
-    /// Moves the camera by one frame: as found or, failing that, as before. The last frame is the reference.
+    /// Moves the camera by one frame: as found or, failing that, as before. The last frame is the
+    /// reference.
     pub fn advance(&mut self, t_current_previous: Option<Transform>) {
         match t_current_previous {
             Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
@@ -106,7 +114,8 @@ impl Egomotion {
         self.refer_to_last();
     }
 
-    /// Moves the camera by one frame as before, `interval_s` after the last one. The reference stays, until it is too long ago.
+    /// Moves the camera by one frame as before, `interval_s` after the last one. The reference
+    /// stays, until it is too long ago.
     pub fn hold(&mut self, interval_s: f32) {
         self.reference_s += f64::from(interval_s);
         self.hold_from_reference();
@@ -144,20 +153,34 @@ impl Egomotion {
     fn expected(&self) -> Transform {
         match self.since_reference {
             0 => self.t_current_previous,
-            _ => (self.t_current_previous * self.t_world_camera.inverse() * self.t_world_reference).normalized(),
+            _ => (self.t_current_previous * self.t_world_camera.inverse() * self.t_world_reference)
+                .normalized(),
         }
     }
 
-    /// Why a camera cannot have moved so since the reference, a frame's share of it being `motion`; `None` where it can.
-    fn doubt(&self, config: &EgomotionConfig, motion: &Transform, estimate: &MotionEstimate) -> Option<MotionStatus> {
+    /// Why a camera cannot have moved so since the reference, a frame's share of it being `motion`;
+    /// `None` where it can.
+    fn doubt(
+        &self,
+        config: &EgomotionConfig,
+        motion: &Transform,
+        estimate: &MotionEstimate,
+    ) -> Option<MotionStatus> {
         // Few matches can agree on anything.
         let as_many = FEWER_INLIERS_MAX * estimate.inliers >= self.inliers;
         let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
         let after_gap = self.since_reference > 0;
         let strong = as_many && agree;
         let vouched = if after_gap { strong } else { agree };
-        let is_synchronous = |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, vouched, after_gap);
-        let can_accelerate = || self.can_accelerate_to(config, motion, self.reference_s / f64::from(self.since_reference + 1));
+        let is_synchronous =
+            |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, vouched, after_gap);
+        let can_accelerate = || {
+            self.can_accelerate_to(
+                config,
+                motion,
+                self.reference_s / f64::from(self.since_reference + 1),
+            )
+        };
         if !estimate.right_ahead.is_none_or(is_synchronous) {
             Some(MotionStatus::Unsynchronized)
         } else if strong || can_accelerate() {
@@ -168,25 +191,36 @@ impl Egomotion {
     }
 
     /// Whether a camera that moved as it last did can move so in the next `frame_s`.
-    fn can_accelerate_to(&self, config: &EgomotionConfig, motion: &Transform, frame_s: f64) -> bool {
+    fn can_accelerate_to(
+        &self,
+        config: &EgomotionConfig,
+        motion: &Transform,
+        frame_s: f64,
+    ) -> bool {
         if self.motion_s <= 0.0 {
             return true;
         }
-        let (then, now) = (self.t_current_previous.translation() * (frame_s / self.motion_s), motion.translation());
+        let (then, now) = (
+            self.t_current_previous.translation() * (frame_s / self.motion_s),
+            motion.translation(),
+        );
         (now - then).norm() <= config.acceleration_max_m_s2 * frame_s * frame_s + NOISE_M
     }
 
-    /// Whether a camera that moved as it last did can stand still for the next `interval_s`: if not, images that repeat the last ones are old.
+    /// Whether a camera that moved as it last did can stand still for the next `interval_s`: if
+    /// not, images that repeat the last ones are old.
     pub fn may_stand(&self, config: &EgomotionConfig, interval_s: f32) -> bool {
         self.can_accelerate_to(config, &Transform::IDENTITY, f64::from(interval_s))
     }
 
     fn extrapolate(&mut self) {
-        self.t_world_camera = (self.t_world_camera * self.t_current_previous.inverse()).normalized();
+        self.t_world_camera =
+            (self.t_world_camera * self.t_current_previous.inverse()).normalized();
     }
 
     fn refer_to_last(&mut self) {
-        (self.t_world_reference, self.since_reference, self.reference_s) = (self.t_world_camera, 0, 0.0);
+        (self.t_world_reference, self.since_reference, self.reference_s) =
+            (self.t_world_camera, 0, 0.0);
     }
 
     /// Frames from the reference to the last one: 0 where the last one is the reference.
@@ -194,7 +228,8 @@ impl Egomotion {
         self.since_reference
     }
 
-    /// Number of the map's segment, from 0: the way from the poses of one to those of another is not known.
+    /// Number of the map's segment, from 0: the way from the poses of one to those of another is
+    /// not known.
     pub fn segment(&self) -> u32 {
         self.segment
     }
@@ -212,13 +247,20 @@ impl Egomotion {
         &mut self.t_world_reference
     }
 
-    /// Digest of the pose, of the motion to be extrapolated, of the random numbers to come, and of this frame's estimate.
+    /// Digest of the pose, of the motion to be extrapolated, of the random numbers to come, and of
+    /// this frame's estimate.
     pub fn digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
         let mut hasher = Hasher::default();
         self.visit(&mut hasher);
         let mut digest = hasher.0;
         if let Some(estimate) = estimate {
-            let counts = [estimate.status as u32, estimate.matches, estimate.inliers, estimate.samples, estimate.steps];
+            let counts = [
+                estimate.status as u32,
+                estimate.matches,
+                estimate.inliers,
+                estimate.samples,
+                estimate.steps,
+            ];
             counts.iter().for_each(|&count| digest.u64(u64::from(count)));
             digest.f64(estimate.residual_rms_px);
         }

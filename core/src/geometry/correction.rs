@@ -3,15 +3,16 @@
 use super::{Shares, StereoRig, scalar::floored_i32};
 use crate::image::{DISPARITY_FILLED, DISPARITY_ONE_PX};
 
-/// Mean square of the distances of matches from the middle row, in shares of that of the first row: so much is taken off the square of
-/// each, and what grows over the rows says nothing of the offset.
+/// Mean square of the distances of matches from the middle row, in shares of that of the first row:
+/// so much is taken off the square of each, and what grows over the rows says nothing of the
+/// offset.
 pub(crate) const ROW_SQUARE_MEAN: f64 = 0.2;
 
 /// What must be added to a disparity, by where the right camera sees the point.
 ///
 /// At shares `s` of the way from the principal point to the side of the image and `t` to its first
-/// row: `offset + slope s + quartic s⁴ + quadratic (t² - 1/5)`. The offset is what is left of the cameras'
-/// convergence, the rest is what is left of their lenses.
+/// row: `offset + slope s + quartic s⁴ + quadratic (t² - 1/5)`. The offset is what is left of the
+/// cameras' convergence, the rest is what is left of their lenses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -39,8 +40,8 @@ pub(crate) struct PixelCorrection {
 }
 
 impl DisparityCorrection {
-    /// Prepares it for a rig. A principal point in column 0 has no sides, one in row 0 no first row:
-    /// what grows towards them is left out.
+    /// Prepares it for a rig. A principal point in column 0 has no sides, one in row 0 no first
+    /// row: what grows towards them is left out.
     pub(crate) fn for_rig(&self, rig: &StereoRig) -> PixelCorrection {
         PixelCorrection {
             offset_px: self.offset_px as f32,
@@ -52,7 +53,8 @@ impl DisparityCorrection {
         }
     }
 
-    /// What must be added to a disparity whose point the right camera of this rig sees at `[u, v]`, px.
+    /// What must be added to a disparity whose point the right camera of this rig sees at `[u, v]`,
+    /// px.
     ///
     /// ```
     /// use dynvox_core::geometry::{DisparityCorrection, StereoRig};
@@ -73,8 +75,8 @@ impl DisparityCorrection {
 }
 
 impl PixelCorrection {
-    /// The same for a right camera that is turned as well: where that moves rows by an angle times the column, it moves columns by the angle
-    /// times the row.
+    /// The same for a right camera that is turned as well: where that moves rows by an angle times
+    /// the column, it moves columns by the angle times the row.
     pub(crate) fn rolled(self, roll_rad: f64) -> Self {
         Self { roll_rad: roll_rad as f32, ..self }
     }
@@ -89,7 +91,9 @@ impl PixelCorrection {
     #[inline(always)]
     fn of_row(&self, v_px: f32) -> f32 {
         let share = self.shares.down(v_px);
-        self.offset_px + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32) + self.roll_rad * self.shares.below_px(v_px)
+        self.offset_px
+            + self.row_quadratic_px * (share * share - ROW_SQUARE_MEAN as f32)
+            + self.roll_rad * self.shares.below_px(v_px)
     }
 
     /// What must be added in a column of a row, given what its columns share.
@@ -138,11 +142,18 @@ mod tests {
     use crate::random::Random;
     use std::vec::Vec;
 
-    const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
 
     #[test]
     fn the_offset_is_the_same_everywhere_and_the_sides_grow() {
-        let correction = DisparityCorrection { offset_px: 0.5, slope_px: 0.2, quartic_px: 1.0, row_quadratic_px: -0.4 }.for_rig(&RIG);
+        let correction = DisparityCorrection {
+            offset_px: 0.5,
+            slope_px: 0.2,
+            quartic_px: 1.0,
+            row_quadratic_px: -0.4,
+        }
+        .for_rig(&RIG);
         for (at, expected) in [
             ([600.0, 180.0], 0.58),
             ([0.0, 180.0], 1.38),
@@ -156,23 +167,38 @@ mod tests {
             let [u, v] = correction.uncorrected(correction.corrected(at));
             assert!((u - at[0]).abs() < 0.02 && v == at[1]);
         }
-        let middle = DisparityCorrection { offset_px: 0.5, slope_px: 9.0, quartic_px: 9.0, row_quadratic_px: 9.0 };
-        assert_eq!(middle.for_rig(&StereoRig { center_u_px: 0.0, ..RIG }).at([50.0, 180.0]), 0.5 - 9.0 * 0.2);
+        let middle = DisparityCorrection {
+            offset_px: 0.5,
+            slope_px: 9.0,
+            quartic_px: 9.0,
+            row_quadratic_px: 9.0,
+        };
+        assert_eq!(
+            middle.for_rig(&StereoRig { center_u_px: 0.0, ..RIG }).at([50.0, 180.0]),
+            0.5 - 9.0 * 0.2
+        );
     }
 
     #[test]
     fn a_turned_camera_errs_with_the_row() {
-        let turned = DisparityCorrection { offset_px: 0.5, ..DisparityCorrection::default() }.for_rig(&RIG).rolled(0.005);
-        assert!((turned.at([50.0, 280.0]) - 1.0).abs() < 1e-6 && (turned.at([900.0, 80.0])).abs() < 1e-6);
+        let turned = DisparityCorrection { offset_px: 0.5, ..DisparityCorrection::default() }
+            .for_rig(&RIG)
+            .rolled(0.005);
+        assert!(
+            (turned.at([50.0, 280.0]) - 1.0).abs() < 1e-6
+                && (turned.at([900.0, 80.0])).abs() < 1e-6
+        );
     }
 
     #[test]
     fn rows_are_corrected_where_there_is_a_disparity() {
-        let correction = DisparityCorrection { offset_px: -0.5, ..DisparityCorrection::default() }.for_rig(&RIG);
+        let correction =
+            DisparityCorrection { offset_px: -0.5, ..DisparityCorrection::default() }.for_rig(&RIG);
         let mut row = [0, 256, 100, 128, 65_535, 1];
         correction.correct_row(0, &mut row);
         assert_eq!(row, [0, 128, 0, 0, 65_407, 0]);
-        let far = DisparityCorrection { offset_px: 9.0, ..DisparityCorrection::default() }.for_rig(&RIG);
+        let far =
+            DisparityCorrection { offset_px: 9.0, ..DisparityCorrection::default() }.for_rig(&RIG);
         let mut row = [65_535, 0];
         far.correct_row(0, &mut row);
         assert_eq!(row, [65_535, 0], "held at the end");
@@ -189,14 +215,22 @@ mod tests {
             ([-200.0, 1.0, 0.0, 0.0], 7),
             ([f64::NAN, 0.0, 0.0, 0.0], 7),
         ] {
-            let correction = DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px }.for_rig(&RIG);
-            let row: Vec<u16> = (0..1_301).map(|_| random.below(65_536).saturating_sub(random.below(2) * 65_000) as u16).collect();
+            let correction =
+                DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px }
+                    .for_rig(&RIG);
+            let row: Vec<u16> = (0..1_301)
+                .map(|_| random.below(65_536).saturating_sub(random.below(2) * 65_000) as u16)
+                .collect();
             let mut corrected = row.clone();
             correction.correct_row(v, &mut corrected);
             for (u, (&before, after)) in row.iter().zip(corrected).enumerate() {
                 let px = f32::from(before) / 256.0;
-                let plain = ((px + correction.at([u as f32 - px, v as f32])) * 256.0 + 0.5) as u16 & !DISPARITY_FILLED;
-                assert_eq!(after, if before == 0 || plain == 0 { 0 } else { plain | before & DISPARITY_FILLED });
+                let plain = ((px + correction.at([u as f32 - px, v as f32])) * 256.0 + 0.5) as u16
+                    & !DISPARITY_FILLED;
+                assert_eq!(
+                    after,
+                    if before == 0 || plain == 0 { 0 } else { plain | before & DISPARITY_FILLED }
+                );
             }
         }
     }

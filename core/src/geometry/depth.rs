@@ -3,8 +3,8 @@
 use super::StereoRig;
 use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
 
-/// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where disparity is unknown or depth outside `near_m..=far_m`.
-/// Images of different sizes are turned as far as both reach.
+/// Turns disparity (1/256 px, 0 none) into depth in metres, 0 where disparity is unknown or depth
+/// outside `near_m..=far_m`. Images of different sizes are turned as far as both reach.
 ///
 /// ```
 /// use dynvox_core::{geometry::{StereoRig, depth_from_disparity}, image::{DISPARITY_ONE_PX, View, ViewMut}};
@@ -15,10 +15,18 @@ use crate::image::{DISPARITY_ONE_PX, View, ViewMut};
 /// depth_from_disparity(&rig, 0.5, 20.0, View::new(&disparity_q8, 2, 1).unwrap(), &mut ViewMut::new(&mut depth_m, 2, 1).unwrap());
 /// assert_eq!(depth_m, [10.0, 0.0]);
 /// ```
-pub fn depth_from_disparity(rig: &StereoRig, near_m: f32, far_m: f32, disparity_q8: View<'_, u16>, depth_m: &mut ViewMut<'_, f32>) {
+pub fn depth_from_disparity(
+    rig: &StereoRig,
+    near_m: f32,
+    far_m: f32,
+    disparity_q8: View<'_, u16>,
+    depth_m: &mut ViewMut<'_, f32>,
+) {
     let scale = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
     let width = depth_m.width();
-    for (depths, disparities) in depth_m.pixels_mut().chunks_exact_mut(width.max(1)).zip(disparity_q8.rows()) {
+    for (depths, disparities) in
+        depth_m.pixels_mut().chunks_exact_mut(width.max(1)).zip(disparity_q8.rows())
+    {
         for (depth, &disparity) in depths.iter_mut().zip(disparities) {
             // Disparity 0 gives infinity, which is beyond far.
             let value = scale / f32::from(disparity);
@@ -33,7 +41,8 @@ mod tests {
 
     #[test]
     fn keeps_near_and_far_and_knows_nothing_without_disparity() {
-        let rig = StereoRig { focal_px: 100.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 0.5 };
+        let rig =
+            StereoRig { focal_px: 100.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 0.5 };
         let disparities = [0, 10 * DISPARITY_ONE_PX, DISPARITY_ONE_PX, 101 * DISPARITY_ONE_PX];
         let mut depths = [9.0; 4];
         let mut view = ViewMut::new(&mut depths, 4, 1).unwrap();

@@ -1,4 +1,5 @@
-//! The median of many values by their counts, exact to a bin. The order of the values does not matter.
+//! The median of many values by their counts, exact to a bin. The order of the values does not
+//! matter.
 
 /// Bins of a [`Histogram`].
 pub(crate) const BINS: usize = 512;
@@ -27,7 +28,8 @@ impl Histogram {
         self.total
     }
 
-    /// The bin of the median: the first up to whose end more than half of all values lie. `None` of no value.
+    /// The bin of the median: the first up to whose end more than half of all values lie. `None` of
+    /// no value.
     pub fn median(&self) -> Option<usize> {
         let mut below = 0;
         self.counts.iter().position(|&count| {

@@ -1,4 +1,5 @@
-//! The stereo rig, rigid motion and projection. Camera axes are KITTI's: x right, y down, z forward.
+//! The stereo rig, rigid motion and projection. Camera axes are KITTI's: x right, y down, z
+//! forward.
 
 mod correction;
 mod depth;

@@ -21,7 +21,9 @@ impl OrientedBox {
     #[inline]
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         let at = self.t_box_world.transform_point(point_m);
-        at.iter().zip(self.low_m.iter().zip(&self.high_m)).all(|(at, (low, high))| low <= at && at <= high)
+        at.iter()
+            .zip(self.low_m.iter().zip(&self.high_m))
+            .all(|(at, (low, high))| low <= at && at <= high)
     }
 
     /// The least box along the world's axes around it: least and greatest coordinates, m.
@@ -29,7 +31,16 @@ impl OrientedBox {
         let t_world_box = self.t_box_world.inverse();
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         let [[x, y, z], [x2, y2, z2]] = [self.low_m, self.high_m];
-        for corner in [[x, y, z], [x2, y, z], [x, y2, z], [x2, y2, z], [x, y, z2], [x2, y, z2], [x, y2, z2], [x2, y2, z2]] {
+        for corner in [
+            [x, y, z],
+            [x2, y, z],
+            [x, y2, z],
+            [x2, y2, z],
+            [x, y, z2],
+            [x2, y, z2],
+            [x, y2, z2],
+            [x2, y2, z2],
+        ] {
             let corner: [f64; 3] = t_world_box.transform_point(corner);
             let [low, high] = &mut bounds;
             for ((low, high), at) in low.iter_mut().zip(high).zip(corner) {
@@ -57,7 +68,12 @@ mod tests {
             let inside: [f64; 3] = t_world_box.transform_point(corner.map(|c| 0.99 * c));
             let outside: [f64; 3] = t_world_box.transform_point(corner.map(|c| 1.01 * c));
             assert!(turned.contains(inside) && !turned.contains(outside));
-            assert!(inside.iter().zip(low.iter().zip(&high)).all(|(at, (low, high))| low < at && at < high));
+            assert!(
+                inside
+                    .iter()
+                    .zip(low.iter().zip(&high))
+                    .all(|(at, (low, high))| low < at && at < high)
+            );
         }
         assert!(!turned.contains([f64::NAN; 3]));
     }

@@ -108,7 +108,8 @@ impl StereoRig {
 
     /// What a pixel of the left and a pixel of the right image show; its row is the mean of both.
     pub(crate) fn observation(&self, left: [f32; 2], right: [f32; 2]) -> StereoObservation {
-        let ([u_left_px, v_left], [u_right_px, v_right]) = (self.centered(left), self.centered(right));
+        let ([u_left_px, v_left], [u_right_px, v_right]) =
+            (self.centered(left), self.centered(right));
         StereoObservation { u_left_px, v_px: 0.5 * (v_left + v_right), u_right_px }
     }
 
@@ -133,7 +134,11 @@ impl StereoRig {
     /// Change of [`StereoRig::project`] by the point, px/m: rows left column, row, right column.
     pub(crate) fn project_jacobian(&self, [x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
         let per_m = self.focal_px / z;
-        [[per_m, 0.0, -per_m * (x / z)], [0.0, per_m, -per_m * y / z], [per_m, 0.0, -per_m * ((x - self.baseline_m) / z)]]
+        [
+            [per_m, 0.0, -per_m * (x / z)],
+            [0.0, per_m, -per_m * y / z],
+            [per_m, 0.0, -per_m * ((x - self.baseline_m) / z)],
+        ]
     }
 
     /// The point both cameras see, in the left camera's frame, m; `None` where the disparity is
@@ -153,7 +158,8 @@ impl StereoRig {
     pub(crate) fn triangulate_jacobian(&self, seen: &StereoObservation) -> [[f64; 3]; 3] {
         let disparity = seen.disparity_px();
         let per_px = self.baseline_m / disparity;
-        let [x, y, z] = [seen.u_left_px, seen.v_px, self.focal_px].map(|part| part * per_px / disparity);
+        let [x, y, z] =
+            [seen.u_left_px, seen.v_px, self.focal_px].map(|part| part * per_px / disparity);
         [[per_px - x, 0.0, x], [-y, per_px, y], [-z, 0.0, z]]
     }
 }
@@ -162,8 +168,10 @@ impl StereoRig {
 mod tests {
     use super::*;
 
-    const RIG: StereoRig = StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
-    const POINTS_M: [[f64; 3]; 4] = [[0.0, 0.0, 5.0], [1.0, -0.5, 3.0], [-7.0, 1.5, 24.0], [0.3, 0.2, 0.9]];
+    const RIG: StereoRig =
+        StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
+    const POINTS_M: [[f64; 3]; 4] =
+        [[0.0, 0.0, 5.0], [1.0, -0.5, 3.0], [-7.0, 1.5, 24.0], [0.3, 0.2, 0.9]];
 
     fn columns(seen: &StereoObservation) -> [f64; 3] {
         [seen.u_left_px, seen.v_px, seen.u_right_px]
@@ -173,7 +181,10 @@ mod tests {
     fn a_point_seen_is_where_it_was() {
         for point in POINTS_M {
             let found = RIG.triangulate(&RIG.project(point).unwrap()).unwrap();
-            assert!((0..3).all(|axis| (found[axis] - point[axis]).abs() < 1e-12), "{found:?} {point:?}");
+            assert!(
+                (0..3).all(|axis| (found[axis] - point[axis]).abs() < 1e-12),
+                "{found:?} {point:?}"
+            );
         }
         let [x, y, z] = RIG.ray(609.6 + 721.5, 172.9);
         assert!((x - 1.0).abs() < 1e-12 && y == 0.0 && z == 1.0);
@@ -198,20 +209,36 @@ mod tests {
             let seen = RIG.project(point).unwrap();
             let (forward, back) = (RIG.project_jacobian(point), RIG.triangulate_jacobian(&seen));
             for by in 0..3 {
-                let moved = |sign: f64| core::array::from_fn(|axis| if axis == by { point[axis] + sign * STEP } else { point[axis] });
-                let [high, low] = [1.0, -1.0].map(|sign| columns(&RIG.project(moved(sign)).unwrap()));
+                let moved = |sign: f64| {
+                    core::array::from_fn(|axis| {
+                        if axis == by { point[axis] + sign * STEP } else { point[axis] }
+                    })
+                };
+                let [high, low] =
+                    [1.0, -1.0].map(|sign| columns(&RIG.project(moved(sign)).unwrap()));
                 let [u_left_px, v_px, u_right_px] = columns(&seen);
                 let shifted = |sign: f64| {
-                    let [a, b, c] = core::array::from_fn(|axis| if axis == by { sign * STEP } else { 0.0 });
-                    let seen = StereoObservation { u_left_px: u_left_px + a, v_px: v_px + b, u_right_px: u_right_px + c };
+                    let [a, b, c] =
+                        core::array::from_fn(|axis| if axis == by { sign * STEP } else { 0.0 });
+                    let seen = StereoObservation {
+                        u_left_px: u_left_px + a,
+                        v_px: v_px + b,
+                        u_right_px: u_right_px + c,
+                    };
                     RIG.triangulate(&seen).unwrap()
                 };
                 let (far, near) = (shifted(1.0), shifted(-1.0));
                 for row in 0..3 {
                     let expected = (high[row] - low[row]) / (2.0 * STEP);
-                    assert!((forward[row][by] - expected).abs() < 1e-5 * (1.0 + expected.abs()), "{point:?} {row} {by}");
+                    assert!(
+                        (forward[row][by] - expected).abs() < 1e-5 * (1.0 + expected.abs()),
+                        "{point:?} {row} {by}"
+                    );
                     let expected = (far[row] - near[row]) / (2.0 * STEP);
-                    assert!((back[row][by] - expected).abs() < 1e-5 * (1.0 + expected.abs()), "{point:?} {row} {by}");
+                    assert!(
+                        (back[row][by] - expected).abs() < 1e-5 * (1.0 + expected.abs()),
+                        "{point:?} {row} {by}"
+                    );
                 }
             }
         }

@@ -2,11 +2,13 @@
 
 use super::{Shares, StereoRig};
 
-/// What must be added to the rows of the right image, so that both cameras see a point in the same row.
+/// What must be added to the rows of the right image, so that both cameras see a point in the same
+/// row.
 ///
-/// At shares `s` of the way from the principal point to the side of the image and `t` to its first row: `constant + column s + row t +
-/// column_quadratic s² + product s t + row_quadratic t²`. The constant and what grows with the column are what is left of the cameras'
-/// rotations, the rest is what is left of their lenses.
+/// At shares `s` of the way from the principal point to the side of the image and `t` to its first
+/// row: `constant + column s + row t + column_quadratic s² + product s t + row_quadratic t²`. The
+/// constant and what grows with the column are what is left of the cameras' rotations, the rest is
+/// what is left of their lenses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -49,7 +51,8 @@ impl RowCorrection {
 
     /// The correction with these terms.
     pub(crate) fn of_terms(terms: [f64; Self::TERMS]) -> Self {
-        let [constant_px, column_px, row_px, column_quadratic_px, product_px, row_quadratic_px] = terms;
+        let [constant_px, column_px, row_px, column_quadratic_px, product_px, row_quadratic_px] =
+            terms;
         Self {
             constant_px,
             column_px,
@@ -62,10 +65,14 @@ impl RowCorrection {
 
     /// What is added at shares of the way from the principal point to side and first row, px.
     pub(crate) fn at(&self, shares: [f64; 2]) -> f64 {
-        self.terms().iter().zip(Self::powers(shares)).fold(0.0, |sum, (term, power)| sum + term * power)
+        self.terms()
+            .iter()
+            .zip(Self::powers(shares))
+            .fold(0.0, |sum, (term, power)| sum + term * power)
     }
 
-    /// The largest difference from another correction, at corners, middles of the borders and the principal point, px.
+    /// The largest difference from another correction, at corners, middles of the borders and the
+    /// principal point, px.
     pub(crate) fn largest_from_px(&self, other: &Self) -> f64 {
         let mut largest = 0.0;
         for shares in [-1.0, 0.0, 1.0].map(|s| [-1.0, 0.0, 1.0].map(|t| [s, t])).as_flattened() {
@@ -75,7 +82,8 @@ impl RowCorrection {
         largest
     }
 
-    /// The largest part of the image's rows, px: at corners, middles of the borders or the principal point.
+    /// The largest part of the image's rows, px: at corners, middles of the borders or the
+    /// principal point.
     ///
     /// ```
     /// use dynvox_core::geometry::RowCorrection;
@@ -93,8 +101,8 @@ impl RowCorrection {
         self.column_px * across
     }
 
-    /// Prepares it for the images of a rig. A principal point in column 0 has no sides, one in row 0 no first row: what grows towards them is
-    /// left out.
+    /// Prepares it for the images of a rig. A principal point in column 0 has no sides, one in row
+    /// 0 no first row: what grows towards them is left out.
     pub(crate) fn for_rig(&self, rig: &StereoRig) -> RowShift {
         RowShift { terms_px: self.terms().map(|term| term as f32), shares: Shares::of(rig) }
     }
@@ -121,7 +129,8 @@ impl RowShift {
 mod tests {
     use super::*;
 
-    const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
 
     #[test]
     fn the_shift_of_a_rig_is_the_correction_at_its_pixels() {

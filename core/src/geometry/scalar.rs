@@ -1,4 +1,5 @@
-//! Float helpers that give the same bits everywhere (ARCHITECTURE.md, *Rules*): no `f32::min`, no rounding by the platform.
+//! Float helpers that give the same bits everywhere (ARCHITECTURE.md, *Rules*): no `f32::min`, no
+//! rounding by the platform.
 
 /// The smaller of two; `b` when either is NaN or both are equal.
 pub(crate) fn min_f32(a: f32, b: f32) -> f32 {
@@ -31,14 +32,16 @@ pub(crate) fn floor_i32(value: f32) -> i32 {
     truncated.saturating_sub(i32::from(value < truncated as f32))
 }
 
-/// The nearest integer to a `value` within ±2^22, ties to even, by the float format itself; any bits at all beyond.
+/// The nearest integer to a `value` within ±2^22, ties to even, by the float format itself; any
+/// bits at all beyond.
 #[inline(always)]
 pub(crate) const fn rounded_i32(value: f32) -> i32 {
     const MAGIC: f32 = 12_582_912.0;
     ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
 }
 
-/// As [`floor_i32`] of a `value` within ±2^22, in loops: its cast, which saturates, is one that compilers do one by one.
+/// As [`floor_i32`] of a `value` within ±2^22, in loops: its cast, which saturates, is one that
+/// compilers do one by one.
 #[inline(always)]
 pub(crate) fn floored_i32(value: f32) -> i32 {
     let near = rounded_i32(value);
@@ -55,7 +58,9 @@ mod tests {
             let value = eighth as f32 * 0.125;
             assert_eq!(floored_i32(value), floor_i32(value), "{value}");
         }
-        for value in [-0.0, 0.999_999_94, 65_534.996, 65_535.0, -4_194_303.5, 4_194_303.5, 1.0e-30, -1.0e-30] {
+        for value in
+            [-0.0, 0.999_999_94, 65_534.996, 65_535.0, -4_194_303.5, 4_194_303.5, 1.0e-30, -1.0e-30]
+        {
             assert_eq!(floored_i32(value), floor_i32(value), "{value}");
         }
     }

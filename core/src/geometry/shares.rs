@@ -2,7 +2,8 @@
 
 use super::StereoRig;
 
-/// Pixels of a rig's images as shares, in single precision: the same bits wherever they are asked for.
+/// Pixels of a rig's images as shares, in single precision: the same bits wherever they are asked
+/// for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Shares {
     center_px: [f32; 2],
@@ -10,7 +11,8 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// Those of a rig. A principal point in column 0 has no side, one in row 0 no first row: the share is 0 then.
+    /// Those of a rig. A principal point in column 0 has no side, one in row 0 no first row: the
+    /// share is 0 then.
     pub(crate) fn of(rig: &StereoRig) -> Self {
         Self {
             center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
@@ -20,7 +22,8 @@ impl Shares {
 
     /// Shares of the way to the side and to the first row in a pixel.
     pub(crate) fn per_px(rig: &StereoRig) -> [f64; 2] {
-        let per_px = |center_px: f64| if libm::fabs(center_px) >= 1.0 { 1.0 / center_px } else { 0.0 };
+        let per_px =
+            |center_px: f64| if libm::fabs(center_px) >= 1.0 { 1.0 / center_px } else { 0.0 };
         [per_px(rig.center_u_px), per_px(rig.center_v_px)]
     }
 

@@ -4,13 +4,14 @@ use bytemuck::{Pod, Zeroable};
 use core::ops::Mul;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
-/// Largest deviation of a quaternion's squared length from 1 at which it still is a rotation: more than
-/// three printed digits lose, less than any mistake makes.
+/// Largest deviation of a quaternion's squared length from 1 at which it still is a rotation: more
+/// than three printed digits lose, less than any mistake makes.
 const UNIT_TOLERANCE: f64 = 1e-2;
 /// Angle below which the sine is its argument to the last bit, rad.
 const SMALL_ANGLE_RAD: f64 = 1e-9;
 
-/// A rigid transformation: first rotates, then moves. `t_world_camera` maps camera coordinates to world coordinates.
+/// A rigid transformation: first rotates, then moves. `t_world_camera` maps camera coordinates to
+/// world coordinates.
 ///
 /// 56 bytes without padding, so that tables, snapshots and other languages can hold it as it is.
 ///
@@ -49,11 +50,16 @@ impl Transform {
         Self { rotation: [0.0, 0.0, 0.0, 1.0], translation_m }
     }
 
-    /// Rotates by a rotation vector (axis times angle, rad), then moves. Arrays and the vectors of most libraries are taken.
+    /// Rotates by a rotation vector (axis times angle, rad), then moves. Arrays and the vectors of
+    /// most libraries are taken.
     pub fn new(rotation_rad: impl Into<[f64; 3]>, translation_m: impl Into<[f64; 3]>) -> Self {
         let [a, b, c] = rotation_rad.into();
         let angle = libm::sqrt(a * a + b * b + c * c);
-        let (real, scale) = if angle > SMALL_ANGLE_RAD { (libm::cos(0.5 * angle), libm::sin(0.5 * angle) / angle) } else { (1.0, 0.5) };
+        let (real, scale) = if angle > SMALL_ANGLE_RAD {
+            (libm::cos(0.5 * angle), libm::sin(0.5 * angle) / angle)
+        } else {
+            (1.0, 0.5)
+        };
         let rotation = [a * scale, b * scale, c * scale, real];
         Self { rotation, translation_m: translation_m.into() }.normalized()
     }
@@ -67,14 +73,16 @@ impl Transform {
         }
     }
 
-    /// The motion after a small step: a rotation vector, rad, and a translation, m, applied after it (a retraction of SE(3) to second order,
-    /// whose derivative at 0 is that of the exponential).
+    /// The motion after a small step: a rotation vector, rad, and a translation, m, applied after
+    /// it (a retraction of SE(3) to second order, whose derivative at 0 is that of the
+    /// exponential).
     #[must_use]
     pub(crate) fn retract(&self, [a, b, c, x, y, z]: [f64; 6]) -> Self {
         (Self::new([a, b, c], [x, y, z]) * *self).normalized()
     }
 
-    /// The same motion with its quaternion rescaled to length 1: long products accumulate rounding errors.
+    /// The same motion with its quaternion rescaled to length 1: long products accumulate rounding
+    /// errors.
     #[must_use]
     pub fn normalized(&self) -> Self {
         let [x, y, z, w] = self.rotation;
@@ -114,10 +122,15 @@ impl Transform {
         let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
         let (ij, wk, wj) = (i * j * 2.0, w * k * 2.0, w * j * 2.0);
         let (ik, jk, wi) = (i * k * 2.0, j * k * 2.0, w * i * 2.0);
-        [[ww + ii - jj - kk, ij - wk, wj + ik], [wk + ij, ww - ii + jj - kk, jk - wi], [ik - wj, wi + jk, ww - ii - jj + kk]]
+        [
+            [ww + ii - jj - kk, ij - wk, wj + ik],
+            [wk + ij, ww - ii + jj - kk, jk - wi],
+            [ik - wj, wi + jk, ww - ii - jj + kk],
+        ]
     }
 
-    /// The upper three rows of the homogeneous matrix: rotation, and translation in the last column, m.
+    /// The upper three rows of the homogeneous matrix: rotation, and translation in the last
+    /// column, m.
     ///
     /// ```
     /// use dynvox_core::geometry::Transform;
@@ -126,7 +139,8 @@ impl Transform {
     /// assert_eq!(first, [1.0, 0.0, 0.0, 4.0]);
     /// ```
     pub fn matrix_3x4(&self) -> [[f64; 4]; 3] {
-        let ([[a, b, c], [d, e, f], [g, h, i]], [x, y, z]) = (self.rotation_matrix(), self.translation_m);
+        let ([[a, b, c], [d, e, f], [g, h, i]], [x, y, z]) =
+            (self.rotation_matrix(), self.translation_m);
         [[a, b, c, x], [d, e, f, y], [g, h, i, z]]
     }
 
@@ -142,15 +156,21 @@ impl Transform {
         2.0 * libm::atan2(libm::sqrt(x * x + y * y + z * z), libm::fabs(w))
     }
 
-    /// The motion of one of `parts` equal parts of a motion in which rotation and translation run side by side; 1 and more.
+    /// The motion of one of `parts` equal parts of a motion in which rotation and translation run
+    /// side by side; 1 and more.
     #[must_use]
     pub(crate) fn part_of(&self, parts: u32) -> Self {
         let ([x, y, z, w], parts) = (self.rotation, f64::from(parts.max(1)));
         let sine = libm::sqrt(x * x + y * y + z * z);
-        // Of a quaternion and its negative, which are the same rotation, the one with the smaller angle.
+        // Of a quaternion and its negative, which are the same rotation, the one with the smaller
+        // angle.
         let half_angle = libm::atan2(if w < 0.0 { -sine } else { sine }, libm::fabs(w));
-        let scale = if sine > SMALL_ANGLE_RAD { 2.0 * half_angle / (sine * parts) } else { 2.0 / parts };
-        Self::new([x * scale, y * scale, z * scale], self.translation_m.map(|metres| metres / parts))
+        let scale =
+            if sine > SMALL_ANGLE_RAD { 2.0 * half_angle / (sine * parts) } else { 2.0 / parts };
+        Self::new(
+            [x * scale, y * scale, z * scale],
+            self.translation_m.map(|metres| metres / parts),
+        )
     }
 
     /// Whether all seven numbers are finite.
@@ -158,7 +178,8 @@ impl Transform {
         self.rotation.iter().chain(&self.translation_m).all(|value| value.is_finite())
     }
 
-    /// Whether the quaternion has length 1, but for what rounding takes from it; `false` where it is not finite.
+    /// Whether the quaternion has length 1, but for what rounding takes from it; `false` where it
+    /// is not finite.
     ///
     /// ```
     /// use dynvox_core::geometry::Transform;
@@ -263,23 +284,41 @@ mod tests {
         assert!((part.distance_m() * 5.0 - whole.distance_m()).abs() < 1e-12);
         let negative = Transform { rotation: whole.rotation.map(|value| -value), ..whole };
         let difference = negative.part_of(5).inverse() * part;
-        assert!(difference.angle_rad() < 1e-9 && difference.distance_m() < 1e-12, "both quaternions are one rotation");
-        assert_eq!(Transform::from_translation([0.0, 0.0, 6.0]).part_of(3), Transform::from_translation([0.0, 0.0, 2.0]));
+        assert!(
+            difference.angle_rad() < 1e-9 && difference.distance_m() < 1e-12,
+            "both quaternions are one rotation"
+        );
+        assert_eq!(
+            Transform::from_translation([0.0, 0.0, 6.0]).part_of(3),
+            Transform::from_translation([0.0, 0.0, 2.0])
+        );
     }
 
     #[test]
     fn every_operation_gives_the_bits_of_nalgebra() {
         let mut random = Random::new(5);
-        let mut number = |scale: f64| scale * (f64::from(random.next_u32()) / 2_147_483_648.0 - 1.0);
+        let mut number =
+            |scale: f64| scale * (f64::from(random.next_u32()) / 2_147_483_648.0 - 1.0);
         for round in 0..2_000 {
             let angle = if round % 3 == 0 { 1e-10 } else { 3.0 };
-            let mut motion = || Transform::new([number(angle), number(angle), number(angle)], [number(50.0), number(2.0), number(900.0)]);
+            let mut motion = || {
+                Transform::new(
+                    [number(angle), number(angle), number(angle)],
+                    [number(50.0), number(2.0), number(900.0)],
+                )
+            };
             let (a, b) = (motion(), motion());
             assert_eq!(bits(&(a * b)), bits_of(&(isometry(&a) * isometry(&b))));
             assert_eq!(bits(&a.inverse()), bits_of(&isometry(&a).inverse()));
             let point = Point3::new(number(9.0), number(9.0), number(9.0));
-            assert_eq!(a.transform_point(point).coords.map(f64::to_bits), (isometry(&a) * point).coords.map(f64::to_bits));
-            assert_eq!(a.rotate(point.coords).map(f64::to_bits), (a.quaternion() * point.coords).map(f64::to_bits));
+            assert_eq!(
+                a.transform_point(point).coords.map(f64::to_bits),
+                (isometry(&a) * point).coords.map(f64::to_bits)
+            );
+            assert_eq!(
+                a.rotate(point.coords).map(f64::to_bits),
+                (a.quaternion() * point.coords).map(f64::to_bits)
+            );
             let matrix = a.quaternion().to_rotation_matrix();
             for (r, row) in a.rotation_matrix().iter().enumerate() {
                 for (c, entry) in row.iter().enumerate() {
@@ -307,7 +346,8 @@ mod tests {
 
     #[test]
     fn only_unit_quaternions_are_rotations() {
-        let of_length = |length: f64| Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
+        let of_length =
+            |length: f64| Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
         assert!([1.0, 1.0 + 1e-6, -1.0].into_iter().all(|length| of_length(length).is_rotation()));
         for length in [0.0, 1e-200, 1e200, 0.99, 1.01, f64::NAN, f64::INFINITY] {
             assert!(!of_length(length).is_rotation(), "{length}");

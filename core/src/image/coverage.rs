@@ -73,7 +73,12 @@ mod tests {
         let invalid = InvalidPixels::new(&words, 70, 2).unwrap();
         assert_eq!(invalid.in_row(0).collect::<std::vec::Vec<_>>(), [3, 63, 64]);
         assert_eq!(invalid.in_row(1).count(), 0);
-        assert!(invalid.contains(64, 0) && !invalid.contains(65, 0) && invalid.contains(70, 0) && invalid.contains(0, 2));
+        assert!(
+            invalid.contains(64, 0)
+                && !invalid.contains(65, 0)
+                && invalid.contains(70, 0)
+                && invalid.contains(0, 2)
+        );
         assert!(InvalidPixels::new(&words, 70, 3).is_none());
     }
 }

@@ -34,7 +34,8 @@ impl View<'_, u16> {
 }
 
 impl<'a, T> View<'a, T> {
-    /// Views `data` as `width` x `height`, rows `width` apart. `None` when empty or when `data` is too short.
+    /// Views `data` as `width` x `height`, rows `width` apart. `None` when empty or when `data` is
+    /// too short.
     pub fn new(data: &'a [T], width: usize, height: usize) -> Option<Self> {
         Self::with_stride(data, width, height, width)
     }
@@ -52,7 +53,8 @@ impl<'a, T> View<'a, T> {
         (data.len() >= span(width, height, stride)?).then_some(Self { data, width, height, stride })
     }
 
-    /// The part of `width` x `height` pixels from (`left`, `top`) on; `None` when it is empty or does not lie within.
+    /// The part of `width` x `height` pixels from (`left`, `top`) on; `None` when it is empty or
+    /// does not lie within.
     ///
     /// ```
     /// use dynvox_core::image::View;
@@ -62,9 +64,14 @@ impl<'a, T> View<'a, T> {
     /// assert_eq!((part.row(0), part.row(1)), (&[5, 6][..], &[9, 10][..]));
     /// ```
     pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
-        let within = left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
+        let within =
+            left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
         let first = top.checked_mul(self.stride)?.checked_add(left)?;
-        if within { Self::with_stride(self.data.get(first..)?, width, height, self.stride) } else { None }
+        if within {
+            Self::with_stride(self.data.get(first..)?, width, height, self.stride)
+        } else {
+            None
+        }
     }
 
     /// Width, px.
@@ -127,7 +134,8 @@ pub struct ViewMut<'a, T> {
 }
 
 impl<'a, T> ViewMut<'a, T> {
-    /// Views the first `width` x `height` items of `data`. `None` when empty or when `data` is too short.
+    /// Views the first `width` x `height` items of `data`. `None` when empty or when `data` is too
+    /// short.
     pub fn new(data: &'a mut [T], width: usize, height: usize) -> Option<Self> {
         let len = span(width, height, width)?;
         Some(Self { data: data.get_mut(..len)?, width, height })

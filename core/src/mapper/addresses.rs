@@ -1,8 +1,9 @@
 //! Whether the bytes of a capacity can be counted where a `usize` has 32 bits.
 //!
 //! [`Capacity::bytes`] is a constant that sums up in `usize`: for every bound that 64 bits allow it stays far below their end, and 32 bits end at
-//! 4 GiB. The bound here is summed up in 64 bits without any overflow, and is never below that sum, nor below any part of it. Where it fits a
-//! `usize` so does the sum. It counts some parts for twice what they take, so that it may refuse bounds that need more than 1.5 GiB; a slice has at
+//! 4 GiB. The bound here is summed up in 64 bits without any overflow, and is never below that sum,
+//! nor below any part of it. Where it fits a `usize` so does the sum. It counts some parts for
+//! twice what they take, so that it may refuse bounds that need more than 1.5 GiB; a slice has at
 //! most 2 GiB there.
 
 use crate::memory::Capacity;
@@ -30,10 +31,12 @@ const fn product(units: usize, of: u64) -> u64 {
 }
 
 impl Capacity {
-    /// At least as many bytes as [`Capacity::bytes`] sums up; `u64::MAX` for bounds beyond all limits.
+    /// At least as many bytes as [`Capacity::bytes`] sums up; `u64::MAX` for bounds beyond all
+    /// limits.
     const fn bytes_at_most(&self) -> u64 {
         let block = if self.colour { COLOUR_BLOCK } else { BLOCK };
-        let history = product(self.history_frames, product(self.blocks / 64 + 1, 8).saturating_add(64));
+        let history =
+            product(self.history_frames, product(self.blocks / 64 + 1, 8).saturating_add(64));
         let object = product(self.object_blocks, block).saturating_add(OBJECT);
         let columns = product(self.planning_width, self.planning_length as u64);
         let cells = product(self.planning_height, columns);
@@ -53,7 +56,8 @@ impl Capacity {
             .saturating_add(cells.saturating_mul(CELL))
     }
 
-    /// Whether [`Capacity::bytes`] can be counted in numbers up to `last`, which on this machine is `usize::MAX`.
+    /// Whether [`Capacity::bytes`] can be counted in numbers up to `last`, which on this machine is
+    /// `usize::MAX`.
     pub(super) const fn is_countable(&self, last: u64) -> bool {
         self.bytes_at_most() < last
     }
@@ -105,10 +109,16 @@ mod tests {
             assert_eq!(capacity.validate(), Ok(()), "{capacity:?}");
             let (bytes, most) = (capacity.bytes() as u64, capacity.bytes_at_most());
             assert!(bytes <= most, "{bytes} of at most {most}: {capacity:?}");
-            assert!(most < 3 * bytes + 2 * FIXED + 16 * OBJECT, "{bytes} of at most {most}, which says little: {capacity:?}");
+            assert!(
+                most < 3 * bytes + 2 * FIXED + 16 * OBJECT,
+                "{bytes} of at most {most}, which says little: {capacity:?}"
+            );
             passed[usize::from(capacity.is_countable(LAST_OF_32))] += 1;
         }
-        assert!(passed.iter().all(|count| *count > 500), "{passed:?} of them beyond and within 4 GiB");
+        assert!(
+            passed.iter().all(|count| *count > 500),
+            "{passed:?} of them beyond and within 4 GiB"
+        );
     }
 
     #[test]
@@ -119,17 +129,27 @@ mod tests {
             |of| of.matches = 1 << 28,
             |of| of.tracks = 1 << 28,
             |of| (of.objects, of.object_blocks) = (16, 1 << 28),
-            |of| (of.planning_width, of.planning_length, of.planning_height) = (1 << 10, 1 << 10, 1 << 10),
+            |of| {
+                (of.planning_width, of.planning_length, of.planning_height) =
+                    (1 << 10, 1 << 10, 1 << 10)
+            },
         ];
         for (at, change) in largest.iter().enumerate() {
             let mut capacity = Capacity::TINY;
             change(&mut capacity);
-            assert!(capacity.bytes() as u64 > LAST_OF_32 && !capacity.is_countable(LAST_OF_32), "bound {at}");
+            assert!(
+                capacity.bytes() as u64 > LAST_OF_32 && !capacity.is_countable(LAST_OF_32),
+                "bound {at}"
+            );
             assert!(capacity.is_countable(u64::MAX) && capacity.validate().is_ok(), "bound {at}");
         }
         // These end in a small number where 32 bits are all there is: 1,400,000 x 3,128 and some.
         let wraps = Capacity { blocks: 1_400_000, colour: true, ..Capacity::TINY };
-        assert!((wraps.bytes() as u64 & LAST_OF_32) < 1 << 28 && !wraps.is_countable(LAST_OF_32), "{}", wraps.bytes());
+        assert!(
+            (wraps.bytes() as u64 & LAST_OF_32) < 1 << 28 && !wraps.is_countable(LAST_OF_32),
+            "{}",
+            wraps.bytes()
+        );
     }
 
     #[test]
@@ -143,7 +163,8 @@ mod tests {
     fn bounds_that_cannot_be_counted_are_refused_before_they_are_summed_up() {
         let beyond = Capacity { blocks: usize::MAX / 2, ..Capacity::TINY };
         assert_eq!(beyond.bytes_at_most(), u64::MAX);
-        let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+        let rig =
+            StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
         let refused = Mapper::new(&beyond, &Config::for_rig(rig), &mut []).err();
         assert_eq!(refused, Some(NewError::Slab(SlabError::TooSmall { missing: usize::MAX })));
     }

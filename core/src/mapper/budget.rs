@@ -1,8 +1,10 @@
-//! A capacity for a given number of bytes and a given image: what the profiles are for four cases, for all others.
+//! A capacity for a given number of bytes and a given image: what the profiles are for four cases,
+//! for all others.
 //!
-//! The rules, in order. What the image needs comes first and follows from its pixels alone (see [`Capacity::for_budget`]). At most a
-//! fifth of the rest goes to volumes of objects, in steps; all that remains is blocks of the static map, since they decide how far a run
-//! gets before blocks leave the pool. The result never exceeds the budget, and one block more would.
+//! The rules, in order. What the image needs comes first and follows from its pixels alone (see
+//! [`Capacity::for_budget`]). At most a fifth of the rest goes to volumes of objects, in steps; all
+//! that remains is blocks of the static map, since they decide how far a run gets before blocks
+//! leave the pool. The result never exceeds the budget, and one block more would.
 
 use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
@@ -26,8 +28,10 @@ const MAX_PIXELS: usize = 1 << 24;
 const MIN_BLOCKS: usize = 1_024;
 /// Colour is kept where at least so many blocks can have it, unless it is asked for or declined.
 const COLOUR_BLOCKS: usize = 20_000;
-/// Steps of objects reconstructed at once, and blocks of each; the first that fits its share is taken.
-const OBJECTS: [(usize, usize); 6] = [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)];
+/// Steps of objects reconstructed at once, and blocks of each; the first that fits its share is
+/// taken.
+const OBJECTS: [(usize, usize); 6] =
+    [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)];
 /// Volumes of objects may take one part in so many of what the image leaves.
 const OBJECTS_SHARE: usize = 5;
 /// The same where their number is asked for.
@@ -40,11 +44,14 @@ const VOXEL_SIZE_M: f32 = 0.05;
 /// What a budget is asked for besides bytes and image size. The default leaves all to the rules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BudgetOptions {
-    /// Whether voxels have colour; where it is not said, they have it where 20,000 blocks with colour fit.
+    /// Whether voxels have colour; where it is not said, they have it where 20,000 blocks with
+    /// colour fit.
     pub colour: Option<bool>,
-    /// Objects reconstructed at once, at most [`MAX_OBJECTS`]; as many as a fifth of the budget allows where it is not said.
+    /// Objects reconstructed at once, at most [`MAX_OBJECTS`]; as many as a fifth of the budget
+    /// allows where it is not said.
     pub objects: Option<usize>,
-    /// Side of a voxel of the static map, m: larger voxels need fewer blocks at once. `None` is 0.05 m.
+    /// Side of a voxel of the static map, m: larger voxels need fewer blocks at once. `None` is
+    /// 0.05 m.
     pub voxel_size_m: Option<f32>,
     /// Largest unrectified image, width and height, px; 0 where images come rectified.
     pub raw_image: [usize; 2],
@@ -71,14 +78,19 @@ pub enum BudgetError {
 impl fmt::Display for BudgetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooSmall { least } => write!(f, "the budget is too small: the least that works for this image is {least} bytes"),
+            Self::TooSmall { least } => write!(
+                f,
+                "the budget is too small: the least that works for this image is {least} bytes"
+            ),
             Self::Image => {
                 write!(
                     f,
                     "images must be from {MIN_WIDTH} x {MIN_HEIGHT} px to {MAX_SIDE} px a side ({MAX_RAW_SIDE} where they are rectified)"
                 )
             }
-            Self::Objects => write!(f, "at most {MAX_OBJECTS} objects can be reconstructed at once"),
+            Self::Objects => {
+                write!(f, "at most {MAX_OBJECTS} objects can be reconstructed at once")
+            }
             Self::VoxelSize => write!(f, "the voxel size must be a positive number of metres"),
         }
     }
@@ -108,11 +120,12 @@ impl core::error::Error for CapacityProblem {}
 const SHORT_HISTORY_FRAMES: usize = 64;
 
 impl Capacity {
-    /// The largest capacity of at most `bytes` for images of `width` x `height` px: `capacity.bytes() <= bytes`, always.
+    /// The largest capacity of at most `bytes` for images of `width` x `height` px:
+    /// `capacity.bytes() <= bytes`, always.
     ///
-    /// One pixel in 16 may be a feature and one in 40 a match, at most 20,000 of either; masks may cover 8 images of pixels; 64
-    /// detections and tracks. The pruning window is 200 frames where `bytes` is 96 MiB or more, else 64. Objects and blocks share the
-    /// rest as the module says.
+    /// One pixel in 16 may be a feature and one in 40 a match, at most 20,000 of either; masks may
+    /// cover 8 images of pixels; 64 detections and tracks. The pruning window is 200 frames where
+    /// `bytes` is 96 MiB or more, else 64. Objects and blocks share the rest as the module says.
     ///
     /// ```
     /// use dynvox_core::{BudgetOptions, Capacity};
@@ -123,8 +136,14 @@ impl Capacity {
     /// ```
     ///
     /// # Errors
-    /// The budget is too small, which names the least that works, or the image or an option cannot be.
-    pub fn for_budget(bytes: usize, width: usize, height: usize, options: &BudgetOptions) -> Result<Self, BudgetError> {
+    /// The budget is too small, which names the least that works, or the image or an option cannot
+    /// be.
+    pub fn for_budget(
+        bytes: usize,
+        width: usize,
+        height: usize,
+        options: &BudgetOptions,
+    ) -> Result<Self, BudgetError> {
         let question = Question::new(bytes, width, height, options)?;
         let least = question.least();
         if least.bytes() > question.bytes {
@@ -137,7 +156,8 @@ impl Capacity {
                 if coloured.blocks >= COLOUR_BLOCKS { coloured } else { question.solved(false) }
             }
         };
-        // What the steps leave may be less than the least that works: then that is the answer, grown by what fits.
+        // What the steps leave may be less than the least that works: then that is the answer,
+        // grown by what fits.
         Ok(if solved.blocks >= MIN_BLOCKS { solved } else { question.filled(least) })
     }
 
@@ -151,8 +171,16 @@ impl Capacity {
         let rules = [
             (self.image_width >= MIN_WIDTH, "image_width", "must be at least 64 px"),
             (self.image_height >= MIN_HEIGHT, "image_height", "must be at least 32 px"),
-            (self.image_width.max(self.image_height) <= MAX_SIDE, "image_width", "and image_height must be at most 8,192 px"),
-            (self.raw_width.max(self.raw_height) <= MAX_RAW_SIDE, "raw_width", "and raw_height must be at most 4,096 px"),
+            (
+                self.image_width.max(self.image_height) <= MAX_SIDE,
+                "image_width",
+                "and image_height must be at most 8,192 px",
+            ),
+            (
+                self.raw_width.max(self.raw_height) <= MAX_RAW_SIDE,
+                "raw_width",
+                "and raw_height must be at most 4,096 px",
+            ),
             (self.features > 0, "features", above_0),
             (self.matches > 0, "matches", above_0),
             (self.blocks > 0, "blocks", above_0),
@@ -175,8 +203,16 @@ impl Capacity {
                 "and planning_length must be at most 1,024",
             ),
             (self.planning_height <= MAX_SIDE_CELLS, "planning_height", "must be at most 1,024"),
-            (self.objects == 0 || self.object_blocks > 0, "object_blocks", "must be above 0 where there are objects"),
-            (self.is_countable(usize::MAX as u64), "blocks", "and all other bounds need more bytes than this machine has addresses"),
+            (
+                self.objects == 0 || self.object_blocks > 0,
+                "object_blocks",
+                "must be above 0 where there are objects",
+            ),
+            (
+                self.is_countable(usize::MAX as u64),
+                "blocks",
+                "and all other bounds need more bytes than this machine has addresses",
+            ),
         ];
         match rules.iter().find(|(holds, ..)| !holds) {
             Some((_, bound, rule)) => Err(CapacityProblem { bound, rule }),
@@ -196,8 +232,15 @@ struct Question<'o> {
 }
 
 impl<'o> Question<'o> {
-    fn new(bytes: usize, width: usize, height: usize, options: &'o BudgetOptions) -> Result<Self, BudgetError> {
-        let fits = |width: usize, height: usize| width <= MAX_SIDE && height <= MAX_SIDE && width * height <= MAX_PIXELS;
+    fn new(
+        bytes: usize,
+        width: usize,
+        height: usize,
+        options: &'o BudgetOptions,
+    ) -> Result<Self, BudgetError> {
+        let fits = |width: usize, height: usize| {
+            width <= MAX_SIDE && height <= MAX_SIDE && width * height <= MAX_PIXELS
+        };
         let [raw_width, raw_height] = options.raw_image;
         let raw_fits = raw_width <= MAX_RAW_SIDE && raw_height <= MAX_RAW_SIDE;
         if width < MIN_WIDTH || height < MIN_HEIGHT || !fits(width, height) || !raw_fits {
@@ -210,7 +253,8 @@ impl<'o> Question<'o> {
         if !(voxel_size_m.is_finite() && voxel_size_m > 0.0) {
             return Err(BudgetError::VoxelSize);
         }
-        // Surfaces of the same extent take fewer blocks of larger voxels, by the square of their side.
+        // Surfaces of the same extent take fewer blocks of larger voxels, by the square of their
+        // side.
         let finer = f64::from(VOXEL_SIZE_M) / f64::from(voxel_size_m);
         let pixels = width * height;
         let at_default = if pixels / 20 > 12_000 { pixels / 20 } else { 12_000 };
@@ -254,13 +298,19 @@ impl<'o> Question<'o> {
     fn least(&self) -> Capacity {
         let base = self.image_only(self.options.colour.unwrap_or(false));
         let objects = self.options.objects.unwrap_or(0);
-        let (object_blocks, crop_pixels) = if objects > 0 { (150, self.width * self.height / 2) } else { (0, 0) };
-        // The short window at every budget: the least that is named must be enough when it is asked for.
+        let (object_blocks, crop_pixels) =
+            if objects > 0 { (150, self.width * self.height / 2) } else { (0, 0) };
+        // The short window at every budget: the least that is named must be enough when it is asked
+        // for.
         let history_frames = SHORT_HISTORY_FRAMES;
-        self.with_blocks(&Capacity { objects, object_blocks, crop_pixels, history_frames, ..base }, MIN_BLOCKS)
+        self.with_blocks(
+            &Capacity { objects, object_blocks, crop_pixels, history_frames, ..base },
+            MIN_BLOCKS,
+        )
     }
 
-    /// The image, objects in their share, and as many blocks as fit; no block where nothing is left for them.
+    /// The image, objects in their share, and as many blocks as fit; no block where nothing is left
+    /// for them.
     fn solved(&self, colour: bool) -> Capacity {
         let base = self.image_only(colour);
         let rest = self.bytes.saturating_sub(base.bytes());
@@ -271,15 +321,21 @@ impl<'o> Question<'o> {
         let cost = |capacity: &Capacity| capacity.bytes() - base.bytes();
         let pixels = self.width * self.height;
         let crops = Capacity { crop_pixels: pixels * 8 / 5, ..base };
-        let crop_pixels = if cost(&crops) <= rest / CROPS_SHARE { crops.crop_pixels } else { pixels / 2 };
-        let share = if self.options.objects.is_some() { rest / ASKED_OBJECTS_SHARE } else { rest / OBJECTS_SHARE };
+        let crop_pixels =
+            if cost(&crops) <= rest / CROPS_SHARE { crops.crop_pixels } else { pixels / 2 };
+        let share = if self.options.objects.is_some() {
+            rest / ASKED_OBJECTS_SHARE
+        } else {
+            rest / OBJECTS_SHARE
+        };
         let steps = OBJECTS.into_iter().map(|(objects, blocks)| match self.options.objects {
             Some(0) => (0, 0),
             Some(asked) => (asked, blocks.max(150)),
             None => (objects, blocks),
         });
         let fits = |step: &(usize, usize)| cost(&with_objects(*step, crop_pixels)) <= share;
-        let step = steps.clone().find(fits).or_else(|| steps.clone().next_back()).unwrap_or_default();
+        let step =
+            steps.clone().find(fits).or_else(|| steps.clone().next_back()).unwrap_or_default();
         self.filled(with_objects(step, crop_pixels))
     }
 
@@ -298,7 +354,8 @@ impl<'o> Question<'o> {
         self.with_blocks(&capacity, fitting)
     }
 
-    /// So many blocks that they cannot fit or be counted; few enough that their bytes can be, in 32 bits as well.
+    /// So many blocks that they cannot fit or be counted; few enough that their bytes can be, in 32
+    /// bits as well.
     fn too_many_blocks(&self, capacity: &Capacity) -> usize {
         // A block has at least 512 voxels of 3 bytes.
         let block_bytes = 512 * if capacity.colour { 6 } else { 3 };

@@ -24,10 +24,14 @@ impl Clock {
         self.last_ns.zip(time_ns).is_none_or(|(last_ns, time_ns)| last_ns < time_ns)
     }
 
-    /// Takes a frame's time: the time since the frame before, or the assumed one where either is not known.
+    /// Takes a frame's time: the time since the frame before, or the assumed one where either is
+    /// not known.
     pub fn advance(&mut self, time_ns: Option<u64>, assumed_s: f32) -> f32 {
         // As precise as the assumed time, so that stamps of exactly that rate give the same bits.
-        let measured = self.last_ns.zip(time_ns).map(|(last_ns, time_ns)| (time_ns.saturating_sub(last_ns) as f64 * S_PER_NS) as f32);
+        let measured = self
+            .last_ns
+            .zip(time_ns)
+            .map(|(last_ns, time_ns)| (time_ns.saturating_sub(last_ns) as f64 * S_PER_NS) as f32);
         self.interval_s = measured.unwrap_or(assumed_s);
         self.last_ns = time_ns;
         self.interval_s
@@ -57,7 +61,11 @@ mod tests {
         assert_eq!(clock.advance(Some(start), 0.1), 0.1, "nothing is known before the first frame");
         assert_eq!(clock.advance(Some(start + 100_000_000), 0.1).to_bits(), 0.1f32.to_bits());
         assert_eq!(clock.advance(Some(start + 133_000_000), 0.1), 0.033);
-        assert!(!clock.may_follow(Some(start + 133_000_000)) && clock.may_follow(Some(start + 133_000_001)) && clock.may_follow(None));
+        assert!(
+            !clock.may_follow(Some(start + 133_000_000))
+                && clock.may_follow(Some(start + 133_000_001))
+                && clock.may_follow(None)
+        );
         assert_eq!([clock.advance(None, 0.1), clock.advance(Some(start), 0.1)], [0.1, 0.1]);
     }
 }

@@ -16,7 +16,8 @@ use crate::{
     volume::VolumeConfig,
 };
 
-/// All settings of a mapper, apart from its capacity. Every default stands with its field, in the struct of the stage it belongs to.
+/// All settings of a mapper, apart from its capacity. Every default stands with its field, in the
+/// struct of the stage it belongs to.
 ///
 /// ```
 /// use dynvox_core::{Config, geometry::StereoRig};
@@ -98,9 +99,24 @@ impl Config {
     pub fn validate(&self) -> Problems {
         let mut problems = Problems::new();
         let rig = self.rig.validate();
-        require(&mut problems, rig != Err(RigProblem::Focal), "rig.focal_px", "must be a positive number");
-        require(&mut problems, rig != Err(RigProblem::Center), "rig.center_px", "must be finite numbers");
-        require(&mut problems, rig != Err(RigProblem::Baseline), "rig.baseline_m", "must be a positive number");
+        require(
+            &mut problems,
+            rig != Err(RigProblem::Focal),
+            "rig.focal_px",
+            "must be a positive number",
+        );
+        require(
+            &mut problems,
+            rig != Err(RigProblem::Center),
+            "rig.center_px",
+            "must be finite numbers",
+        );
+        require(
+            &mut problems,
+            rig != Err(RigProblem::Baseline),
+            "rig.baseline_m",
+            "must be a positive number",
+        );
         self.rig_settings.validate(&mut problems);
         self.stereo.validate(&mut problems);
         self.scene_flow.validate(&mut problems);

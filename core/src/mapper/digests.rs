@@ -1,11 +1,13 @@
-//! A digest of each stage's outcome: the first that differs names the stage at which two runs diverge.
+//! A digest of each stage's outcome: the first that differs names the stage at which two runs
+//! diverge.
 //!
-//! Stages are listed in the order data flows. Every stage before the first difference is equal; every stage after it depends on it. The
-//! association of detections with tracks has no digest of its own: it runs before the camera's motion and is part of the tracks' digest,
-//! which comes later in the list.
+//! Stages are listed in the order data flows. Every stage before the first difference is equal;
+//! every stage after it depends on it. The association of detections with tracks has no digest of
+//! its own: it runs before the camera's motion and is part of the tracks' digest, which comes later
+//! in the list.
 //!
-//! Memory: 8 bytes a stage and 16 an object. Time: a multiplication for each 8 bytes of images, disparity, matches and masks; of volumes only
-//! blocks that changed are read.
+//! Memory: 8 bytes a stage and 16 an object. Time: a multiplication for each 8 bytes of images,
+//! disparity, matches and masks; of volumes only blocks that changed are read.
 
 use crate::{digest::Digest, objects::MAX_OBJECTS};
 use core::fmt;
@@ -141,19 +143,28 @@ impl StageDigests {
             (Digested::Tracks, self.tracks, other.tracks),
             (Digested::Background, self.background, other.background),
         ];
-        let stage = stages.iter().find(|(_, mine, theirs)| mine != theirs).map(|&(stage, ..)| stage);
+        let stage =
+            stages.iter().find(|(_, mine, theirs)| mine != theirs).map(|&(stage, ..)| stage);
         // The object of lowest id that differs or that only one step has.
-        let alone =
-            |of: &Self, than: Self| of.objects.iter().find(|&object| than.objects.iter().all(|known| known != object)).map(|o| o.id);
-        stage.or_else(|| alone(self, *other).into_iter().chain(alone(other, *self)).min().map(Digested::Object))
+        let alone = |of: &Self, than: Self| {
+            of.objects
+                .iter()
+                .find(|&object| than.objects.iter().all(|known| known != object))
+                .map(|o| o.id)
+        };
+        stage.or_else(|| {
+            alone(self, *other).into_iter().chain(alone(other, *self)).min().map(Digested::Object)
+        })
     }
 }
 
-/// The digests in the order data flows, with a space between two, those of all objects last; 16 zeros
-/// for a stage that did not run.
+/// The digests in the order data flows, with a space between two, those of all objects last; 16
+/// zeros for a stage that did not run.
 impl fmt::Display for StageDigests {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for stage in [self.input, self.disparity, self.matches, self.egomotion, self.tracks, self.background] {
+        for stage in
+            [self.input, self.disparity, self.matches, self.egomotion, self.tracks, self.background]
+        {
             write!(f, "{stage:016x} ")?;
         }
         self.objects.fmt(f)
@@ -181,10 +192,26 @@ mod tests {
             objects: objects(&[(9, 1), (2, 7)]),
         };
         assert_eq!(one.first_difference(&one), None);
-        assert_eq!(one.first_difference(&StageDigests { background: 0, egomotion: 0, ..one }), Some(Digested::Egomotion));
-        assert_eq!(one.first_difference(&StageDigests { objects: objects(&[(2, 7), (9, 2)]), ..one }), Some(Digested::Object(9)));
-        assert_eq!(one.first_difference(&StageDigests { objects: objects(&[(2, 7), (5, 0), (9, 1)]), ..one }), Some(Digested::Object(5)));
-        assert_eq!(one.first_difference(&StageDigests { objects: objects(&[(2, 7), (9, 1)]), ..one }), None, "in any order");
+        assert_eq!(
+            one.first_difference(&StageDigests { background: 0, egomotion: 0, ..one }),
+            Some(Digested::Egomotion)
+        );
+        assert_eq!(
+            one.first_difference(&StageDigests { objects: objects(&[(2, 7), (9, 2)]), ..one }),
+            Some(Digested::Object(9))
+        );
+        assert_eq!(
+            one.first_difference(&StageDigests {
+                objects: objects(&[(2, 7), (5, 0), (9, 1)]),
+                ..one
+            }),
+            Some(Digested::Object(5))
+        );
+        assert_eq!(
+            one.first_difference(&StageDigests { objects: objects(&[(2, 7), (9, 1)]), ..one }),
+            None,
+            "in any order"
+        );
         assert_ne!(one.whole(0), one.whole(1));
         assert_ne!(one.whole(0), StageDigests { objects: objects(&[(2, 7)]), ..one }.whole(0));
         assert_eq!(one.whole(0), StageDigests { input: 0, ..one }.whole(0));

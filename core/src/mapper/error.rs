@@ -23,7 +23,8 @@ pub const MIN_HEIGHT: usize = 32;
 pub enum NewError {
     /// The slab cannot hold the capacity.
     Slab(SlabError),
-    /// The configuration is not usable: the first problem; [`super::Config::validate`] lists them all.
+    /// The configuration is not usable: the first problem; [`super::Config::validate`] lists them
+    /// all.
     Config(Problem),
     /// The rectification does not fit the capacity.
     Rectification(RectifierError),
@@ -103,18 +104,33 @@ impl fmt::Display for StepError {
         match self {
             Self::SizesDiffer => f.write_str("the images of the frame differ in size"),
             Self::TooLarge { width, height } => {
-                write!(f, "the frame is larger than the capacity allows: at most {width} x {height} px")
+                write!(
+                    f,
+                    "the frame is larger than the capacity allows: at most {width} x {height} px"
+                )
             }
             Self::TooSmall { width, height } => {
-                write!(f, "the frame is smaller than the matchers can use: at least {width} x {height} px")
+                write!(
+                    f,
+                    "the frame is smaller than the matchers can use: at least {width} x {height} px"
+                )
             }
             Self::SizeChanged => f.write_str("the frame is not of the size of those before"),
             Self::RawSizeDiffers { width, height } => {
-                write!(f, "the frame is not of {width} x {height} px, the size the calibration is for")
+                write!(
+                    f,
+                    "the frame is not of {width} x {height} px, the size the calibration is for"
+                )
             }
-            Self::PoseNotFinite => f.write_str("the pose of the frame is not made of finite numbers"),
-            Self::TimeNotLater => f.write_str("the time of the frame is not after that of the frame before"),
-            Self::PoseNotRotation => f.write_str("the quaternion of the frame's pose does not have length 1"),
+            Self::PoseNotFinite => {
+                f.write_str("the pose of the frame is not made of finite numbers")
+            }
+            Self::TimeNotLater => {
+                f.write_str("the time of the frame is not after that of the frame before")
+            }
+            Self::PoseNotRotation => {
+                f.write_str("the quaternion of the frame's pose does not have length 1")
+            }
         }
     }
 }

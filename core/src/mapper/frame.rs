@@ -7,8 +7,9 @@ use crate::{
     tracking::Detection,
 };
 
-/// One stereo frame as the core takes it, 8 bit: rectified images of equal sizes, or raw ones for a mapper that rectifies
-/// ([`crate::Config::rectification`]). Classes, disparities and detections belong to the rectified left image in either case.
+/// One stereo frame as the core takes it, 8 bit: rectified images of equal sizes, or raw ones for a
+/// mapper that rectifies ([`crate::Config::rectification`]). Classes, disparities and detections
+/// belong to the rectified left image in either case.
 ///
 /// ```
 /// use dynvox_core::{StereoFrame, geometry::Transform, image::View};
@@ -26,23 +27,27 @@ pub struct StereoFrame<'a> {
     pub right: View<'a, u8>,
     /// Left image in colour, for fusion; grey is fused where it is absent.
     pub colour: Option<View<'a, [u8; 3]>>,
-    /// Semantic class of each left pixel, an index into `VolumeConfig::class_weight`; all weights are 1 where it is absent.
+    /// Semantic class of each left pixel, an index into `VolumeConfig::class_weight`; all weights
+    /// are 1 where it is absent.
     pub class: Option<View<'a, u8>>,
-    /// Disparity of each left pixel in 1/256 px, 0 none, from elsewhere: it replaces the pair's own. Motion still needs both
-    /// images. Values no pair of this width can have are refused and counted.
+    /// Disparity of each left pixel in 1/256 px, 0 none, from elsewhere: it replaces the pair's
+    /// own. Motion still needs both images. Values no pair of this width can have are refused and
+    /// counted.
     pub disparity_q8: Option<View<'a, u16>>,
-    /// Where the left camera is, camera to world, from elsewhere: it replaces the camera's own egomotion. Give it with every frame,
-    /// in one world.
+    /// Where the left camera is, camera to world, from elsewhere: it replaces the camera's own
+    /// egomotion. Give it with every frame, in one world.
     pub t_world_camera: Option<Transform>,
-    /// When the pair was taken, ns since any moment that stays the same: later than that of the frame before. Where two frames in a row have
-    /// it, objects move by the true time between them; else by `frame_interval_s` of the configuration.
+    /// When the pair was taken, ns since any moment that stays the same: later than that of the
+    /// frame before. Where two frames in a row have it, objects move by the true time between them;
+    /// else by `frame_interval_s` of the configuration.
     pub time_ns: Option<u64>,
     /// What a detector saw in the left image, in any order; empty without a detector.
     pub detections: &'a [Detection<'a>],
 }
 
 impl<'a> StereoFrame<'a> {
-    /// A pair of grey images and nothing else: add what there is with `StereoFrame { colour, ..StereoFrame::pair(left, right) }`.
+    /// A pair of grey images and nothing else: add what there is with
+    /// `StereoFrame { colour, ..StereoFrame::pair(left, right) }`.
     pub fn pair(left: View<'a, u8>, right: View<'a, u8>) -> Self {
         Self {
             left,
@@ -56,7 +61,8 @@ impl<'a> StereoFrame<'a> {
         }
     }
 
-    /// Digest of the images, row by row, of given disparities, pose and time, and of the detections in any order.
+    /// Digest of the images, row by row, of given disparities, pose and time, and of the detections
+    /// in any order.
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         self.left.rows().chain(self.right.rows()).for_each(|row| digest.bytes(row));

@@ -29,7 +29,8 @@ pub(super) struct Localization<'m, 's> {
     pub self_calibration: &'m mut SelfCalibration,
     pub estimator: &'m mut Estimator<'s>,
     pub raycaster: &'m mut Raycaster<'s>,
-    /// The depth image is computed anew when the frame is fused: until then it is scratch for ICP's pyramid.
+    /// The depth image is computed anew when the frame is fused: until then it is scratch for ICP's
+    /// pyramid.
     pub depth_m: &'m mut [f32],
 }
 
@@ -54,14 +55,15 @@ impl Found {
     }
 }
 
-/// Rows by which the left and the right position of a match may differ where it says something about
-/// the rig.
+/// Rows by which the left and the right position of a match may differ where it says something
+/// about the rig.
 const ROW_DIFFERENCE_MAX_PX: f32 = 2.0;
 
 /// What both cameras saw of a match, before and now; `None` where the rows are too far apart.
 fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     let pairs = [(m.previous_left, m.previous_right), (m.current_left, m.current_right)];
-    let aligned = pairs.iter().all(|(left, right)| (left[1] - right[1]).abs() <= ROW_DIFFERENCE_MAX_PX);
+    let aligned =
+        pairs.iter().all(|(left, right)| (left[1] - right[1]).abs() <= ROW_DIFFERENCE_MAX_PX);
     aligned.then(|| pairs.map(|(left, right)| rig.observation(left, right)))
 }
 
@@ -74,27 +76,45 @@ impl Localization<'_, '_> {
         mask: &EgomotionMask<'_, '_>,
         executor: &E,
     ) -> Located {
-        let (before, over_several) = (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
+        let (before, over_several) =
+            (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
         let found = if let Some(t_world_camera) = &frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
             Found::new(if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given })
         } else if self.config.mapper.egomotion == MotionSource::Icp {
-            let icp = (self.frame > 0).then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
+            let icp = (self.frame > 0)
+                .then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
             Found { icp, ..Found::new(self.origin(icp.is_some())) }
         } else {
             match status {
                 FlowStatus::Frozen => self.hold(),
-                FlowStatus::Repeated if !self.camera.may_stand(&self.config.egomotion, self.interval_s) => self.hold(),
-                FlowStatus::Matched | FlowStatus::Repeated => self.estimate_from_matches(frame, mask, executor),
+                FlowStatus::Repeated
+                    if !self.camera.may_stand(&self.config.egomotion, self.interval_s) =>
+                {
+                    self.hold()
+                }
+                FlowStatus::Matched | FlowStatus::Repeated => {
+                    self.estimate_from_matches(frame, mask, executor)
+                }
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
-        let is_measured = matches!(found.origin, PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given);
+        let is_measured = matches!(
+            found.origin,
+            PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
+        );
         // After a guess the motion from the guessed pose, so that motions lead from pose to pose.
-        let last_motion = || if over_several { self.camera.t_world_camera().inverse() * before } else { *self.camera.t_current_previous() };
+        let last_motion = || {
+            if over_several {
+                self.camera.t_world_camera().inverse() * before
+            } else {
+                *self.camera.t_current_previous()
+            }
+        };
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
-        let camera = CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
+        let camera =
+            CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
         Located { camera, found }
     }
 
@@ -114,7 +134,12 @@ impl Localization<'_, '_> {
     }
 
     /// Estimates the motion from the matches the mask includes.
-    fn estimate_from_matches<E: Executor>(&mut self, frame: &StereoFrame<'_>, mask: &EgomotionMask<'_, '_>, executor: &E) -> Found {
+    fn estimate_from_matches<E: Executor>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        mask: &EgomotionMask<'_, '_>,
+        executor: &E,
+    ) -> Found {
         let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
         // Masks are of the frame before; matches over several frames are left to RANSAC.
         let over_several = self.camera.since_reference() > 0;
@@ -122,10 +147,22 @@ impl Localization<'_, '_> {
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
         let (rig, was_lost) = (self.config.scaled_rig(), self.camera.is_lost());
-        let estimate = self.camera.step(&self.config.egomotion, &rig, self.interval_s, matches.clone(), self.estimator);
+        let estimate = self.camera.step(
+            &self.config.egomotion,
+            &rig,
+            self.interval_s,
+            matches.clone(),
+            self.estimator,
+        );
         // A motion few matches agree with says nothing about the rig.
-        if let Some(motion) = estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches) {
-            self.self_calibration.update(&rig, matches.filter_map(|m| observations(&rig, m)), &motion);
+        if let Some(motion) =
+            estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches)
+        {
+            self.self_calibration.update(
+                &rig,
+                matches.filter_map(|m| observations(&rig, m)),
+                &motion,
+            );
         }
         let ends_loss = was_lost && !self.camera.is_lost();
         let is_found = ends_loss && self.end_loss(frame, executor);
@@ -136,35 +173,57 @@ impl Localization<'_, '_> {
         }
     }
 
-    /// Registers the depth with the map as it appears from the last pose. All of the picture counts, what moves as well: the baseline knows
-    /// no objects.
+    /// Registers the depth with the map as it appears from the last pose. All of the picture
+    /// counts, what moves as well: the baseline knows no objects.
     fn register_depth<E: Executor>(&mut self, size: [usize; 2], executor: &E) -> IcpReport {
         let config = &self.config.icp;
         let t_world_camera = *self.camera.t_world_camera();
         let is_cast = self.cast(&t_world_camera, size, executor);
         let mut report = if is_cast { self.register(config) } else { IcpReport::unpaired() };
         let refined = self.scene_flow.refined();
-        let matches = self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
+        let matches =
+            self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
         let rig = self.config.scaled_rig();
-        report.matches = self.estimator.count_inliers(&rig, matches, &report.t_current_previous, config.explained_px);
+        report.matches = self.estimator.count_inliers(
+            &rig,
+            matches,
+            &report.t_current_previous,
+            config.explained_px,
+        );
         report.check_matches(config);
         self.camera.advance(report.motion());
         report
     }
 
     /// Looks at the map from a pose; whether that could be done.
-    pub(super) fn cast<E: Executor>(&mut self, t_world_camera: &Transform, [width, height]: [usize; 2], executor: &E) -> bool {
-        let view = Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera };
+    pub(super) fn cast<E: Executor>(
+        &mut self,
+        t_world_camera: &Transform,
+        [width, height]: [usize; 2],
+        executor: &E,
+    ) -> bool {
+        let view = Viewpoint {
+            rig: self.config.scaled_rig(),
+            width,
+            height,
+            t_world_camera: *t_world_camera,
+        };
         self.raycaster.cast(self.background, &view, executor).is_ok()
     }
 
     /// Registers the depth with the map as it was cast last.
     pub(super) fn register(&mut self, config: &IcpConfig) -> IcpReport {
-        let (rig, limits_m) = (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
+        let (rig, limits_m) =
+            (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
         match (self.raycaster.depth_m(), self.raycaster.normal()) {
-            (Some(depth_m), Some(normal)) => {
-                icp::track(config, &rig, limits_m, self.disparity_q8, &MapPicture { depth_m, normal }, self.depth_m)
-            }
+            (Some(depth_m), Some(normal)) => icp::track(
+                config,
+                &rig,
+                limits_m,
+                self.disparity_q8,
+                &MapPicture { depth_m, normal },
+                self.depth_m,
+            ),
             _ => IcpReport::unpaired(),
         }
     }

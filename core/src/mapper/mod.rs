@@ -40,7 +40,9 @@ use crate::{
     memory::{Carver, SlabError, region_bytes},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
-    rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration},
+    rectify::{
+        AlignedImage, RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration,
+    },
     scene_flow::FlowMatcher,
     stereo::StereoMatcher,
     tracking::{InstanceAt, TrackReport, Tracker},
@@ -87,7 +89,8 @@ pub struct Mapper<'s> {
 }
 
 impl Capacity {
-    /// Bytes of slab a mapper of this capacity needs, for a capacity that [`Capacity::validate`] takes: beyond, they may be more than can be counted.
+    /// Bytes of slab a mapper of this capacity needs, for a capacity that [`Capacity::validate`]
+    /// takes: beyond, they may be more than can be counted.
     ///
     /// ```
     /// use dynvox_core::{Capacity, Slab};
@@ -138,7 +141,8 @@ const _: () = assert!(Capacity::ONBOARD.bytes() < 256 * MIB);
 const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
 
 impl<'s> Mapper<'s> {
-    /// Makes a mapper in `slab`, which must hold at least `capacity.bytes()` from its first byte at a multiple of
+    /// Makes a mapper in `slab`, which must hold at least `capacity.bytes()` from its first byte at
+    /// a multiple of
     /// [`SLAB_ALIGN`](crate::memory::SLAB_ALIGN) on: `capacity.bytes() + SLAB_ALIGN` bytes are enough anywhere.
     ///
     /// # Errors
@@ -156,7 +160,10 @@ impl<'s> Mapper<'s> {
         let mut mapper = Self::new_in(capacity, config, &mut carver);
         carver.check()?;
         if let Some(rectification) = &config.rectification {
-            mapper.rectifier.prepare(rectification, &config.rig).map_err(NewError::Rectification)?;
+            mapper
+                .rectifier
+                .prepare(rectification, &config.rig)
+                .map_err(NewError::Rectification)?;
         }
         Ok(mapper)
     }
@@ -175,7 +182,12 @@ impl<'s> Mapper<'s> {
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             background: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
-            planning: Planning::new_in(capacity, &config.planning, config.volume.voxel_size_m, carver),
+            planning: Planning::new_in(
+                capacity,
+                &config.planning,
+                config.volume.voxel_size_m,
+                carver,
+            ),
             rectifier: Rectifier::new_in(capacity, carver),
             rectified: RectifiedImages::new_in(capacity, carver),
             aligned: AlignedImage::new_in(capacity, carver),
@@ -208,7 +220,10 @@ impl<'s> Mapper<'s> {
             return Err(StepError::SizesDiffer);
         }
         if size[0] > self.capacity.image_width || size[1] > self.capacity.image_height {
-            return Err(StepError::TooLarge { width: self.capacity.image_width, height: self.capacity.image_height });
+            return Err(StepError::TooLarge {
+                width: self.capacity.image_width,
+                height: self.capacity.image_height,
+            });
         }
         if size[0] < MIN_WIDTH || size[1] < MIN_HEIGHT {
             return Err(StepError::TooSmall { width: MIN_WIDTH, height: MIN_HEIGHT });
@@ -229,7 +244,8 @@ impl<'s> Mapper<'s> {
         Ok(size)
     }
 
-    /// Ends a run: prunes what is still in the window. Objects are lost; see [`Mapper::finish_with`].
+    /// Ends a run: prunes what is still in the window. Objects are lost; see
+    /// [`Mapper::finish_with`].
     pub fn finish(&mut self) -> PruneReport {
         self.finish_with(&mut NoSink)
     }
@@ -265,7 +281,8 @@ impl<'s> Mapper<'s> {
         self.objects.objects()
     }
 
-    /// Lets every block of the static map leave into `store`, so that the store holds the whole map.
+    /// Lets every block of the static map leave into `store`, so that the store holds the whole
+    /// map.
     pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
         self.background.stream_out(store)
     }
@@ -280,7 +297,8 @@ impl<'s> Mapper<'s> {
         &self.background
     }
 
-    /// Left and right grey image of the last frame as they were rectified; `None` where pairs come rectified.
+    /// Left and right grey image of the last frame as they were rectified; `None` where pairs come
+    /// rectified.
     pub fn rectified_pair(&self) -> Option<[View<'_, u8>; 2]> {
         self.rectifier.grey(&self.rectified)
     }

@@ -1,4 +1,5 @@
-//! Maps for planners, with the objects that the mapper knows: those that stand as obstacles, those that move as boxes.
+//! Maps for planners, with the objects that the mapper knows: those that stand as obstacles, those
+//! that move as boxes.
 //!
 //! | object | in the window |
 //! |---|---|
@@ -22,8 +23,9 @@ const POINTS_MIN: f64 = 8.0;
 const DISPARITIES: usize = 256;
 
 impl<'s> Mapper<'s> {
-    /// Reads the maps into the planner's window, finds the ground, and makes the slice and the distance fields, with moving objects where
-    /// they will be `ahead_s` seconds after the last frame. Nothing where the capacity has no window.
+    /// Reads the maps into the planner's window, finds the ground, and makes the slice and the
+    /// distance fields, with moving objects where they will be `ahead_s` seconds after the last
+    /// frame. Nothing where the capacity has no window.
     ///
     /// ```
     /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
@@ -63,7 +65,11 @@ impl<'s> Mapper<'s> {
     /// Marks what the frame sees through in the planner's window, where the capacity has one.
     pub(super) fn observe_free_space(&mut self, t_world_camera: &Transform) {
         let rig = self.config.scaled_rig();
-        self.planning.observe(&Sight { rig: &rig, t_world_camera, disparity_q8: self.stereo.disparity_q8() });
+        self.planning.observe(&Sight {
+            rig: &rig,
+            t_world_camera,
+            disparity_q8: self.stereo.disparity_q8(),
+        });
     }
 
     /// Draws the moving objects at another time, see [`Planning::predict`].
@@ -81,7 +87,8 @@ impl<'s> Mapper<'s> {
         &mut self.planning
     }
 
-    /// The box of a track that moves or may move; `None` of one that stands, and where too little of it was seen.
+    /// The box of a track that moves or may move; `None` of one that stands, and where too little
+    /// of it was seen.
     fn moving_box(&self, track: &Track) -> Option<MovingBox> {
         let state = track.motion_state.state();
         let moves = state == MotionState::Dynamic;
@@ -100,7 +107,8 @@ impl<'s> Mapper<'s> {
             None => return None,
         }
         let moving = fit.solve().filter(|_| fit.points() >= POINTS_MIN)?;
-        let sigma_m_s = if moves { track.sigma_m_s } else { self.config.tracking.state.dynamic_m_s };
+        let sigma_m_s =
+            if moves { track.sigma_m_s } else { self.config.tracking.state.dynamic_m_s };
         Some(MovingBox {
             id: track.id,
             unseen_frames: self.tracker.frame().saturating_sub(track.last_frame),
@@ -124,21 +132,27 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Takes in what this frame's mask of a track shows, within an object's extent of its middle disparity.
+    /// Takes in what this frame's mask of a track shows, within an object's extent of its middle
+    /// disparity.
     fn add_mask(&self, fit: &mut BoxFit, track: &Track, rig: &StereoRig) {
         let (disparity_q8, grid) = (self.stereo.disparity_q8(), self.planning.grid());
         let pixels = track.mask.pixels;
         let span = |from: i32, length: i32, size: usize| {
-            let [from, to] = [from, from.saturating_add(length)].map(|at| usize::try_from(at).unwrap_or(0));
+            let [from, to] =
+                [from, from.saturating_add(length)].map(|at| usize::try_from(at).unwrap_or(0));
             (from..if to < size { to } else { size }).step_by(PIXEL_STEP)
         };
         let rows = || span(pixels.top, pixels.height, disparity_q8.height());
         let shown = || {
-            rows().flat_map(|v| span(pixels.left, pixels.width, disparity_q8.width()).map(move |u| (u, v))).filter_map(|(u, v)| {
-                let disparity = disparity_q8.get(u, v).filter(|disparity| *disparity > 0)?;
-                let instance = self.tracker.instance_at(u as i32, v as i32)?;
-                (instance.track == Some(track.id)).then_some((u, v, disparity))
-            })
+            rows()
+                .flat_map(|v| {
+                    span(pixels.left, pixels.width, disparity_q8.width()).map(move |u| (u, v))
+                })
+                .filter_map(|(u, v)| {
+                    let disparity = disparity_q8.get(u, v).filter(|disparity| *disparity > 0)?;
+                    let instance = self.tracker.instance_at(u as i32, v as i32)?;
+                    (instance.track == Some(track.id)).then_some((u, v, disparity))
+                })
         };
         let mut counts = [0u32; DISPARITIES];
         for (_, _, disparity) in shown() {
@@ -159,8 +173,12 @@ impl<'s> Mapper<'s> {
         for (u, v, disparity) in shown() {
             let z = depth_m(f64::from(disparity) / 256.0);
             if libm::fabs(z - middle_m) <= extent_m {
-                let [x, y] = [u as f64 - rig.center_u_px, v as f64 - rig.center_v_px].map(|px| px * z / rig.focal_px);
-                fit.add(grid.of_world(self.t_world_camera().transform_point([x, y, z])).map(|c| c * grid.cell_m()));
+                let [x, y] = [u as f64 - rig.center_u_px, v as f64 - rig.center_v_px]
+                    .map(|px| px * z / rig.focal_px);
+                fit.add(
+                    grid.of_world(self.t_world_camera().transform_point([x, y, z]))
+                        .map(|c| c * grid.cell_m()),
+                );
             }
         }
     }

@@ -11,8 +11,8 @@ use crate::{
 };
 
 impl<'s> Mapper<'s> {
-    /// Looks at the static map from a pose, at the size of the frames taken so far or thinned out ([`RaycastView`]). Before the first frame
-    /// there is no size to look at.
+    /// Looks at the static map from a pose, at the size of the frames taken so far or thinned out
+    /// ([`RaycastView`]). Before the first frame there is no size to look at.
     ///
     /// ```
     /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform}, image::View, memory::SLAB_ALIGN};
@@ -30,22 +30,37 @@ impl<'s> Mapper<'s> {
     /// assert_eq!(preview.depth_m().map(|depth_m| [depth_m.width(), depth_m.height()]), Some([80, 24]));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn raycast<E: Executor>(&mut self, view: impl Into<RaycastView>, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+    pub fn raycast<E: Executor>(
+        &mut self,
+        view: impl Into<RaycastView>,
+        executor: &E,
+    ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(view.into())?;
-        executor.stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
+        executor
+            .stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
         Ok(&self.raycaster)
     }
 
-    /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is nearest (the compositing of Section
-    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and
-    /// one more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
-    pub fn raycast_composed<E: Executor>(&mut self, view: impl Into<RaycastView>, executor: &E) -> Result<&Raycaster<'s>, RaycastError> {
+    /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is
+    /// nearest (the compositing of Section III-E). [`Raycaster::layer`] is 0 for the static map and
+    /// n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and one more for each
+    /// object; there are at most [`crate::objects::MAX_OBJECTS`].
+    pub fn raycast_composed<E: Executor>(
+        &mut self,
+        view: impl Into<RaycastView>,
+        executor: &E,
+    ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(view.into())?;
         executor.stage(Stage::Raycast, || {
             self.raycaster.cast(&self.background, &view, executor)?;
             for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
                 // An object too far away for its coordinates is too far away to be seen.
-                let _ = self.raycaster.cast_over(posed.object.volume(), &from_object(&view, &posed), layer, executor);
+                let _ = self.raycaster.cast_over(
+                    posed.object.volume(),
+                    &from_object(&view, &posed),
+                    layer,
+                    executor,
+                );
             }
             Ok::<(), RaycastError>(())
         })?;
@@ -60,9 +75,15 @@ impl<'s> Mapper<'s> {
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(view.into())?;
-        let posed = self.objects.posed(&self.tracker).find(|posed| posed.summary.id == track).ok_or(RaycastError::Object)?;
+        let posed = self
+            .objects
+            .posed(&self.tracker)
+            .find(|posed| posed.summary.id == track)
+            .ok_or(RaycastError::Object)?;
         let view = from_object(&view, &posed);
-        executor.stage(Stage::Raycast, || self.raycaster.cast(posed.object.volume(), &view, executor))?;
+        executor.stage(Stage::Raycast, || {
+            self.raycaster.cast(posed.object.volume(), &view, executor)
+        })?;
         Ok(&self.raycaster)
     }
 
@@ -78,7 +99,12 @@ impl<'s> Mapper<'s> {
 
     fn whole_view(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {
         let [width, height] = self.size.ok_or(RaycastError::ImageSize)?;
-        Ok(Viewpoint { rig: self.config.scaled_rig(), width, height, t_world_camera: *t_world_camera })
+        Ok(Viewpoint {
+            rig: self.config.scaled_rig(),
+            width,
+            height,
+            t_world_camera: *t_world_camera,
+        })
     }
 }
 

@@ -1,10 +1,14 @@
-//! Where a camera that was lost is: found again in the map, or at the start of another segment of it.
+//! Where a camera that was lost is: found again in the map, or at the start of another segment of
+//! it.
 //!
-//! The guessed pose is refined by registering the frame's depth with the map (ICP, twice). The pose from which the map has most of the image's
-//! edges is believed if it has enough of them, and fewer half a metre ahead and behind, and two degrees around what is shown: between façades
-//! depth alone does not hold a camera along the street, and a small part of the view lets it circle. Without colour in the map no pose is believed.
+//! The guessed pose is refined by registering the frame's depth with the map (ICP, twice). The pose
+//! from which the map has most of the image's edges is believed if it has enough of them, and fewer
+//! half a metre ahead and behind, and two degrees around what is shown: between façades depth alone
+//! does not hold a camera along the street, and a small part of the view lets it circle. Without
+//! colour in the map no pose is believed.
 //!
-//! **Time.** Seven raycasts and two registrations, in the one frame that ends a loss. **Memory.** The raycaster's.
+//! **Time.** Seven raycasts and two registrations, in the one frame that ends a loss. **Memory.**
+//! The raycaster's.
 
 use super::{StereoFrame, localization::Localization};
 use crate::{
@@ -16,7 +20,8 @@ use crate::{
 
 /// Distance over which brightness is compared, px: wider than what fusion blurs.
 const EDGE_PX: usize = 4;
-/// Least correlation of edges. Right poses have .16 to .74 on 06 and r1405, those half a metre aside up to .29.
+/// Least correlation of edges. Right poses have .16 to .74 on 06 and r1405, those half a metre
+/// aside up to .29.
 const CORRELATION_MIN: f64 = 0.25;
 /// How far ahead and behind the map must look less like the image, m.
 const ASIDE_M: f64 = 0.5;
@@ -28,7 +33,8 @@ const SIGNAL_FACTOR: f64 = 1.07;
 const SHOWN_MIN: f64 = 0.1;
 /// How often the pose is refined.
 const REGISTRATIONS: usize = 2;
-/// Registration with the map: a guess is off by more than a frame's motion, and much of the view may be new.
+/// Registration with the map: a guess is off by more than a frame's motion, and much of the view
+/// may be new.
 const REGISTRATION: IcpConfig = IcpConfig {
     levels: 3,
     steps: 10,
@@ -43,8 +49,8 @@ const REGISTRATION: IcpConfig = IcpConfig {
 };
 
 impl Localization<'_, '_> {
-    /// Ends a loss after a motion was estimated: the camera is found, or a segment begins. Returns whether it is found. Where no map is
-    /// yet, the guess is as good as any pose.
+    /// Ends a loss after a motion was estimated: the camera is found, or a segment begins. Returns
+    /// whether it is found. Where no map is yet, the guess is as good as any pose.
     pub(super) fn end_loss<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> bool {
         if self.background.pool().is_empty() {
             return false;
@@ -75,37 +81,52 @@ impl Localization<'_, '_> {
         }
         let (correlation, t_world_camera, depth_m) = best;
         let is_less_like = |aside: &Transform| {
-            let there = self.correlation_at(grey, &(t_world_camera * *aside).normalized(), executor);
+            let there =
+                self.correlation_at(grey, &(t_world_camera * *aside).normalized(), executor);
             is_clearer(correlation, there.unwrap_or(0.0))
         };
         let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
-        let around = |angle_rad: f64| ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m);
+        let around = |angle_rad: f64| {
+            ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m)
+        };
         let aside = [ahead(ASIDE_M), ahead(-ASIDE_M), around(ASIDE_RAD), around(-ASIDE_RAD)];
         (correlation >= CORRELATION_MIN && aside.iter().all(is_less_like)).then_some(t_world_camera)
     }
 
     /// How much the map from a pose looks like the image; `None` where it shows too little of it.
-    fn correlation_at<E: Executor>(&mut self, grey: View<'_, u8>, t_world_camera: &Transform, executor: &E) -> Option<f64> {
+    fn correlation_at<E: Executor>(
+        &mut self,
+        grey: View<'_, u8>,
+        t_world_camera: &Transform,
+        executor: &E,
+    ) -> Option<f64> {
         let is_cast = self.cast(t_world_camera, [grey.width(), grey.height()], executor);
         edge_correlation(self.raycaster.colour().filter(|_| is_cast)?, grey)
     }
 
     /// Mean depth of what was cast last, m.
     fn mean_depth_m(&self) -> f64 {
-        let depths = self.raycaster.depth_m().into_iter().flat_map(|depth_m| depth_m.pixels()).filter(|depth_m| **depth_m > 0.0);
-        let (sum, count) = depths.fold((0.0, 0u32), |(sum, count), &depth_m| (sum + f64::from(depth_m), count + 1));
+        let depths = self
+            .raycaster
+            .depth_m()
+            .into_iter()
+            .flat_map(|depth_m| depth_m.pixels())
+            .filter(|depth_m| **depth_m > 0.0);
+        let (sum, count) = depths
+            .fold((0.0, 0u32), |(sum, count), &depth_m| (sum + f64::from(depth_m), count + 1));
         sum / f64::from(count.max(1))
     }
 }
 
-/// Whether one correlation says that signal to noise is larger by the factor than the other says. Two images of one scene with noise of their own
-/// correlate by S / (S + N): near 1 a small step of correlation is a large one of signal to noise.
+/// Whether one correlation says that signal to noise is larger by the factor than the other says.
+/// Two images of one scene with noise of their own correlate by S / (S + N): near 1 a small step of
+/// correlation is a large one of signal to noise.
 fn is_clearer(correlation: f64, other: f64) -> bool {
     correlation * (1.0 - other) >= SIGNAL_FACTOR * other * (1.0 - correlation)
 }
 
-/// The correlation of brightness differences, across and down, of a picture with a grey image of its size; `None` where the picture, which is
-/// black where it shows nothing, has too few.
+/// The correlation of brightness differences, across and down, of a picture with a grey image of
+/// its size; `None` where the picture, which is black where it shows nothing, has too few.
 fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f64> {
     let (width, height) = (grey.width(), grey.height());
     let shown = |u: usize, v: usize| {
@@ -113,13 +134,20 @@ fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f6
         (red + green + blue > 0).then_some((red + 2 * green + blue) / 4)
     };
     let seen = |u: usize, v: usize| grey.get(u, v).map(i64::from);
-    // Sums of one image's differences, the other's, their squares and products: differences are below 2^8, so sums fit.
+    // Sums of one image's differences, the other's, their squares and products: differences are
+    // below 2^8, so sums fit.
     let (mut sums, mut squares, mut products, mut count) = ([0i64; 2], [0i64; 2], 0i64, 0i64);
     for v in (EDGE_PX..height.saturating_sub(EDGE_PX)).step_by(2) {
         for u in (EDGE_PX..width.saturating_sub(EDGE_PX)).step_by(2) {
-            for (before, after) in [([u - EDGE_PX, v], [u + EDGE_PX, v]), ([u, v - EDGE_PX], [u, v + EDGE_PX])] {
-                let of_map = shown(after[0], after[1]).zip(shown(before[0], before[1])).map(|(after, before)| after - before);
-                let of_image = seen(after[0], after[1]).zip(seen(before[0], before[1])).map(|(after, before)| after - before);
+            for (before, after) in
+                [([u - EDGE_PX, v], [u + EDGE_PX, v]), ([u, v - EDGE_PX], [u, v + EDGE_PX])]
+            {
+                let of_map = shown(after[0], after[1])
+                    .zip(shown(before[0], before[1]))
+                    .map(|(after, before)| after - before);
+                let of_image = seen(after[0], after[1])
+                    .zip(seen(before[0], before[1]))
+                    .map(|(after, before)| after - before);
                 let (Some(a), Some(b)) = (of_map, of_image) else { continue };
                 sums = [sums[0] + a, sums[1] + b];
                 squares = [squares[0] + a * a, squares[1] + b * b];
@@ -161,7 +189,10 @@ mod tests {
             core::array::from_fn(|at| [gain * grey[(at + shift) % (WIDTH * HEIGHT)]; 3])
         };
         let correlation = |pixels: &[[u8; 3]]| {
-            let views = (View::new(pixels, WIDTH, HEIGHT).unwrap(), View::new(&grey, WIDTH, HEIGHT).unwrap());
+            let views = (
+                View::new(pixels, WIDTH, HEIGHT).unwrap(),
+                View::new(&grey, WIDTH, HEIGHT).unwrap(),
+            );
             edge_correlation(views.0, views.1)
         };
         assert!(correlation(&picture(0, 1)).unwrap() > 0.999);

@@ -55,7 +55,8 @@ pub enum PoseOrigin {
     First,
     /// Estimated from this frame.
     Estimated,
-    /// A guess: the estimate failed, and the motion before was held. The next frames are matched with the last one whose pose is not a guess.
+    /// A guess: the estimate failed, and the motion before was held. The next frames are matched
+    /// with the last one whose pose is not a guess.
     Held,
     /// Given with the frame.
     Given,
@@ -97,11 +98,13 @@ pub struct Report {
     pub scene_flow: FlowReport,
     /// How the pose came about.
     pub pose: PoseOrigin,
-    /// Number of the map's segment, from 0. A camera lost for [`crate::egomotion::REFERENCE_FRAMES_MAX`] frames that is not found in the map
-    /// begins another one, [`crate::egomotion::SEGMENT_GAP_M`] above its guessed pose. Poses and map of a segment are right among themselves;
-    /// where one stands beside another is not known.
+    /// Number of the map's segment, from 0. A camera lost for
+    /// [`crate::egomotion::REFERENCE_FRAMES_MAX`] frames that is not found in the map begins
+    /// another one, [`crate::egomotion::SEGMENT_GAP_M`] above its guessed pose. Poses and map of a
+    /// segment are right among themselves; where one stands beside another is not known.
     pub segment: u32,
-    /// The camera's motion from matches; none was looked for in the first frame, nor where the pose was given.
+    /// The camera's motion from matches; none was looked for in the first frame, nor where the pose
+    /// was given.
     pub egomotion: Option<MotionEstimate>,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
@@ -109,8 +112,8 @@ pub struct Report {
     pub self_calibration: SelfCalibrationReport,
     /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
     pub instances: InstancesReport,
-    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the map. Nor is one between two turns of
-    /// `mapper.fuse_every`.
+    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the
+    /// map. Nor is one between two turns of `mapper.fuse_every`.
     pub fused: bool,
     /// Blocks made and refused.
     pub allocation: AllocationReport,
@@ -122,18 +125,24 @@ pub struct Report {
     pub internal_faults: u32,
     /// Digests of what went in and of what each stage made of it.
     pub digests: StageDigests,
-    /// One digest for all stages: [`StageDigests::whole`], and with it that of the rectified images where there are any.
+    /// One digest for all stages: [`StageDigests::whole`], and with it that of the rectified images
+    /// where there are any.
     pub digest: u64,
 }
 
 impl Report {
-    /// The worst event of this step. The map is affected where anything that belongs in a map was refused or
-    /// lost: blocks of any map, detections, tracks, objects, masks and crops.
+    /// The worst event of this step. The map is affected where anything that belongs in a map was
+    /// refused or lost: blocks of any map, detections, tracks, objects, masks and crops.
     pub fn severity(&self) -> Severity {
         let allocation = &self.allocation;
-        let blocks = allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
+        let blocks =
+            allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
         let refused = blocks + self.instances.refused() + self.internal_faults;
-        if self.pose == PoseOrigin::Held || self.segment > 0 || refused > 0 || self.self_calibration.is_uncorrected() {
+        if self.pose == PoseOrigin::Held
+            || self.segment > 0
+            || refused > 0
+            || self.self_calibration.is_uncorrected()
+        {
             Severity::MapAffected
         } else if self.pose == PoseOrigin::Relocalized
             || self.dropped_features() + self.prune.early > 0

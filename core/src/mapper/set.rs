@@ -38,8 +38,9 @@ impl fmt::Display for SetError {
 impl core::error::Error for SetError {}
 
 impl Config {
-    /// Sets one setting by its dotted key, as it stands in a run's `config.toml`. Numbers are decimal; names of choices stand bare (`depth`);
-    /// `volume.class_weight` takes its numbers with commas between them. The calibration has no keys. Whether the value is in its range,
+    /// Sets one setting by its dotted key, as it stands in a run's `config.toml`. Numbers are
+    /// decimal; names of choices stand bare (`depth`); `volume.class_weight` takes its numbers with
+    /// commas between them. The calibration has no keys. Whether the value is in its range,
     /// [`Config::validate`] says.
     ///
     /// ```
@@ -135,8 +136,8 @@ choices! {
     SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off }
 }
 
-/// A function from a section and a name in it to the field. A field that is not listed does not compile; a section within the section is
-/// listed with the function for it.
+/// A function from a section and a name in it to the field. A field that is not listed does not
+/// compile; a section within the section is listed with the function for it.
 macro_rules! section {
     ($function:ident: $section:ident { $($field:ident),* $(,)? } $(and { $($inner:ident),* })?) => {
         fn $function<'c>(section: &'c mut $section, name: &str) -> Option<&'c mut dyn Value> {

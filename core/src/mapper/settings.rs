@@ -4,7 +4,11 @@ use crate::problem::{Problems, require};
 
 /// Where the camera's motion comes from, unless a frame brings its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum MotionSource {
     /// From matches over two stereo pairs.
     #[default]
@@ -24,12 +28,17 @@ pub enum MotionSource {
 /// assert!(config.validate().is_empty());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct MapperConfig {
     /// Where the camera's motion comes from; `stereo`.
     pub egomotion: MotionSource,
-    /// Frames from one that is fused to the next: the camera and all tracks are followed in every frame, maps grow in each `fuse_every`-th
-    /// alone, and pruning's lag counts those. 1 and more; 1.
+    /// Frames from one that is fused to the next: the camera and all tracks are followed in every
+    /// frame, maps grow in each `fuse_every`-th alone, and pruning's lag counts those. 1 and more;
+    /// 1.
     pub fuse_every: u32,
 }
 

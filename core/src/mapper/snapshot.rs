@@ -1,8 +1,10 @@
-//! A mapper's state as bytes: all that a resumed run needs to give the results of an uninterrupted one.
+//! A mapper's state as bytes: all that a resumed run needs to give the results of an uninterrupted
+//! one.
 //!
-//! Each struct describes its state once (the module `state`); the description that is hashed into each
-//! step's digests is the one that is written here and read back. What can be rebuilt is not stored:
-//! features of the last pair, the block index. What only one frame needs is not stored either, so
+//! Each struct describes its state once (the module `state`); the description that is hashed into
+//! each step's digests is the one that is written here and read back. What can be rebuilt is not
+//! stored: features of the last pair, the block index. What only one frame needs is not stored
+//! either, so
 //! [`Mapper::disparity_q8`] has nothing to show before the next frame.
 //!
 //! | bytes | what |
@@ -68,10 +70,14 @@ impl<E: fmt::Display> fmt::Display for RestoreError<E> {
             Self::New(error) => error.fmt(f),
             Self::Source(error) => write!(f, "the snapshot cannot be read: {error}"),
             Self::Foreign => f.write_str("the bytes are not a snapshot of a mapper"),
-            Self::Version(found) => write!(f, "the snapshot is of version {found}, this mapper reads version {VERSION}"),
+            Self::Version(found) => {
+                write!(f, "the snapshot is of version {found}, this mapper reads version {VERSION}")
+            }
             Self::Capacity => f.write_str("the snapshot is of a mapper with another capacity"),
             Self::Config => f.write_str("the snapshot is of a mapper with another configuration"),
-            Self::Damaged => f.write_str("the snapshot is damaged: its bytes are not those that were written"),
+            Self::Damaged => {
+                f.write_str("the snapshot is damaged: its bytes are not those that were written")
+            }
         }
     }
 }
@@ -79,12 +85,12 @@ impl<E: fmt::Display> fmt::Display for RestoreError<E> {
 impl<E: fmt::Debug + fmt::Display> core::error::Error for RestoreError<E> {}
 
 impl<'s> Mapper<'s> {
-    /// Writes all that later frames depend on to `sink`, piece by piece. A mapper restored from it goes
-    /// on bit for bit as this one does. Nothing changes; `&mut` only because one description of the
-    /// state serves writing and reading.
+    /// Writes all that later frames depend on to `sink`, piece by piece. A mapper restored from it
+    /// goes on bit for bit as this one does. Nothing changes; `&mut` only because one description
+    /// of the state serves writing and reading.
     ///
-    /// What a [`crate::volume::BlockStore`] or an [`crate::objects::ObjectSink`] holds is the caller's,
-    /// and not in it.
+    /// What a [`crate::volume::BlockStore`] or an [`crate::objects::ObjectSink`] holds is the
+    /// caller's, and not in it.
     ///
     /// # Errors
     /// The sink's first one; what it took until then is not a snapshot.
@@ -116,8 +122,8 @@ impl<'s> Mapper<'s> {
         writer.finish()
     }
 
-    /// Cuts a mapper out of `slab` as [`Mapper::new`] does, and brings it to where [`Mapper::save`] was
-    /// called. `source` fills the bytes it is handed with those that come next.
+    /// Cuts a mapper out of `slab` as [`Mapper::new`] does, and brings it to where [`Mapper::save`]
+    /// was called. `source` fills the bytes it is handed with those that come next.
     ///
     /// # Errors
     /// See [`RestoreError`]. There is no mapper then: nothing half restored can be used.
@@ -127,7 +133,8 @@ impl<'s> Mapper<'s> {
         slab: &'s mut [u8],
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<Self, RestoreError<E>> {
-        // Used where it lies, as a mapper is some kilobytes: each move would take as much stack again.
+        // Used where it lies, as a mapper is some kilobytes: each move would take as much stack
+        // again.
         let mut made = Self::new(capacity, config, slab);
         if let Ok(mapper) = &mut made {
             mapper.read(capacity, config, source)?;
@@ -216,7 +223,8 @@ impl<'s> Mapper<'s> {
     }
 }
 
-/// A digest of a value's `Debug` text: no field can be forgotten, and floats are written to the last bit.
+/// A digest of a value's `Debug` text: no field can be forgotten, and floats are written to the
+/// last bit.
 fn fingerprint(value: &impl fmt::Debug) -> u64 {
     struct Text(Digest);
     impl Write for Text {

@@ -21,12 +21,16 @@ impl StaticMap<'_, '_> {
     pub fn erase_trails(&mut self, camera: &CameraMotion, tracked: &mut Tracked<'_, '_>) -> u32 {
         let mut erased = 0;
         tracked.take_trails(&camera.t_world_camera, |trail| {
-            erased += trail.boxes().map(|before| self.background.erase(&before, trail.frames())).sum::<u32>();
+            erased += trail
+                .boxes()
+                .map(|before| self.background.erase(&before, trail.frames()))
+                .sum::<u32>();
         });
         erased
     }
 
-    /// Turns the disparity into depth, removes what moves or may move, allocates blocks around the rest and averages it in.
+    /// Turns the disparity into depth, removes what moves or may move, allocates blocks around the
+    /// rest and averages it in.
     pub fn fuse<E: Executor, S: BlockStore>(
         &mut self,
         frame: &StereoFrame<'_>,
@@ -46,7 +50,11 @@ impl StaticMap<'_, '_> {
             debug_assert!(false, "the depth image has the capacity's size");
             return AllocationReport::default();
         };
-        let observed = ObservedDepth { config: &self.config.volume, rig: &view.rig, disparity_q8: self.disparity_q8 };
+        let observed = ObservedDepth {
+            config: &self.config.volume,
+            rig: &view.rig,
+            disparity_q8: self.disparity_q8,
+        };
         executor.stage(Stage::Fuse, || observed.write(&mut depth_m, executor));
         executor.stage(Stage::Instances, || tracked.mask_dynamic_depth(&mut depth_m));
         let observation = Observation {
@@ -56,7 +64,9 @@ impl StaticMap<'_, '_> {
             class: frame.class,
             noted: true,
         };
-        let allocation = executor.stage(Stage::Allocate, || self.background.allocate(&view, observation.depth_m, store, executor));
+        let allocation = executor.stage(Stage::Allocate, || {
+            self.background.allocate(&view, observation.depth_m, store, executor)
+        });
         executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));
         allocation
     }

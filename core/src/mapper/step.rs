@@ -1,7 +1,9 @@
-//! One frame: the loop of the paper (Section III), a line or two per stage; each stage returns what the next one takes.
+//! One frame: the loop of the paper (Section III), a line or two per stage; each stage returns what
+//! the next one takes.
 
 use super::{
-    BlockCount, Config, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report, StageDigests, StepError, StereoFrame,
+    BlockCount, Config, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report, StageDigests,
+    StepError, StereoFrame,
     localization::{Localization, Located},
     static_map::StaticMap,
 };
@@ -32,14 +34,18 @@ struct Outcome {
 }
 
 impl Mapper<'_> {
-    /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done is counted in the report. Blocks that
-    /// must leave a full pool are lost, and counted.
-    pub fn step<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> Result<Report, StepError> {
+    /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done
+    /// is counted in the report. Blocks that must leave a full pool are lost, and counted.
+    pub fn step<E: Executor>(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        executor: &E,
+    ) -> Result<Report, StepError> {
         self.step_with(frame, executor, &mut NoStore, &mut NoSink)
     }
 
-    /// As [`Mapper::step`], with a store for blocks that are evicted and loaded again when they are visible, and a sink for objects that
-    /// retire.
+    /// As [`Mapper::step`], with a store for blocks that are evicted and loaded again when they are
+    /// visible, and a sink for objects that retire.
     // Never inlined, so that a step's stack can be told from its caller's.
     #[inline(never)]
     pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(
@@ -51,17 +57,18 @@ impl Mapper<'_> {
     ) -> Result<Report, StepError> {
         let size = self.validate(frame)?;
         let input = frame.digest();
-        // The rectified images are lent out for the step, so that the stages may read them while they change the mapper.
+        // The rectified images are lent out for the step, so that the stages may read them while
+        // they change the mapper.
         let mut images = core::mem::take(&mut self.rectified);
         let raw = Pair { left: frame.left, right: frame.right, colour: frame.colour };
-        let rectified = executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
+        let rectified =
+            executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
         let Pair { left, right, colour } = rectified.unwrap_or(raw);
         let rectification = self.rectifier.report(&Pair { left, right, colour });
         let mut aligned = core::mem::take(&mut self.aligned);
-        let moved = self
-            .self_calibration
-            .row_shift(&self.config.rig)
-            .and_then(|shift| executor.stage(Stage::Rectify, || aligned.align(right, &shift, executor)));
+        let moved = self.self_calibration.row_shift(&self.config.rig).and_then(|shift| {
+            executor.stage(Stage::Rectify, || aligned.align(right, &shift, executor))
+        });
         let frame = StereoFrame { left, right: moved.unwrap_or(right), colour, ..*frame };
         let report = self.step_rectified(&frame, size, executor, store, sink);
         (self.rectified, self.aligned) = (images, aligned);
@@ -80,18 +87,35 @@ impl Mapper<'_> {
         let (config, rig) = (&self.config, self.config.scaled_rig());
         let invalid = self.rectifier.invalid();
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last.
-        let (stereo, scene_flow) = match_images(config, &mut self.stereo, &mut self.scene_flow, frame, invalid.as_ref(), executor);
-        calibrate(config, &mut self.self_calibration, &mut self.stereo, &mut self.scene_flow, executor);
+        let (stereo, scene_flow) = match_images(
+            config,
+            &mut self.stereo,
+            &mut self.scene_flow,
+            frame,
+            invalid.as_ref(),
+            executor,
+        );
+        calibrate(
+            config,
+            &mut self.self_calibration,
+            &mut self.stereo,
+            &mut self.scene_flow,
+            executor,
+        );
         let disparity_q8 = self.stereo.disparity_q8();
-        // Objects are followed from frame to frame: matches with an earlier one say nothing of theirs.
+        // Objects are followed from frame to frame: matches with an earlier one say nothing of
+        // theirs.
         let with_last = self.camera.since_reference() == 0;
-        let matches = if with_last { frame_matches(&self.scene_flow) } else { FrameMatches::default() };
+        let matches =
+            if with_last { frame_matches(&self.scene_flow) } else { FrameMatches::default() };
         // (B) Detections, associated with tracks, and the matches assigned to them.
         let interval_s = self.clock.advance(frame.time_ns, config.tracking.frame_interval_s);
         self.tracker.set_frame_interval_s(interval_s);
-        let assigned =
-            executor.stage(Stage::Instances, || self.tracker.detect(self.frame, frame.detections, size, matches).assign_matches());
-        // (C.2) The camera's own motion, from what does not move. The first frame's camera is the world.
+        let assigned = executor.stage(Stage::Instances, || {
+            self.tracker.detect(self.frame, frame.detections, size, matches).assign_matches()
+        });
+        // (C.2) The camera's own motion, from what does not move. The first frame's camera is the
+        // world.
         let mut localization = Localization {
             config,
             frame: self.frame,
@@ -106,28 +130,62 @@ impl Mapper<'_> {
             depth_m: self.depth_m,
         };
         let mask = assigned.egomotion_mask();
-        let located = executor.stage(Stage::Egomotion, || localization.locate(frame, scene_flow.status, &mask, executor));
+        let located = executor.stage(Stage::Egomotion, || {
+            localization.locate(frame, scene_flow.status, &mask, executor)
+        });
         // (B) Moving objects that no detector found, and (D) the objects' motions.
-        let search = with_last.then_some(GuidedMatching { matcher: &self.scene_flow, disparity_q8 });
-        let segment_motion = || assigned.segment_motion(&rig, &located.camera, disparity_q8, search);
+        let search =
+            with_last.then_some(GuidedMatching { matcher: &self.scene_flow, disparity_q8 });
+        let segment_motion =
+            || assigned.segment_motion(&rig, &located.camera, disparity_q8, search);
         let assigned = executor.stage(Stage::Segmentation, segment_motion);
-        let estimate_motions = || assigned.estimate_motions(&rig, &located.camera, search, &mut self.estimator);
+        let estimate_motions =
+            || assigned.estimate_motions(&rig, &located.camera, search, &mut self.estimator);
         let mut tracked = executor.stage(Stage::Instances, estimate_motions);
-        // (E) The static map, without what moves or may move, and the objects' maps; unless the pose is extrapolated.
-        let fused = located.found.origin != PoseOrigin::Held && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
-        let mut map = StaticMap { config, disparity_q8, background: &mut self.background, depth_m: self.depth_m };
-        let voxels_erased = executor.stage(Stage::Prune, || map.erase_trails(&located.camera, &mut tracked));
-        let allocation = if fused { map.fuse(frame, &located.camera, &mut tracked, executor, store) } else { AllocationReport::default() };
+        // (E) The static map, without what moves or may move, and the objects' maps; unless the
+        // pose is extrapolated.
+        let fused = located.found.origin != PoseOrigin::Held
+            && self.frame.is_multiple_of(config.mapper.fuse_every.max(1));
+        let mut map = StaticMap {
+            config,
+            disparity_q8,
+            background: &mut self.background,
+            depth_m: self.depth_m,
+        };
+        let voxels_erased =
+            executor.stage(Stage::Prune, || map.erase_trails(&located.camera, &mut tracked));
+        let allocation = if fused {
+            map.fuse(frame, &located.camera, &mut tracked, executor, store)
+        } else {
+            AllocationReport::default()
+        };
         let picture = Picture { grey: frame.left, colour: frame.colour };
-        let shown = ObjectFrame { rig: &rig, t_world_camera: &located.camera.t_world_camera, picture, disparity_q8 };
+        let shown = ObjectFrame {
+            rig: &rig,
+            t_world_camera: &located.camera.t_world_camera,
+            picture,
+            disparity_q8,
+        };
         let tracking = executor.stage(Stage::Instances, || {
             self.objects.reconstruct(&tracked, fused.then_some(&shown), executor, sink);
             tracked.commit()
         });
         // (F) Noise last observed a fixed lag ago is removed.
-        let prune = if fused { executor.stage(Stage::Prune, || self.background.prune()) } else { PruneReport::default() };
+        let prune = if fused {
+            executor.stage(Stage::Prune, || self.background.prune())
+        } else {
+            PruneReport::default()
+        };
         let prune = PruneReport { voxels_erased, ..prune };
-        self.finish_frame(Outcome { stereo, scene_flow, located, tracking, fused, allocation, prune })
+        self.finish_frame(Outcome {
+            stereo,
+            scene_flow,
+            located,
+            tracking,
+            fused,
+            allocation,
+            prune,
+        })
     }
 
     /// Reports the frame and counts it.
@@ -159,7 +217,11 @@ impl Mapper<'_> {
             egomotion: found.egomotion,
             icp: found.icp,
             self_calibration: self.self_calibration.report(),
-            instances: InstancesReport::of(&tracking, self.objects.report(), found.matches_excluded),
+            instances: InstancesReport::of(
+                &tracking,
+                self.objects.report(),
+                found.matches_excluded,
+            ),
             fused,
             allocation,
             prune,
@@ -202,7 +264,9 @@ impl Mapper<'_> {
             egomotion: self.egomotion_digest(egomotion),
             tracks: self.tracks_digest(),
             background: self.background.digest(),
-            objects: ObjectDigests::of(self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest })),
+            objects: ObjectDigests::of(
+                self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest }),
+            ),
         }
     }
 
@@ -228,7 +292,8 @@ fn frame_matches<'m>(scene_flow: &'m FlowMatcher<'_>) -> FrameMatches<'m> {
     FrameMatches { refined: scene_flow.refined(), sparse: scene_flow.sparse() }
 }
 
-/// Depth from the pair, unless it is given, and matches over this pair and the last: neither needs the other.
+/// Depth from the pair, unless it is given, and matches over this pair and the last: neither needs
+/// the other.
 fn match_images<E: Executor>(
     config: &Config,
     stereo: &mut StereoMatcher<'_>,
@@ -241,11 +306,16 @@ fn match_images<E: Executor>(
         Some(given) => stereo.take(given),
         None => stereo.compute_within(&config.stereo, frame.left, frame.right, invalid, executor),
     };
-    let match_features = || scene_flow.push_within(&config.scene_flow, frame.left, frame.right, invalid, executor);
-    executor.join(|| executor.stage(Stage::Stereo, compute_disparity), || executor.stage(Stage::SceneFlow, match_features))
+    let match_features =
+        || scene_flow.push_within(&config.scene_flow, frame.left, frame.right, invalid, executor);
+    executor.join(
+        || executor.stage(Stage::Stereo, compute_disparity),
+        || executor.stage(Stage::SceneFlow, match_features),
+    )
 }
 
-/// Learns from the matches which rows agree, and takes the disparity error found so far out of them and of the disparity image.
+/// Learns from the matches which rows agree, and takes the disparity error found so far out of them
+/// and of the disparity image.
 fn calibrate<E: Executor>(
     config: &Config,
     self_calibration: &mut SelfCalibration,

@@ -22,7 +22,8 @@ use crate::{
 use nalgebra::Vector3;
 use std::{vec, vec::Vec};
 
-const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, blocks: 4_000, ..Capacity::TINY };
+const CAPACITY: Capacity =
+    Capacity { image_width: WIDTH, image_height: HEIGHT, blocks: 4_000, ..Capacity::TINY };
 
 /// A walk through the scene past a patch that the detector takes for a parked car.
 struct Walk {
@@ -34,7 +35,12 @@ impl Walk {
     const CAR: [u32; 4] = [230, 50, 90, 70];
 
     fn new(frames: usize) -> Self {
-        let pose = |frame: usize| Transform::new(Vector3::new(0.0, 0.01 * frame as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * frame as f64);
+        let pose = |frame: usize| {
+            Transform::new(
+                Vector3::new(0.0, 0.01 * frame as f64, 0.0),
+                Vector3::new(0.02, 0.0, 0.15) * frame as f64,
+            )
+        };
         let [_, _, width, height] = Self::CAR;
         Self {
             pairs: (0..frames).map(|frame| see(&pose(frame))).collect(),
@@ -65,7 +71,8 @@ impl Walk {
     /// Hands frame `at` to `take`.
     fn with_frame<R>(&self, at: usize, take: impl FnOnce(&StereoFrame<'_>) -> R) -> R {
         let detections = [self.detection()];
-        let [left, right] = self.pairs[at].each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
+        let [left, right] =
+            self.pairs[at].each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
         take(&StereoFrame { detections: &detections, ..StereoFrame::pair(left, right) })
     }
 
@@ -75,7 +82,11 @@ impl Walk {
 }
 
 /// A mapper that has seen the first `frames` frames.
-fn with_mapper<R>(walk: &Walk, frames: usize, test: impl FnOnce(&mut Mapper<'_>, &[Report]) -> R) -> R {
+fn with_mapper<R>(
+    walk: &Walk,
+    frames: usize,
+    test: impl FnOnce(&mut Mapper<'_>, &[Report]) -> R,
+) -> R {
     let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut mapper = Mapper::new(&CAPACITY, &Walk::config(), &mut slab[start..]).unwrap();

@@ -1,7 +1,9 @@
-//! Masks as bits, and boxes of pixels: how a detection's pixels are kept, compared, scaled and carried to the next frame.
+//! Masks as bits, and boxes of pixels: how a detection's pixels are kept, compared, scaled and
+//! carried to the next frame.
 //!
-//! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer a frame. Time: linear in the words of a
-//! mask. What can go wrong: a full buffer, which is a value (`MaskStore::alloc`).
+//! Memory: 8 bytes for each 64 columns a row of a box touches, out of one bounded buffer a frame.
+//! Time: linear in the words of a mask. What can go wrong: a full buffer, which is a value
+//! (`MaskStore::alloc`).
 
 mod pixel_box;
 mod scaled;

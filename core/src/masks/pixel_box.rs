@@ -3,7 +3,8 @@
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
-/// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may lie partly or wholly beside the image.
+/// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may
+/// lie partly or wholly beside the image.
 ///
 /// ```
 /// use dynvox_core::masks::PixelBox;
@@ -62,8 +63,9 @@ impl PixelBox {
         Self { left: self.left + u, top: self.top + v, ..*self }
     }
 
-    /// The box scaled about its centre: the new width is `width * permille / 1000` cut to whole pixels, half the excess on either side, the
-    /// odd pixel right and below (as in the published code).
+    /// The box scaled about its centre: the new width is `width * permille / 1000` cut to whole
+    /// pixels, half the excess on either side, the odd pixel right and below (as in the published
+    /// code).
     pub(crate) fn scaled(&self, permille: u32) -> Self {
         let of = |side: i32| (i64::from(side) * i64::from(permille) / 1000) as i32;
         let (width, height) = (of(self.width), of(self.height));

@@ -3,8 +3,9 @@
 use super::{MaskHandle, MaskStore, PixelBox};
 use core::ops::Range;
 
-/// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image, in integers; a pixel belongs to it if its value is 1. Not
-/// a dilation: a corner cut out of the mask is cut out of the scaled one, larger.
+/// A mask scaled about the centre of its box: a bilinear resize of a 0/1 image, in integers; a
+/// pixel belongs to it if its value is 1. Not a dilation: a corner cut out of the mask is cut out
+/// of the scaled one, larger.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScaledMask<'m, 's> {
     store: &'m MaskStore<'s>,
@@ -32,11 +33,14 @@ impl<'m, 's> ScaledMask<'m, 's> {
         let (from, scaled) = (&self.mask.pixels, &self.pixels);
         let columns = sources(u - scaled.left, from.width, scaled.width);
         let rows = sources(v - scaled.top, from.height, scaled.height);
-        let set = |column: i32, row: i32| self.store.contains(&self.mask, from.left + column, from.top + row);
+        let set = |column: i32, row: i32| {
+            self.store.contains(&self.mask, from.left + column, from.top + row)
+        };
         rows.iter().all(|&row| columns.iter().all(|&column| set(column, row)))
     }
 
-    /// Visits the runs of pixels of row `v` of the image that belong to the scaled mask and lie in columns `0..width`, from left to right.
+    /// Visits the runs of pixels of row `v` of the image that belong to the scaled mask and lie in
+    /// columns `0..width`, from left to right.
     pub(crate) fn runs(&self, v: i32, width: usize, mut visit: impl FnMut(Range<usize>)) {
         let (from, scaled) = (&self.mask.pixels, &self.pixels);
         if v < scaled.top || v - scaled.top >= scaled.height {
@@ -44,7 +48,8 @@ impl<'m, 's> ScaledMask<'m, 's> {
         }
         let mut visit_scaled = |run: Range<i32>| {
             let run = scaled_run(run, from.width, scaled.width);
-            let [first, end] = [run.start, run.end].map(|column| (scaled.left + column).max(0) as usize);
+            let [first, end] =
+                [run.start, run.end].map(|column| (scaled.left + column).max(0) as usize);
             if first < end.min(width) {
                 visit(first..end.min(width));
             }
@@ -52,7 +57,8 @@ impl<'m, 's> ScaledMask<'m, 's> {
         if self.mask.is_box() {
             return visit_scaled(0..from.width);
         }
-        let [above, below] = sources(v - scaled.top, from.height, scaled.height).map(|row| self.store.row(&self.mask, from.top + row));
+        let [above, below] = sources(v - scaled.top, from.height, scaled.height)
+            .map(|row| self.store.row(&self.mask, from.top + row));
         let before = from.left - self.mask.origin();
         let words = above.iter().zip(below).map(|(above, below)| above & below);
         runs_of_ones(words, |run| visit_scaled(run.start - before..run.end - before));
@@ -67,7 +73,8 @@ fn runs_of_ones(words: impl Iterator<Item = u64>, mut visit: impl FnMut(Range<i3
         while left > 0 {
             let rest = word >> (64 - left);
             // A shifted word is filled up with zeros, which are no pixels.
-            let alike = if begun.is_some() { rest.trailing_ones() } else { rest.trailing_zeros() }.min(left);
+            let alike = if begun.is_some() { rest.trailing_ones() } else { rest.trailing_zeros() }
+                .min(left);
             (at, left) = (at + alike as i32, left - alike);
             if left > 0 {
                 match begun.take() {
@@ -82,7 +89,8 @@ fn runs_of_ones(words: impl Iterator<Item = u64>, mut visit: impl FnMut(Range<i3
     }
 }
 
-/// The pixels of a line of `from` resized to `to` that lie between two of a run, or beyond the line's ends where these belong to it.
+/// The pixels of a line of `from` resized to `to` that lie between two of a run, or beyond the
+/// line's ends where these belong to it.
 fn scaled_run(run: Range<i32>, from: i32, to: i32) -> Range<i32> {
     let start = if run.start <= 0 {
         0
@@ -99,7 +107,8 @@ fn scaled_run(run: Range<i32>, from: i32, to: i32) -> Range<i32> {
     start..end
 }
 
-/// The two pixels of a line of `from` between which pixel `at` of the same line resized to `to` lies; the same one twice where it hits one.
+/// The two pixels of a line of `from` between which pixel `at` of the same line resized to `to`
+/// lies; the same one twice where it hits one.
 fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
     let (position, unit) = resized(at, to, from);
     let low = position.div_euclid(unit);
@@ -107,7 +116,8 @@ fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
     [low, low + i64::from(position.rem_euclid(unit) != 0)].map(|pixel| pixel.clamp(0, last) as i32)
 }
 
-/// Where pixel `at` of a line of `from` lies in the same line resized to `to`, and how much a pixel is there.
+/// Where pixel `at` of a line of `from` lies in the same line resized to `to`, and how much a pixel
+/// is there.
 fn resized(at: i32, from: i32, to: i32) -> (i64, i64) {
     (i64::from(2 * at + 1) * i64::from(to) - i64::from(from), 2 * i64::from(from.max(1)))
 }

@@ -1,5 +1,5 @@
-//! A bounded buffer of masks: a box each and, for each of its rows, words of 64 pixels that begin at multiples of 64 columns of
-//! the image, so that two masks meet word by word.
+//! A bounded buffer of masks: a box each and, for each of its rows, words of 64 pixels that begin
+//! at multiples of 64 columns of the image, so that two masks meet word by word.
 
 use super::{PixelBox, pixel_box::share};
 use crate::{
@@ -89,7 +89,8 @@ impl<'s> MaskStore<'s> {
     pub(crate) fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
         let mut mask = MaskHandle { pixels, start: self.used as u32, stride: 0 };
         mask.stride = ((pixels.left + pixels.width - mask.origin() + WORD - 1) / WORD) as u32;
-        let end = self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
+        let end =
+            self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
         self.words.get_mut(self.used..end)?.fill(0);
         self.used = end;
         if end > self.peak {
@@ -103,12 +104,15 @@ impl<'s> MaskStore<'s> {
         self.used = mask.start as usize;
     }
 
-    /// Copies a mask from another store; the box alone is kept where this one is full. Whether it was kept whole.
+    /// Copies a mask from another store; the box alone is kept where this one is full. Whether it
+    /// was kept whole.
     pub(crate) fn copy(&mut self, mask: MaskHandle, from: &MaskStore<'_>) -> (MaskHandle, bool) {
         if mask.stride == 0 {
             return (mask, true);
         }
-        let Some(to) = self.alloc(mask.pixels) else { return (MaskHandle::full(mask.pixels), false) };
+        let Some(to) = self.alloc(mask.pixels) else {
+            return (MaskHandle::full(mask.pixels), false);
+        };
         let words = part(from.words, mask.start as usize..);
         let copy = part_mut(self.words, to.start as usize..self.used);
         copy.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
@@ -161,11 +165,15 @@ impl<'s> MaskStore<'s> {
         }
     }
 
-    /// Adds a row of a caller's mask, whose first pixel is at column `left`; pixels outside the box are left out.
+    /// Adds a row of a caller's mask, whose first pixel is at column `left`; pixels outside the box
+    /// are left out.
     pub(crate) fn set_row(&mut self, mask: &MaskHandle, v: i32, left: i32, pixels: &[u8]) {
         let (origin, columns) = (mask.origin(), mask.pixels);
         let words = self.row_mut(mask, v);
-        for (u, _) in (left..).zip(pixels).filter(|&(u, &pixel)| pixel != 0 && columns.contains(u, columns.top)) {
+        for (u, _) in (left..)
+            .zip(pixels)
+            .filter(|&(u, &pixel)| pixel != 0 && columns.contains(u, columns.top))
+        {
             let column = (u - origin) as usize;
             if let Some(word) = words.get_mut(column / 64) {
                 *word |= 1 << (column % 64);
@@ -182,7 +190,9 @@ impl<'s> MaskStore<'s> {
         let row = self.row(mask, v);
         let from = u - mask.origin();
         let (word, shift) = (from.div_euclid(WORD), from.rem_euclid(WORD) as u32);
-        let at = |word: i32| usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0);
+        let at = |word: i32| {
+            usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0)
+        };
         if shift == 0 { at(word) } else { at(word) >> shift | at(word + 1) << (64 - shift) }
     }
 
@@ -196,14 +206,22 @@ impl<'s> MaskStore<'s> {
         words.iter().map(|word| i64::from(word.count_ones())).sum()
     }
 
-    /// Intersection over union of a mask of this store with one of another, the other one moved by `shift` px.
-    pub(crate) fn overlap(&self, mask: &MaskHandle, other: &MaskStore<'_>, other_mask: &MaskHandle, shift: [i32; 2]) -> f32 {
+    /// Intersection over union of a mask of this store with one of another, the other one moved by
+    /// `shift` px.
+    pub(crate) fn overlap(
+        &self,
+        mask: &MaskHandle,
+        other: &MaskStore<'_>,
+        other_mask: &MaskHandle,
+        shift: [i32; 2],
+    ) -> f32 {
         let common = mask.pixels.intersection(&other_mask.pixels.moved(shift));
         let mut both = 0;
         for v in common.top..common.top + common.height {
             let mut u = common.left;
             while u < common.left + common.width {
-                let bits = self.bits(mask, u, v) & other.bits(other_mask, u - shift[0], v - shift[1]);
+                let bits =
+                    self.bits(mask, u, v) & other.bits(other_mask, u - shift[0], v - shift[1]);
                 both += i64::from(bits.count_ones());
                 u += WORD;
             }

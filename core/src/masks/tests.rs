@@ -21,14 +21,17 @@ fn the_runs_of_rows_have_the_pixels_that_lie_in_the_scaled_mask() {
         let row: Vec<u8> = (0..150).map(|u| u8::from(is_set(u))).collect();
         store.set_row(&mask, 3 + v, 70, &row);
     }
-    for (mask, permille) in [mask, MaskHandle::full(pixels)].into_iter().flat_map(|mask| [300, 970, 1000, 1200, 1440].map(|by| (mask, by)))
+    for (mask, permille) in [mask, MaskHandle::full(pixels)]
+        .into_iter()
+        .flat_map(|mask| [300, 970, 1000, 1200, 1440].map(|by| (mask, by)))
     {
         for shift in [0, -90, 60] {
             let scaled = ScaledMask::new(&store, mask, permille).moved([shift, 0]);
             for v in -5..40 {
                 let mut found = Vec::new();
                 scaled.runs(v, 240, |run| found.extend(run));
-                let expected: Vec<usize> = (0..240).filter(|&u| scaled.contains(u as i32, v)).collect();
+                let expected: Vec<usize> =
+                    (0..240).filter(|&u| scaled.contains(u as i32, v)).collect();
                 assert_eq!(found, expected, "row {v} at {permille}");
             }
         }
@@ -47,7 +50,12 @@ fn overlap_by_words_is_overlap_by_pixels_at_any_shift() {
         b.clear();
         let mut fill = |store: &mut MaskStore<'_>| {
             let mut below = |bound| random.below(bound) as i32;
-            let pixels = PixelBox { left: below(150), top: below(20), width: 1 + below(140), height: 1 + below(20) };
+            let pixels = PixelBox {
+                left: below(150),
+                top: below(20),
+                width: 1 + below(140),
+                height: 1 + below(20),
+            };
             let mask = store.alloc(pixels).unwrap();
             for v in 0..pixels.height {
                 let row: Vec<u8> = (0..pixels.width).map(|_| random.below(3) as u8).collect();
@@ -60,7 +68,8 @@ fn overlap_by_words_is_overlap_by_pixels_at_any_shift() {
         let (mut both, mut any) = (0, 0);
         for v in -10..60 {
             for u in -60..400 {
-                let (x, y) = (a.contains(&mine, u, v), b.contains(&theirs, u - shift[0], v - shift[1]));
+                let (x, y) =
+                    (a.contains(&mine, u, v), b.contains(&theirs, u - shift[0], v - shift[1]));
                 both += i32::from(x && y);
                 any += i32::from(x || y);
             }

@@ -14,7 +14,8 @@ pub struct Capacity {
     pub image_width: usize,
     /// Highest image, px. A higher frame is refused.
     pub image_height: usize,
-    /// Widest raw image that is rectified, px, at most 4,096; 0 where images come rectified, and then rectification costs no byte.
+    /// Widest raw image that is rectified, px, at most 4,096; 0 where images come rectified, and
+    /// then rectification costs no byte.
     pub raw_width: usize,
     /// Highest raw image, px; as the width.
     pub raw_height: usize,
@@ -26,21 +27,27 @@ pub struct Capacity {
     pub blocks: usize,
     /// Blocks visible in one frame. Further ones are not fused in that frame, and counted.
     pub visible_blocks: usize,
-    /// Frames the visible history spans. A longer `prune_lag` is shortened to this, and each frame pruned early is counted.
+    /// Frames the visible history spans. A longer `prune_lag` is shortened to this, and each frame
+    /// pruned early is counted.
     pub history_frames: usize,
-    /// Detections accepted in one frame, at most [`crate::tracking::MAX_DETECTIONS`]. Beyond, the lowest scores are refused and counted.
+    /// Detections accepted in one frame, at most [`crate::tracking::MAX_DETECTIONS`]. Beyond, the
+    /// lowest scores are refused and counted.
     pub detections: usize,
     /// Words of 64 pixels for the masks of one frame. Further masks are refused and counted.
     pub mask_words: usize,
-    /// Tracks. When all are in use the one unseen for longest is dropped, unless it was seen lately: then the new one is refused and counted.
+    /// Tracks. When all are in use the one unseen for longest is dropped, unless it was seen
+    /// lately: then the new one is refused and counted.
     pub tracks: usize,
-    /// Objects reconstructed at once, at most [`crate::objects::MAX_OBJECTS`]. The one fused longest ago is handed over for another.
+    /// Objects reconstructed at once, at most [`crate::objects::MAX_OBJECTS`]. The one fused
+    /// longest ago is handed over for another.
     pub objects: usize,
     /// Voxel blocks of one object. Further ones are refused and counted.
     pub object_blocks: usize,
-    /// Pixels of crops that wait for their object's motion. The oldest crops go first, and are counted.
+    /// Pixels of crops that wait for their object's motion. The oldest crops go first, and are
+    /// counted.
     pub crop_pixels: usize,
-    /// Width of the planner's window, cells, at most [`crate::planning::MAX_SIDE_CELLS`]; 0 makes none, and then it costs no byte. See
+    /// Width of the planner's window, cells, at most [`crate::planning::MAX_SIDE_CELLS`]; 0 makes
+    /// none, and then it costs no byte. See
     /// [`crate::planning`].
     pub planning_width: usize,
     /// Length of the planner's window, cells; as the width.
@@ -148,8 +155,12 @@ impl Capacity {
     };
 
     /// The profiles by name.
-    pub const PROFILES: [(&'static str, Self); 4] =
-        [("tiny", Self::TINY), ("small", Self::SMALL), ("onboard", Self::ONBOARD), ("desktop", Self::DESKTOP)];
+    pub const PROFILES: [(&'static str, Self); 4] = [
+        ("tiny", Self::TINY),
+        ("small", Self::SMALL),
+        ("onboard", Self::ONBOARD),
+        ("desktop", Self::DESKTOP),
+    ];
 
     /// Pixels of the largest image.
     pub const fn pixels(&self) -> usize {

@@ -33,10 +33,12 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Records so many bytes under a name: to the last region if that is its name, else to a new one. Whether the list holds it.
+    /// Records so many bytes under a name: to the last region if that is its name, else to a new
+    /// one. Whether the list holds it.
     pub(super) fn record(&mut self, name: &'static str, bytes: usize) -> bool {
         if let Some(last) = self.regions.last_mut().filter(|last| last.name == name) {
-            (last.bytes, last.used, last.peak) = (last.bytes + bytes, last.used + bytes, last.peak + bytes);
+            (last.bytes, last.used, last.peak) =
+                (last.bytes + bytes, last.used + bytes, last.peak + bytes);
             return true;
         }
         self.regions.push(Region { name, bytes, used: bytes, peak: bytes }).is_ok()

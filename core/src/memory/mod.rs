@@ -1,7 +1,8 @@
 //! The slab and its regions.
 //!
-//! A caller owns all memory: one byte slab, divided once into named, typed regions ([`Carver`]), counted to the byte
-//! ([`Footprint`]) and sized by one table of bounds ([`Capacity`]). Nothing here grows; full is a value.
+//! A caller owns all memory: one byte slab, divided once into named, typed regions ([`Carver`]),
+//! counted to the byte ([`Footprint`]) and sized by one table of bounds ([`Capacity`]). Nothing
+//! here grows; full is a value.
 
 mod capacity;
 mod footprint;

@@ -13,9 +13,11 @@ use core::{
 /// A slab itself may begin anywhere: up to `SLAB_ALIGN - 1` bytes at its front are skipped.
 pub const SLAB_ALIGN: usize = 64;
 
-/// An aligned slab of `N` bytes, all zero, for a `static`: it lands in `.bss` and never touches the stack, in debug builds either.
+/// An aligned slab of `N` bytes, all zero, for a `static`: it lands in `.bss` and never touches the
+/// stack, in debug builds either.
 ///
-/// With an allocator a `vec![0u8; capacity.bytes() + SLAB_ALIGN]` does as well: see [`Mapper::new`](crate::Mapper::new).
+/// With an allocator a `vec![0u8; capacity.bytes() + SLAB_ALIGN]` does as well: see
+/// [`Mapper::new`](crate::Mapper::new).
 ///
 /// ```
 /// use dynvox_core::{Capacity, Slab};
@@ -77,8 +79,12 @@ impl fmt::Display for SlabError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooSmall { missing } => write!(f, "the slab is {missing} bytes too small"),
-            Self::RegionTooSmall => f.write_str("a value does not fit its region of the slab: a bug of dynvox-core"),
-            Self::TooManyRegions => f.write_str("more regions than a footprint can name: a bug of dynvox-core"),
+            Self::RegionTooSmall => {
+                f.write_str("a value does not fit its region of the slab: a bug of dynvox-core")
+            }
+            Self::TooManyRegions => {
+                f.write_str("more regions than a footprint can name: a bug of dynvox-core")
+            }
         }
     }
 }
@@ -96,8 +102,9 @@ pub const fn region_bytes<T>(count: usize) -> usize {
 
 /// Allocates typed, zeroed regions from a slab, front to back, and records each by name.
 ///
-/// A single allocation returns no error: from the first failure on every region is empty, and [`Carver::check`] returns the
-/// failure. So a stage is built of its regions without a `Result` at each, which would be a copy of the stage on the stack.
+/// A single allocation returns no error: from the first failure on every region is empty, and
+/// [`Carver::check`] returns the failure. So a stage is built of its regions without a `Result` at
+/// each, which would be a copy of the stage on the stack.
 ///
 /// ```
 /// use dynvox_core::memory::{Carver, SLAB_ALIGN, region_bytes};
@@ -130,7 +137,9 @@ impl<'s> Carver<'s> {
         let skipped = slab.as_ptr().align_offset(SLAB_ALIGN);
         let len = slab.len();
         match slab.get_mut(skipped..) {
-            Some(aligned) if aligned.len() >= needed => Ok(Self { rest: Some(aligned), ..Self::without_slab() }),
+            Some(aligned) if aligned.len() >= needed => {
+                Ok(Self { rest: Some(aligned), ..Self::without_slab() })
+            }
             _ => Err(SlabError::TooSmall { missing: skipped.saturating_add(needed) - len }),
         }
     }
@@ -147,9 +156,13 @@ impl<'s> Carver<'s> {
         items
     }
 
-    /// As [`Carver::alloc`], without clearing: for big regions whose items are cleared as they come into use, so that a slab
-    /// much larger than the map costs neither time nor resident memory.
-    pub(crate) fn alloc_as_found<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
+    /// As [`Carver::alloc`], without clearing: for big regions whose items are cleared as they come
+    /// into use, so that a slab much larger than the map costs neither time nor resident memory.
+    pub(crate) fn alloc_as_found<T: Pod>(
+        &mut self,
+        name: &'static str,
+        count: usize,
+    ) -> &'s mut [T] {
         let region = self.take(name, region_bytes::<T>(count));
         let items = region.get_mut(..count * size_of::<T>()).unwrap_or_default();
         let cast = bytemuck::try_cast_slice_mut(items);
@@ -157,9 +170,14 @@ impl<'s> Carver<'s> {
         cast.unwrap_or_default()
     }
 
-    /// Moves `value`, which is not plain data, into `bytes` of the slab: a stated number, which must not depend on the width of
-    /// pointers. The value is never dropped.
-    pub(crate) fn alloc_value<T: 's>(&mut self, name: &'static str, bytes: usize, value: T) -> Option<&'s mut T> {
+    /// Moves `value`, which is not plain data, into `bytes` of the slab: a stated number, which
+    /// must not depend on the width of pointers. The value is never dropped.
+    pub(crate) fn alloc_value<T: 's>(
+        &mut self,
+        name: &'static str,
+        bytes: usize,
+        value: T,
+    ) -> Option<&'s mut T> {
         let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
         self.require_fit(made.is_ok());
         made.ok().map(Box::leak)
@@ -184,7 +202,8 @@ impl<'s> Carver<'s> {
         region
     }
 
-    /// Records all that `alloc` allocates as one region: for arrays of stages, whose regions would have too many names.
+    /// Records all that `alloc` allocates as one region: for arrays of stages, whose regions would
+    /// have too many names.
     ///
     /// ```
     /// use dynvox_core::memory::Carver;
@@ -207,7 +226,8 @@ impl<'s> Carver<'s> {
         }
     }
 
-    /// Whether every region was allocated. After a failure nothing built from the regions may be used.
+    /// Whether every region was allocated. After a failure nothing built from the regions may be
+    /// used.
     ///
     /// # Errors
     /// The first failure.
@@ -266,10 +286,13 @@ mod tests {
         carver.alloc::<u8>("a", 1);
         carver.alloc::<u8>("a", 65);
         for _ in 0..2 {
-            carver.group("both", |carver| (carver.alloc::<u8>("b", 1).len(), carver.alloc::<u8>("c", 1).len()));
+            carver.group("both", |carver| {
+                (carver.alloc::<u8>("b", 1).len(), carver.alloc::<u8>("c", 1).len())
+            });
         }
         carver.alloc::<u8>("a", 1);
-        let regions: std::vec::Vec<_> = carver.footprint().regions().iter().map(|region| (region.name, region.bytes)).collect();
+        let regions: std::vec::Vec<_> =
+            carver.footprint().regions().iter().map(|region| (region.name, region.bytes)).collect();
         assert_eq!(regions, [("a", 192), ("both", 256), ("a", 64)]);
     }
 
@@ -287,7 +310,10 @@ mod tests {
     fn names_the_bytes_it_lacks() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 128]));
         assert_eq!(Carver::new(&mut slab, 200).unwrap_err(), SlabError::TooSmall { missing: 72 });
-        assert_eq!(SlabError::TooSmall { missing: 72 }.to_string(), "the slab is 72 bytes too small");
+        assert_eq!(
+            SlabError::TooSmall { missing: 72 }.to_string(),
+            "the slab is 72 bytes too small"
+        );
     }
 
     #[test]
@@ -299,8 +325,15 @@ mod tests {
             assert_eq!(carver.alloc::<u64>("a", 16).as_ptr().align_offset(SLAB_ALIGN), 0);
             assert_eq!(carver.check(), Ok(()));
             let short = Carver::new(&mut slab[offset..], needed + 1).unwrap_err();
-            assert_eq!(short, SlabError::TooSmall { missing: 1 }, "{offset} bytes behind an aligned one");
+            assert_eq!(
+                short,
+                SlabError::TooSmall { missing: 1 },
+                "{offset} bytes behind an aligned one"
+            );
         }
-        assert_eq!(Carver::new(&mut slab[1..3], 0).unwrap_err(), SlabError::TooSmall { missing: 61 });
+        assert_eq!(
+            Carver::new(&mut slab[1..3], 0).unwrap_err(),
+            SlabError::TooSmall { missing: 61 }
+        );
     }
 }

@@ -1,11 +1,14 @@
-//! What a frame shows of one object: its virtual frame, cropped to the object's box (Section III-B of the paper).
+//! What a frame shows of one object: its virtual frame, cropped to the object's box (Section III-B
+//! of the paper).
 //!
-//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Next to an edge the matcher's surface continues
-//! behind what is in front, and would stay attached to the object, for no later frame observes that space: pixels next to much nearer
-//! ones are left out. Crops of objects whose motion is uncertain are kept in a ring until it is known; when the ring is full the oldest
-//! is dropped, and counted.
+//! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Next to an
+//! edge the matcher's surface continues behind what is in front, and would stay attached to the
+//! object, for no later frame observes that space: pixels next to much nearer ones are left out.
+//! Crops of objects whose motion is uncertain are kept in a ring until it is known; when the ring
+//! is full the oldest is dropped, and counted.
 //!
-//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of 152 bytes.
+//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of
+//! 152 bytes.
 
 use crate::{
     audit::Audit,
@@ -27,14 +30,15 @@ const BIN: u16 = 128;
 
 /// How far an edge spoils what is behind it, px.
 const EDGE_REACH_PX: isize = 3;
-/// A neighbour nearer by more disparity than this is across an edge: within that distance a surface has no such step unless it is viewed
-/// edge-on.
+/// A neighbour nearer by more disparity than this is across an edge: within that distance a surface
+/// has no such step unless it is viewed edge-on.
 const EDGE_Q8: u16 = 384;
 
 /// Columns worked on at once: a word of a mask.
 const BLOCK: usize = 64;
 
-/// The largest disparity within [`EDGE_REACH_PX`] along row and column of each pixel of a block that begins at (`u`, `v`).
+/// The largest disparity within [`EDGE_REACH_PX`] along row and column of each pixel of a block
+/// that begins at (`u`, `v`).
 #[inline(always)]
 fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOCK] {
     let mut nearest = [0; BLOCK];
@@ -54,8 +58,9 @@ fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOC
     nearest
 }
 
-/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask, just behind edges, and where the depth is
-/// farther than `extent_m` from the median. Returns how many pixels have one.
+/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask,
+/// just behind edges, and where the depth is farther than `extent_m` from the median. Returns how
+/// many pixels have one.
 pub(super) fn crop(
     rig: &StereoRig,
     extent_m: f32,
@@ -71,7 +76,9 @@ pub(super) fn crop(
     let mut found = Histogram::new();
     for (v, row) in disparities.chunks_exact_mut(columns).enumerate().take(rows) {
         let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
-        for ((u, row), from) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK)) {
+        for ((u, row), from) in
+            (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK))
+        {
             let bits = masks.bits(mask, u, top + v as i32);
             for (i, (to, &disparity)) in row.iter_mut().zip(from).enumerate() {
                 *to = if bits >> i & 1 == 1 { disparity } else { 0 };
@@ -86,7 +93,13 @@ pub(super) fn crop(
         let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
         if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
     });
-    vectors.run(LeaveOut { disparity_q8, origin: [left_u, top_v], size, limits: [low, high], disparities })
+    vectors.run(LeaveOut {
+        disparity_q8,
+        origin: [left_u, top_v],
+        size,
+        limits: [low, high],
+        disparities,
+    })
 }
 
 /// Leaves out of a crop what is too far or too near, or just behind an edge.
@@ -112,11 +125,16 @@ impl Work for LeaveOut<'_> {
             for (u, block) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
                 // A pixel without a disparity lies below `low`, or is 0.
                 let is_kept = |disparity: u16| (disparity >= low) & (disparity <= high);
-                if !block.iter().fold(false, |any, &disparity| any | (is_kept(disparity) & (disparity > 0))) {
+                if !block
+                    .iter()
+                    .fold(false, |any, &disparity| any | (is_kept(disparity) & (disparity > 0)))
+                {
                     block.fill(0);
                     continue;
                 }
-                for (disparity, nearest) in block.iter_mut().zip(nearest_around(self.disparity_q8, u, v)) {
+                for (disparity, nearest) in
+                    block.iter_mut().zip(nearest_around(self.disparity_q8, u, v))
+                {
                     let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
                     *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
                     kept += u32::from(*disparity > 0);
@@ -149,7 +167,8 @@ pub(super) struct Crop {
 impl Crop {
     /// Visits every field; the pixels are [`Crops`]'.
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { t_world_camera, t_world_object, pixels, id, start, len, coloured, digest } = self;
+        let Self { t_world_camera, t_world_object, pixels, id, start, len, coloured, digest } =
+            self;
         visitor.transform(t_world_camera);
         visitor.transform(t_world_object);
         pixels.visit(visitor);
@@ -170,9 +189,13 @@ pub struct Picture<'a> {
 impl Picture<'_> {
     /// The part in a box within the picture.
     pub(super) fn part(&self, pixels: &PixelBox) -> Option<Self> {
-        let [left, top, width, height] = [pixels.left, pixels.top, pixels.width, pixels.height].map(|side| side.max(0) as usize);
+        let [left, top, width, height] =
+            [pixels.left, pixels.top, pixels.width, pixels.height].map(|side| side.max(0) as usize);
         let grey = self.grey.part(left, top, width, height)?;
-        Some(Self { grey, colour: self.colour.and_then(|image| image.part(left, top, width, height)) })
+        Some(Self {
+            grey,
+            colour: self.colour.and_then(|image| image.part(left, top, width, height)),
+        })
     }
 }
 
@@ -202,15 +225,19 @@ impl<'s> Crops<'s> {
         Self {
             disparity_q8: carver.alloc("objects.crop_disparity", pixels),
             grey: carver.alloc("objects.crop_grey", pixels),
-            colour: if capacity.colour { carver.alloc("objects.crop_colour", pixels) } else { &mut [] },
+            colour: if capacity.colour {
+                carver.alloc("objects.crop_colour", pixels)
+            } else {
+                &mut []
+            },
             entries: carver.alloc("objects.crop", CROPS_MAX),
             len: 0,
             next: 0,
         }
     }
 
-    /// Adds a crop, its disparity given row by row. Returns how many kept crops it displaced, or `None` when it is larger than the
-    /// ring.
+    /// Adds a crop, its disparity given row by row. Returns how many kept crops it displaced, or
+    /// `None` when it is larger than the ring.
     pub fn push(&mut self, crop: Crop, disparity_q8: &[u16], picture: &Picture<'_>) -> Option<u32> {
         let picture = picture.part(&crop.pixels)?;
         let len = crop.pixels.area() as usize;
@@ -222,17 +249,26 @@ impl<'s> Crops<'s> {
         }
         let span = self.next..self.next + len;
         let dropped = self.drop_where(|old, count| {
-            let overlaps = (old.start as usize) < span.end && (old.start + old.len) as usize > span.start;
+            let overlaps =
+                (old.start as usize) < span.end && (old.start + old.len) as usize > span.start;
             overlaps || count >= CROPS_MAX
         });
         let width = (crop.pixels.width as usize).max(1);
-        self.disparity_q8.get_mut(span.clone())?.iter_mut().zip(disparity_q8).for_each(|(to, from)| *to = *from);
-        for (to, from) in self.grey.get_mut(span.clone())?.chunks_exact_mut(width).zip(picture.grey.rows()) {
+        self.disparity_q8
+            .get_mut(span.clone())?
+            .iter_mut()
+            .zip(disparity_q8)
+            .for_each(|(to, from)| *to = *from);
+        for (to, from) in
+            self.grey.get_mut(span.clone())?.chunks_exact_mut(width).zip(picture.grey.rows())
+        {
             to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
         let coloured = picture.colour.filter(|_| !self.colour.is_empty());
         if let Some(image) = coloured {
-            for (to, from) in self.colour.get_mut(span.clone())?.chunks_exact_mut(width).zip(image.rows()) {
+            for (to, from) in
+                self.colour.get_mut(span.clone())?.chunks_exact_mut(width).zip(image.rows())
+            {
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
         }
@@ -249,7 +285,8 @@ impl<'s> Crops<'s> {
         Some(dropped)
     }
 
-    /// Drops the crops `drop` says, handed each and how many are left; how many of those had a track.
+    /// Drops the crops `drop` says, handed each and how many are left; how many of those had a
+    /// track.
     fn drop_where(&mut self, mut drop: impl FnMut(&Crop, usize) -> bool) -> u32 {
         let (mut kept, mut left, mut dropped) = (0, self.len, 0);
         for index in 0..self.len {
@@ -296,7 +333,10 @@ impl<'s> Crops<'s> {
         audit.require(self.len <= self.entries.len(), "no more crops wait than there are entries");
         let pixels = self.disparity_q8.len();
         for crop in self.entries.iter().take(self.len) {
-            audit.require(crop.start as usize + crop.len as usize <= pixels, "a crop's pixels lie in the ring");
+            audit.require(
+                crop.start as usize + crop.len as usize <= pixels,
+                "a crop's pixels lie in the ring",
+            );
         }
     }
 
@@ -328,18 +368,23 @@ impl<'s> Crops<'s> {
         if let Some((disparity_q8, picture)) = self.picture(crop) {
             digest.u16s(disparity_q8);
             picture.grey.rows().for_each(|row| digest.bytes(row));
-            picture.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
+            picture
+                .colour
+                .iter()
+                .flat_map(View::rows)
+                .for_each(|row| digest.bytes(row.as_flattened()));
         }
         digest.finish()
     }
 
-    /// Pixels of a ring that would hold the crops kept now: from the oldest to the newest, and once more the largest, since a crop that does
-    /// not fit at the end of the ring begins at its front.
+    /// Pixels of a ring that would hold the crops kept now: from the oldest to the newest, and once
+    /// more the largest, since a crop that does not fit at the end of the ring begins at its front.
     pub fn enough_pixels(&self) -> usize {
         let kept = part(self.entries, ..self.len);
         let oldest = kept.first().map_or(0, |crop| crop.start as usize);
         let pixels = self.disparity_q8.len();
-        let span = if oldest < self.next { self.next - oldest } else { pixels - oldest + self.next };
+        let span =
+            if oldest < self.next { self.next - oldest } else { pixels - oldest + self.next };
         let largest = kept.iter().map(|crop| crop.len as usize).max().unwrap_or(0);
         if span + largest < pixels { span + largest } else { pixels }
     }

@@ -1,4 +1,5 @@
-//! Objects: what a frame shows of each is cropped and fused into a volume of its own (Section III-E of Bârsan et al., ICRA 2018).
+//! Objects: what a frame shows of each is cropped and fused into a volume of its own (Section III-E
+//! of Bârsan et al., ICRA 2018).
 //!
 //! Memory: crops and volumes as their modules say.
 
@@ -15,7 +16,9 @@ mod visit;
 pub use config::ObjectsConfig;
 pub(crate) use crop::CROPS_MAX;
 pub use crop::Picture;
-pub use object::{MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement};
+pub use object::{
+    MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement,
+};
 pub use posed::PosedObject;
 pub(crate) use reconstruct::ObjectFrame;
 pub use report::{InstancesReport, ObjectsReport};
@@ -43,7 +46,11 @@ impl<'s> Objects<'s> {
     }
 
     /// Allocates its regions.
-    pub(crate) fn new_in(capacity: &Capacity, config: &ObjectsConfig, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(
+        capacity: &Capacity,
+        config: &ObjectsConfig,
+        carver: &mut Carver<'s>,
+    ) -> Self {
         Self {
             config: *config,
             crops: Crops::new_in(capacity, carver),

@@ -1,7 +1,8 @@
 //! The objects' own volumes.
 //!
-//! An object that is static or dynamic and of a class to be reconstructed gets a volume: a map of its own whose frame moves with it. Its
-//! frame is the camera's at the first pose of the track's trajectory segment. What was observed before its motion was known is fused first.
+//! An object that is static or dynamic and of a class to be reconstructed gets a volume: a map of
+//! its own whose frame moves with it. Its frame is the camera's at the first pose of the track's
+//! trajectory segment. What was observed before its motion was known is fused first.
 //!
 //! | when | then |
 //! |---|---|
@@ -12,10 +13,12 @@
 //!
 //! A retired object is handed to an [`ObjectSink`] first, so that nothing reconstructed is lost.
 //!
-//! Every `prune_frames` fused frames, and before it retires, voxels of the whole volume that weigh at most `prune_weight` are reset: the
-//! paper prunes objects whole at every frame (Section III-F); a voxel needs time to be observed twice, hence the interval.
+//! Every `prune_frames` fused frames, and before it retires, voxels of the whole volume that weigh
+//! at most `prune_weight` are reset: the paper prunes objects whole at every frame (Section III-F);
+//! a voxel needs time to be observed twice, hence the interval.
 //!
-//! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes, and 6 bytes a pixel of the largest image.
+//! Memory: `capacity.objects` times a [`Volume`] of `capacity.object_blocks` blocks and 640 bytes,
+//! and 6 bytes a pixel of the largest image.
 
 use super::ObjectsConfig;
 use crate::{
@@ -110,15 +113,25 @@ impl<'s> Object<'s> {
         self.summary.as_ref()
     }
 
-    /// Number of its track, and the digest of what is known of it and of its map; `None` while the volume is free.
+    /// Number of its track, and the digest of what is known of it and of its map; `None` while the
+    /// volume is free.
     pub(crate) fn digest(&mut self) -> Option<(u32, u64)> {
         let id = self.summary.as_ref()?.id;
         Some((id, Hasher::digest(|hasher| self.visit(hasher))))
     }
 
-    pub(super) fn retire(&mut self, config: &ObjectsConfig, reason: Retirement, sink: &mut impl ObjectSink) -> bool {
+    pub(super) fn retire(
+        &mut self,
+        config: &ObjectsConfig,
+        reason: Retirement,
+        sink: &mut impl ObjectSink,
+    ) -> bool {
         let Some(summary) = self.summary.take() else { return false };
-        self.volume.prune_whole(if summary.frames > u32::from(config.prune_frames) { config.prune_weight } else { 0 });
+        self.volume.prune_whole(if summary.frames > u32::from(config.prune_frames) {
+            config.prune_weight
+        } else {
+            0
+        });
         sink.retire(RetiredObject { summary, reason, volume: &self.volume });
         // No voxel weighs more.
         self.volume.prune_whole(u8::MAX);
@@ -156,7 +169,8 @@ impl<'s> ObjectVolumes<'s> {
     }
 
     pub const fn bytes(capacity: &Capacity) -> usize {
-        Self::volumes(capacity) * (Volume::bytes(&bounds(capacity)) + region_bytes::<u8>(OBJECT_BYTES))
+        Self::volumes(capacity)
+            * (Volume::bytes(&bounds(capacity)) + region_bytes::<u8>(OBJECT_BYTES))
             + region_bytes::<f32>(capacity.pixels())
             + region_bytes::<u16>(capacity.pixels())
     }
@@ -180,20 +194,32 @@ impl<'s> ObjectVolumes<'s> {
 
     /// Position of the object of a track.
     pub fn position_of(&self, id: u32) -> Option<usize> {
-        self.objects.iter().position(|object| object.summary.is_some_and(|summary| summary.id == id))
+        self.objects
+            .iter()
+            .position(|object| object.summary.is_some_and(|summary| summary.id == id))
     }
 
-    /// A volume for a new object in frame `frame`: a free one, or that of the object fused longest ago, which retires.
-    pub fn allocate(&mut self, config: &ObjectsConfig, frame: u32, retired: &mut u32, sink: &mut impl ObjectSink) -> Option<usize> {
+    /// A volume for a new object in frame `frame`: a free one, or that of the object fused longest
+    /// ago, which retires.
+    pub fn allocate(
+        &mut self,
+        config: &ObjectsConfig,
+        frame: u32,
+        retired: &mut u32,
+        sink: &mut impl ObjectSink,
+    ) -> Option<usize> {
         if let Some(free) = self.objects.iter().position(|object| object.summary.is_none()) {
             return Some(free);
         }
-        let summaries = self.objects.iter().enumerate().filter_map(|(at, object)| Some((at, object.summary?)));
-        let (oldest, summary) = summaries.min_by_key(|(_, summary)| (summary.last_frame, summary.id))?;
+        let summaries =
+            self.objects.iter().enumerate().filter_map(|(at, object)| Some((at, object.summary?)));
+        let (oldest, summary) =
+            summaries.min_by_key(|(_, summary)| (summary.last_frame, summary.id))?;
         if summary.last_frame == frame {
             return None;
         }
-        *retired += u32::from(self.objects.get_mut(oldest)?.retire(config, Retirement::Displaced, sink));
+        *retired +=
+            u32::from(self.objects.get_mut(oldest)?.retire(config, Retirement::Displaced, sink));
         Some(oldest)
     }
 

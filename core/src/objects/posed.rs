@@ -25,11 +25,21 @@ pub struct PosedObject<'i, 's> {
 
 impl<'s> Objects<'s> {
     /// The objects that are in the world after the last frame, in the order of their volumes.
-    pub(crate) fn posed<'a>(&'a self, tracker: &'a Tracker<'_>) -> impl Iterator<Item = PosedObject<'a, 's>> {
+    pub(crate) fn posed<'a>(
+        &'a self,
+        tracker: &'a Tracker<'_>,
+    ) -> impl Iterator<Item = PosedObject<'a, 's>> {
         self.objects().filter_map(move |(summary, object)| {
-            let is_fused_segment =
-                |track: &&Track| track.id == summary.id && track.segment_len > 0 && track.segment_id == summary.segment_id;
-            let t_world_object = match tracker.tracks_with_instances().map(|(track, _)| track).find(is_fused_segment) {
+            let is_fused_segment = |track: &&Track| {
+                track.id == summary.id
+                    && track.segment_len > 0
+                    && track.segment_id == summary.segment_id
+            };
+            let t_world_object = match tracker
+                .tracks_with_instances()
+                .map(|(track, _)| track)
+                .find(is_fused_segment)
+            {
                 Some(track) => track.t_world_object,
                 None if summary.state == MotionState::Static => summary.t_world_object,
                 None => return None,

@@ -27,8 +27,8 @@ pub(crate) struct ObjectFrame<'a> {
 }
 
 impl<'s> Objects<'s> {
-    /// Fuses what this frame shows of each object into its volume; nothing where `frame` is `None`, as when the camera's pose is
-    /// extrapolated. Objects that retire are handed to `sink`.
+    /// Fuses what this frame shows of each object into its volume; nothing where `frame` is `None`,
+    /// as when the camera's pose is extrapolated. Objects that retire are handed to `sink`.
     pub(crate) fn reconstruct<E: Executor>(
         &mut self,
         tracked: &Tracked<'_, '_>,
@@ -40,17 +40,27 @@ impl<'s> Objects<'s> {
         self.report = ObjectsReport::default();
         // The crops of a trajectory segment that ended do not connect to what follows.
         let is_new_segment = |track: &&Track| track.segment_len <= 1;
-        tracker.tracks_with_instances().map(|(track, _)| track).filter(is_new_segment).for_each(|track| self.crops.forget(track.id));
+        tracker
+            .tracks_with_instances()
+            .map(|(track, _)| track)
+            .filter(is_new_segment)
+            .for_each(|track| self.crops.forget(track.id));
         self.retire_orphans(tracker, sink);
         if let Some(frame) = frame {
-            let detected = tracker.tracks_with_instances().filter_map(|(track, instance)| Some((track, instance?)));
-            detected.for_each(|(track, instance)| self.integrate(tracker, track, instance, frame, executor, sink));
+            let detected = tracker
+                .tracks_with_instances()
+                .filter_map(|(track, instance)| Some((track, instance?)));
+            detected.for_each(|(track, instance)| {
+                self.integrate(tracker, track, instance, frame, executor, sink)
+            });
         }
-        self.report.objects = self.volumes.objects.iter().filter(|object| object.summary.is_some()).count() as u32;
+        self.report.objects =
+            self.volumes.objects.iter().filter(|object| object.summary.is_some()).count() as u32;
         self.report.blocks = self.volumes.blocks() as u32;
     }
 
-    /// Crops what a frame shows of one object, and fuses it into its volume or, while its motion is uncertain, keeps it for later.
+    /// Crops what a frame shows of one object, and fuses it into its volume or, while its motion is
+    /// uncertain, keeps it for later.
     fn integrate<E: Executor>(
         &mut self,
         tracker: &Tracker<'_>,
@@ -60,7 +70,10 @@ impl<'s> Objects<'s> {
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
-        if track.segment_len == 0 || track.class().treatment() != Treatment::Reconstruct || instance.tracked_only.get() {
+        if track.segment_len == 0
+            || track.class().treatment() != Treatment::Reconstruct
+            || instance.tracked_only.get()
+        {
             return;
         }
         let pixels = instance.mask.pixels;
@@ -69,7 +82,16 @@ impl<'s> Objects<'s> {
             return;
         };
         let extent_m = self.config.extent_m;
-        if crop::crop(frame.rig, extent_m, frame.disparity_q8, tracker.masks(), &instance.mask, disparity, executor.vectors()) == 0 {
+        if crop::crop(
+            frame.rig,
+            extent_m,
+            frame.disparity_q8,
+            tracker.masks(),
+            &instance.mask,
+            disparity,
+            executor.vectors(),
+        ) == 0
+        {
             return;
         }
         let crop = Crop {
@@ -83,7 +105,8 @@ impl<'s> Objects<'s> {
             MotionState::Uncertain => {
                 let dropped = self.crops.push(crop, disparity, &frame.picture);
                 let enough = self.crops.enough_pixels() as u32;
-                self.report.crop_pixels = if enough > self.report.crop_pixels { enough } else { self.report.crop_pixels };
+                self.report.crop_pixels =
+                    if enough > self.report.crop_pixels { enough } else { self.report.crop_pixels };
                 self.report.crops_dropped += dropped.unwrap_or(1);
             }
             // A moving object's pose is extrapolated in a frame without a motion of its own.
@@ -92,8 +115,8 @@ impl<'s> Objects<'s> {
         }
     }
 
-    /// Fuses this frame's crop, whose disparity is in the scratch image, into the track's volume; if that is new, the crops that were
-    /// kept for it first.
+    /// Fuses this frame's crop, whose disparity is in the scratch image, into the track's volume;
+    /// if that is new, the crops that were kept for it first.
     fn fuse<E: Executor>(
         &mut self,
         number: u32,
@@ -104,7 +127,9 @@ impl<'s> Objects<'s> {
         sink: &mut impl ObjectSink,
     ) {
         let known = self.volume_of(track, sink);
-        let Some(at) = known.or_else(|| self.volumes.allocate(&self.config, number, &mut self.report.retired, sink)) else {
+        let Some(at) = known.or_else(|| {
+            self.volumes.allocate(&self.config, number, &mut self.report.retired, sink)
+        }) else {
             self.report.refused += 1;
             return;
         };
@@ -117,7 +142,8 @@ impl<'s> Objects<'s> {
         };
         let ObjectVolumes { objects, depth_m, disparity_q8 } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
-        self.report.blocks_refused += fuse_crop(object, frame.rig, crop, disparity_q8, &picture, depth_m, executor);
+        self.report.blocks_refused +=
+            fuse_crop(object, frame.rig, crop, disparity_q8, &picture, depth_m, executor);
         self.report.fused += 1;
         if let Some(summary) = &mut object.summary {
             summary.class = track.class();
@@ -125,7 +151,9 @@ impl<'s> Objects<'s> {
             summary.last_frame = number;
             summary.frames += 1;
             summary.t_world_object = track.t_world_object;
-            if self.config.prune_weight > 0 && summary.frames.is_multiple_of(u32::from(self.config.prune_frames)) {
+            if self.config.prune_weight > 0
+                && summary.frames.is_multiple_of(u32::from(self.config.prune_frames))
+            {
                 object.volume.prune_whole(self.config.prune_weight);
             }
         }
@@ -143,7 +171,14 @@ impl<'s> Objects<'s> {
     }
 
     /// Begins an object in the free volume at `at`, with the crops that were kept for it.
-    fn begin<E: Executor>(&mut self, at: usize, number: u32, track: &Track, rig: &StereoRig, executor: &E) {
+    fn begin<E: Executor>(
+        &mut self,
+        at: usize,
+        number: u32,
+        track: &Track,
+        rig: &StereoRig,
+        executor: &E,
+    ) {
         let ObjectVolumes { objects, depth_m, .. } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
         self.report.begun += 1;
@@ -162,7 +197,8 @@ impl<'s> Objects<'s> {
             // A static object has the pose of the first frame in every frame.
             let t_world_object = if is_static { track.t_world_origin } else { kept.t_world_object };
             let crop = Crop { t_world_object, ..*kept };
-            self.report.blocks_refused += fuse_crop(object, rig, &crop, disparity, &picture, depth_m, executor);
+            self.report.blocks_refused +=
+                fuse_crop(object, rig, &crop, disparity, &picture, depth_m, executor);
             self.report.caught_up += 1;
         }
         self.crops.forget(track.id);
@@ -171,7 +207,9 @@ impl<'s> Objects<'s> {
     /// Retires the objects whose track was forgotten.
     fn retire_orphans(&mut self, tracker: &Tracker<'_>, sink: &mut impl ObjectSink) {
         for object in &mut self.volumes.objects {
-            let is_tracked = |summary: &ObjectSummary| tracker.tracks_with_instances().any(|(track, _)| track.id == summary.id);
+            let is_tracked = |summary: &ObjectSummary| {
+                tracker.tracks_with_instances().any(|(track, _)| track.id == summary.id)
+            };
             let is_orphan = object.summary.is_some_and(|summary| !is_tracked(&summary));
             if is_orphan && object.retire(&self.config, Retirement::Forgotten, sink) {
                 self.report.retired += 1;
@@ -182,11 +220,16 @@ impl<'s> Objects<'s> {
     /// Ends a sequence: retires every object. Returns how many.
     pub(crate) fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
         let config = &self.config;
-        self.volumes.objects.iter_mut().map(|object| u32::from(object.retire(config, Retirement::Finished, sink))).sum()
+        self.volumes
+            .objects
+            .iter_mut()
+            .map(|object| u32::from(object.retire(config, Retirement::Finished, sink)))
+            .sum()
     }
 }
 
-/// Fuses a crop as an image of its own, with the principal point relative to its box. Returns the blocks refused.
+/// Fuses a crop as an image of its own, with the principal point relative to its box. Returns the
+/// blocks refused.
 fn fuse_crop<E: Executor>(
     object: &mut Object<'_>,
     rig: &StereoRig,
@@ -197,7 +240,9 @@ fn fuse_crop<E: Executor>(
     executor: &E,
 ) -> u32 {
     let (width, height) = (picture.grey.width(), picture.grey.height());
-    let (Some(disparity), Some(mut depth)) = (View::new(disparity_q8, width, height), ViewMut::new(depth_m, width, height)) else {
+    let (Some(disparity), Some(mut depth)) =
+        (View::new(disparity_q8, width, height), ViewMut::new(depth_m, width, height))
+    else {
         debug_assert!(false, "a crop is as large as its box");
         return 0;
     };

@@ -1,7 +1,9 @@
 //! Reports of a frame's instances, as plain values.
 
 use super::{Object, ObjectSummary, Objects};
-use crate::tracking::{DetectionCount, SegmentationReport, TrackCount, TrackReport, Tracker, TrackingReport};
+use crate::tracking::{
+    DetectionCount, SegmentationReport, TrackCount, TrackReport, Tracker, TrackingReport,
+};
 
 /// How volumes were used in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +29,8 @@ pub struct ObjectsReport {
     pub crops_dropped: u32,
     /// Blocks in use over all objects.
     pub blocks: u32,
-    /// Pixels of crops that would have been enough for this frame: what `capacity.crop_pixels` bounds.
+    /// Pixels of crops that would have been enough for this frame: what `capacity.crop_pixels`
+    /// bounds.
     pub crop_pixels: u32,
 }
 
@@ -55,8 +58,13 @@ pub struct InstancesReport {
 
 impl InstancesReport {
     /// The report of a frame, from those of its stages. `matches_excluded` is the camera's.
-    pub(crate) fn of(tracking: &TrackingReport, objects: ObjectsReport, matches_excluded: u32) -> Self {
-        let &TrackingReport { detections, tracks, segmentation, pixels_masked, mask_words } = tracking;
+    pub(crate) fn of(
+        tracking: &TrackingReport,
+        objects: ObjectsReport,
+        matches_excluded: u32,
+    ) -> Self {
+        let &TrackingReport { detections, tracks, segmentation, pixels_masked, mask_words } =
+            tracking;
         Self {
             detections,
             segmentation,
@@ -68,11 +76,18 @@ impl InstancesReport {
         }
     }
 
-    /// What should have been used and was not: detections, tracks, masks, objects, their blocks and crops.
+    /// What should have been used and was not: detections, tracks, masks, objects, their blocks and
+    /// crops.
     pub(crate) fn refused(&self) -> u32 {
         let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
         let segmentation = self.segmentation.refused;
-        self.detections.refused() + segmentation + self.tracks.refused + self.tracks.masks_lost + refused + blocks_refused + crops_dropped
+        self.detections.refused()
+            + segmentation
+            + self.tracks.refused
+            + self.tracks.masks_lost
+            + refused
+            + blocks_refused
+            + crops_dropped
     }
 }
 
@@ -83,10 +98,17 @@ impl<'s> Objects<'s> {
     }
 
     /// The tracks as they stand, with the blocks of their volumes.
-    pub(crate) fn tracks<'a>(&'a self, tracker: &'a Tracker<'_>) -> impl Iterator<Item = TrackReport> + 'a {
+    pub(crate) fn tracks<'a>(
+        &'a self,
+        tracker: &'a Tracker<'_>,
+    ) -> impl Iterator<Item = TrackReport> + 'a {
         tracker.tracks().map(|track| {
-            let object = self.volumes.position_of(track.id).and_then(|at| self.volumes.objects.get(at));
-            TrackReport { blocks: object.map_or(0, |object| object.volume.pool().len() as u32), ..track }
+            let object =
+                self.volumes.position_of(track.id).and_then(|at| self.volumes.objects.get(at));
+            TrackReport {
+                blocks: object.map_or(0, |object| object.volume.pool().len() as u32),
+                ..track
+            }
         })
     }
 

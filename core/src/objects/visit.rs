@@ -13,8 +13,14 @@ impl Objects<'_> {
     pub(crate) fn audit(&self, audit: &mut Audit) {
         self.crops.audit(audit);
         for object in &self.volumes.objects {
-            audit.require(object.summary.is_none_or(|summary| summary.id != 0), "an object belongs to a track");
-            audit.require(object.summary.is_some() || object.volume.pool().is_empty(), "a volume without an object is empty");
+            audit.require(
+                object.summary.is_none_or(|summary| summary.id != 0),
+                "an object belongs to a track",
+            );
+            audit.require(
+                object.summary.is_some() || object.volume.pool().is_empty(),
+                "a volume without an object is empty",
+            );
             object.volume.audit(audit);
         }
     }
@@ -54,7 +60,8 @@ impl Object<'_> {
 impl ObjectSummary {
     /// Visits every field.
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { id, segment_id, class, state, first_frame, last_frame, frames, t_world_object } = self;
+        let Self { id, segment_id, class, state, first_frame, last_frame, frames, t_world_object } =
+            self;
         visitor.u32s([id, segment_id, first_frame, last_frame, frames]);
         visitor.code(class, Class::code, Class::from_code);
         visitor.code(state, MotionState::code, MotionState::from_code);

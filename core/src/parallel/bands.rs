@@ -41,8 +41,13 @@ impl Bands {
 }
 
 /// Does the work of all bands. The first two are done together, and the last two.
-pub fn each<E: Executor, J: Send, R: Send>(executor: &E, [a, b, c, d]: [J; BANDS], work: impl Fn(J) -> R + Sync) -> [R; BANDS] {
-    let ((a, b), (c, d)) = executor.join(|| executor.join(|| work(a), || work(b)), || executor.join(|| work(c), || work(d)));
+pub fn each<E: Executor, J: Send, R: Send>(
+    executor: &E,
+    [a, b, c, d]: [J; BANDS],
+    work: impl Fn(J) -> R + Sync,
+) -> [R; BANDS] {
+    let ((a, b), (c, d)) = executor
+        .join(|| executor.join(|| work(a), || work(b)), || executor.join(|| work(c), || work(d)));
     [a, b, c, d]
 }
 
@@ -52,7 +57,11 @@ pub(crate) fn zip2<A, B>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS]) -> 
 }
 
 /// Three arrays as one of triples.
-pub(crate) fn zip3<A, B, C>([a, b, c, d]: [A; BANDS], [e, f, g, h]: [B; BANDS], [i, j, k, l]: [C; BANDS]) -> [(A, B, C); BANDS] {
+pub(crate) fn zip3<A, B, C>(
+    [a, b, c, d]: [A; BANDS],
+    [e, f, g, h]: [B; BANDS],
+    [i, j, k, l]: [C; BANDS],
+) -> [(A, B, C); BANDS] {
     [(a, e, i), (b, f, j), (c, g, k), (d, h, l)]
 }
 

@@ -41,7 +41,8 @@ pub(crate) use vectors::{Level, Work};
 /// assert_eq!(TwoThreads.stage(Stage::Fuse, || 3), 3);
 /// ```
 pub trait Executor: Sync {
-    /// Does both and returns both results, in any order or at once; one after the other unless an executor knows better.
+    /// Does both and returns both results, in any order or at once; one after the other unless an
+    /// executor knows better.
     fn join<A, B, RA, RB>(&self, a: A, b: B) -> (RA, RB)
     where
         A: FnOnce() -> RA + Send,
@@ -57,8 +58,8 @@ pub trait Executor: Sync {
         work()
     }
 
-    /// Vector instructions that kernels may use. A host that asked its processor for more than the target's machines all have overrides
-    /// this; no bit depends on it.
+    /// Vector instructions that kernels may use. A host that asked its processor for more than the
+    /// target's machines all have overrides this; no bit depends on it.
     fn vectors(&self) -> Vectors {
         Vectors::BASELINE
     }

@@ -1,7 +1,8 @@
-//! Which vector instructions kernels may use: told to the core by its caller, never a reason for another bit.
+//! Which vector instructions kernels may use: told to the core by its caller, never a reason for
+//! another bit.
 //!
-//! A value of [`Vectors`] above [`Vectors::BASELINE`] exists only where the processor was asked, so that a kernel may
-//! rely on it (docs/decisions/0023-vector-kernels.md).
+//! A value of [`Vectors`] above [`Vectors::BASELINE`] exists only where the processor was asked, so
+//! that a kernel may rely on it (docs/decisions/0023-vector-kernels.md).
 
 /// Vector instructions that a machine has.
 ///
@@ -14,10 +15,12 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Vectors(Level);
 
-/// Ordinary code whose loops compilers turn into vectors: compiled once for each level that compilers can write for.
+/// Ordinary code whose loops compilers turn into vectors: compiled once for each level that
+/// compilers can write for.
 ///
 /// [`Work::run`] is `#[inline(always)]`, and so is every function that one of its loops is in: what is called and not inlined keeps to
-/// the target's baseline. No level multiplies and adds in one instruction, so that none gives another bit.
+/// the target's baseline. No level multiplies and adds in one instruction, so that none gives
+/// another bit.
 pub(crate) trait Work {
     type Output;
 
@@ -68,13 +71,18 @@ impl Vectors {
     /// Every level that this machine has, each once: what a comparison of kernels runs.
     pub fn available() -> impl Iterator<Item = Self> {
         let [plain, baseline, most] = [Self::PLAIN, Self::BASELINE, Self::detect()];
-        [Some(plain), (baseline != plain).then_some(baseline), (most != baseline).then_some(most)].into_iter().flatten()
+        [Some(plain), (baseline != plain).then_some(baseline), (most != baseline).then_some(most)]
+            .into_iter()
+            .flatten()
     }
 
     /// Runs work compiled for these vectors.
     #[cfg_attr(
         all(target_arch = "x86_64", target_feature = "sse2"),
-        expect(unsafe_code, reason = "calls code compiled for what the processor has; docs/decisions/0023-vector-kernels.md")
+        expect(
+            unsafe_code,
+            reason = "calls code compiled for what the processor has; docs/decisions/0023-vector-kernels.md"
+        )
     )]
     pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
         match self.0 {
@@ -105,7 +113,10 @@ impl Vectors {
 }
 
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
-#[expect(unsafe_code, reason = "asks for the processor's state; docs/decisions/0023-vector-kernels.md")]
+#[expect(
+    unsafe_code,
+    reason = "asks for the processor's state; docs/decisions/0023-vector-kernels.md"
+)]
 mod x86 {
     use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
@@ -115,7 +126,9 @@ mod x86 {
         const AVX2: u32 = 1 << 5;
         /// The operating system saves SSE and AVX registers.
         const SAVED: u64 = 0b110;
-        let known = __cpuid(0).eax >= 7 && __cpuid(1).ecx & OSXSAVE != 0 && __cpuid_count(7, 0).ebx & AVX2 != 0;
+        let known = __cpuid(0).eax >= 7
+            && __cpuid(1).ecx & OSXSAVE != 0
+            && __cpuid_count(7, 0).ebx & AVX2 != 0;
         // SAFETY: XGETBV exists where OSXSAVE is set.
         known && unsafe { saved_state() } & SAVED == SAVED
     }
@@ -149,6 +162,9 @@ mod tests {
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     #[test]
     fn the_processor_is_asked_as_the_standard_library_asks_it() {
-        assert_eq!(Vectors::detect() == Vectors(Level::Avx2), std::is_x86_feature_detected!("avx2"));
+        assert_eq!(
+            Vectors::detect() == Vectors(Level::Avx2),
+            std::is_x86_feature_detected!("avx2")
+        );
     }
 }

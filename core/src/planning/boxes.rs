@@ -1,9 +1,11 @@
 //! Moving objects as boxes, at a chosen time ahead.
 //!
-//! An object is a box that stands upright and points where it moves. Its sides come from surface points: twice their standard deviation on
-//! either side of their mean, which for points spread evenly over a side is its length and a seventh, and for a few wild ones hardly more.
-//! At `t + dt` it is displaced by its velocity; its position is as uncertain as it is now, and by `dt` times its velocity's error more, and the box
-//! drawn is larger by a stated number of sigmas. A constant velocity is the model that the tracks themselves are filtered with.
+//! An object is a box that stands upright and points where it moves. Its sides come from surface
+//! points: twice their standard deviation on either side of their mean, which for points spread
+//! evenly over a side is its length and a seventh, and for a few wild ones hardly more. At `t + dt`
+//! it is displaced by its velocity; its position is as uncertain as it is now, and by `dt` times
+//! its velocity's error more, and the box drawn is larger by a stated number of sigmas. A constant
+//! velocity is the model that the tracks themselves are filtered with.
 //!
 //! Memory: 56 bytes for each of `Capacity::tracks`. Time: linear in the cells drawn over.
 
@@ -19,7 +21,8 @@ const HALF_MIN_M: f32 = 0.25;
 /// Below this speed a box does not point where it moves, m/s.
 const HEADING_MIN_M_S: f32 = 0.2;
 
-/// A moving object. Coordinates are the grid's: x right, y ahead, z up, in metres from the world's origin.
+/// A moving object. Coordinates are the grid's: x right, y ahead, z up, in metres from the world's
+/// origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct MovingBox {
@@ -61,17 +64,24 @@ impl MovingBox {
         }
     }
 
-    /// Marks the cells whose centre lies in the box, `sigmas` sigmas and half a cell larger on each side.
+    /// Marks the cells whose centre lies in the box, `sigmas` sigmas and half a cell larger on each
+    /// side.
     pub(super) fn draw(&self, grid: &Grid, sigmas: f32, cells: &mut Cells<'_>) {
         let cell_m = grid.cell_m() as f32;
         let more = sigmas * self.sigma_m + 0.5 * cell_m;
         let [along, across, up] = self.half_m.map(|half| half + more);
         let [cos, sin] = self.heading;
-        let reach = [(cos * along).abs() + (sin * across).abs(), (sin * along).abs() + (cos * across).abs(), up];
+        let reach = [
+            (cos * along).abs() + (sin * across).abs(),
+            (sin * along).abs() + (cos * across).abs(),
+            up,
+        ];
         // The cells the box reaches, within the window.
         let mut spans = [[0, 0]; 3];
-        for ((span, size), ((center, reach), origin)) in
-            spans.iter_mut().zip(cells.size).zip(self.center_m.into_iter().zip(reach).zip(cells.origin))
+        for ((span, size), ((center, reach), origin)) in spans
+            .iter_mut()
+            .zip(cells.size)
+            .zip(self.center_m.into_iter().zip(reach).zip(cells.origin))
         {
             let bound = |at: f32| {
                 let cell = at / cell_m - origin as f32;
@@ -81,13 +91,15 @@ impl MovingBox {
         }
         let center = |axis: usize, at: usize| {
             let of = |cell: [i32; 3]| cell.get(axis).copied().unwrap_or_default();
-            (of(cells.origin) as f32 + at as f32 + 0.5) * cell_m - self.center_m.get(axis).copied().unwrap_or_default()
+            (of(cells.origin) as f32 + at as f32 + 0.5) * cell_m
+                - self.center_m.get(axis).copied().unwrap_or_default()
         };
         let [columns, rows, levels] = spans;
         for y in rows[0]..rows[1] {
             for x in columns[0]..columns[1] {
                 let (dx, dy) = (center(0, x), center(1, y));
-                let is_beside = (cos * dx + sin * dy).abs() > along || (cos * dy - sin * dx).abs() > across;
+                let is_beside =
+                    (cos * dx + sin * dy).abs() > along || (cos * dy - sin * dx).abs() > across;
                 if is_beside {
                     continue;
                 }
@@ -119,7 +131,8 @@ impl BoxFit {
     pub fn new(velocity_m_s: [f64; 2], near: [f64; 3]) -> Self {
         let [x, y] = velocity_m_s;
         let speed = libm::sqrt(x * x + y * y);
-        let heading = if speed > f64::from(HEADING_MIN_M_S) { [x / speed, y / speed] } else { [0.0, 1.0] };
+        let heading =
+            if speed > f64::from(HEADING_MIN_M_S) { [x / speed, y / speed] } else { [0.0, 1.0] };
         Self { heading, near, count: 0.0, sum: [0.0; 3], squares: [0.0; 3] }
     }
 
@@ -147,11 +160,18 @@ impl BoxFit {
         let mut half_m = [0.0; 3];
         for ((half, squares), mean) in half_m.iter_mut().zip(self.squares).zip(mean) {
             let variance = squares / self.count - mean * mean;
-            *half = max_f32(2.0 * libm::sqrt(if variance > 0.0 { variance } else { 0.0 }) as f32, HALF_MIN_M);
+            *half = max_f32(
+                2.0 * libm::sqrt(if variance > 0.0 { variance } else { 0.0 }) as f32,
+                HALF_MIN_M,
+            );
         }
         let [cos, sin] = self.heading;
         let [along, across, up] = mean;
-        let center = [self.near[0] + cos * along - sin * across, self.near[1] + sin * along + cos * across, self.near[2] + up];
+        let center = [
+            self.near[0] + cos * along - sin * across,
+            self.near[1] + sin * along + cos * across,
+            self.near[2] + up,
+        ];
         Some(MovingBox {
             center_m: center.map(|c| c as f32),
             half_m,

@@ -1,4 +1,5 @@
-//! The window's cells: a ring in each direction, so that moving with the camera clears what enters and moves nothing.
+//! The window's cells: a ring in each direction, so that moving with the camera clears what enters
+//! and moves nothing.
 //!
 //! Memory: 6 bytes a cell. Time of a move: linear in the cells that enter.
 
@@ -19,8 +20,9 @@ pub(super) const OBJECT: u8 = 4;
 const THROUGH_SHIFT: u32 = 3;
 /// Most that are counted.
 const THROUGH_MAX: u8 = 31;
-/// Frames in a row that saw through all of a cell, after which a surface in the map is not believed any more: what moved there before it was known to
-/// move. The map forgets it as well, but by its averages, which takes as many frames as it was seen in.
+/// Frames in a row that saw through all of a cell, after which a surface in the map is not believed
+/// any more: what moved there before it was known to move. The map forgets it as well, but by its
+/// averages, which takes as many frames as it was seen in.
 pub(super) const GHOST_FRAMES: u8 = 5;
 
 /// The bits of a cell that a frame saw through as a whole.
@@ -88,7 +90,8 @@ pub(super) struct Cells<'s> {
     /// When the cell was last looked at: the clock then, 0 never.
     pub observed_at: &'s mut [u16],
     pub bits: &'s mut [u8],
-    /// Upward surface points of the map in the cell, and the sum of their heights above its floor, in 1/256 of its side.
+    /// Upward surface points of the map in the cell, and the sum of their heights above its floor,
+    /// in 1/256 of its side.
     pub count: &'s mut [u8],
     pub sum: &'s mut [u16],
 }
@@ -96,8 +99,11 @@ pub(super) struct Cells<'s> {
 impl<'s> Cells<'s> {
     /// Cells along each side: as the capacity says, up to [`MAX_SIDE_CELLS`]; all 0 where one is.
     pub const fn sides(capacity: &Capacity) -> [usize; 3] {
-        let [width, length, height] =
-            [shortened(capacity.planning_width), shortened(capacity.planning_length), shortened(capacity.planning_height)];
+        let [width, length, height] = [
+            shortened(capacity.planning_width),
+            shortened(capacity.planning_length),
+            shortened(capacity.planning_height),
+        ];
         if width * length * height == 0 { [0; 3] } else { [width, length, height] }
     }
 
@@ -140,7 +146,10 @@ impl<'s> Cells<'s> {
     pub fn advance(&mut self) {
         if self.clock >= STAMP_MAX {
             self.clock -= STAMP_STEP;
-            self.observed_at.iter_mut().filter(|stamp| **stamp > 0).for_each(|stamp| *stamp = stamp.saturating_sub(STAMP_STEP).max(1));
+            self.observed_at
+                .iter_mut()
+                .filter(|stamp| **stamp > 0)
+                .for_each(|stamp| *stamp = stamp.saturating_sub(STAMP_STEP).max(1));
         }
         self.clock += 1;
     }
@@ -179,7 +188,9 @@ impl<'s> Cells<'s> {
     #[inline]
     pub fn local(&self, cell: Cell) -> Option<[usize; 3]> {
         let mut local = [0; 3];
-        for ((local, size), (cell, origin)) in local.iter_mut().zip(self.size).zip(cell.into_iter().zip(self.origin)) {
+        for ((local, size), (cell, origin)) in
+            local.iter_mut().zip(self.size).zip(cell.into_iter().zip(self.origin))
+        {
             *local = usize::try_from(cell.checked_sub(origin)?).ok().filter(|at| *at < size)?;
         }
         Some(local)
@@ -192,7 +203,8 @@ impl<'s> Cells<'s> {
             let of = |cell: Cell| i64::from(cell.get(axis).copied().unwrap_or_default());
             of(origin) - of(before)
         });
-        let far = shifts.iter().zip(self.size).any(|(shift, size)| shift.unsigned_abs() >= size as u64);
+        let far =
+            shifts.iter().zip(self.size).any(|(shift, size)| shift.unsigned_abs() >= size as u64);
         if far {
             self.observed_at.fill(0);
             self.bits.fill(0);
@@ -216,7 +228,9 @@ impl<'s> Cells<'s> {
     }
 
     fn clear(&mut self, cells: core::ops::Range<usize>) {
-        if let (Some(observed_at), Some(bits)) = (self.observed_at.get_mut(cells.clone()), self.bits.get_mut(cells)) {
+        if let (Some(observed_at), Some(bits)) =
+            (self.observed_at.get_mut(cells.clone()), self.bits.get_mut(cells))
+        {
             observed_at.fill(0);
             bits.fill(0);
         }

@@ -1,20 +1,24 @@
 //! The exact Euclidean distance transform, in integers.
 //!
-//! For every cell the squared distance from its centre to the nearest centre of a cell of the other kind, in cells: of an obstacle where
-//! the cell is none, and of a cell without where it is one. So the field is signed, and one transform gives both sides. It is separable (Saito,
-//! Toriwaki: *New algorithms for Euclidean distance transformation of an n-dimensional digitized picture*, 1994): the first pass counts
-//! steps along y, each further pass takes, along x and then z, the lower envelope of the parabolas that the pass before left (Maurer, Qi,
-//! Raghavan: *A Linear Time Algorithm for Computing Exact Euclidean Distance Transforms of Binary Images in Arbitrary Dimensions*, 2003;
-//! Felzenszwalb, Huttenlocher: *Distance Transforms of Sampled Functions*, 2012). Parabolas are compared by products, so nothing is divided and
-//! nothing is rounded.
+//! For every cell the squared distance from its centre to the nearest centre of a cell of the other
+//! kind, in cells: of an obstacle where the cell is none, and of a cell without where it is one. So
+//! the field is signed, and one transform gives both sides. It is separable (Saito, Toriwaki: *New
+//! algorithms for Euclidean distance transformation of an n-dimensional digitized picture*, 1994):
+//! the first pass counts steps along y, each further pass takes, along x and then z, the lower
+//! envelope of the parabolas that the pass before left (Maurer, Qi, Raghavan: *A Linear Time
+//! Algorithm for Computing Exact Euclidean Distance Transforms of Binary Images in Arbitrary
+//! Dimensions*, 2003; Felzenszwalb, Huttenlocher: *Distance Transforms of Sampled Functions*,
+//! 2012). Parabolas are compared by products, so nothing is divided and nothing is rounded.
 //!
-//! A line falls into runs of one kind. The cells next to a run are of the other kind and 0 away from it, so they hide all that lies beyond them:
-//! each run needs itself and these two, and no cell is looked at for the other side's sake.
+//! A line falls into runs of one kind. The cells next to a run are of the other kind and 0 away
+//! from it, so they hide all that lies beyond them: each run needs itself and these two, and no
+//! cell is looked at for the other side's sake.
 //!
-//! Of several nearest cells the one with the lowest z, of these with the lowest x, of these with the lowest y is kept: the order is total,
-//! so it does not depend on how the work is done.
+//! Of several nearest cells the one with the lowest z, of these with the lowest x, of these with
+//! the lowest y is kept: the order is total, so it does not depend on how the work is done.
 //!
-//! Memory: 8 bytes a cell and 16 bytes for each cell of the longest side. Time: linear in the cells, whichever are obstacles.
+//! Memory: 8 bytes a cell and 16 bytes for each cell of the longest side. Time: linear in the
+//! cells, whichever are obstacles.
 
 use crate::{
     digest::Digest,
@@ -46,7 +50,8 @@ impl Site {
         along * along + u64::from(self.squared)
     }
 
-    /// Whether this one, between two others on the line, is nowhere nearer than both: by the places where their parabolas meet.
+    /// Whether this one, between two others on the line, is nowhere nearer than both: by the places
+    /// where their parabolas meet.
     fn is_hidden(&self, before: &Self, after: &Self) -> bool {
         let [a, b] = [self.at - before.at, after.at - self.at].map(i64::from);
         let [own, first, last] = [self.squared, before.squared, after.squared].map(i64::from);
@@ -94,8 +99,8 @@ impl<'s> DistanceField<'s> {
         }
     }
 
-    /// Squared distance to the nearest cell of the other kind, in cells, and that cell's position; `None` where all are of one kind or
-    /// the position is outside.
+    /// Squared distance to the nearest cell of the other kind, in cells, and that cell's position;
+    /// `None` where all are of one kind or the position is outside.
     pub fn get(&self, position: usize) -> Option<(u32, usize)> {
         let squared = *self.squared.get(position)?;
         (squared != NO_OBSTACLE).then_some((squared, *self.nearest.get(position)? as usize))
@@ -103,11 +108,14 @@ impl<'s> DistanceField<'s> {
 
     /// Adds all of it to a digest.
     pub(super) fn digest(&self, digest: &mut Digest) {
-        self.squared.iter().zip(&*self.nearest).for_each(|(squared, nearest)| digest.u64(u64::from(*squared) << 32 | u64::from(*nearest)));
+        self.squared.iter().zip(&*self.nearest).for_each(|(squared, nearest)| {
+            digest.u64(u64::from(*squared) << 32 | u64::from(*nearest))
+        });
     }
 
-    /// Transforms a field of `[width, length, height]` cells, cell (x, y, z) at `(y * width + x) * height + z`. `is_obstacle` is 0 or 1.
-    /// A field larger than the memory is refused: `false`, and nothing changes.
+    /// Transforms a field of `[width, length, height]` cells, cell (x, y, z) at
+    /// `(y * width + x) * height + z`. `is_obstacle` is 0 or 1. A field larger than the memory is
+    /// refused: `false`, and nothing changes.
     pub fn transform(&mut self, is_obstacle: &[u8], [width, length, height]: [usize; 3]) -> bool {
         let cells = width * length * height;
         let longest = if width > height { width } else { height };
@@ -121,20 +129,26 @@ impl<'s> DistanceField<'s> {
             (0..height).for_each(|z| self.along_line(is_obstacle, [y * row + z, height, width]));
         }
         if height > 1 {
-            (0..width * length).for_each(|column| self.along_line(is_obstacle, [column * height, 1, height]));
+            (0..width * length)
+                .for_each(|column| self.along_line(is_obstacle, [column * height, 1, height]));
         }
         true
     }
 
     /// The first pass, along y: rows of `row` cells, one after the other, up and down again.
     fn across_rows(&mut self, is_obstacle: &[u8], row: usize, rows: usize) {
-        let (squared, nearest) = (part_mut(self.squared, ..row * rows), part_mut(self.nearest, ..row * rows));
+        let (squared, nearest) =
+            (part_mut(self.squared, ..row * rows), part_mut(self.nearest, ..row * rows));
         part_mut(squared, ..row).fill(NO_OBSTACLE);
         // Steps to the nearest cell of the other kind in the rows before.
         for y in 1..rows {
             let Some((before, after)) = squared.split_at_mut_checked(y * row) else { return };
-            let kinds = part(is_obstacle, (y - 1) * row..y * row).iter().zip(part(is_obstacle, y * row..(y + 1) * row));
-            for ((steps, last), (other, own)) in after.iter_mut().zip(part(before, (y - 1) * row..)).zip(kinds) {
+            let kinds = part(is_obstacle, (y - 1) * row..y * row)
+                .iter()
+                .zip(part(is_obstacle, y * row..(y + 1) * row));
+            for ((steps, last), (other, own)) in
+                after.iter_mut().zip(part(before, (y - 1) * row..)).zip(kinds)
+            {
                 *steps = if own == other { last.saturating_add(1) } else { 1 };
             }
         }
@@ -146,14 +160,21 @@ impl<'s> DistanceField<'s> {
         // And in the rows after, which win where they are nearer.
         for y in (1..rows).rev() {
             let Some((before, after)) = squared.split_at_mut_checked(y * row) else { return };
-            let Some((near_before, near_after)) = nearest.split_at_mut_checked(y * row) else { return };
-            let kinds = part(is_obstacle, (y - 1) * row..y * row).iter().zip(part(is_obstacle, y * row..(y + 1) * row));
-            let below = part_mut(before, (y - 1) * row..).iter_mut().zip(part_mut(near_before, (y - 1) * row..));
+            let Some((near_before, near_after)) = nearest.split_at_mut_checked(y * row) else {
+                return;
+            };
+            let kinds = part(is_obstacle, (y - 1) * row..y * row)
+                .iter()
+                .zip(part(is_obstacle, y * row..(y + 1) * row));
+            let below = part_mut(before, (y - 1) * row..)
+                .iter_mut()
+                .zip(part_mut(near_before, (y - 1) * row..));
             let first = (y * row) as u32;
             for (((steps, near), (last, near_last)), ((own, other), at)) in
                 below.zip(after.iter().zip(&*near_after)).zip(kinds.zip(first..))
             {
-                let (down, near_down) = if own == other { (last.saturating_add(1), *near_last) } else { (1, at) };
+                let (down, near_down) =
+                    if own == other { (last.saturating_add(1), *near_last) } else { (1, at) };
                 (*steps, *near) = if down < *steps { (down, near_down) } else { (*steps, *near) };
             }
         }
@@ -185,14 +206,21 @@ impl<'s> DistanceField<'s> {
         for at in from..to {
             let position = first + at * step;
             let other = at < begin || at >= end;
-            let squared = if other { 0 } else { self.squared.get(position).copied().unwrap_or(NO_OBSTACLE) };
+            let squared =
+                if other { 0 } else { self.squared.get(position).copied().unwrap_or(NO_OBSTACLE) };
             if squared == NO_OBSTACLE {
                 continue;
             }
-            let nearest = if other { position as u32 } else { self.nearest.get(position).copied().unwrap_or_default() };
+            let nearest = if other {
+                position as u32
+            } else {
+                self.nearest.get(position).copied().unwrap_or_default()
+            };
             let site = Site { at: at as u32, squared, nearest, reserved: 0 };
-            while let Some([before, last]) =
-                len.checked_sub(2).and_then(|low| self.sites.get(low..len)).and_then(|two| two.first_chunk::<2>())
+            while let Some([before, last]) = len
+                .checked_sub(2)
+                .and_then(|low| self.sites.get(low..len))
+                .and_then(|two| two.first_chunk::<2>())
             {
                 if !last.is_hidden(before, &site) {
                     break;
@@ -213,7 +241,9 @@ impl<'s> DistanceField<'s> {
                 current = next;
             }
             let position = first + at as usize * step;
-            if let (Some(entry), Some(nearest)) = (self.squared.get_mut(position), self.nearest.get_mut(position)) {
+            if let (Some(entry), Some(nearest)) =
+                (self.squared.get_mut(position), self.nearest.get_mut(position))
+            {
                 (*entry, *nearest) = (squared as u32, current.nearest);
             }
         }

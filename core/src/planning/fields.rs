@@ -1,7 +1,8 @@
 //! Reading the window: cells, columns, distances, ways.
 
 use super::{
-    CellState, Column, Grid, MovingBox, Planning, PlanningConfig, PlanningReport, Sweep, Way, cells::OBJECT, grid::Cell, query, slice,
+    CellState, Column, Grid, MovingBox, Planning, PlanningConfig, PlanningReport, Sweep, Way,
+    cells::OBJECT, grid::Cell, query, slice,
 };
 use crate::volume::Volume;
 
@@ -30,8 +31,9 @@ pub struct Distance {
 }
 
 impl Planning<'_> {
-    /// Draws the moving objects where they will be `ahead_s` seconds after the last frame, and makes the slice and the distance fields anew. The
-    /// window beneath stays as it is: another time can be asked for next.
+    /// Draws the moving objects where they will be `ahead_s` seconds after the last frame, and
+    /// makes the slice and the distance fields anew. The window beneath stays as it is: another
+    /// time can be asked for next.
     pub fn predict(&mut self, ahead_s: f32) -> PlanningReport {
         let Self { cells, boxes, grid, config, box_count, .. } = self;
         cells.bits.iter_mut().for_each(|bits| *bits &= !OBJECT);
@@ -41,21 +43,34 @@ impl Planning<'_> {
         let limits = Limits { low_m: config.low_m, high_m: config.high_m, level: config.level };
         self.cut_slice(&limits);
         self.fill_distances();
-        let count = |state: CellState| self.cells.bits.iter().filter(|bits| CellState::of(**bits) == state).count() as u32;
+        let count = |state: CellState| {
+            self.cells.bits.iter().filter(|bits| CellState::of(**bits) == state).count() as u32
+        };
         PlanningReport {
             occupied: count(CellState::Occupied),
             free: count(CellState::Free),
-            ground: self.ground.columns().iter().filter(|column| column.has(Column::GROUND)).count() as u32,
-            obstacles: self.slice.iter().filter(|state| **state == CellState::Occupied as u8).count() as u32,
+            ground: self.ground.columns().iter().filter(|column| column.has(Column::GROUND)).count()
+                as u32,
+            obstacles: self
+                .slice
+                .iter()
+                .filter(|state| **state == CellState::Occupied as u8)
+                .count() as u32,
             boxes: self.box_count as u32,
             boxes_refused: 0,
         }
     }
 
-    /// Makes the slice between other heights and its distance field; another slice is made by another call, and the last one stands.
+    /// Makes the slice between other heights and its distance field; another slice is made by
+    /// another call, and the last one stands.
     pub fn cut_slice(&mut self, limits: &Limits) {
         let Self { config, cells, ground, slice, slice_obstacle, slice_distance, grid, .. } = self;
-        let config = PlanningConfig { low_m: limits.low_m, high_m: limits.high_m, level: limits.level, ..*config };
+        let config = PlanningConfig {
+            low_m: limits.low_m,
+            high_m: limits.high_m,
+            level: limits.level,
+            ..*config
+        };
         slice::reduce(&config, grid.cell_m() as f32, cells, ground, slice);
         for (obstacle, state) in slice_obstacle.iter_mut().zip(&**slice) {
             *obstacle = u8::from(is_obstacle(&config, *state));
@@ -96,10 +111,15 @@ impl Planning<'_> {
         self.cells.origin
     }
 
-    /// What a cell is, and the frames since it was last looked at; `None` where it never was, or lies outside.
+    /// What a cell is, and the frames since it was last looked at; `None` where it never was, or
+    /// lies outside.
     pub fn cell(&self, cell: Cell) -> (CellState, Option<u32>) {
-        let Some(position) = self.cells.local(cell).and_then(|local| self.cells.position(local)) else { return (CellState::Unknown, None) };
-        let state = self.cells.bits.get(position).map_or(CellState::Unknown, |bits| CellState::of(*bits));
+        let Some(position) = self.cells.local(cell).and_then(|local| self.cells.position(local))
+        else {
+            return (CellState::Unknown, None);
+        };
+        let state =
+            self.cells.bits.get(position).map_or(CellState::Unknown, |bits| CellState::of(*bits));
         let stamp = self.cells.observed_at.get(position).copied().filter(|stamp| *stamp > 0);
         (state, stamp.map(|stamp| self.cells.age(stamp)))
     }
@@ -117,18 +137,21 @@ impl Planning<'_> {
         state.map_or(CellState::Unknown, |state| state_of(*state))
     }
 
-    /// The distance from a column of the slice to the nearest of the other kind. `None` outside, and where all are of one kind.
+    /// The distance from a column of the slice to the nearest of the other kind. `None` outside,
+    /// and where all are of one kind.
     pub fn slice_distance(&self, [x, y, _]: Cell) -> Option<Distance> {
         let [x, y, _] = self.cells.local([x, y, self.cells.origin[2]])?;
         let width = self.cells.size[0].max(1);
         let position = y * width + x;
         let (squared, nearest) = self.slice_distance.get(position)?;
         let origin = self.cells.origin;
-        let nearest = [origin[0] + (nearest % width) as i32, origin[1] + (nearest / width) as i32, origin[2]];
+        let nearest =
+            [origin[0] + (nearest % width) as i32, origin[1] + (nearest / width) as i32, origin[2]];
         Some(self.distance(self.slice_obstacle.get(position), squared, nearest))
     }
 
-    /// The distance from a cell to the nearest of the other kind. `None` outside, where all are of one kind, and without
+    /// The distance from a cell to the nearest of the other kind. `None` outside, where all are of
+    /// one kind, and without
     /// [`crate::Capacity::planning_distance_3d`].
     pub fn cell_distance(&self, cell: Cell) -> Option<Distance> {
         let [x, y, z] = self.cells.local(cell)?;
@@ -137,7 +160,11 @@ impl Planning<'_> {
         let (squared, nearest) = self.cell_distance.get(position)?;
         let column = nearest / height;
         let [ox, oy, oz] = self.cells.origin;
-        let nearest = [ox + (column % width) as i32, oy + (column / width) as i32, oz + (nearest % height) as i32];
+        let nearest = [
+            ox + (column % width) as i32,
+            oy + (column / width) as i32,
+            oz + (nearest % height) as i32,
+        ];
         Some(self.distance(self.cell_obstacle.get(position), squared, nearest))
     }
 
@@ -151,16 +178,20 @@ impl Planning<'_> {
         }
     }
 
-    /// How fast the slice's distance grows to the right and ahead, m per m: by central differences, by one-sided ones at the window's edge. `None`
-    /// where there is no distance.
+    /// How fast the slice's distance grows to the right and ahead, m per m: by central differences,
+    /// by one-sided ones at the window's edge. `None` where there is no distance.
     pub fn slice_gradient(&self, [x, y, z]: Cell) -> Option<[f32; 2]> {
-        let along = |dx: i32, dy: i32| self.difference(|n| self.slice_distance([x + n * dx, y + n * dy, z]));
+        let along = |dx: i32, dy: i32| {
+            self.difference(|n| self.slice_distance([x + n * dx, y + n * dy, z]))
+        };
         Some([along(1, 0)?, along(0, 1)?])
     }
 
     /// As [`Planning::slice_gradient`], of the field over all cells: to the right, ahead, upwards.
     pub fn cell_gradient(&self, [x, y, z]: Cell) -> Option<[f32; 3]> {
-        let along = |dx: i32, dy: i32, dz: i32| self.difference(|n| self.cell_distance([x + n * dx, y + n * dy, z + n * dz]));
+        let along = |dx: i32, dy: i32, dz: i32| {
+            self.difference(|n| self.cell_distance([x + n * dx, y + n * dy, z + n * dz]))
+        };
         Some([along(1, 0, 0)?, along(0, 1, 0)?, along(0, 0, 1)?])
     }
 
@@ -177,8 +208,15 @@ impl Planning<'_> {
         self.boxes.get(..self.box_count).unwrap_or_default()
     }
 
-    /// How far a ray is free: from a point of the world, in a direction of any length, at most `far_m`. See [`Way`].
-    pub fn ray(&self, volume: &Volume<'_>, origin_m: [f64; 3], direction: [f64; 3], far_m: f64) -> Way {
+    /// How far a ray is free: from a point of the world, in a direction of any length, at most
+    /// `far_m`. See [`Way`].
+    pub fn ray(
+        &self,
+        volume: &Volume<'_>,
+        origin_m: [f64; 3],
+        direction: [f64; 3],
+        far_m: f64,
+    ) -> Way {
         query::ray(volume, &self.grid, &self.cells, origin_m, direction, far_m)
     }
 

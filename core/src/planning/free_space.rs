@@ -1,13 +1,18 @@
 //! Free space from a disparity image: what a cell is seen through, is free.
 //!
-//! A cell's centre at depth z falls on pixels of disparity d at most. With the disparity error m that is to be expected, the surface lies beyond
-//! `f b / (d + m)`; where that is more than `z` and half the cell's diagonal, the cell is free. Where the surface is not nearer than the
-//! cell it was looked at, and keeps what it was. The disparity is the greatest of all pixels that a cell covers: free is what is seen through as a whole, so
-//! nothing thin is lost. A surface of the map in a cell that several frames in a row saw through is a ghost of what moved on. Pixels without a disparity say nothing: sky is unknown. This is the inverse sensor model of
-//! occupancy grids (Elfes: *Using Occupancy Grids for Mobile Robot Perception and Navigation*, 1989) with certainties for
-//! probabilities: surfaces come from the map, whose averages are better evidence than a count of hits.
+//! A cell's centre at depth z falls on pixels of disparity d at most. With the disparity error m
+//! that is to be expected, the surface lies beyond `f b / (d + m)`; where that is more than `z` and
+//! half the cell's diagonal, the cell is free. Where the surface is not nearer than the cell it was
+//! looked at, and keeps what it was. The disparity is the greatest of all pixels that a cell
+//! covers: free is what is seen through as a whole, so nothing thin is lost. A surface of the map
+//! in a cell that several frames in a row saw through is a ghost of what moved on. Pixels without a
+//! disparity say nothing: sky is unknown. This is the inverse sensor model of occupancy grids
+//! (Elfes: *Using Occupancy Grids for Mobile Robot Perception and Navigation*, 1989) with
+//! certainties for probabilities: surfaces come from the map, whose averages are better evidence
+//! than a count of hits.
 //!
-//! Time: linear in the cells in view within `far_m`. Order: columns by y, then x, cells upwards; no cell's result depends on another's.
+//! Time: linear in the cells in view within `far_m`. Order: columns by y, then x, cells upwards; no
+//! cell's result depends on another's.
 
 use super::{
     PlanningConfig,
@@ -32,7 +37,8 @@ pub struct Sight<'a> {
     pub rig: &'a StereoRig,
     /// Left camera to world.
     pub t_world_camera: &'a Transform,
-    /// Disparity, 1/256 px, 0 none; of everything, moving objects too: they hide what is behind them and show what is before them.
+    /// Disparity, 1/256 px, 0 none; of everything, moving objects too: they hide what is behind
+    /// them and show what is before them.
     pub disparity_q8: View<'a, u16>,
 }
 
@@ -58,7 +64,13 @@ struct Rays<'a> {
 }
 
 /// Marks what a frame sees through. The window must lie around the camera.
-pub(super) fn mark(config: &PlanningConfig, grid: &Grid, sight: &Sight<'_>, pyramid: &Pyramid<'_>, cells: &mut Cells<'_>) {
+pub(super) fn mark(
+    config: &PlanningConfig,
+    grid: &Grid,
+    sight: &Sight<'_>,
+    pyramid: &Pyramid<'_>,
+    cells: &mut Cells<'_>,
+) {
     let rays = Rays::new(config, grid, sight, pyramid, cells);
     let [width, length, _] = cells.size;
     for y in 0..length {
@@ -69,7 +81,13 @@ pub(super) fn mark(config: &PlanningConfig, grid: &Grid, sight: &Sight<'_>, pyra
 }
 
 impl<'a> Rays<'a> {
-    fn new(config: &PlanningConfig, grid: &Grid, sight: &Sight<'a>, pyramid: &'a Pyramid<'a>, cells: &Cells<'_>) -> Self {
+    fn new(
+        config: &PlanningConfig,
+        grid: &Grid,
+        sight: &Sight<'a>,
+        pyramid: &'a Pyramid<'a>,
+        cells: &Cells<'_>,
+    ) -> Self {
         let (turn, camera) = grid.of_camera(sight.t_world_camera);
         let cell_m = grid.cell_m();
         // The grid's axes in the camera: the rotation backwards.
@@ -103,9 +121,13 @@ impl<'a> Rays<'a> {
             *at = first + x as f32 * right + y as f32 * ahead;
         }
         let height = cells.size[2];
-        let top = |axis: usize, at: f32| at + up.get(axis).copied().unwrap_or_default() * height as f32;
+        let top =
+            |axis: usize, at: f32| at + up.get(axis).copied().unwrap_or_default() * height as f32;
         let depths = [at[2], top(2, at[2])];
-        if depths.iter().all(|z| *z < self.near_m) || depths.iter().all(|z| *z > self.far_m) || self.is_beside(at, up, height) {
+        if depths.iter().all(|z| *z < self.near_m)
+            || depths.iter().all(|z| *z > self.far_m)
+            || self.is_beside(at, up, height)
+        {
             return;
         }
         let (column, now) = (cells.column(x, y), cells.now());
@@ -116,8 +138,14 @@ impl<'a> Rays<'a> {
                 continue;
             }
             let position = column + cells.level(z);
-            if let (Some(observed_at), Some(bits)) = (cells.observed_at.get_mut(position), cells.bits.get_mut(position)) {
-                *bits = if seen == Visibility::Through { seen_through(*bits) } else { seen_surface(*bits) };
+            if let (Some(observed_at), Some(bits)) =
+                (cells.observed_at.get_mut(position), cells.bits.get_mut(position))
+            {
+                *bits = if seen == Visibility::Through {
+                    seen_through(*bits)
+                } else {
+                    seen_surface(*bits)
+                };
                 *observed_at = now;
             }
         }
@@ -126,10 +154,12 @@ impl<'a> Rays<'a> {
     /// Whether a whole column lies left or right of what the camera sees.
     fn is_beside(&self, at: [f32; 3], up: [f32; 3], height: usize) -> bool {
         let (width, height) = (self.disparity_q8.width() as f32, height as f32);
-        // Points of the left edge have x f + z c = 0, those of the right edge x f + z (c - width) = 0.
+        // Points of the left edge have x f + z c = 0, those of the right edge x f + z (c - width) =
+        // 0.
         let side = |edge: f32, x: f32, z: f32| x * self.focal_px + z * (self.center_px[0] - edge);
         let (x, z) = (at[0] + up[0] * height, at[2] + up[2] * height);
-        (side(0.0, at[0], at[2]) < 0.0 && side(0.0, x, z) < 0.0) || (side(width, at[0], at[2]) > 0.0 && side(width, x, z) > 0.0)
+        (side(0.0, at[0], at[2]) < 0.0 && side(0.0, x, z) < 0.0)
+            || (side(width, at[0], at[2]) > 0.0 && side(width, x, z) > 0.0)
     }
 
     /// How a cell whose centre has these camera coordinates is seen.
@@ -142,9 +172,10 @@ impl<'a> Rays<'a> {
         let scale = self.focal_px / z;
         let half_px = self.half_side_px_m / z;
         let image = self.disparity_q8;
-        let (Some(columns), Some(rows)) =
-            (span(x * scale + self.center_px[0], half_px, image.width()), span(y * scale + self.center_px[1], half_px, image.height()))
-        else {
+        let (Some(columns), Some(rows)) = (
+            span(x * scale + self.center_px[0], half_px, image.width()),
+            span(y * scale + self.center_px[1], half_px, image.height()),
+        ) else {
             return Visibility::Not;
         };
         let disparity_q8 = f32::from(self.pyramid.greatest(image, columns, rows));

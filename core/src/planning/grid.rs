@@ -1,7 +1,8 @@
 //! Where cells lie: integer coordinates with z up, turned from the world's.
 //!
-//! A grid point is a world point turned by a rotation of 14 fractional bits. Cell (x, y, z) holds the grid points from `cell * (x, y, z)`
-//! up to but without the next cell's: x to the right of the first camera's view, y ahead, z up.
+//! A grid point is a world point turned by a rotation of 14 fractional bits. Cell (x, y, z) holds
+//! the grid points from `cell * (x, y, z)` up to but without the next cell's: x to the right of the
+//! first camera's view, y ahead, z up.
 
 use super::PlanningConfig;
 use crate::geometry::Transform;
@@ -36,9 +37,15 @@ impl Grid {
         // Ahead is the world's z, or its y where up is along z, without the part that is up.
         let ahead = if up[2] * up[2] < 0.9 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
         let part = dot(ahead, up);
-        let ahead = normalized([ahead[0] - part * up[0], ahead[1] - part * up[1], ahead[2] - part * up[2]]);
-        let right = [ahead[1] * up[2] - ahead[2] * up[1], ahead[2] * up[0] - ahead[0] * up[2], ahead[0] * up[1] - ahead[1] * up[0]];
-        let turn_q14 = [right, ahead, up].map(|axis| axis.map(|c| libm::round(c * TURN_ONE) as i32));
+        let ahead =
+            normalized([ahead[0] - part * up[0], ahead[1] - part * up[1], ahead[2] - part * up[2]]);
+        let right = [
+            ahead[1] * up[2] - ahead[2] * up[1],
+            ahead[2] * up[0] - ahead[0] * up[2],
+            ahead[0] * up[1] - ahead[1] * up[0],
+        ];
+        let turn_q14 =
+            [right, ahead, up].map(|axis| axis.map(|c| libm::round(c * TURN_ONE) as i32));
         Self {
             turn_q14,
             turn: turn_q14.map(|axis| axis.map(|c| f64::from(c) / TURN_ONE)),
@@ -61,16 +68,22 @@ impl Grid {
     pub fn to_world(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let [right, ahead, up] = self.turn;
         let along = |axis: usize| {
-            let [a, b, c] = [right, ahead, up].map(|row| row.get(axis).copied().unwrap_or_default());
+            let [a, b, c] =
+                [right, ahead, up].map(|row| row.get(axis).copied().unwrap_or_default());
             (a * x + b * y + c * z) * self.cell_m()
         };
         [along(0), along(1), along(2)]
     }
 
-    /// The rotation and position of a camera in the grid: the camera's axes (columns) in grid axes, and where it is, in cells.
+    /// The rotation and position of a camera in the grid: the camera's axes (columns) in grid axes,
+    /// and where it is, in cells.
     pub fn of_camera(&self, t_world_camera: &Transform) -> ([[f64; 3]; 3], [f64; 3]) {
         let world = t_world_camera.rotation_matrix();
-        let turned = self.turn.map(|row| [0, 1, 2].map(|column| dot(row, world.map(|axis| axis.get(column).copied().unwrap_or_default()))));
+        let turned = self.turn.map(|row| {
+            [0, 1, 2].map(|column| {
+                dot(row, world.map(|axis| axis.get(column).copied().unwrap_or_default()))
+            })
+        });
         (turned, self.of_world(t_world_camera.translation_m))
     }
 

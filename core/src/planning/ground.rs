@@ -1,16 +1,22 @@
-//! The height map: which surface of a column is ground, how high it lies, how it slopes and steps, and what hangs over it.
+//! The height map: which surface of a column is ground, how high it lies, how it slopes and steps,
+//! and what hangs over it.
 //!
-//! Ground grows outwards from below the camera, ring by ring of columns. A column's reference is the height of its neighbour in the ring
-//! before (of the three nearest, the one closest to known ground); its ground is the upward surface nearest to that reference, unless it is farther from
-//! it than a step and the steepest slope allow. Where none is, the reference is carried on, and what is allowed grows by a tenth of the
-//! distance, up to one more step. The first reference is the plane that the disparity image shows below and before the camera, or the camera's
-//! height where that is configured: the camera cannot see the ground below itself. This is the growing of ground from the sensor
-//! outwards of Himmelsbach, v. Hundelshausen, Wuensche (*Fast Segmentation of 3D Point Clouds for Ground Vehicles*, 2010), on a height grid.
+//! Ground grows outwards from below the camera, ring by ring of columns. A column's reference is
+//! the height of its neighbour in the ring before (of the three nearest, the one closest to known
+//! ground); its ground is the upward surface nearest to that reference, unless it is farther from
+//! it than a step and the steepest slope allow. Where none is, the reference is carried on, and
+//! what is allowed grows by a tenth of the distance, up to one more step. The first reference is
+//! the plane that the disparity image shows below and before the camera, or the camera's height
+//! where that is configured: the camera cannot see the ground below itself. This is the growing of
+//! ground from the sensor outwards of Himmelsbach, v. Hundelshausen, Wuensche (*Fast Segmentation
+//! of 3D Point Clouds for Ground Vehicles*, 2010), on a height grid.
 //!
-//! Slope and roughness are those of a plane fitted to the columns around (least squares). A step is how far the surfaces on either side
-//! miss each other where they are drawn on to the column in between, so a slope is no step.
+//! Slope and roughness are those of a plane fitted to the columns around (least squares). A step is
+//! how far the surfaces on either side miss each other where they are drawn on to the column in
+//! between, so a slope is no step.
 //!
-//! Memory: 32 bytes a column. Time: linear in cells and columns. Order: rings outwards, each by y, then x.
+//! Memory: 32 bytes a column. Time: linear in cells and columns. Order: rings outwards, each by y,
+//! then x.
 
 use super::{
     PlanningConfig,
@@ -22,7 +28,8 @@ use crate::{
 };
 use bytemuck::{Pod, Zeroable};
 
-/// A plane is fitted to every second column up to four away: twice as far as its neighbours, so half the error at the same cost.
+/// A plane is fitted to every second column up to four away: twice as far as its neighbours, so
+/// half the error at the same cost.
 const FIT_OFFSETS: [i32; 5] = [-4, -2, 0, 2, 4];
 /// Fewest columns of a fit.
 const FIT_MIN: u32 = 6;
@@ -68,11 +75,13 @@ impl Column {
 
     /// Rise over run along the steepest way; `None` where too little is known around.
     pub fn slope(&self) -> Option<f32> {
-        self.has(Self::FITTED).then(|| libm::sqrtf(self.slope[0] * self.slope[0] + self.slope[1] * self.slope[1]))
+        self.has(Self::FITTED)
+            .then(|| libm::sqrtf(self.slope[0] * self.slope[0] + self.slope[1] * self.slope[1]))
     }
 }
 
-/// The plane ground is expected in around the camera: its height below the camera, m, and its rise over run to the right and ahead.
+/// The plane ground is expected in around the camera: its height below the camera, m, and its rise
+/// over run to the right and ahead.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Level {
     pub height_m: f32,
@@ -102,7 +111,11 @@ impl<'s> Ground<'s> {
 
     /// A column, counted from the window's first.
     pub fn get(&self, x: usize, y: usize) -> Column {
-        if x < self.width { self.columns.get(y * self.width + x).copied().unwrap_or_default() } else { Column::default() }
+        if x < self.width {
+            self.columns.get(y * self.width + x).copied().unwrap_or_default()
+        } else {
+            Column::default()
+        }
     }
 
     /// All columns, x fastest.
@@ -116,10 +129,24 @@ impl<'s> Ground<'s> {
     }
 
     /// Finds the ground anew, outwards from the column at `center`.
-    pub fn find(&mut self, config: &PlanningConfig, cell_m: f32, level: Level, center: [usize; 2], cells: &Cells<'_>) {
+    pub fn find(
+        &mut self,
+        config: &PlanningConfig,
+        cell_m: f32,
+        level: Level,
+        center: [usize; 2],
+        cells: &Cells<'_>,
+    ) {
         self.level = level;
         let [width, length, _] = cells.size;
-        let rings = [center[0], center[1], width.saturating_sub(center[0]), length.saturating_sub(center[1])].into_iter().max();
+        let rings = [
+            center[0],
+            center[1],
+            width.saturating_sub(center[0]),
+            length.saturating_sub(center[1]),
+        ]
+        .into_iter()
+        .max();
         for ring in 0..=rings.unwrap_or(0) {
             let rows = center[1].saturating_sub(ring)..length.min(center[1] + ring + 1);
             for y in rows {
@@ -127,7 +154,8 @@ impl<'s> Ground<'s> {
                 let columns = center[0].saturating_sub(ring)..width.min(center[0] + ring + 1);
                 let step = if is_edge { 1 } else { (2 * ring).max(1) };
                 // Between the ring's first row and its last only its two ends belong to it.
-                let first = if is_edge || center[0] >= ring { columns.start } else { center[0] + ring };
+                let first =
+                    if is_edge || center[0] >= ring { columns.start } else { center[0] + ring };
                 for x in (first..columns.end).step_by(step) {
                     let column = self.grow(config, cell_m, [x, y], center, cells);
                     if let Some(entry) = self.columns.get_mut(y * self.width + x) {
@@ -147,10 +175,19 @@ impl<'s> Ground<'s> {
     }
 
     /// The column at a position, from its neighbours in the ring before.
-    fn grow(&self, config: &PlanningConfig, cell_m: f32, at: [usize; 2], center: [usize; 2], cells: &Cells<'_>) -> Column {
+    fn grow(
+        &self,
+        config: &PlanningConfig,
+        cell_m: f32,
+        at: [usize; 2],
+        center: [usize; 2],
+        cells: &Cells<'_>,
+    ) -> Column {
         let (reference_m, gap) = self.reference(cell_m, at, center);
         let gap_m = f32::from(gap) * cell_m;
-        let allowed_m = config.ground_step_m + config.slope_max * cell_m + min_f32(DRIFT * gap_m, config.ground_step_m);
+        let allowed_m = config.ground_step_m
+            + config.slope_max * cell_m
+            + min_f32(DRIFT * gap_m, config.ground_step_m);
         let mut best: Option<(f32, f32)> = None;
         for height_m in surfaces(at, cell_m, cells) {
             let off_m = (height_m - reference_m).abs();
@@ -159,8 +196,18 @@ impl<'s> Ground<'s> {
             }
         }
         match best {
-            Some((height_m, _)) => Column { height_m, reference_m: height_m, flags: Column::GROUND, ..Column::default() },
-            None => Column { height_m: 0.0, reference_m, gap: gap.saturating_add(1), ..Column::default() },
+            Some((height_m, _)) => Column {
+                height_m,
+                reference_m: height_m,
+                flags: Column::GROUND,
+                ..Column::default()
+            },
+            None => Column {
+                height_m: 0.0,
+                reference_m,
+                gap: gap.saturating_add(1),
+                ..Column::default()
+            },
         }
     }
 
@@ -168,20 +215,30 @@ impl<'s> Ground<'s> {
     fn reference(&self, cell_m: f32, at: [usize; 2], center: [usize; 2]) -> (f32, u16) {
         let [dx, dy] = [0, 1].map(|axis| offset(at, center, axis));
         let ring = if dx.abs() > dy.abs() { dx.abs() } else { dy.abs() };
-        let plane = |dx: i32, dy: i32| self.level.height_m + (self.level.slope[0] * dx as f32 + self.level.slope[1] * dy as f32) * cell_m;
+        let plane = |dx: i32, dy: i32| {
+            self.level.height_m
+                + (self.level.slope[0] * dx as f32 + self.level.slope[1] * dy as f32) * cell_m
+        };
         if ring == 0 {
             return (self.level.height_m, 0);
         }
         // The column in the ring before that lies straight towards the camera, and those beside it.
-        let towards = |d: i32| (2 * d * (ring - 1) + d.signum() * ring).checked_div(2 * ring).unwrap_or(0);
+        let towards =
+            |d: i32| (2 * d * (ring - 1) + d.signum() * ring).checked_div(2 * ring).unwrap_or(0);
         let side = if dx.abs() > dy.abs() { [0, 1] } else { [1, 0] };
         let mut best: Option<(Column, [i32; 2])> = None;
         for beside in [0, -1, 1] {
             let inner = [towards(dx) + beside * side[0], towards(dy) + beside * side[1]];
-            let ring_of = if inner[0].abs() > inner[1].abs() { inner[0].abs() } else { inner[1].abs() };
-            let column_at = [center[0] as i32 + inner[0], center[1] as i32 + inner[1]].map(|c| usize::try_from(c).ok());
+            let ring_of =
+                if inner[0].abs() > inner[1].abs() { inner[0].abs() } else { inner[1].abs() };
+            let column_at = [center[0] as i32 + inner[0], center[1] as i32 + inner[1]]
+                .map(|c| usize::try_from(c).ok());
             let [Some(x), Some(y)] = column_at else { continue };
-            let Some(column) = self.columns.get(y * self.width + x).filter(|_| x < self.width && ring_of < ring) else { continue };
+            let Some(column) =
+                self.columns.get(y * self.width + x).filter(|_| x < self.width && ring_of < ring)
+            else {
+                continue;
+            };
             if best.is_none_or(|(least, _)| column.gap < least.gap) {
                 best = Some((*column, inner));
             }
@@ -195,7 +252,13 @@ impl<'s> Ground<'s> {
     }
 
     /// A column with what its surroundings say about it.
-    fn describe(&self, config: &PlanningConfig, cell_m: f32, [x, y]: [usize; 2], cells: &Cells<'_>) -> Column {
+    fn describe(
+        &self,
+        config: &PlanningConfig,
+        cell_m: f32,
+        [x, y]: [usize; 2],
+        cells: &Cells<'_>,
+    ) -> Column {
         let mut column = self.get(x, y);
         let Some(height_m) = column.ground_m() else { return column };
         let mut fit = Fit::default();
@@ -221,7 +284,8 @@ impl<'s> Ground<'s> {
         self.get(x, y).ground_m()
     }
 
-    /// By how much the surfaces on both sides miss each other, each drawn on from its first and third column.
+    /// By how much the surfaces on both sides miss each other, each drawn on from its first and
+    /// third column.
     fn step_along(&self, at: [usize; 2], [dx, dy]: [i32; 2]) -> f32 {
         let side = |sign: i32| {
             let beside = |n: i32| self.ground_beside(at, [sign * n * dx, sign * n * dy]);
@@ -240,7 +304,8 @@ fn offset(at: [usize; 2], center: [usize; 2], axis: usize) -> i32 {
     of(at) - of(center)
 }
 
-/// The upward surfaces of a column, from below: the heights of cells with some, m. What lies on either side of a cell's border is one surface.
+/// The upward surfaces of a column, from below: the heights of cells with some, m. What lies on
+/// either side of a cell's border is one surface.
 fn surfaces([x, y]: [usize; 2], cell_m: f32, cells: &Cells<'_>) -> impl Iterator<Item = f32> {
     let column = cells.column(x, y);
     let read = move |z: usize| -> Option<(u32, i32)> {
@@ -274,12 +339,26 @@ fn surfaces([x, y]: [usize; 2], cell_m: f32, cells: &Cells<'_>) -> impl Iterator
     })
 }
 
-/// Height above ground of the lowest cell that is occupied and hangs over it as a whole; 0 where none does.
-fn clearance(config: &PlanningConfig, cell_m: f32, [x, y]: [usize; 2], ground_m: f32, cells: &Cells<'_>) -> f32 {
+/// Height above ground of the lowest cell that is occupied and hangs over it as a whole; 0 where
+/// none does.
+fn clearance(
+    config: &PlanningConfig,
+    cell_m: f32,
+    [x, y]: [usize; 2],
+    ground_m: f32,
+    cells: &Cells<'_>,
+) -> f32 {
     let (column, floor_m) = (cells.column(x, y), cells.origin[2] as f32 * cell_m);
     let from = max_f32(config.low_m, cell_m);
-    let above = (0..cells.size[2]).map(|z| (z, floor_m + z as f32 * cell_m - ground_m)).filter(|(_, above_m)| *above_m >= from);
-    let is_occupied = |z: usize| cells.bits.get(column + cells.level(z)).is_some_and(|bits| CellState::of(*bits) == CellState::Occupied);
+    let above = (0..cells.size[2])
+        .map(|z| (z, floor_m + z as f32 * cell_m - ground_m))
+        .filter(|(_, above_m)| *above_m >= from);
+    let is_occupied = |z: usize| {
+        cells
+            .bits
+            .get(column + cells.level(z))
+            .is_some_and(|bits| CellState::of(*bits) == CellState::Occupied)
+    };
     above.into_iter().find(|(z, _)| is_occupied(*z)).map_or(0.0, |(_, above_m)| above_m)
 }
 
@@ -306,15 +385,24 @@ impl Fit {
         (self.xz, self.yz, self.zz) = (self.xz + x * z, self.yz + y * z, self.zz + z * z);
     }
 
-    /// The plane's gradient and the root mean square distance from it; `None` where the points lie too close to a line.
+    /// The plane's gradient and the root mean square distance from it; `None` where the points lie
+    /// too close to a line.
     fn solve(&self) -> Option<([f32; 2], f32)> {
         if self.count < FIT_MIN {
             return None;
         }
         let n = self.count as f32;
         let central = |sum: f32, a: f32, b: f32| sum - a * b / n;
-        let (xx, xy, yy) = (central(self.xx, self.x, self.x), central(self.xy, self.x, self.y), central(self.yy, self.y, self.y));
-        let (xz, yz, zz) = (central(self.xz, self.x, self.z), central(self.yz, self.y, self.z), central(self.zz, self.z, self.z));
+        let (xx, xy, yy) = (
+            central(self.xx, self.x, self.x),
+            central(self.xy, self.x, self.y),
+            central(self.yy, self.y, self.y),
+        );
+        let (xz, yz, zz) = (
+            central(self.xz, self.x, self.z),
+            central(self.yz, self.y, self.z),
+            central(self.zz, self.z, self.z),
+        );
         let determinant = xx * yy - xy * xy;
         if determinant < n {
             return None;

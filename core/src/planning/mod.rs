@@ -1,4 +1,5 @@
-//! Maps for planners: what is free, occupied or unknown around the camera, how far the nearest obstacle is, how high ground lies.
+//! Maps for planners: what is free, occupied or unknown around the camera, how far the nearest
+//! obstacle is, how high ground lies.
 //!
 //! | part | what | source |
 //! |---|---|---|
@@ -9,14 +10,15 @@
 //! | distance fields | exact squared distances to the nearest obstacle, signed, over a slice and over the window | Maurer et al. 2003 |
 //! | ways | how far a ray or a robot's path is free | the map |
 //!
-//! Free space is marked in every frame that is fused ([`Planning::observe`]); all else is read from the map on request
-//! ([`Planning::update`]), so a mapper whose planner asks at 5 Hz pays for 5 Hz. The window moves with the camera by whole cells, and
-//! what leaves it is forgotten.
+//! Free space is marked in every frame that is fused ([`Planning::observe`]); all else is read from
+//! the map on request ([`Planning::update`]), so a mapper whose planner asks at 5 Hz pays for 5 Hz.
+//! The window moves with the camera by whole cells, and what leaves it is forgotten.
 //!
-//! Memory: nothing where [`Capacity::planning_width`] or another side is 0. Else 2 bytes for every third pixel, 6 bytes a cell, 42 bytes a column and 16 for the longest side,
-//! and with [`Capacity::planning_distance_3d`] 9 bytes a cell and 16 for the longest side more; 56 bytes a track.
-//! Time: linear in cells, columns and blocks; see docs/measurements.md. What can go wrong: nothing; a window without ground, free space or
-//! obstacles says so.
+//! Memory: nothing where [`Capacity::planning_width`] or another side is 0. Else 2 bytes for every
+//! third pixel, 6 bytes a cell, 42 bytes a column and 16 for the longest side, and with
+//! [`Capacity::planning_distance_3d`] 9 bytes a cell and 16 for the longest side more; 56 bytes a
+//! track. Time: linear in cells, columns and blocks; see docs/measurements.md. What can go wrong:
+//! nothing; a window without ground, free space or obstacles says so.
 
 mod boxes;
 mod cells;
@@ -121,15 +123,30 @@ impl<'s> Planning<'s> {
     }
 
     /// Allocates an empty window for a map with voxels of that size.
-    pub fn new_in(capacity: &Capacity, config: &PlanningConfig, voxel_size_m: f32, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(
+        capacity: &Capacity,
+        config: &PlanningConfig,
+        voxel_size_m: f32,
+        carver: &mut Carver<'s>,
+    ) -> Self {
         if Self::bytes(capacity) == 0 {
             // Nothing is allocated, and no region named.
-            return Self::alloc(&Capacity { tracks: 0, ..*capacity }, config, voxel_size_m, &mut Carver::without_slab());
+            return Self::alloc(
+                &Capacity { tracks: 0, ..*capacity },
+                config,
+                voxel_size_m,
+                &mut Carver::without_slab(),
+            );
         }
         carver.group("planning", |carver| Self::alloc(capacity, config, voxel_size_m, carver))
     }
 
-    fn alloc(capacity: &Capacity, config: &PlanningConfig, voxel_size_m: f32, carver: &mut Carver<'s>) -> Self {
+    fn alloc(
+        capacity: &Capacity,
+        config: &PlanningConfig,
+        voxel_size_m: f32,
+        carver: &mut Carver<'s>,
+    ) -> Self {
         let [width, length, height] = Cells::sides(capacity);
         let columns = width * length;
         let cells = if capacity.planning_distance_3d { columns * height } else { 0 };
@@ -157,28 +174,36 @@ impl<'s> Planning<'s> {
         self.cells.observed_at.is_empty()
     }
 
-    /// Moves the window to the camera and marks what a frame sees through. Nothing without a window, or where the pose lies beyond 2^24 cells.
+    /// Moves the window to the camera and marks what a frame sees through. Nothing without a
+    /// window, or where the pose lies beyond 2^24 cells.
     pub fn observe(&mut self, sight: &Sight<'_>) {
         let camera = self.grid.of_camera(sight.t_world_camera).1;
         let Some(cell) = self.grid.cell_at(camera).filter(|_| !self.is_empty()) else { return };
         let [width, length, _] = self.cells.size;
         let below = libm::floor(f64::from(self.config.below_m) / self.grid.cell_m()) as i32;
         self.cells.advance();
-        self.cells.move_to([cell[0] - width as i32 / 2, cell[1] - length as i32 / 2, cell[2] - below]);
+        self.cells.move_to([
+            cell[0] - width as i32 / 2,
+            cell[1] - length as i32 / 2,
+            cell[2] - below,
+        ]);
         self.camera = [width / 2, length / 2];
         self.level_ground(sight);
         self.pyramid.build(sight.disparity_q8);
         free_space::mark(&self.config, &self.grid, sight, &self.pyramid, &mut self.cells);
     }
 
-    /// Finds the plane that ground is expected in: what the disparity image shows, or the camera's height where that is configured. A frame that
-    /// shows no ground leaves the plane where it was.
+    /// Finds the plane that ground is expected in: what the disparity image shows, or the camera's
+    /// height where that is configured. A frame that shows no ground leaves the plane where it was.
     fn level_ground(&mut self, sight: &Sight<'_>) {
         let height_m = f64::from(self.config.camera_height_m);
-        let shown = if height_m > 0.0 { None } else { GroundPlane::of(sight.rig, sight.disparity_q8) };
+        let shown =
+            if height_m > 0.0 { None } else { GroundPlane::of(sight.rig, sight.disparity_q8) };
         let cell_m = self.grid.cell_m();
         // The grid coordinates of a point of the camera's frame, m.
-        let in_grid = |point: [f64; 3]| self.grid.of_world(sight.t_world_camera.transform_point(point)).map(|c| c * cell_m);
+        let in_grid = |point: [f64; 3]| {
+            self.grid.of_world(sight.t_world_camera.transform_point(point)).map(|c| c * cell_m)
+        };
         let Some(plane) = shown else {
             if height_m > 0.0 {
                 let camera = in_grid([0.0; 3]);
@@ -186,26 +211,34 @@ impl<'s> Planning<'s> {
             }
             return;
         };
-        // Ground below the camera, and ten metres ahead and to the right of there: its plane holds y for x and z.
+        // Ground below the camera, and ten metres ahead and to the right of there: its plane holds
+        // y for x and z.
         let ground = |x: f64, z: f64| in_grid([x, plane.above_m([x, 0.0, z]), z]);
         let (below, ahead, right) = (ground(0.0, 0.0), ground(0.0, 10.0), ground(10.0, 0.0));
-        let [a, b] = [ahead, right].map(|to| [to[0] - below[0], to[1] - below[1], to[2] - below[2]]);
+        let [a, b] =
+            [ahead, right].map(|to| [to[0] - below[0], to[1] - below[1], to[2] - below[2]]);
         let determinant = a[0] * b[1] - a[1] * b[0];
         if libm::fabs(determinant) > 1.0 {
-            let slope = [(a[2] * b[1] - b[2] * a[1]) / determinant, (a[0] * b[2] - b[0] * a[2]) / determinant];
+            let slope = [
+                (a[2] * b[1] - b[2] * a[1]) / determinant,
+                (a[0] * b[2] - b[0] * a[2]) / determinant,
+            ];
             let camera = in_grid([0.0; 3]);
-            let height_m = below[2] + slope[0] * (camera[0] - below[0]) + slope[1] * (camera[1] - below[1]);
+            let height_m =
+                below[2] + slope[0] * (camera[0] - below[0]) + slope[1] * (camera[1] - below[1]);
             self.level = Level { height_m: height_m as f32, slope: slope.map(|c| c as f32) };
         }
     }
 
-    /// Reads the map into the window, finds the ground, and forgets the moving objects of the last update.
+    /// Reads the map into the window, finds the ground, and forgets the moving objects of the last
+    /// update.
     pub(crate) fn read(&mut self, volume: &Volume<'_>) {
         surface::read(volume, &self.grid, self.config.min_weight, &mut self.cells);
         self.box_count = 0;
     }
 
-    /// Adds the surface of an object that stands still: a map of its own, with its frame in the world.
+    /// Adds the surface of an object that stands still: a map of its own, with its frame in the
+    /// world.
     pub(crate) fn add_static(&mut self, volume: &Volume<'_>, t_world_object: &Transform) {
         let voxel_m = f64::from(volume.config().voxel_size_m);
         let Self { grid, cells, config, .. } = self;
@@ -213,7 +246,9 @@ impl<'s> Planning<'s> {
             let Some(coord) = volume.blocks().coord(slot) else { continue };
             crossings(volume, slot, coord, config.min_weight, |crossing| {
                 let point = t_world_object.transform_point(crossing.point_m(voxel_m));
-                let position = grid.cell_at(grid.of_world(point)).and_then(|cell| cells.position(cells.local(cell)?));
+                let position = grid
+                    .cell_at(grid.of_world(point))
+                    .and_then(|cell| cells.position(cells.local(cell)?));
                 if let Some(bits) = position.and_then(|at| cells.bits.get_mut(at)) {
                     *bits |= OCCUPIED;
                 }
@@ -229,14 +264,16 @@ impl<'s> Planning<'s> {
         true
     }
 
-    /// Finds the ground and makes the slice and the distance fields, with moving objects where they will be `ahead_s` seconds after the last frame.
+    /// Finds the ground and makes the slice and the distance fields, with moving objects where they
+    /// will be `ahead_s` seconds after the last frame.
     pub(crate) fn finish(&mut self, ahead_s: f32) -> PlanningReport {
         let cell_m = self.grid.cell_m() as f32;
         self.ground.find(&self.config, cell_m, self.level, self.camera, &self.cells);
         self.predict(ahead_s)
     }
 
-    /// Makes the whole of it from a map alone, without objects: as [`crate::Mapper::plan`] does with them.
+    /// Makes the whole of it from a map alone, without objects: as [`crate::Mapper::plan`] does
+    /// with them.
     pub fn update(&mut self, volume: &Volume<'_>) -> PlanningReport {
         self.read(volume);
         self.finish(0.0)
@@ -273,15 +310,26 @@ impl<'s> Planning<'s> {
         *camera = [cells.size[0] / 2, cells.size[1] / 2];
     }
 
-    /// Digest of the window, the ground and the distance fields, as they stand after the last update: the same on every machine.
+    /// Digest of the window, the ground and the distance fields, as they stand after the last
+    /// update: the same on every machine.
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         self.cells.origin.iter().for_each(|c| digest.u64(*c as u64));
         self.cells.observed_at.iter().for_each(|stamp| digest.u64(u64::from(*stamp)));
         digest.bytes(self.cells.bits);
         for column in self.ground.columns() {
-            let values = [column.height_m, column.reference_m, column.slope[0], column.slope[1], column.roughness_m, column.step_m];
-            values.iter().chain([&column.clearance_m]).for_each(|value| digest.u64(u64::from(value.to_bits())));
+            let values = [
+                column.height_m,
+                column.reference_m,
+                column.slope[0],
+                column.slope[1],
+                column.roughness_m,
+                column.step_m,
+            ];
+            values
+                .iter()
+                .chain([&column.clearance_m])
+                .for_each(|value| digest.u64(u64::from(value.to_bits())));
         }
         digest.bytes(self.slice);
         self.slice_distance.digest(&mut digest);

@@ -1,7 +1,9 @@
-//! The greatest disparity of rectangles of an image: a pyramid of maxima (Williams: *Pyramidal Parametrics*, 1983, with maxima for means).
+//! The greatest disparity of rectangles of an image: a pyramid of maxima (Williams: *Pyramidal
+//! Parametrics*, 1983, with maxima for means).
 //!
-//! Level n holds the maximum of 2^n x 2^n pixels. A rectangle is covered by at most 3 x 3 texels of the level whose texels are about half as large, so
-//! what is read reaches beyond it by at most half its side: more is looked at, never less.
+//! Level n holds the maximum of 2^n x 2^n pixels. A rectangle is covered by at most 3 x 3 texels of
+//! the level whose texels are about half as large, so what is read reaches beyond it by at most
+//! half its side: more is looked at, never less.
 //!
 //! Memory: 2 bytes for every third pixel. Time: linear in pixels.
 
@@ -36,7 +38,8 @@ impl<'s> Pyramid<'s> {
 
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            texels: carver.alloc("planning.pyramid", texels(capacity.image_width, capacity.image_height)),
+            texels: carver
+                .alloc("planning.pyramid", texels(capacity.image_width, capacity.image_height)),
         }
     }
 
@@ -47,7 +50,11 @@ impl<'s> Pyramid<'s> {
         let mut below: Option<&[u16]> = None;
         for _ in 0..LEVELS {
             let (columns, rows) = (width.div_ceil(2), height.div_ceil(2));
-            let Some((level, further)) = core::mem::take(&mut rest).split_at_mut_checked(columns * rows) else { return };
+            let Some((level, further)) =
+                core::mem::take(&mut rest).split_at_mut_checked(columns * rows)
+            else {
+                return;
+            };
             let at = |u: usize, v: usize| match below {
                 None => image.get(u, v).unwrap_or(0),
                 Some(below) if u < width => below.get(v * width + u).copied().unwrap_or(0),
@@ -61,7 +68,8 @@ impl<'s> Pyramid<'s> {
         }
     }
 
-    /// The greatest value of the image from column `u[0]` to `u[1]` and row `v[0]` to `v[1]`, both included and in the image, and of less than half as much around.
+    /// The greatest value of the image from column `u[0]` to `u[1]` and row `v[0]` to `v[1]`, both
+    /// included and in the image, and of less than half as much around.
     pub fn greatest(&self, image: View<'_, u16>, u: [usize; 2], v: [usize; 2]) -> u16 {
         let side = (u[1] - u[0]).max(v[1] - v[0]) + 1;
         // The largest level whose texels are at most half a side.
@@ -71,7 +79,11 @@ impl<'s> Pyramid<'s> {
         let mut greatest = 0;
         for row in v[0] >> level..=v[1] >> level {
             for column in u[0] >> level..=u[1] >> level {
-                let texel = if level == 0 { image.get(column, row) } else { self.texels.get(first + row * width + column).copied() };
+                let texel = if level == 0 {
+                    image.get(column, row)
+                } else {
+                    self.texels.get(first + row * width + column).copied()
+                };
                 greatest = greatest.max(texel.unwrap_or(0));
             }
         }
@@ -95,15 +107,22 @@ mod tests {
         let (width, height) = (101, 57);
         let capacity = Capacity { image_width: 128, image_height: 64, ..Capacity::TINY };
         let mut slab = vec![0u8; Pyramid::bytes(&capacity) + SLAB_ALIGN];
-        let mut pyramid = Pyramid::new_in(&capacity, &mut Carver::new(&mut slab, Pyramid::bytes(&capacity)).unwrap());
+        let mut pyramid = Pyramid::new_in(
+            &capacity,
+            &mut Carver::new(&mut slab, Pyramid::bytes(&capacity)).unwrap(),
+        );
         let mut random = Random::new(3);
-        let pixels: Vec<u16> = (0..width * height).map(|_| if random.below(40) == 0 { random.below(9_000) as u16 } else { 0 }).collect();
+        let pixels: Vec<u16> = (0..width * height)
+            .map(|_| if random.below(40) == 0 { random.below(9_000) as u16 } else { 0 })
+            .collect();
         let pixels = &pixels[..];
         let image = View::new(pixels, width, height).unwrap();
         pyramid.build(image);
         let within = |u: [usize; 2], v: [usize; 2]| {
             (v[0]..=v[1].min(height - 1))
-                .flat_map(|row| (u[0]..=u[1].min(width - 1)).map(move |column| pixels[row * width + column]))
+                .flat_map(|row| {
+                    (u[0]..=u[1].min(width - 1)).map(move |column| pixels[row * width + column])
+                })
                 .max()
                 .unwrap()
         };

@@ -1,7 +1,8 @@
-//! Questions to the map itself, for which no window need be read: how far a ray is free, and whether a robot fits along a path.
+//! Questions to the map itself, for which no window need be read: how far a ray is free, and
+//! whether a robot fits along a path.
 //!
-//! Free space far from surfaces is not in the map, whose blocks lie around surfaces alone: there the window's cells are asked, and outside the
-//! window what the map has not seen is unknown.
+//! Free space far from surfaces is not in the map, whose blocks lie around surfaces alone: there
+//! the window's cells are asked, and outside the window what the map has not seen is unknown.
 
 use super::{
     cells::{CellState, Cells, is_ghost},
@@ -46,17 +47,29 @@ pub struct Sweep {
     pub unknown_ends: bool,
 }
 
-/// Follows a ray from a point of the world in a direction of any length, at most `far_m`, to the first surface or unknown place.
+/// Follows a ray from a point of the world in a direction of any length, at most `far_m`, to the
+/// first surface or unknown place.
 ///
-/// The surface is where the distance of the nearest lattice points falls to 0 or below, looked at every half voxel: the map keeps at least
-/// two voxels behind each surface, so none is stepped over. Time: linear in `far_m`.
-pub(super) fn ray(volume: &Volume<'_>, grid: &Grid, cells: &Cells<'_>, origin_m: [f64; 3], direction: [f64; 3], far_m: f64) -> Way {
+/// The surface is where the distance of the nearest lattice points falls to 0 or below, looked at
+/// every half voxel: the map keeps at least two voxels behind each surface, so none is stepped
+/// over. Time: linear in `far_m`.
+pub(super) fn ray(
+    volume: &Volume<'_>,
+    grid: &Grid,
+    cells: &Cells<'_>,
+    origin_m: [f64; 3],
+    direction: [f64; 3],
+    far_m: f64,
+) -> Way {
     let length = libm::sqrt(direction.iter().map(|c| c * c).sum::<f64>());
     let voxel_m = f64::from(volume.config().voxel_size_m);
     let step_m = 0.5 * voxel_m;
     let steps = far_m / step_m;
     // False for NaN as well.
-    let is_usable = length > 0.0 && length.is_finite() && origin_m.iter().all(|c| c.is_finite()) && (0.0..1e7).contains(&steps);
+    let is_usable = length > 0.0
+        && length.is_finite()
+        && origin_m.iter().all(|c| c.is_finite())
+        && (0.0..1e7).contains(&steps);
     if !is_usable {
         return Way { end: WayEnd::Unknown, free_m: 0.0 };
     }
@@ -72,7 +85,10 @@ pub(super) fn ray(volume: &Volume<'_>, grid: &Grid, cells: &Cells<'_>, origin_m:
             Some(voxel) if voxel.sdf <= 0 && !bits_at(grid, cells, point).is_some_and(is_ghost) => {
                 let now = f64::from(voxel.sdf);
                 let back = before.map_or(0.0, |before| now / (now - before) * step_m);
-                return Way { end: WayEnd::Surface, free_m: if back < at_m { at_m - back } else { 0.0 } };
+                return Way {
+                    end: WayEnd::Surface,
+                    free_m: if back < at_m { at_m - back } else { 0.0 },
+                };
             }
             Some(voxel) => {
                 before = (voxel.sdf > 0).then(|| f64::from(voxel.sdf));
@@ -100,13 +116,27 @@ fn bits_at(grid: &Grid, cells: &Cells<'_>, point_m: [f64; 3]) -> Option<u8> {
 
 /// How far a robot may follow a polyline, its points in world coordinates on the ground.
 ///
-/// Every surface point within `radius_m` of the path and between the heights is found by the edges of the map that it crosses, so the
-/// answer is as fine as the map, not as the window's cells; the first place is where the robot's rim touches it. Unknown cells of the window
-/// are looked up at the path's middle, every half cell. Time: linear in the map's blocks, and in the surface near the path times its points.
-pub(super) fn sweep(volume: &Volume<'_>, grid: &Grid, cells: &Cells<'_>, min_weight: u8, path_m: &[[f64; 3]], robot: &Sweep) -> Way {
+/// Every surface point within `radius_m` of the path and between the heights is found by the edges
+/// of the map that it crosses, so the answer is as fine as the map, not as the window's cells; the
+/// first place is where the robot's rim touches it. Unknown cells of the window are looked up at
+/// the path's middle, every half cell. Time: linear in the map's blocks, and in the surface near
+/// the path times its points.
+pub(super) fn sweep(
+    volume: &Volume<'_>,
+    grid: &Grid,
+    cells: &Cells<'_>,
+    min_weight: u8,
+    path_m: &[[f64; 3]],
+    robot: &Sweep,
+) -> Way {
     let cell_m = grid.cell_m();
     let to_grid_m = |point: [f64; 3]| grid.of_world(point).map(|c| c * cell_m);
-    let legs = || path_m.iter().zip(path_m.iter().skip(1)).map(move |(from, to)| Leg::new(to_grid_m(*from), to_grid_m(*to)));
+    let legs = || {
+        path_m
+            .iter()
+            .zip(path_m.iter().skip(1))
+            .map(move |(from, to)| Leg::new(to_grid_m(*from), to_grid_m(*to)))
+    };
     let whole_m = legs().map(|leg| leg.length_m).sum::<f64>();
     if !whole_m.is_finite() {
         return Way { end: WayEnd::Unknown, free_m: 0.0 };
@@ -142,7 +172,10 @@ pub(super) fn sweep(volume: &Volume<'_>, grid: &Grid, cells: &Cells<'_>, min_wei
     if robot.unknown_ends {
         let mut start_m = 0.0;
         for leg in legs() {
-            if let Some(at_m) = leg.first_unknown(grid, cells, robot, way.free_m - start_m).map(|at_m| start_m + at_m) {
+            if let Some(at_m) = leg
+                .first_unknown(grid, cells, robot, way.free_m - start_m)
+                .map(|at_m| start_m + at_m)
+            {
                 return Way { end: WayEnd::Unknown, free_m: at_m };
             }
             start_m += leg.length_m;
@@ -199,7 +232,13 @@ impl Leg {
     }
 
     /// The first place on the leg, before `until_m`, that was never seen.
-    fn first_unknown(&self, grid: &Grid, cells: &Cells<'_>, robot: &Sweep, until_m: f64) -> Option<f64> {
+    fn first_unknown(
+        &self,
+        grid: &Grid,
+        cells: &Cells<'_>,
+        robot: &Sweep,
+        until_m: f64,
+    ) -> Option<f64> {
         let cell_m = grid.cell_m();
         let until_m = if until_m < self.length_m { until_m } else { self.length_m };
         let middle = 0.5 * (robot.low_m + robot.high_m);
@@ -208,10 +247,17 @@ impl Leg {
             return None;
         }
         (0..=steps as u32).map(|n| f64::from(n) * 0.5 * cell_m).find(|&at_m| {
-            let point =
-                [self.from[0] + self.along[0] * at_m, self.from[1] + self.along[1] * at_m, self.from[2] + self.rise * at_m + middle];
-            let position = grid.cell_at(point.map(|c| c / cell_m)).and_then(|cell| cells.position(cells.local(cell)?));
-            position.and_then(|at| cells.bits.get(at)).is_none_or(|bits| CellState::of(*bits) == CellState::Unknown)
+            let point = [
+                self.from[0] + self.along[0] * at_m,
+                self.from[1] + self.along[1] * at_m,
+                self.from[2] + self.rise * at_m + middle,
+            ];
+            let position = grid
+                .cell_at(point.map(|c| c / cell_m))
+                .and_then(|cell| cells.position(cells.local(cell)?));
+            position
+                .and_then(|at| cells.bits.get(at))
+                .is_none_or(|bits| CellState::of(*bits) == CellState::Unknown)
         })
     }
 }

@@ -8,22 +8,32 @@ use super::{
 
 /// Reduces the window to one state per column, x fastest: `states` is as long as there are columns.
 ///
-/// A column is occupied where a cell between the limits is, or where the ground steps by more
-/// than `climb_m` or is steeper than `slope_max`. It is free where none is and at
-/// least one of these cells was seen free, or where its ground was seen and the cells were not looked into. Else it is unknown.
-pub(super) fn reduce(config: &PlanningConfig, cell_m: f32, cells: &Cells<'_>, ground: &Ground<'_>, states: &mut [u8]) {
+/// A column is occupied where a cell between the limits is, or where the ground steps by more than
+/// `climb_m` or is steeper than `slope_max`. It is free where none is and at least one of these
+/// cells was seen free, or where its ground was seen and the cells were not looked into. Else it is
+/// unknown.
+pub(super) fn reduce(
+    config: &PlanningConfig,
+    cell_m: f32,
+    cells: &Cells<'_>,
+    ground: &Ground<'_>,
+    states: &mut [u8],
+) {
     let [width, length, height] = cells.size;
     let floor_m = cells.origin[2] as f32 * cell_m;
     for y in 0..length {
         for x in 0..width {
             let column = ground.get(x, y);
             let level_m = if config.level { ground.level_m() } else { column.reference_m };
-            // The first cell that lies above the lower limit as a whole, and the last that begins below the upper one.
+            // The first cell that lies above the lower limit as a whole, and the last that begins
+            // below the upper one.
             let from = ceil_cell(level_m + config.low_m - floor_m, cell_m);
             let to = ceil_cell(level_m + config.high_m - floor_m, cell_m);
             let [from, to] = [from, to].map(|at| usize::try_from(at).unwrap_or(0).min(height));
             let first = cells.column(x, y);
-            let states_above = (from..to).map(|z| CellState::of(cells.bits.get(first + cells.level(z)).copied().unwrap_or_default()));
+            let states_above = (from..to).map(|z| {
+                CellState::of(cells.bits.get(first + cells.level(z)).copied().unwrap_or_default())
+            });
             let (mut free, mut occupied) = (false, false);
             for state in states_above {
                 free |= state == CellState::Free;

@@ -1,12 +1,15 @@
 //! The map's surface in the window's cells.
 //!
-//! A cell is occupied where the surface runs through it: where two neighbouring lattice points, both observed often enough, lie on either side, the
-//! point of the edge between them where the distance is 0 if it runs straight marks the cell that holds it. So nothing thin is lost, no matter how
-//! large cells are: every edge is looked at, not a sample per cell. Edges along the lattice axis nearest to up that leave the surface upwards also
-//! tell how high ground lies in the cell.
+//! A cell is occupied where the surface runs through it: where two neighbouring lattice points,
+//! both observed often enough, lie on either side, the point of the edge between them where the
+//! distance is 0 if it runs straight marks the cell that holds it. So nothing thin is lost, no
+//! matter how large cells are: every edge is looked at, not a sample per cell. Edges along the
+//! lattice axis nearest to up that leave the surface upwards also tell how high ground lies in the
+//! cell.
 //!
-//! Memory: none but the cells'. Time: linear in the map's blocks; those outside the window cost a comparison. Order: blocks by slot, edges by
-//! axis, z, y, x; all that is written are sums and bits, so the order does not matter.
+//! Memory: none but the cells'. Time: linear in the map's blocks; those outside the window cost a
+//! comparison. Order: blocks by slot, edges by axis, z, y, x; all that is written are sums and
+//! bits, so the order does not matter.
 
 use super::{
     cells::{Cells, OBJECT, OCCUPIED},
@@ -49,8 +52,15 @@ impl Crossing {
     }
 }
 
-/// Hands every edge of a block that the surface crosses to `visit`: those that begin at its lattice points.
-pub(crate) fn crossings(volume: &Volume<'_>, slot: Slot, coord: BlockCoord, min_weight: u8, mut visit: impl FnMut(Crossing)) {
+/// Hands every edge of a block that the surface crosses to `visit`: those that begin at its lattice
+/// points.
+pub(crate) fn crossings(
+    volume: &Volume<'_>,
+    slot: Slot,
+    coord: BlockCoord,
+    min_weight: u8,
+    mut visit: impl FnMut(Crossing),
+) {
     let blocks = volume.blocks();
     let (Some(sdf), Some(weight)) = (blocks.sdf(slot), blocks.weight(slot)) else { return };
     let [before, behind] = signs_of_block(sdf, weight, min_weight);
@@ -65,7 +75,8 @@ pub(crate) fn crossings(volume: &Volume<'_>, slot: Slot, coord: BlockCoord, min_
         }
         let next = coord.offset(offset).and_then(|coord| volume.find(coord));
         let next = next.and_then(|slot| Some((blocks.sdf(slot)?, blocks.weight(slot)?)));
-        let [next_before, next_behind] = next.map_or([[0; BLOCK_SIDE]; 2], |(sdf, weight)| signs_of_block(sdf, weight, min_weight));
+        let [next_before, next_behind] = next
+            .map_or([[0; BLOCK_SIDE]; 2], |(sdf, weight)| signs_of_block(sdf, weight, min_weight));
         let after = |words: &[u64; BLOCK_SIDE], next: &[u64; BLOCK_SIDE], z: usize| {
             let word = words.get(z).copied().unwrap_or_default();
             let beside = next.get(z).copied().unwrap_or_default();
@@ -90,7 +101,11 @@ pub(crate) fn crossings(volume: &Volume<'_>, slot: Slot, coord: BlockCoord, min_
                 });
                 let upper = if wraps { next.map(|(sdf, _)| sdf) } else { Some(sdf) };
                 let voxel = |[x, y, z]: [usize; 3]| x + BLOCK_SIDE * (y + BLOCK_SIDE * z);
-                let (Some(&low), Some(&high)) = (sdf.get(voxel(local)), upper.and_then(|sdf| sdf.get(voxel(end)))) else { continue };
+                let (Some(&low), Some(&high)) =
+                    (sdf.get(voxel(local)), upper.and_then(|sdf| sdf.get(voxel(end))))
+                else {
+                    continue;
+                };
                 let (low, high) = (i32::from(low), i32::from(high));
                 let mut point = origin;
                 point.iter_mut().zip(local).for_each(|(point, local)| *point += local as i32);
@@ -117,7 +132,9 @@ impl Window<'_> {
     #[inline]
     fn of_map(&self, point_q8: [i64; 3]) -> [i64; 3] {
         let mut to = self.grid.turn_q14.map(|[a, b, c]| {
-            let sum = i64::from(a) * point_q8[0] + i64::from(b) * point_q8[1] + i64::from(c) * point_q8[2];
+            let sum = i64::from(a) * point_q8[0]
+                + i64::from(b) * point_q8[1]
+                + i64::from(c) * point_q8[2];
             sum >> 8
         });
         to.iter_mut().zip(self.origin).for_each(|(to, origin)| *to -= origin);
@@ -126,10 +143,14 @@ impl Window<'_> {
 
     /// Whether a block may reach into the window.
     fn meets(&self, coord: BlockCoord, size: [usize; 3]) -> bool {
-        let center = coord.origin().map(|c| (i64::from(c) + BLOCK_SIDE as i64 / 2) * i64::from(STEP_ONE));
+        let center =
+            coord.origin().map(|c| (i64::from(c) + BLOCK_SIDE as i64 / 2) * i64::from(STEP_ONE));
         // Half a block's diagonal, and a step for edges that end in the next block.
         let reach = (BLOCK_SIDE as i64 + 1) << TURN_BITS;
-        self.of_map(center).into_iter().zip(size).all(|(at, size)| at >= -reach && at < size as i64 * self.cell + reach)
+        self.of_map(center)
+            .into_iter()
+            .zip(size)
+            .all(|(at, size)| at >= -reach && at < size as i64 * self.cell + reach)
     }
 }
 
@@ -141,7 +162,8 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
     let cell = i64::from(grid.cell_voxels) << TURN_BITS;
     let [.., up] = grid.turn_q14;
     let steepest = |&(_, along): &(usize, i32)| along.unsigned_abs();
-    let (up_axis, up_along) = up.into_iter().enumerate().rev().max_by_key(steepest).unwrap_or_default();
+    let (up_axis, up_along) =
+        up.into_iter().enumerate().rev().max_by_key(steepest).unwrap_or_default();
     let window = Window {
         grid,
         origin: cells.origin.map(|origin| i64::from(origin) * cell),
@@ -152,8 +174,12 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
     };
     let mut points = 0u32;
     for slot in volume.pool().live() {
-        if let Some(coord) = volume.blocks().coord(slot).filter(|&coord| window.meets(coord, cells.size)) {
-            crossings(volume, slot, coord, window.min_weight, |crossing| points += u32::from(mark(&window, &crossing, cells)));
+        if let Some(coord) =
+            volume.blocks().coord(slot).filter(|&coord| window.meets(coord, cells.size))
+        {
+            crossings(volume, slot, coord, window.min_weight, |crossing| {
+                points += u32::from(mark(&window, &crossing, cells))
+            });
         }
     }
     points
@@ -169,8 +195,10 @@ fn mark(window: &Window<'_>, crossing: &Crossing, cells: &mut Cells<'_>) -> bool
     let mut local = [0; 3];
     for ((local, size), at) in local.iter_mut().zip(cells.size).zip(at) {
         // Window sides are at most 2^10 cells of 2^4 voxels: 2^28 units.
-        let Some(index) =
-            u32::try_from(at).ok().and_then(|at| Some(at.checked_div(window.cell as u32)? as usize)).filter(|&index| index < size)
+        let Some(index) = u32::try_from(at)
+            .ok()
+            .and_then(|at| Some(at.checked_div(window.cell as u32)? as usize))
+            .filter(|&index| index < size)
         else {
             return false;
         };
@@ -182,8 +210,10 @@ fn mark(window: &Window<'_>, crossing: &Crossing, cells: &mut Cells<'_>) -> bool
     }
     if crossing.axis == window.up_axis && crossing.leaves_upwards == window.up_is_positive {
         let above = (at[2] - local[2] as i64 * window.cell) as i32;
-        let share = (i64::from(above) * i64::from(SIDE_ONE)).checked_div(window.cell).unwrap_or(0) as u16;
-        if let (Some(count), Some(sum)) = (cells.count.get_mut(position), cells.sum.get_mut(position))
+        let share =
+            (i64::from(above) * i64::from(SIDE_ONE)).checked_div(window.cell).unwrap_or(0) as u16;
+        if let (Some(count), Some(sum)) =
+            (cells.count.get_mut(position), cells.sum.get_mut(position))
             && *count < u8::MAX
         {
             (*count, *sum) = (*count + 1, *sum + share);

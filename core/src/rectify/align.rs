@@ -1,15 +1,18 @@
 //! Turning both cameras of a raw rig so that their rows agree.
 //!
-//! Bouguet's way (described by Bradski and Kaehler, *Learning OpenCV*, 2008, chapter 12): each camera turns by half of the rotation
-//! between them, then both turn alike so that the line between them becomes their x axis. Each picture bends as little as the other.
+//! Bouguet's way (described by Bradski and Kaehler, *Learning OpenCV*, 2008, chapter 12): each
+//! camera turns by half of the rotation between them, then both turn alike so that the line between
+//! them becomes their x axis. Each picture bends as little as the other.
 
 use super::Lens;
 use core::fmt;
 use nalgebra::{Matrix3, Vector3};
 
-/// Largest angle between the optical axes of two cameras that are worth rectifying, rad: 60 degrees.
+/// Largest angle between the optical axes of two cameras that are worth rectifying, rad: 60
+/// degrees.
 pub const WIDEST_ANGLE_RAD: f64 = 1.047_197_551_196_597_6;
-/// Largest entry of `R R' - 1` of what counts as a rotation: calibration files have six or seven digits.
+/// Largest entry of `R R' - 1` of what counts as a rotation: calibration files have six or seven
+/// digits.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// A camera as it is: its lens and the size of its images.
@@ -36,7 +39,8 @@ pub struct RawRig {
     pub t_right_left_m: Vector3<f64>,
 }
 
-/// Rotations that rectify a pair, raw camera coordinates to rectified ones, and the distance of the cameras.
+/// Rotations that rectify a pair, raw camera coordinates to rectified ones, and the distance of the
+/// cameras.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
     /// Rotation of the left camera.
@@ -87,7 +91,8 @@ impl fmt::Display for RectifyProblem {
 
 impl core::error::Error for RectifyProblem {}
 
-/// The nearest matrix with exactly orthogonal columns (one step of Newton's iteration for the polar factor).
+/// The nearest matrix with exactly orthogonal columns (one step of Newton's iteration for the polar
+/// factor).
 ///
 /// # Errors
 /// [`RectifyProblem::NotARotation`] when it is too far from one.
@@ -95,7 +100,11 @@ pub(super) fn rotation(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, RectifyPro
     let excess = matrix * matrix.transpose() - Matrix3::identity();
     let near = excess.iter().all(|entry| libm::fabs(*entry) <= ROTATION_TOLERANCE);
     let upright = matrix.determinant() > 0.0;
-    if near && upright { Ok(matrix - excess * matrix * 0.5) } else { Err(RectifyProblem::NotARotation) }
+    if near && upright {
+        Ok(matrix - excess * matrix * 0.5)
+    } else {
+        Err(RectifyProblem::NotARotation)
+    }
 }
 
 impl RawRig {
@@ -160,7 +169,8 @@ fn half_way(r: &Matrix3<f64>) -> Matrix3<f64> {
 fn turn_onto_x(from: &Vector3<f64>) -> Matrix3<f64> {
     // The axis is the cross product of the vector with (1, 0, 0).
     let aside = libm::sqrt(from.y * from.y + from.z * from.z);
-    let axis = if aside > 1e-300 { Vector3::new(0.0, from.z, -from.y) / aside } else { Vector3::zeros() };
+    let axis =
+        if aside > 1e-300 { Vector3::new(0.0, from.z, -from.y) / aside } else { Vector3::zeros() };
     about(&axis, aside, from.x)
 }
 

@@ -10,7 +10,8 @@ use crate::{
     part::part_mut,
 };
 
-/// Columns that move by the same: over so few, what a calibration leaves changes by a few hundredths of a pixel.
+/// Columns that move by the same: over so few, what a calibration leaves changes by a few
+/// hundredths of a pixel.
 const BLOCK: usize = 16;
 /// Parts of a row, and the shift that makes rows of them.
 const ONE_ROW: i32 = 1 << ROW_SHIFT;
@@ -29,8 +30,14 @@ impl<'s> AlignedImage<'s> {
         Self(carver.alloc("rectify.aligned", capacity.pixels()))
     }
 
-    /// Moves every pixel of the right image down by what `shift` says there; rows beyond the image are its first and last ones.
-    pub(crate) fn align<E: Executor>(&mut self, right: View<'_, u8>, shift: &RowShift, executor: &E) -> Option<View<'_, u8>> {
+    /// Moves every pixel of the right image down by what `shift` says there; rows beyond the image
+    /// are its first and last ones.
+    pub(crate) fn align<E: Executor>(
+        &mut self,
+        right: View<'_, u8>,
+        shift: &RowShift,
+        executor: &E,
+    ) -> Option<View<'_, u8>> {
         let (width, height) = (right.width(), right.height());
         let bands = Bands::of(height);
         let rows = part_mut(self.0, ..width * height);
@@ -58,11 +65,17 @@ impl Work for AlignRows<'_> {
         for (v, row) in (first..).zip(rows.chunks_exact_mut(right.width().max(1))) {
             for (block, pixels) in row.chunks_mut(BLOCK).enumerate() {
                 let u = block * BLOCK;
-                let (upper, lower, share) = source(right.height(), v, shift.at([(u + BLOCK / 2) as f32, v as f32]));
+                let (upper, lower, share) =
+                    source(right.height(), v, shift.at([(u + BLOCK / 2) as f32, v as f32]));
                 let (upper, lower) = (right.row(upper), right.row(lower));
-                let (Some(upper), Some(lower)) = (upper.get(u..u + pixels.len()), lower.get(u..u + pixels.len())) else { return };
+                let (Some(upper), Some(lower)) =
+                    (upper.get(u..u + pixels.len()), lower.get(u..u + pixels.len()))
+                else {
+                    return;
+                };
                 for (pixel, (&upper, &lower)) in pixels.iter_mut().zip(upper.iter().zip(lower)) {
-                    let sum = u16::from(upper) * (ONE_ROW as u16 - share) + u16::from(lower) * share;
+                    let sum =
+                        u16::from(upper) * (ONE_ROW as u16 - share) + u16::from(lower) * share;
                     *pixel = ((sum + ONE_ROW as u16 / 2) >> ROW_SHIFT) as u8;
                 }
             }
@@ -70,12 +83,16 @@ impl Work for AlignRows<'_> {
     }
 }
 
-/// The two rows between which row `v` comes from, and how far it lies towards the lower one, in parts of [`ONE_ROW`].
+/// The two rows between which row `v` comes from, and how far it lies towards the lower one, in
+/// parts of [`ONE_ROW`].
 #[inline(always)]
 fn source(height: usize, v: usize, shift_px: f32) -> (usize, usize, u16) {
     let last = (height as i32 - 1) << ROW_SHIFT;
     // A cast saturates, and no number becomes 0.
-    let at = ((v as i32) << ROW_SHIFT).saturating_sub((shift_px * ONE_ROW as f32) as i32).max(0).min(last);
+    let at = ((v as i32) << ROW_SHIFT)
+        .saturating_sub((shift_px * ONE_ROW as f32) as i32)
+        .max(0)
+        .min(last);
     let upper = (at >> ROW_SHIFT) as usize;
     (upper, (upper + 1).min(height - 1), (at & (ONE_ROW - 1)) as u16)
 }
@@ -91,7 +108,8 @@ mod tests {
     use std::{vec, vec::Vec};
 
     const CAPACITY: Capacity = Capacity { image_width: 70, image_height: 40, ..Capacity::TINY };
-    const RIG: StereoRig = StereoRig { focal_px: 60.0, center_u_px: 35.0, center_v_px: 20.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 60.0, center_u_px: 35.0, center_v_px: 20.0, baseline_m: 0.5 };
 
     /// An image whose grey values are four times their row, moved.
     fn moved(terms: [f64; 6]) -> Vec<u8> {
@@ -101,16 +119,26 @@ mod tests {
         let mut aligned = AlignedImage::new_in(&CAPACITY, &mut carver);
         let pixels: Vec<u8> = (0..70 * 40).map(|at| (at / 70 * 4) as u8).collect();
         let shift = RowCorrection::of_terms(terms).for_rig(&RIG);
-        aligned.align(View::new(&pixels, 70, 40).unwrap(), &shift, &Serial).unwrap().pixels().to_vec()
+        aligned
+            .align(View::new(&pixels, 70, 40).unwrap(), &shift, &Serial)
+            .unwrap()
+            .pixels()
+            .to_vec()
     }
 
     #[test]
     fn rows_move_by_parts_of_a_pixel_and_end_at_the_borders() {
         let at = |image: &[u8], u: usize, v: usize| image[v * 70 + u];
         let down = moved([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!([at(&down, 3, 0), at(&down, 3, 1), at(&down, 3, 10), at(&down, 69, 39)], [0, 0, 34, 150]);
+        assert_eq!(
+            [at(&down, 3, 0), at(&down, 3, 1), at(&down, 3, 10), at(&down, 69, 39)],
+            [0, 0, 34, 150]
+        );
         let up = moved([-1.25, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!([at(&up, 3, 0), at(&up, 3, 10), at(&up, 69, 38), at(&up, 69, 39)], [5, 45, 156, 156]);
+        assert_eq!(
+            [at(&up, 3, 0), at(&up, 3, 10), at(&up, 69, 38), at(&up, 69, 39)],
+            [5, 45, 156, 156]
+        );
         for nonsense in [f64::NAN, f64::INFINITY, -1e30, 1e30] {
             assert_eq!(moved([nonsense, 0.0, 0.0, 0.0, 0.0, 0.0]).len(), 70 * 40);
         }

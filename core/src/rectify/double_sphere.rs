@@ -1,4 +1,5 @@
-//! Double sphere: Usenko, Demmel and Cremers, *The double sphere camera model* (3DV 2018), equations 40 to 52.
+//! Double sphere: Usenko, Demmel and Cremers, *The double sphere camera model* (3DV 2018),
+//! equations 40 to 52.
 
 /// Where a ray meets the image, in units of the focal length.
 pub(super) fn distort(xi: f64, alpha: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {

@@ -1,7 +1,9 @@
-//! Equidistant fisheye: Kannala and Brandt, *A generic camera model and calibration method for conventional, wide-angle and fish-eye
-//! lenses* (2006), with the four coefficients that calibration tools keep.
+//! Equidistant fisheye: Kannala and Brandt, *A generic camera model and calibration method for
+//! conventional, wide-angle and fish-eye lenses* (2006), with the four coefficients that
+//! calibration tools keep.
 //!
-//! With a the angle from the optical axis: `a' = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8)` is the distance from the middle.
+//! With a the angle from the optical axis: `a' = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8)` is the
+//! distance from the middle.
 
 use super::monotonic;
 

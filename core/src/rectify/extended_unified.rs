@@ -1,5 +1,5 @@
-//! Extended unified camera model: Khomutenko, Garcia and Martinet, *An enhanced unified camera model* (RA-L 2016); beta 1 is the unified
-//! model of Geyer and Daniilidis, Barreto and Mei.
+//! Extended unified camera model: Khomutenko, Garcia and Martinet, *An enhanced unified camera
+//! model* (RA-L 2016); beta 1 is the unified model of Geyer and Daniilidis, Barreto and Mei.
 
 /// Where a ray meets the image, in units of the focal length.
 pub(super) fn distort(alpha: f64, beta: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {

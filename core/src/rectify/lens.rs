@@ -6,7 +6,8 @@ use core::fmt;
 /// How a lens bends rays, with the parameters as calibration tools name them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LensModel {
-    /// Pinhole with radial and tangential distortion (Brown 1971), rational where `radial[3..]` is not 0. All zero: an ideal pinhole.
+    /// Pinhole with radial and tangential distortion (Brown 1971), rational where `radial[3..]` is
+    /// not 0. All zero: an ideal pinhole.
     RadialTangential {
         /// k1 to k6: the numerator's three coefficients, then the denominator's.
         radial: [f64; 6],
@@ -51,10 +52,16 @@ impl LensModel {
     fn validate(&self) -> Result<(), LensProblem> {
         let share = |alpha: f64| (0.0..=1.0).contains(&alpha);
         let (finite, within) = match *self {
-            Self::RadialTangential { radial, tangential } => (radial.iter().chain(&tangential).all(|k| k.is_finite()), true),
+            Self::RadialTangential { radial, tangential } => {
+                (radial.iter().chain(&tangential).all(|k| k.is_finite()), true)
+            }
             Self::Equidistant { radial } => (radial.iter().all(|k| k.is_finite()), true),
-            Self::DoubleSphere { xi, alpha } => (xi.is_finite() && alpha.is_finite(), xi > -1.0 && share(alpha)),
-            Self::ExtendedUnified { alpha, beta } => (alpha.is_finite() && beta.is_finite(), beta > 0.0 && share(alpha)),
+            Self::DoubleSphere { xi, alpha } => {
+                (xi.is_finite() && alpha.is_finite(), xi > -1.0 && share(alpha))
+            }
+            Self::ExtendedUnified { alpha, beta } => {
+                (alpha.is_finite() && beta.is_finite(), beta > 0.0 && share(alpha))
+            }
         };
         match (finite, within) {
             (false, _) => Err(LensProblem::DistortionNotFinite),
@@ -85,7 +92,9 @@ impl fmt::Display for LensProblem {
             Self::Focal => "a focal length is not a positive number",
             Self::Center => "the principal point is not finite",
             Self::DistortionNotFinite => "a distortion parameter is not finite",
-            Self::DistortionOutOfRange => "a distortion parameter lies outside the range of its model",
+            Self::DistortionOutOfRange => {
+                "a distortion parameter lies outside the range of its model"
+            }
         })
     }
 }
@@ -110,8 +119,9 @@ pub struct Lens {
     focal_px: [f64; 2],
     center_px: [f64; 2],
     model: LensModel,
-    /// The largest ray radius (radial-tangential: x over z; equidistant: angle, rad) up to which the distortion grows with the ray.
-    /// Beyond it the polynomial folds back, and far rays would land among near ones.
+    /// The largest ray radius (radial-tangential: x over z; equidistant: angle, rad) up to which
+    /// the distortion grows with the ray. Beyond it the polynomial folds back, and far rays would
+    /// land among near ones.
     limit: f64,
 }
 
@@ -120,7 +130,11 @@ impl Lens {
     ///
     /// # Errors
     /// The first parameter that cannot be.
-    pub fn new(focal_px: [f64; 2], center_px: [f64; 2], model: LensModel) -> Result<Self, LensProblem> {
+    pub fn new(
+        focal_px: [f64; 2],
+        center_px: [f64; 2],
+        model: LensModel,
+    ) -> Result<Self, LensProblem> {
         if !focal_px.iter().all(|focal| focal.is_finite() && *focal > 0.0) {
             return Err(LensProblem::Focal);
         }
@@ -151,32 +165,46 @@ impl Lens {
         &self.model
     }
 
-    /// The raw pixel a ray (any length but 0) meets, px, whether or not it lies in the image. `None` outside the lens's field of view.
+    /// The raw pixel a ray (any length but 0) meets, px, whether or not it lies in the image.
+    /// `None` outside the lens's field of view.
     pub fn project(&self, ray: [f64; 3]) -> Option<[f64; 2]> {
         let [x, y] = match &self.model {
-            LensModel::RadialTangential { radial, tangential } => radial_tangential::distort(radial, tangential, self.limit, ray)?,
+            LensModel::RadialTangential { radial, tangential } => {
+                radial_tangential::distort(radial, tangential, self.limit, ray)?
+            }
             LensModel::Equidistant { radial } => equidistant::distort(radial, self.limit, ray)?,
             LensModel::DoubleSphere { xi, alpha } => double_sphere::distort(*xi, *alpha, ray)?,
-            LensModel::ExtendedUnified { alpha, beta } => extended_unified::distort(*alpha, *beta, ray)?,
+            LensModel::ExtendedUnified { alpha, beta } => {
+                extended_unified::distort(*alpha, *beta, ray)?
+            }
         };
-        let pixel = [self.focal_px[0] * x + self.center_px[0], self.focal_px[1] * y + self.center_px[1]];
+        let pixel =
+            [self.focal_px[0] * x + self.center_px[0], self.focal_px[1] * y + self.center_px[1]];
         pixel.iter().all(|value| value.is_finite()).then_some(pixel)
     }
 
     /// The ray a raw pixel sees, of length 1. `None` where no ray leads to that pixel.
     pub fn unproject(&self, pixel: [f64; 2]) -> Option<[f64; 3]> {
-        let at = [(pixel[0] - self.center_px[0]) / self.focal_px[0], (pixel[1] - self.center_px[1]) / self.focal_px[1]];
+        let at = [
+            (pixel[0] - self.center_px[0]) / self.focal_px[0],
+            (pixel[1] - self.center_px[1]) / self.focal_px[1],
+        ];
         let [x, y, z] = match &self.model {
-            LensModel::RadialTangential { radial, tangential } => radial_tangential::undistort(radial, tangential, self.limit, at)?,
+            LensModel::RadialTangential { radial, tangential } => {
+                radial_tangential::undistort(radial, tangential, self.limit, at)?
+            }
             LensModel::Equidistant { radial } => equidistant::undistort(radial, self.limit, at)?,
             LensModel::DoubleSphere { xi, alpha } => double_sphere::undistort(*xi, *alpha, at)?,
-            LensModel::ExtendedUnified { alpha, beta } => extended_unified::undistort(*alpha, *beta, at)?,
+            LensModel::ExtendedUnified { alpha, beta } => {
+                extended_unified::undistort(*alpha, *beta, at)?
+            }
         };
         let length = libm::sqrt(x * x + y * y + z * z);
         (length.is_finite() && length > 0.0).then(|| [x / length, y / length, z / length])
     }
 
-    /// Pixels per radian on the optical axis: the focal length of the ideal pinhole that shows the middle at the same scale.
+    /// Pixels per radian on the optical axis: the focal length of the ideal pinhole that shows the
+    /// middle at the same scale.
     pub(crate) fn middle_focal_px(&self) -> f64 {
         const STEP: f64 = 1e-4;
         let middle = self.project([0.0, 0.0, 1.0]).unwrap_or(self.center_px);

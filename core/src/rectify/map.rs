@@ -1,8 +1,8 @@
 //! A map from rectified pixels to raw ones: one `u32` a pixel.
 //!
-//! An entry holds column and row of the raw image in fixed point, the column in the upper bits. Each coordinate has as many bits before
-//! the point as the raw image needs; what is left of the 32 is shared behind it, at most 8 bits each: 1/64 px for 1392 x 512, 1/32 px for
-//! 2048 x 1536.
+//! An entry holds column and row of the raw image in fixed point, the column in the upper bits.
+//! Each coordinate has as many bits before the point as the raw image needs; what is left of the 32
+//! is shared behind it, at most 8 bits each: 1/64 px for 1392 x 512, 1/32 px for 2048 x 1536.
 
 use super::{MAX_RAW_SIDE, RawCamera, TurnedCamera};
 use crate::{
@@ -13,11 +13,12 @@ use crate::{
 /// The entry of a pixel that no raw pixel covers.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// How far outside the centres of a raw image's outermost pixels a place still counts as theirs, px: what a rectified image's sides, found
-/// from points along the raw ones, may be off by.
+/// How far outside the centres of a raw image's outermost pixels a place still counts as theirs,
+/// px: what a rectified image's sides, found from points along the raw ones, may be off by.
 const RIM_PX: f64 = 1.0 / 16.0;
 
-/// Pixels around an invalid one that are not to be used either: descriptors of features reach 5 px and their gradients 1 px further.
+/// Pixels around an invalid one that are not to be used either: descriptors of features reach 5 px
+/// and their gradients 1 px further.
 pub const INVALID_MARGIN_PX: usize = 6;
 
 /// How an entry is made up.
@@ -42,8 +43,8 @@ impl Packing {
 
     /// The entry of a point in the raw image; [`NONE`] outside it.
     ///
-    /// All four neighbours of an entry lie within the image: a point in the last column is moved left by the smallest step there is, one in
-    /// the last row up.
+    /// All four neighbours of an entry lie within the image: a point in the last column is moved
+    /// left by the smallest step there is, one in the last row up.
     fn entry(&self, camera: &RawCamera, [u, v]: [f64; 2]) -> u32 {
         let [last_u, last_v] = [camera.width - 1, camera.height - 1];
         let inside = |at: f64, last: u32| at >= -RIM_PX && at <= f64::from(last) + RIM_PX;
@@ -84,7 +85,8 @@ pub(super) fn fill(map: &mut [u32], width: usize, camera: &TurnedCamera, rig: &S
     }
 }
 
-/// Sets the bits of all pixels within [`INVALID_MARGIN_PX`] of one that no raw pixel covers. How many no raw pixel covers.
+/// Sets the bits of all pixels within [`INVALID_MARGIN_PX`] of one that no raw pixel covers. How
+/// many no raw pixel covers.
 pub(super) fn mark_invalid(map: &[u32], width: usize, height: usize, words: &mut [u64]) -> u32 {
     words.fill(0);
     let row_words = InvalidPixels::words_a_row(width);
@@ -92,12 +94,19 @@ pub(super) fn mark_invalid(map: &[u32], width: usize, height: usize, words: &mut
     for (v, row) in map.chunks_exact(width.max(1)).enumerate() {
         for (u, _) in row.iter().enumerate().filter(|(_, entry)| **entry == NONE) {
             count += 1;
-            let [above, below] = [v.saturating_sub(INVALID_MARGIN_PX), (v + INVALID_MARGIN_PX).min(height.saturating_sub(1))];
-            let [first, last] = [u.saturating_sub(INVALID_MARGIN_PX), (u + INVALID_MARGIN_PX).min(width - 1)];
+            let [above, below] = [
+                v.saturating_sub(INVALID_MARGIN_PX),
+                (v + INVALID_MARGIN_PX).min(height.saturating_sub(1)),
+            ];
+            let [first, last] =
+                [u.saturating_sub(INVALID_MARGIN_PX), (u + INVALID_MARGIN_PX).min(width - 1)];
             // Inside an invalid area the neighbours have set all but the foremost column.
             let inside = u > 0 && row.get(u - 1) == Some(&NONE);
             for near_v in above..=below {
-                let Some(words) = words.get_mut(near_v * row_words..(near_v + 1) * row_words) else { continue };
+                let Some(words) = words.get_mut(near_v * row_words..(near_v + 1) * row_words)
+                else {
+                    continue;
+                };
                 for near_u in (if inside { last } else { first })..=last {
                     if let Some(word) = words.get_mut(near_u / 64) {
                         *word |= 1 << (near_u % 64);
@@ -109,8 +118,8 @@ pub(super) fn mark_invalid(map: &[u32], width: usize, height: usize, words: &mut
     count
 }
 
-/// Fills a rectified image from a raw one: bilinear, in integers, halves rounded up. Pixels that no raw pixel covers become 0. Nothing
-/// where the raw image is not of the size the map was made for.
+/// Fills a rectified image from a raw one: bilinear, in integers, halves rounded up. Pixels that no
+/// raw pixel covers become 0. Nothing where the raw image is not of the size the map was made for.
 pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T>, out: &mut [T]) {
     if [raw.width(), raw.height()] != [camera.width as usize, camera.height as usize] {
         return;
@@ -143,13 +152,21 @@ impl Sample for u8 {
     const NONE: Self = 0;
 
     #[inline(always)]
-    fn between(upper: &[Self; 2], lower: &[Self; 2], [right, down]: [u32; 2], packing: &Packing) -> Self {
-        // At most 16 bits: 8 of the pixel, 8 of the fraction. A difference may be negative, and wraps back in the sum.
+    fn between(
+        upper: &[Self; 2],
+        lower: &[Self; 2],
+        [right, down]: [u32; 2],
+        packing: &Packing,
+    ) -> Self {
+        // At most 16 bits: 8 of the pixel, 8 of the fraction. A difference may be negative, and
+        // wraps back in the sum.
         let along = |[a, b]: &[u8; 2]| {
-            (u32::from(*a) << packing.fraction_u).wrapping_add(u32::from(*b).wrapping_sub(u32::from(*a)).wrapping_mul(right))
+            (u32::from(*a) << packing.fraction_u)
+                .wrapping_add(u32::from(*b).wrapping_sub(u32::from(*a)).wrapping_mul(right))
         };
         let (upper, lower) = (along(upper), along(lower));
-        let sum = (upper << packing.fraction_v).wrapping_add(lower.wrapping_sub(upper).wrapping_mul(down));
+        let sum = (upper << packing.fraction_v)
+            .wrapping_add(lower.wrapping_sub(upper).wrapping_mul(down));
         let bits = packing.fraction_u + packing.fraction_v;
         (sum.wrapping_add((1 << bits) >> 1) >> bits) as u8
     }
@@ -159,7 +176,12 @@ impl Sample for [u8; 3] {
     const NONE: Self = [0; 3];
 
     #[inline(always)]
-    fn between([a, b]: &[Self; 2], [c, d]: &[Self; 2], weights: [u32; 2], packing: &Packing) -> Self {
+    fn between(
+        [a, b]: &[Self; 2],
+        [c, d]: &[Self; 2],
+        weights: [u32; 2],
+        packing: &Packing,
+    ) -> Self {
         let ([a0, a1, a2], [b0, b1, b2], [c0, c1, c2], [d0, d1, d2]) = (*a, *b, *c, *d);
         [([a0, b0], [c0, d0]), ([a1, b1], [c1, d1]), ([a2, b2], [c2, d2])]
             .map(|(upper, lower)| u8::between(&upper, &lower, weights, packing))

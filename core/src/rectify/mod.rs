@@ -1,18 +1,23 @@
 //! Raw pairs become rectified ones.
 //!
-//! Real cameras bend rays and do not stand exactly side by side. [`Lens`] says how each bends them (four models), [`RawRig`] how the two
-//! stand, [`Rectification`] how both are turned so that their rows agree, how large the result is and at which scale. A [`Rectifier`] makes
-//! one map a camera, once, in `f64` with `libm`, and remaps each pair in integers.
+//! Real cameras bend rays and do not stand exactly side by side. [`Lens`] says how each bends them
+//! (four models), [`RawRig`] how the two stand, [`Rectification`] how both are turned so that their
+//! rows agree, how large the result is and at which scale. A [`Rectifier`] makes one map a camera,
+//! once, in `f64` with `libm`, and remaps each pair in integers.
 //!
-//! **Invalid pixels.** A rectified pixel that no raw pixel covers is not black but invalid, and so are those within
+//! **Invalid pixels.** A rectified pixel that no raw pixel covers is not black but invalid, and so
+//! are those within
 //! [`INVALID_MARGIN_PX`] of it, whose surroundings are not all there: `Rectifier::invalid` has one bit a pixel. Stereo finds no disparity
-//! there, scene flow no features, and without depth nothing is fused. [`Sizing::Automatic`] leaves none.
+//! there, scene flow no features, and without depth nothing is fused. [`Sizing::Automatic`] leaves
+//! none.
 //!
-//! Memory, from `Capacity`, where it has raw pixels: 4 bytes a rectified pixel and camera for the map, 1 for the image, an eighth for the
-//! mask, 3 for colour. Raw images stay with the caller.
-//! Time: making the maps takes one projection a rectified pixel and camera; a frame 2 reads of two bytes and four multiplications a pixel.
-//! What can go wrong: a rig that cannot be rectified ([`RectifyProblem`]), a lens with absurd parameters ([`LensProblem`]), images that do
-//! not fit the capacity ([`RectifierError`]): all before the first frame. A frame of another size is refused by the mapper.
+//! Memory, from `Capacity`, where it has raw pixels: 4 bytes a rectified pixel and camera for the
+//! map, 1 for the image, an eighth for the mask, 3 for colour. Raw images stay with the caller.
+//! Time: making the maps takes one projection a rectified pixel and camera; a frame 2 reads of two
+//! bytes and four multiplications a pixel. What can go wrong: a rig that cannot be rectified
+//! ([`RectifyProblem`]), a lens with absurd parameters ([`LensProblem`]), images that do not fit
+//! the capacity ([`RectifierError`]): all before the first frame. A frame of another size is
+//! refused by the mapper.
 //!
 //! ```
 //! use dynvox_core::rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, Sizing};

@@ -1,12 +1,18 @@
 //! Growing functions of one number: up to where they grow, and their inverse.
 
-/// Most Newton steps of the inverse. Each is at most half as long as the one before, so that as many leave less than a rounding error.
+/// Most Newton steps of the inverse. Each is at most half as long as the one before, so that as
+/// many leave less than a rounding error.
 pub const MAX_STEPS: usize = 64;
 /// Points at which [`growing_until`] evaluates the function.
 const POINTS: u32 = 512;
 
-/// The last of [`POINTS`] points between 0 and `end`, each mapped by `point`, up to which `value` grows from one to the next.
-pub(super) fn growing_until(end: f64, point: impl Fn(f64) -> f64, value: impl Fn(f64) -> f64) -> f64 {
+/// The last of [`POINTS`] points between 0 and `end`, each mapped by `point`, up to which `value`
+/// grows from one to the next.
+pub(super) fn growing_until(
+    end: f64,
+    point: impl Fn(f64) -> f64,
+    value: impl Fn(f64) -> f64,
+) -> f64 {
     let (mut last, mut before) = (0.0, value(0.0));
     for step in 1..=POINTS {
         let at = point(end * f64::from(step) / f64::from(POINTS));
@@ -21,9 +27,10 @@ pub(super) fn growing_until(end: f64, point: impl Fn(f64) -> f64, value: impl Fn
     last
 }
 
-/// Where a function that grows from 0 to `end` takes the value `sought`: Newton's step where it stays within the bracket and is at most
-/// half as long as the step before, else half the bracket. `with_slope` gives value and derivative. `None` when `sought` is not between 0
-/// and the value at `end`, or after [`MAX_STEPS`].
+/// Where a function that grows from 0 to `end` takes the value `sought`: Newton's step where it
+/// stays within the bracket and is at most half as long as the step before, else half the bracket.
+/// `with_slope` gives value and derivative. `None` when `sought` is not between 0 and the value at
+/// `end`, or after [`MAX_STEPS`].
 pub(super) fn inverse(sought: f64, end: f64, with_slope: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
     let within = sought >= 0.0 && sought <= with_slope(end)[0];
     if !within {
@@ -42,7 +49,8 @@ pub(super) fn inverse(sought: f64, end: f64, with_slope: impl Fn(f64) -> [f64; 2
         };
         let newton = at - error / slope;
         let short = libm::fabs(newton - at) <= 0.5 * length;
-        let next = if newton >= low && newton <= high && short { newton } else { 0.5 * (low + high) };
+        let next =
+            if newton >= low && newton <= high && short { newton } else { 0.5 * (low + high) };
         length = libm::fabs(next - at);
         at = next;
         if length <= 1e-15 * (1.0 + at) {

@@ -1,16 +1,19 @@
-//! Radial and tangential distortion: Brown, *Decentering distortion of lenses* (1971), with the denominator of the rational model (Claus
-//! and Fitzgibbon 2005).
+//! Radial and tangential distortion: Brown, *Decentering distortion of lenses* (1971), with the
+//! denominator of the rational model (Claus and Fitzgibbon 2005).
 //!
-//! With x, y over z and r its length: `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)`,
+//! With x, y over z and r its length:
+//! `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)`,
 //! `x' = x g + 2 p1 x y + p2 (r^2 + 2 x^2)`, `y' = y g + p1 (r^2 + 2 y^2) + 2 p2 x y`.
 
 use super::monotonic;
 
-/// Most of Newton's steps in the plane: each doubles the right digits, and the radial part is exact before the first.
+/// Most of Newton's steps in the plane: each doubles the right digits, and the radial part is exact
+/// before the first.
 pub const MAX_STEPS: usize = 12;
 /// A step or a residual below this counts as none, in units of the focal length.
 const SMALL: f64 = 1e-14;
-/// Largest residual that is an answer when no step got smaller: 1e-7 px at 1,000 px of focal length.
+/// Largest residual that is an answer when no step got smaller: 1e-7 px at 1,000 px of focal
+/// length.
 const ACCEPTED: f64 = 1e-10;
 /// Angle from the optical axis at which a pinhole ends, rad: 85 degrees.
 const WIDEST_RAD: f64 = 1.483_529_864;
@@ -33,11 +36,19 @@ pub(super) fn limit(k: &[f64; 6]) -> f64 {
 fn distort_plane(k: &[f64; 6], [p1, p2]: &[f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
     let r2 = x * x + y * y;
     let [g, _] = factor(k, r2);
-    [x * g + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * g + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y]
+    [
+        x * g + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+        y * g + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+    ]
 }
 
 /// Where a ray meets the plane at distance 1 behind the lens.
-pub(super) fn distort(k: &[f64; 6], p: &[f64; 2], limit: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
+pub(super) fn distort(
+    k: &[f64; 6],
+    p: &[f64; 2],
+    limit: f64,
+    [x, y, z]: [f64; 3],
+) -> Option<[f64; 2]> {
     if z.is_nan() || z <= 0.0 {
         return None;
     }
@@ -46,8 +57,14 @@ pub(super) fn distort(k: &[f64; 6], p: &[f64; 2], limit: f64, [x, y, z]: [f64; 3
     within.then(|| distort_plane(k, p, at))
 }
 
-/// The ray that meets the plane there: the radial part by itself, then Newton's steps for the whole.
-pub(super) fn undistort(k: &[f64; 6], p: &[f64; 2], limit: f64, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
+/// The ray that meets the plane there: the radial part by itself, then Newton's steps for the
+/// whole.
+pub(super) fn undistort(
+    k: &[f64; 6],
+    p: &[f64; 2],
+    limit: f64,
+    [u, v]: [f64; 2],
+) -> Option<[f64; 3]> {
     let distorted = libm::sqrt(u * u + v * v);
     if distorted < 1e-300 {
         return Some([u, v, 1.0]);

@@ -6,8 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Widest and highest raw image, px: positions of a map have 12 bits before the point.
 pub const MAX_RAW_SIDE: u32 = 4_096;
-/// Tangent of the widest half field of view a rectified image is given by itself: 60 degrees. Pixels further out show little of the world
-/// each, and cost as much.
+/// Tangent of the widest half field of view a rectified image is given by itself: 60 degrees.
+/// Pixels further out show little of the world each, and cost as much.
 const WIDEST_TANGENT: f64 = 1.732_050_807_568_877_2;
 /// Points along each side of a raw image by which the common view is found.
 const SIDE_POINTS: u32 = 256;
@@ -15,8 +15,8 @@ const SIDE_POINTS: u32 = 256;
 /// How large the rectified images are to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sizing {
-    /// All that both cameras see of one rectangle, up to 120 degrees, at the scale of the raw images' middle; smaller where that does not
-    /// fit. No pixel is invalid.
+    /// All that both cameras see of one rectangle, up to 120 degrees, at the scale of the raw
+    /// images' middle; smaller where that does not fit. No pixel is invalid.
     Automatic {
         /// Widest image, px.
         max_width: u32,
@@ -43,7 +43,8 @@ pub struct TurnedCamera {
     pub r_rectified_raw: Matrix3<f64>,
 }
 
-/// How raw pairs become rectified ones. Focal length and principal point of both rectified images are those of the mapper's rig.
+/// How raw pairs become rectified ones. Focal length and principal point of both rectified images
+/// are those of the mapper's rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectification {
     /// The left camera.
@@ -66,7 +67,8 @@ impl Rectification {
         let left = TurnedCamera { raw: rig.left, r_rectified_raw: r_rectified_left };
         let right = TurnedCamera { raw: rig.right, r_rectified_raw: r_rectified_right };
         let common = common_view([&left, &right])?;
-        let middle_focal_px = 0.5 * (rig.left.lens.middle_focal_px() + rig.right.lens.middle_focal_px());
+        let middle_focal_px =
+            0.5 * (rig.left.lens.middle_focal_px() + rig.right.lens.middle_focal_px());
         let (focal_px, [width, height]) = common.sized(sizing, middle_focal_px)?;
         let rig = StereoRig {
             focal_px,
@@ -81,7 +83,11 @@ impl Rectification {
     ///
     /// # Errors
     /// See [`RectifyProblem`].
-    pub fn given(left: TurnedCamera, right: TurnedCamera, [width, height]: [u32; 2]) -> Result<Self, RectifyProblem> {
+    pub fn given(
+        left: TurnedCamera,
+        right: TurnedCamera,
+        [width, height]: [u32; 2],
+    ) -> Result<Self, RectifyProblem> {
         for camera in [&left, &right] {
             align::rotation(&camera.r_rectified_raw)?;
             let side = 2..=MAX_RAW_SIDE;
@@ -104,12 +110,18 @@ struct CommonView {
 
 impl CommonView {
     /// Focal length and size.
-    fn sized(&self, sizing: Sizing, middle_focal_px: f64) -> Result<(f64, [u32; 2]), RectifyProblem> {
+    fn sized(
+        &self,
+        sizing: Sizing,
+        middle_focal_px: f64,
+    ) -> Result<(f64, [u32; 2]), RectifyProblem> {
         let [wide, high] = [self.x[1] - self.x[0], self.y[1] - self.y[0]];
         let (focal_px, size) = match sizing {
             Sizing::Automatic { max_width, max_height } => {
-                // From the centre of the first pixel to that of the last there is one pixel less than the image has.
-                let [fits_u, fits_v] = [(f64::from(max_width) - 1.0) / wide, (f64::from(max_height) - 1.0) / high];
+                // From the centre of the first pixel to that of the last there is one pixel less
+                // than the image has.
+                let [fits_u, fits_v] =
+                    [(f64::from(max_width) - 1.0) / wide, (f64::from(max_height) - 1.0) / high];
                 let fits = if fits_u < fits_v { fits_u } else { fits_v };
                 let focal_px = if fits < middle_focal_px { fits } else { middle_focal_px };
                 let pixels = |tangent: f64, most: u32| {
@@ -119,7 +131,8 @@ impl CommonView {
                 (focal_px, [pixels(wide, max_width), pixels(high, max_height)])
             }
             Sizing::Given { width, height, focal_px } => {
-                let [fits_u, fits_v] = [(f64::from(width) - 1.0) / wide, (f64::from(height) - 1.0) / high];
+                let [fits_u, fits_v] =
+                    [(f64::from(width) - 1.0) / wide, (f64::from(height) - 1.0) / high];
                 (focal_px.unwrap_or(if fits_u > fits_v { fits_u } else { fits_v }), [width, height])
             }
         };
@@ -128,9 +141,11 @@ impl CommonView {
     }
 }
 
-/// The largest rectangle about the middle that both cameras cover: each side as far out as the raw image's own side comes in.
+/// The largest rectangle about the middle that both cameras cover: each side as far out as the raw
+/// image's own side comes in.
 fn common_view(cameras: [&TurnedCamera; 2]) -> Result<CommonView, RectifyProblem> {
-    let mut common = CommonView { x: [-WIDEST_TANGENT, WIDEST_TANGENT], y: [-WIDEST_TANGENT, WIDEST_TANGENT] };
+    let mut common =
+        CommonView { x: [-WIDEST_TANGENT, WIDEST_TANGENT], y: [-WIDEST_TANGENT, WIDEST_TANGENT] };
     for camera in cameras {
         let last = [f64::from(camera.raw.width) - 1.0, f64::from(camera.raw.height) - 1.0];
         for step in 0..=SIDE_POINTS {
@@ -151,19 +166,29 @@ fn common_view(cameras: [&TurnedCamera; 2]) -> Result<CommonView, RectifyProblem
         }
     }
     let wide_enough = |[from, to]: [f64; 2]| to - from > 0.05;
-    if wide_enough(common.x) && wide_enough(common.y) { Ok(common) } else { Err(RectifyProblem::NoCommonView) }
+    if wide_enough(common.x) && wide_enough(common.y) {
+        Ok(common)
+    } else {
+        Err(RectifyProblem::NoCommonView)
+    }
 }
 
 impl TurnedCamera {
-    /// x and y over z of the ray a raw pixel sees, in rectified coordinates; `None` where it sees none, or one behind the image plane.
+    /// x and y over z of the ray a raw pixel sees, in rectified coordinates; `None` where it sees
+    /// none, or one behind the image plane.
     fn tangents(&self, raw: [f64; 2]) -> Option<[f64; 2]> {
         let ray = self.r_rectified_raw * Vector3::from(self.raw.lens.unproject(raw)?);
         (ray.z > 1e-3).then(|| [ray.x / ray.z, ray.y / ray.z])
     }
 
-    /// The raw pixel a rectified pixel shows, px, whether or not it lies in the raw image. `None` outside the lens's field of view.
+    /// The raw pixel a rectified pixel shows, px, whether or not it lies in the raw image. `None`
+    /// outside the lens's field of view.
     pub fn raw_pixel(&self, rig: &StereoRig, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
-        let ray = Vector3::new((u - rig.center_u_px) / rig.focal_px, (v - rig.center_v_px) / rig.focal_px, 1.0);
+        let ray = Vector3::new(
+            (u - rig.center_u_px) / rig.focal_px,
+            (v - rig.center_v_px) / rig.focal_px,
+            1.0,
+        );
         self.raw.lens.project((self.r_rectified_raw.transpose() * ray).into())
     }
 }

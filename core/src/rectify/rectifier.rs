@@ -39,12 +39,20 @@ pub enum RectifierError {
 impl fmt::Display for RectifierError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::RawTooLarge { width: 0, .. } => f.write_str("the capacity holds no raw images: set its raw_width and raw_height"),
+            Self::RawTooLarge { width: 0, .. } => {
+                f.write_str("the capacity holds no raw images: set its raw_width and raw_height")
+            }
             Self::RawTooLarge { width, height } => {
-                write!(f, "the raw images are larger than the capacity allows: at most {width} x {height} px")
+                write!(
+                    f,
+                    "the raw images are larger than the capacity allows: at most {width} x {height} px"
+                )
             }
             Self::RectifiedTooLarge { width, height } => {
-                write!(f, "the rectified images are larger than the capacity allows: at most {width} x {height} px")
+                write!(
+                    f,
+                    "the rectified images are larger than the capacity allows: at most {width} x {height} px"
+                )
             }
         }
     }
@@ -87,7 +95,8 @@ impl Camera<'_> {
     }
 }
 
-/// Memory of the rectified images. Separate from the [`Rectifier`], so that a mapper can lend them to its stages.
+/// Memory of the rectified images. Separate from the [`Rectifier`], so that a mapper can lend them
+/// to its stages.
 #[derive(Debug, Default)]
 pub struct RectifiedImages<'s> {
     left: &'s mut [u8],
@@ -99,7 +108,8 @@ impl<'s> RectifiedImages<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
         let [pixels, _] = lengths(capacity);
-        2 * region_bytes::<u8>(pixels) + region_bytes::<[u8; 3]>(if capacity.colour { pixels } else { 0 })
+        2 * region_bytes::<u8>(pixels)
+            + region_bytes::<[u8; 3]>(if capacity.colour { pixels } else { 0 })
     }
 
     /// Allocates the regions; none without raw pixels.
@@ -134,13 +144,15 @@ const fn lengths(capacity: &Capacity) -> [usize; 2] {
 }
 
 impl<'s> Rectifier<'s> {
-    /// Bytes of the slab: 8 and a quarter a rectified pixel for maps and masks; none without raw pixels.
+    /// Bytes of the slab: 8 and a quarter a rectified pixel for maps and masks; none without raw
+    /// pixels.
     pub const fn bytes(capacity: &Capacity) -> usize {
         let [pixels, words] = lengths(capacity);
         2 * (region_bytes::<u32>(pixels) + region_bytes::<u64>(words))
     }
 
-    /// Allocates the regions; none without raw pixels. It rectifies nothing until [`Rectifier::prepare`].
+    /// Allocates the regions; none without raw pixels. It rectifies nothing until
+    /// [`Rectifier::prepare`].
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let [pixels, words] = lengths(capacity);
         let camera = |carver: &mut Carver<'s>| {
@@ -165,9 +177,14 @@ impl<'s> Rectifier<'s> {
     ///
     /// # Errors
     /// When the images do not fit the capacity; the rectifier is as it was.
-    pub fn prepare(&mut self, rectification: &Rectification, rig: &StereoRig) -> Result<(), RectifierError> {
+    pub fn prepare(
+        &mut self,
+        rectification: &Rectification,
+        rig: &StereoRig,
+    ) -> Result<(), RectifierError> {
         let Capacity { image_width, image_height, .. } = self.capacity;
-        let [raw_width, raw_height] = [self.capacity.raw_width, self.capacity.raw_height].map(|side| side.min(MAX_RAW_SIDE as usize));
+        let [raw_width, raw_height] = [self.capacity.raw_width, self.capacity.raw_height]
+            .map(|side| side.min(MAX_RAW_SIDE as usize));
         let [width, height] = [rectification.width as usize, rectification.height as usize];
         for raw in [&rectification.left.raw, &rectification.right.raw] {
             if raw.width as usize > raw_width || raw.height as usize > raw_height {
@@ -175,9 +192,14 @@ impl<'s> Rectifier<'s> {
             }
         }
         if width > image_width || height > image_height {
-            return Err(RectifierError::RectifiedTooLarge { width: image_width, height: image_height });
+            return Err(RectifierError::RectifiedTooLarge {
+                width: image_width,
+                height: image_height,
+            });
         }
-        for (camera, turned) in [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)] {
+        for (camera, turned) in
+            [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)]
+        {
             let entries = part_mut(camera.map, ..width * height);
             map::fill(entries, width, turned, rig);
             camera.invalid_count = map::mark_invalid(entries, width, height, camera.invalid);
@@ -202,9 +224,14 @@ impl<'s> Rectifier<'s> {
         })
     }
 
-    /// Rectifies a pair into `images`. `None` without a rectification. An image that is not of the raw size leaves what was there before:
-    /// the mapper refuses those.
-    pub fn rectify<'a, E: Executor>(&self, raw: &Pair<'_>, images: &'a mut RectifiedImages<'_>, executor: &E) -> Option<Pair<'a>> {
+    /// Rectifies a pair into `images`. `None` without a rectification. An image that is not of the
+    /// raw size leaves what was there before: the mapper refuses those.
+    pub fn rectify<'a, E: Executor>(
+        &self,
+        raw: &Pair<'_>,
+        images: &'a mut RectifiedImages<'_>,
+        executor: &E,
+    ) -> Option<Pair<'a>> {
         let Rectification { left, right, width, height } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
         let RectifiedImages { left: left_out, right: right_out, colour: colour_out } = images;
@@ -223,7 +250,8 @@ impl<'s> Rectifier<'s> {
         })
     }
 
-    /// The grey images, left and right, that the last [`Rectifier::rectify`] left in `images`; `None` without a rectification.
+    /// The grey images, left and right, that the last [`Rectifier::rectify`] left in `images`;
+    /// `None` without a rectification.
     pub(crate) fn grey<'a>(&self, images: &'a RectifiedImages<'_>) -> Option<[View<'a, u8>; 2]> {
         let Rectification { width, height, .. } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
@@ -235,7 +263,11 @@ impl<'s> Rectifier<'s> {
         self.rectification.as_ref()?;
         let mut digest = Digest::default();
         rectified.left.rows().chain(rectified.right.rows()).for_each(|row| digest.bytes(row));
-        rectified.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
+        rectified
+            .colour
+            .iter()
+            .flat_map(View::rows)
+            .for_each(|row| digest.bytes(row.as_flattened()));
         Some(RectifyReport {
             invalid_left: self.left.invalid_count,
             invalid_right: self.right.invalid_count,

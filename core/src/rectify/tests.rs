@@ -16,8 +16,20 @@ fn lenses() -> [Lens; 6] {
     let lens = |focal: f64, model| Lens::new([focal, 1.01 * focal], [310.0, 236.0], model).unwrap();
     [
         lens(400.0, LensModel::IDEAL),
-        lens(400.0, LensModel::RadialTangential { radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0], tangential: [2e-4, -3e-4] }),
-        lens(380.0, LensModel::RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [1e-4, 1e-4] }),
+        lens(
+            400.0,
+            LensModel::RadialTangential {
+                radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0],
+                tangential: [2e-4, -3e-4],
+            },
+        ),
+        lens(
+            380.0,
+            LensModel::RadialTangential {
+                radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05],
+                tangential: [1e-4, 1e-4],
+            },
+        ),
         lens(290.0, LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] }),
         lens(280.0, LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 }),
         lens(300.0, LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 }),
@@ -32,7 +44,10 @@ fn every_lens_takes_back_what_it_projects_over_its_whole_image() {
             let pixel = [f64::from(at % 64) * 10.0 + 0.3, f64::from(at / 64) * 10.0 + 0.7];
             let Some(ray) = lens.unproject(pixel) else { continue };
             let back = lens.project(ray.map(|x| 3.0 * x)).unwrap();
-            assert!((back[0] - pixel[0]).hypot(back[1] - pixel[1]) < 1e-9, "{lens:?} {pixel:?} {back:?}");
+            assert!(
+                (back[0] - pixel[0]).hypot(back[1] - pixel[1]) < 1e-9,
+                "{lens:?} {pixel:?} {back:?}"
+            );
             seen += 1;
         }
         assert!(seen > 64 * 48 * 9 / 10, "{lens:?} sees {seen} pixels");
@@ -44,7 +59,10 @@ fn beyond_the_fold_of_a_polynomial_there_is_nothing() {
     let lens = Lens::new(
         [500.0; 2],
         [320.0, 240.0],
-        LensModel::RadialTangential { radial: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0], tangential: [0.0; 2] },
+        LensModel::RadialTangential {
+            radial: [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0],
+            tangential: [0.0; 2],
+        },
     );
     let lens = lens.unwrap();
     // r (1 - .3 r^2) grows up to r = 1.054 and is back at .5 for r = 1.43.
@@ -63,9 +81,18 @@ fn absurd_lenses_are_refused() {
     let make = |focal: f64, model| Lens::new([focal, 400.0], [0.0; 2], model).unwrap_err();
     assert_eq!(make(0.0, LensModel::IDEAL), LensProblem::Focal);
     assert_eq!(make(f64::NAN, LensModel::IDEAL), LensProblem::Focal);
-    assert_eq!(make(1.0, LensModel::Equidistant { radial: [f64::INFINITY, 0.0, 0.0, 0.0] }), LensProblem::DistortionNotFinite);
-    assert_eq!(make(1.0, LensModel::DoubleSphere { xi: 0.0, alpha: 1.2 }), LensProblem::DistortionOutOfRange);
-    assert_eq!(make(1.0, LensModel::ExtendedUnified { alpha: 0.5, beta: 0.0 }), LensProblem::DistortionOutOfRange);
+    assert_eq!(
+        make(1.0, LensModel::Equidistant { radial: [f64::INFINITY, 0.0, 0.0, 0.0] }),
+        LensProblem::DistortionNotFinite
+    );
+    assert_eq!(
+        make(1.0, LensModel::DoubleSphere { xi: 0.0, alpha: 1.2 }),
+        LensProblem::DistortionOutOfRange
+    );
+    assert_eq!(
+        make(1.0, LensModel::ExtendedUnified { alpha: 0.5, beta: 0.0 }),
+        LensProblem::DistortionOutOfRange
+    );
 }
 
 /// A rig whose right camera is turned, lifted and pushed.
@@ -134,24 +161,33 @@ fn see_raw(camera: &RawCamera, r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<u8> {
 fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
     for lens in lenses() {
         let raw = raw_rig(lens);
-        let (rectification, rig) = Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+        let (rectification, rig) =
+            Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
         let left = see_raw(&raw.left, &Matrix3::identity(), &Vector3::zeros());
         let right = see_raw(&raw.right, &raw.r_right_left, &raw.t_right_left_m);
         let [left, right] = [&left, &right].map(|pixels| View::new(pixels, 640, 480).unwrap());
         with_rectifier(&rectification, &rig, |rectifier, images| {
-            assert!(rectifier.invalid().is_none(), "automatic sizes leave no invalid pixel: {lens:?}");
+            assert!(
+                rectifier.invalid().is_none(),
+                "automatic sizes leave no invalid pixel: {lens:?}"
+            );
             let frame = rectifier.rectify(&pair(left, right), images, &Serial).unwrap();
             let r = rectification.left.r_rectified_raw;
             for (image, shift_m) in [(frame.left, 0.0), (frame.right, rig.baseline_m)] {
                 let (mut sum, mut worst) = (0.0f64, 0.0f64);
                 for (v, row) in image.rows().enumerate() {
                     for (u, &grey) in row.iter().enumerate() {
-                        let ray =
-                            Vector3::new((u as f64 - rig.center_u_px) / rig.focal_px, (v as f64 - rig.center_v_px) / rig.focal_px, 1.0);
-                        let (origin, ray) = (r.transpose() * Vector3::new(shift_m, 0.0, 0.0), r.transpose() * ray);
+                        let ray = Vector3::new(
+                            (u as f64 - rig.center_u_px) / rig.focal_px,
+                            (v as f64 - rig.center_v_px) / rig.focal_px,
+                            1.0,
+                        );
+                        let (origin, ray) =
+                            (r.transpose() * Vector3::new(shift_m, 0.0, 0.0), r.transpose() * ray);
                         let meets = origin + ray * ((2.0 - origin.z) / ray.z);
                         let difference = (pattern([meets.x, meets.y]) - f64::from(grey)).abs();
-                        (sum, worst) = (sum + difference, if difference > worst { difference } else { worst });
+                        (sum, worst) =
+                            (sum + difference, if difference > worst { difference } else { worst });
                     }
                 }
                 let mean = sum / (image.width() * image.height()) as f64;
@@ -164,12 +200,16 @@ fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
 #[test]
 fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
     let raw = raw_rig(lenses()[1]);
-    let (rectification, rig) = Rectification::of(&raw, Sizing::Given { width: 400, height: 300, focal_px: Some(150.0) }).unwrap();
+    let (rectification, rig) =
+        Rectification::of(&raw, Sizing::Given { width: 400, height: 300, focal_px: Some(150.0) })
+            .unwrap();
     with_rectifier(&rectification, &rig, |rectifier, images| {
         let invalid = rectifier.invalid().unwrap().left;
         let covered = |u: i64, v: i64| {
             let raw = rectification.left.raw_pixel(&rig, [u as f64, v as f64]);
-            raw.is_some_and(|[u, v]| (-0.0625..=639.0625).contains(&u) && (-0.0625..=479.0625).contains(&v))
+            raw.is_some_and(|[u, v]| {
+                (-0.0625..=639.0625).contains(&u) && (-0.0625..=479.0625).contains(&v)
+            })
         };
         let margin = INVALID_MARGIN_PX as i64;
         for (u, v) in (0..400i64).flat_map(|u| (0..300i64).map(move |v| (u, v))).step_by(7) {
@@ -182,15 +222,20 @@ fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
         let frame = rectifier.rectify(&pair(view, view), images, &Serial).unwrap();
         assert_eq!((frame.left.get(200, 150), frame.left.get(0, 0)), (Some(255), Some(0)));
         let report = rectifier.report(&frame).unwrap();
-        assert_eq!(report.invalid_left, (0..400 * 300).filter(|at| !covered(at % 400, at / 400)).count() as u32);
+        assert_eq!(
+            report.invalid_left,
+            (0..400 * 300).filter(|at| !covered(at % 400, at / 400)).count() as u32
+        );
     });
 }
 
 #[test]
 fn threads_change_nothing_and_rows_may_be_padded() {
     let raw = raw_rig(lenses()[3]);
-    let (rectification, rig) = Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
-    let noise: Vec<u8> = (0..700 * 480u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    let (rectification, rig) =
+        Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+    let noise: Vec<u8> =
+        (0..700 * 480u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let padded = View::with_stride(&noise, 640, 480, 700).unwrap();
     let tight: Vec<u8> = padded.rows().flatten().copied().collect();
     let tight = View::new(&tight, 640, 480).unwrap();
@@ -211,6 +256,10 @@ fn without_raw_pixels_it_costs_nothing_and_takes_nothing() {
     RectifiedImages::new_in(&none, &mut carver);
     assert!(carver.footprint().regions().is_empty());
     let raw = raw_rig(lenses()[0]);
-    let (rectification, rig) = Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
-    assert_eq!(rectifier.prepare(&rectification, &rig), Err(RectifierError::RawTooLarge { width: 0, height: 0 }));
+    let (rectification, rig) =
+        Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+    assert_eq!(
+        rectifier.prepare(&rectification, &rig),
+        Err(RectifierError::RawTooLarge { width: 0, height: 0 })
+    );
 }

@@ -1,7 +1,9 @@
-//! Sums of absolute differences of eight descriptors at a time, by the vector instructions there are.
+//! Sums of absolute differences of eight descriptors at a time, by the vector instructions there
+//! are.
 //!
-//! x86 has one instruction for such sums, which compilers find in a loop over one pair at most. Work that compares descriptors is
-//! therefore written once, over [`Eight`] pairs, and compiled for each level of instructions (docs/decisions/0023-vector-kernels.md).
+//! x86 has one instruction for such sums, which compilers find in a loop over one pair at most.
+//! Work that compares descriptors is therefore written once, over [`Eight`] pairs, and compiled for
+//! each level of instructions (docs/decisions/0023-vector-kernels.md).
 
 use crate::{
     lanes::{Eight, LANES},
@@ -16,8 +18,9 @@ pub(crate) struct Descriptor(pub [u8; 16]);
 
 /// Sum of absolute differences of two descriptors, at most 4,080.
 ///
-/// Written as larger less smaller in bytes: where one descriptor stays the same throughout a loop, the compiler would widen it once
-/// before the loop and so lose the one instruction that x86 has for such sums.
+/// Written as larger less smaller in bytes: where one descriptor stays the same throughout a loop,
+/// the compiler would widen it once before the loop and so lose the one instruction that x86 has
+/// for such sums.
 #[inline(always)]
 pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
     let mut differences = [0u8; 16];
@@ -29,7 +32,8 @@ pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
 
 /// Work that compares descriptors.
 pub(crate) trait Comparison {
-    /// Does the work. To be inlined, with all it calls, so that it is compiled for the level of the kernels.
+    /// Does the work. To be inlined, with all it calls, so that it is compiled for the level of the
+    /// kernels.
     fn run(self, kernels: &impl Kernels);
 }
 
@@ -62,26 +66,40 @@ pub(crate) trait Kernels {
     /// The same with descriptors from anywhere.
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32>;
 
-    /// Sums of eight descriptors with two each, which lie side by side anywhere: those with the first ones, and those with the second ones.
+    /// Sums of eight descriptors with two each, which lie side by side anywhere: those with the
+    /// first ones, and those with the second ones.
     fn sums_of_two(&self, a: &Eight<Descriptor>, b: Eight<&[Descriptor; 2]>) -> [Eight<u32>; 2];
 
     /// Quotients of integers below 2^24, without their fractions; no divisor is 0.
     fn quotients(&self, dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32>;
 
-    /// The lesser of `best` and of the keys of eight features that are compared with one: the sum of absolute differences of their two
-    /// descriptors, at most 8,160, above [`OFFSET_BITS`] for their offsets. Features outside do not count.
-    fn least_inside(&self, best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>) -> Eight<u32>;
+    /// The lesser of `best` and of the keys of eight features that are compared with one: the sum
+    /// of absolute differences of their two descriptors, at most 8,160, above [`OFFSET_BITS`] for
+    /// their offsets. Features outside do not count.
+    fn least_inside(
+        &self,
+        best: Eight<u32>,
+        sought: &[Descriptor; 2],
+        others: &Eight<[Descriptor; 2]>,
+        inside: &Inside<'_>,
+    ) -> Eight<u32>;
 
-    /// The lesser of `best` and of what the pairs' sums make with `base`, each positive as `i32`: `(sum << 12) + base`. In the order in
-    /// which the sums come, which [`Kernels::ordered`] undoes.
+    /// The lesser of `best` and of what the pairs' sums make with `base`, each positive as `i32`:
+    /// `(sum << 12) + base`. In the order in which the sums come, which [`Kernels::ordered`]
+    /// undoes.
     fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32>;
 
     /// What [`Kernels::least`] made, in the order of the pairs.
     fn ordered(&self, keys: Eight<u32>) -> Eight<u32>;
 
-    /// Sums of absolute differences of four descriptors with those of columns, eight at a time, each at most 16,320. As many as there are
-    /// of all four and space for.
-    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]);
+    /// Sums of absolute differences of four descriptors with those of columns, eight at a time,
+    /// each at most 16,320. As many as there are of all four and space for.
+    fn costs(
+        &self,
+        point: &[Descriptor; 4],
+        columns: [&[Eight<Descriptor>]; 4],
+        costs: &mut [Eight<i16>],
+    );
 }
 
 /// Kernels as functions, so that each can be written where its instructions are safe.
@@ -136,7 +154,13 @@ where
     }
 
     #[inline(always)]
-    fn least_inside(&self, best: Eight<u32>, sought: &[Descriptor; 2], others: &Eight<[Descriptor; 2]>, inside: &Inside<'_>) -> Eight<u32> {
+    fn least_inside(
+        &self,
+        best: Eight<u32>,
+        sought: &[Descriptor; 2],
+        others: &Eight<[Descriptor; 2]>,
+        inside: &Inside<'_>,
+    ) -> Eight<u32> {
         (self.least_inside)(best, sought, others, inside)
     }
 
@@ -151,14 +175,23 @@ where
     }
 
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]) {
+    fn costs(
+        &self,
+        point: &[Descriptor; 4],
+        columns: [&[Eight<Descriptor>]; 4],
+        costs: &mut [Eight<i16>],
+    ) {
         for_columns(columns, costs, |columns| (self.costs)(point, columns));
     }
 }
 
 /// Fills in what columns cost, eight at a time.
 #[inline(always)]
-fn for_columns([a, b, c, d]: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>], cost: impl Fn([&Eight<Descriptor>; 4]) -> Eight<i16>) {
+fn for_columns(
+    [a, b, c, d]: [&[Eight<Descriptor>]; 4],
+    costs: &mut [Eight<i16>],
+    cost: impl Fn([&Eight<Descriptor>; 4]) -> Eight<i16>,
+) {
     for ((costs, (a, b)), (c, d)) in costs.iter_mut().zip(a.iter().zip(b)).zip(c.iter().zip(d)) {
         *costs = cost([a, b, c, d]);
     }
@@ -208,7 +241,9 @@ impl Kernels for Plain {
         let mut sums = [[0; LANES]; 2];
         for (step, sums) in sums.iter_mut().enumerate() {
             let others = b.iter().filter_map(|two| two.get(step));
-            sums.iter_mut().zip(a.iter().zip(others)).for_each(|(sum, (a, b))| *sum = distance(a, b));
+            sums.iter_mut()
+                .zip(a.iter().zip(others))
+                .for_each(|(sum, (a, b))| *sum = distance(a, b));
         }
         sums
     }
@@ -229,9 +264,14 @@ impl Kernels for Plain {
         inside: &Inside<'_>,
     ) -> Eight<u32> {
         let Inside { at, low, span, offset, end } = *inside;
-        for ((best, offset), ([u, v], [a, b])) in best.iter_mut().zip(offset..).zip(at.iter().zip(others)) {
-            // Left of the first column, or above the first row, differences wrap to far beyond the last.
-            let counts = (u.wrapping_sub(low[0]) <= span[0]) & (v.wrapping_sub(low[1]) <= span[1]) & (offset < end);
+        for ((best, offset), ([u, v], [a, b])) in
+            best.iter_mut().zip(offset..).zip(at.iter().zip(others))
+        {
+            // Left of the first column, or above the first row, differences wrap to far beyond the
+            // last.
+            let counts = (u.wrapping_sub(low[0]) <= span[0])
+                & (v.wrapping_sub(low[1]) <= span[1])
+                & (offset < end);
             let key = (distance(first, a) + distance(second, b)) << OFFSET_BITS | offset;
             *best = if counts { key.min(*best) } else { *best };
         }
@@ -239,7 +279,12 @@ impl Kernels for Plain {
     }
 
     #[inline(always)]
-    fn least(&self, mut best: Eight<u32>, [a, b]: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32> {
+    fn least(
+        &self,
+        mut best: Eight<u32>,
+        [a, b]: [&Eight<Descriptor>; 2],
+        base: u32,
+    ) -> Eight<u32> {
         for (best, (a, b)) in best.iter_mut().zip(a.iter().zip(b)) {
             *best = ((distance(a, b) << KEY_SCALE_BITS) + base).min(*best);
         }
@@ -252,11 +297,19 @@ impl Kernels for Plain {
     }
 
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], columns: [&[Eight<Descriptor>]; 4], costs: &mut [Eight<i16>]) {
+    fn costs(
+        &self,
+        point: &[Descriptor; 4],
+        columns: [&[Eight<Descriptor>]; 4],
+        costs: &mut [Eight<i16>],
+    ) {
         for_columns(columns, costs, |columns| {
             let mut costs = [0; LANES];
             for (corner, column) in point.iter().zip(columns) {
-                costs.iter_mut().zip(column).for_each(|(cost, other)| *cost += distance(corner, other) as i16);
+                costs
+                    .iter_mut()
+                    .zip(column)
+                    .for_each(|(cost, other)| *cost += distance(corner, other) as i16);
             }
             costs
         });
@@ -298,7 +351,16 @@ mod tests {
             let Self { a, b, most } = self;
             assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
             assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
-            let twos = [[b[3], a[1]], [a[0], b[6]], [b[1], b[2]], [a[7], a[6]], [b[0], a[4]], [a[2], b[5]], [b[7], b[4]], [a[3], a[5]]];
+            let twos = [
+                [b[3], a[1]],
+                [a[0], b[6]],
+                [b[1], b[2]],
+                [a[7], a[6]],
+                [b[0], a[4]],
+                [a[2], b[5]],
+                [b[7], b[4]],
+                [a[3], a[5]],
+            ];
             let two = kernels.sums_of_two(&a, twos.each_ref());
             assert_eq!(two, Plain.sums_of_two(&a, twos.each_ref()));
             assert_eq!(two, [0, 1].map(|step| Plain.sums(&a, &twos.map(|two| two[step]))));
@@ -308,17 +370,38 @@ mod tests {
             assert_eq!(quotients, Plain.quotients(dividends, divisors));
             assert!((0..LANES).all(|lane| quotients[lane] == dividends[lane] / divisors[lane]));
             let (sought, others) = ([a[5], b[2]], bytemuck::cast([a, b]));
-            for (at, offset) in [[[7u16, 9]; LANES], [[8, 65_535], [9, 0], [8, 0], [65_535, 65_535], [0, 0], [7, 9], [107, 9], [108, 12]]]
-                .iter()
-                .zip([0, 1_000])
+            for (at, offset) in [
+                [[7u16, 9]; LANES],
+                [
+                    [8, 65_535],
+                    [9, 0],
+                    [8, 0],
+                    [65_535, 65_535],
+                    [0, 0],
+                    [7, 9],
+                    [107, 9],
+                    [108, 12],
+                ],
+            ]
+            .iter()
+            .zip([0, 1_000])
             {
-                for (low, span) in [([0, 0], [65_535, 65_535]), ([8, 0], [99, 9]), ([7, 9], [100, 3]), ([0, 65_535], [65_535, 0])] {
+                for (low, span) in [
+                    ([0, 0], [65_535, 65_535]),
+                    ([8, 0], [99, 9]),
+                    ([7, 9], [100, 3]),
+                    ([0, 65_535], [65_535, 0]),
+                ] {
                     let inside = Inside { at, low, span, offset, end: 1_005 };
                     let best = [NO_FEATURE.min(most); LANES];
-                    assert_eq!(kernels.least_inside(best, &sought, &others, &inside), Plain.least_inside(best, &sought, &others, &inside));
+                    assert_eq!(
+                        kernels.least_inside(best, &sought, &others, &inside),
+                        Plain.least_inside(best, &sought, &others, &inside)
+                    );
                 }
             }
-            let (point, columns) = ([a[0], a[3], b[5], b[7]], [&[a, b, b][..], &[b, a, a], &[b, b, a], &[a, b]]);
+            let (point, columns) =
+                ([a[0], a[3], b[5], b[7]], [&[a, b, b][..], &[b, a, a], &[b, b, a], &[a, b]]);
             let [mut costs, mut twin] = [[[-1; LANES]; 3]; 2];
             kernels.costs(&point, columns, &mut costs);
             Plain.costs(&point, columns, &mut twin);
@@ -332,12 +415,20 @@ mod tests {
         let mut random = Random::new(8);
         for vectors in Vectors::available() {
             for bound in [2, 16, 256].repeat(50) {
-                let [a, b] =
-                    [(); 2].map(|()| [(); LANES].map(|()| Descriptor([(); 16].map(|()| (random.below(bound) * 255 / (bound - 1)) as u8))));
+                let [a, b] = [(); 2].map(|()| {
+                    [(); LANES].map(|()| {
+                        Descriptor(
+                            [(); 16].map(|()| (random.below(bound) * 255 / (bound - 1)) as u8),
+                        )
+                    })
+                });
                 compare(vectors, Equal { a, b, most: random.below(1 << 30) });
             }
             let extremes = [[0; 16], [255; 16]].map(Descriptor);
-            compare(vectors, Equal { a: [extremes[0]; LANES], b: [extremes[1]; LANES], most: 1 << 30 });
+            compare(
+                vectors,
+                Equal { a: [extremes[0]; LANES], b: [extremes[1]; LANES], most: 1 << 30 },
+            );
         }
     }
 }

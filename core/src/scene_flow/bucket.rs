@@ -1,12 +1,13 @@
-//! Bucketing: the best few matches of each cell, so that egomotion hears the whole picture and not its busiest corner.
+//! Bucketing: the best few matches of each cell, so that egomotion hears the whole picture and not
+//! its busiest corner.
 
 use super::{
     cells::{Cells, Shape},
     matches::Match,
 };
 
-/// Writes the positions of the `per_cell` best matches of each cell, cell by cell, best first (of equals the earlier), to `selection`
-/// and returns how many those are.
+/// Writes the positions of the `per_cell` best matches of each cell, cell by cell, best first (of
+/// equals the earlier), to `selection` and returns how many those are.
 pub(super) fn select(
     matches: &[Match],
     score: &[f32],
@@ -25,9 +26,11 @@ pub(super) fn select(
         for _ in 0..per_cell {
             let Some((best, others)) = rest.split_first_mut() else { break };
             let Some(slot) = slots.next() else { return selected };
-            // Few are wanted of a cell, so each is sought among what is left: no sort, whose depth would depend on the matches.
+            // Few are wanted of a cell, so each is sought among what is left: no sort, whose depth
+            // would depend on the matches.
             for other in &mut *others {
-                if score(*other).total_cmp(&score(*best)).reverse().then((*other).cmp(best)).is_lt() {
+                if score(*other).total_cmp(&score(*best)).reverse().then((*other).cmp(best)).is_lt()
+                {
                     core::mem::swap(other, best);
                 }
             }

@@ -101,8 +101,13 @@ impl<'s> Camera<'s> {
         let mut descriptor = carver.alloc(names.descriptor, features);
         let mut cell = carver.alloc(names.cell, 4 * table(capacity));
         let mut frame = || {
-            let [dense, sparse] =
-                sets.map(|count| Features::new(part(&mut position, count), part(&mut descriptor, count), part(&mut cell, table(capacity))));
+            let [dense, sparse] = sets.map(|count| {
+                Features::new(
+                    part(&mut position, count),
+                    part(&mut descriptor, count),
+                    part(&mut cell, table(capacity)),
+                )
+            });
             Frame { pixels: part(&mut image, pixels), dense, sparse }
         };
         Self {
@@ -152,8 +157,8 @@ impl<'s> Camera<'s> {
         previous.pixels.get(..pixels) == current.pixels.get(..pixels)
     }
 
-    /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame before is not
-    /// looked at again.
+    /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame
+    /// before is not looked at again.
     pub(super) fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {
         let Self {
             frames: [a, b],
@@ -198,28 +203,38 @@ impl Work for FindFeatures<'_, '_> {
         let [a, b] = &mut camera.frames;
         let frame = if camera.current { b } else { a };
         let pixels = width * height;
-        let (Some(gradient), Some(blob), Some(corner)) =
-            (camera.gradient.get_mut(..pixels), camera.blob.get_mut(..pixels), camera.corner.get_mut(..pixels))
-        else {
+        let (Some(gradient), Some(blob), Some(corner)) = (
+            camera.gradient.get_mut(..pixels),
+            camera.blob.get_mut(..pixels),
+            camera.corner.get_mut(..pixels),
+        ) else {
             frame.dense.clear();
             frame.sparse.clear();
             return FeatureCount::default();
         };
-        let Some(image) = View::new(frame.pixels, width, height) else { return FeatureCount::default() };
+        let Some(image) = View::new(frame.pixels, width, height) else {
+            return FeatureCount::default();
+        };
         filter(image, Responses { gradient, blob, corner }, camera.sums);
         if let Some(invalid) = invalid {
             silence(invalid, width, blob);
             silence(invalid, width, corner);
         }
         let wanted = config.features_max as usize;
-        let mut strongest = Strongest::new(camera.candidates, camera.lists, [width, height], wanted);
+        let mut strongest =
+            Strongest::new(camera.candidates, camera.lists, [width, height], wanted);
         let response_min = config.response_min.min(i16::MAX as u16) as i16;
         let (blob, corner) = (Field { response: blob, width }, Field { response: corner, width });
         suppress(blob, corner, response_min, camera.sums, |candidate| strongest.add(candidate));
         let (mut dropped, kept) = strongest.finish();
         let candidates = kept.iter().map(|held| held.candidate);
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
-        dropped += frame.sparse.fill(candidates.filter(|candidate| candidate.sparse == 1), gradient, width, height);
+        dropped += frame.sparse.fill(
+            candidates.filter(|candidate| candidate.sparse == 1),
+            gradient,
+            width,
+            height,
+        );
         FeatureCount {
             dense: frame.dense.len() as u32,
             sparse: frame.sparse.len() as u32,

@@ -1,4 +1,5 @@
-//! Matches sorted into square cells of the previous left image, for the stages that ask who is near.
+//! Matches sorted into square cells of the previous left image, for the stages that ask who is
+//! near.
 //!
 //! Memory: 4 bytes per match and per cell of [`CELL_MIN_PX`].
 
@@ -37,7 +38,8 @@ impl Shape {
     /// Column and row of the cell a match lies in.
     pub(super) fn cell(&self, m: &Match) -> [usize; 2] {
         // Previous left positions are inside the image, so the cast is exact.
-        let [column, row] = m.previous_left.map(|x| (x as usize).checked_div(self.cell_px).unwrap_or(0));
+        let [column, row] =
+            m.previous_left.map(|x| (x as usize).checked_div(self.cell_px).unwrap_or(0));
         [column.min(self.columns.saturating_sub(1)), row.min(self.rows.saturating_sub(1))]
     }
 }
@@ -58,10 +60,13 @@ impl<'s> Cells<'s> {
         }
     }
 
-    /// Sorts. Returns the cells' starts (one more than cells) and the matches' positions, cell by cell.
+    /// Sorts. Returns the cells' starts (one more than cells) and the matches' positions, cell by
+    /// cell.
     pub(super) fn sort(&mut self, matches: &[Match], shape: Shape) -> (&[u32], &mut [u32]) {
         let cells = shape.cells();
-        let (Some(start), Some(order)) = (self.start.get_mut(..=cells), self.order.get_mut(..matches.len())) else {
+        let (Some(start), Some(order)) =
+            (self.start.get_mut(..=cells), self.order.get_mut(..matches.len()))
+        else {
             return (&[], &mut []);
         };
         let key = |m: &Match| {

@@ -1,5 +1,6 @@
-//! Circular matching: left-previous -> right-previous -> right-current -> left-current -> left-previous. A circle that does not close
-//! on the feature it began with is no match, nor is one without positive disparity in both frames.
+//! Circular matching: left-previous -> right-previous -> right-current -> left-current ->
+//! left-previous. A circle that does not close on the feature it began with is no match, nor is one
+//! without positive disparity in both frames.
 
 use super::{
     SceneFlowConfig,
@@ -15,7 +16,8 @@ use bytemuck::{Pod, Zeroable};
 /// One side of the circle has no partner.
 const NONE: [u32; 3] = [u32::MAX; 3];
 
-/// Where a circle's four sides may lead, relative to where each begins: smallest and largest step in u, then in v, px.
+/// Where a circle's four sides may lead, relative to where each begins: smallest and largest step
+/// in u, then in v, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Reach {
@@ -66,8 +68,14 @@ impl<R: Fn([u16; 2]) -> Reach> Comparison for TraceBand<'_, '_, '_, R> {
 }
 
 impl Corners<'_, '_> {
-    /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the circle's order.
-    pub(super) fn trace<E: Executor>(&self, reach: impl Fn([u16; 2]) -> Reach + Sync, traced: &mut [[u32; 3]], executor: &E) {
+    /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the
+    /// circle's order.
+    pub(super) fn trace<E: Executor>(
+        &self,
+        reach: impl Fn([u16; 2]) -> Reach + Sync,
+        traced: &mut [[u32; 3]],
+        executor: &E,
+    ) {
         let len = self.previous_left.len();
         let Some(traced) = traced.get_mut(..len) else { return };
         let bands = Bands::of(len);
@@ -78,7 +86,12 @@ impl Corners<'_, '_> {
 
     /// The circle that begins with one feature, if it closes.
     #[inline(always)]
-    fn circle(&self, first: usize, reach: impl Fn([u16; 2]) -> Reach, kernels: &impl Kernels) -> Option<[u32; 3]> {
+    fn circle(
+        &self,
+        first: usize,
+        reach: impl Fn([u16; 2]) -> Reach,
+        kernels: &impl Kernels,
+    ) -> Option<[u32; 3]> {
         let class = self.previous_left.class(first);
         let reach = reach(self.previous_left.at(first)?);
         let sides = [
@@ -91,16 +104,21 @@ impl Corners<'_, '_> {
         let mut index = first;
         for ((from, to, by), corner) in sides.into_iter().zip(corners.iter_mut().skip(1)) {
             let ([u, v], by) = (from.at(index)?.map(i32::from), by.map(i32::from));
-            let window = Window { u_min: u + by[0], u_max: u + by[1], v_min: v + by[2], v_max: v + by[3] };
+            let window =
+                Window { u_min: u + by[0], u_max: u + by[1], v_min: v + by[2], v_max: v + by[3] };
             index = to.nearest(class, window, from.descriptor(index)?, kernels)?;
             *corner = index;
         }
         let [_, previous_right, current_right, current_left, back] = corners;
-        (back == first).then_some([previous_right as u32, current_right as u32, current_left as u32])
+        (back == first).then_some([
+            previous_right as u32,
+            current_right as u32,
+            current_left as u32,
+        ])
     }
 
-    /// The closed circles as matches, in the order of the previous left features. Returns how many there were; those beyond the capacity
-    /// in `out` are dropped.
+    /// The closed circles as matches, in the order of the previous left features. Returns how many
+    /// there were; those beyond the capacity in `out` are dropped.
     pub(super) fn gather(&self, traced: &[[u32; 3]], out: &mut [Match]) -> usize {
         let mut slots = out.iter_mut();
         let mut found = 0;
@@ -115,7 +133,11 @@ impl Corners<'_, '_> {
         found
     }
 
-    fn closed(&self, first: usize, [previous_right, current_right, current_left]: [u32; 3]) -> Option<Match> {
+    fn closed(
+        &self,
+        first: usize,
+        [previous_right, current_right, current_left]: [u32; 3],
+    ) -> Option<Match> {
         let position = |set: &Features<'_>, index: usize| set.at(index).map(|at| at.map(f32::from));
         Some(Match {
             previous_left: position(self.previous_left, first)?,

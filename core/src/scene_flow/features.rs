@@ -1,7 +1,8 @@
 //! An image's features, sorted so that a search window is a few contiguous runs.
 //!
-//! Order: by class, then by bands of [`CELL_V`] rows, then by cells of [`CELL_U`] columns, then as found. Positions and descriptors
-//! stand in separate arrays, so that comparing a run of neighbours reads contiguous 32-byte descriptors.
+//! Order: by class, then by bands of [`CELL_V`] rows, then by cells of [`CELL_U`] columns, then as
+//! found. Positions and descriptors stand in separate arrays, so that comparing a run of neighbours
+//! reads contiguous 32-byte descriptors.
 //!
 //! Memory: 36 bytes per feature, and 4 bytes per class and cell (16 / 256 bytes per pixel).
 
@@ -19,7 +20,8 @@ pub(super) const CELL_V: usize = 8;
 /// Bytes of a descriptor: 16 positions, two Sobel responses each.
 const DESCRIPTOR: usize = 32;
 
-/// Where a descriptor samples the gradients, relative to the feature: 16 positions within 11 x 11 px, finer towards the middle.
+/// Where a descriptor samples the gradients, relative to the feature: 16 positions within 11 x 11
+/// px, finer towards the middle.
 const SAMPLES: [(isize, isize); DESCRIPTOR / 2] = [
     (-2, -5),
     (2, -5),
@@ -56,8 +58,13 @@ pub(super) const fn table(capacity: &Capacity) -> usize {
 }
 
 impl<'s> Features<'s> {
-    /// An empty set with space for as many features as `at` and `descriptor` have entries, `start` has [`table`] of them.
-    pub(super) fn new(at: &'s mut [[u16; 2]], descriptor: &'s mut [[Descriptor; 2]], start: &'s mut [u32]) -> Self {
+    /// An empty set with space for as many features as `at` and `descriptor` have entries, `start`
+    /// has [`table`] of them.
+    pub(super) fn new(
+        at: &'s mut [[u16; 2]],
+        descriptor: &'s mut [[Descriptor; 2]],
+        start: &'s mut [u32],
+    ) -> Self {
         Self { at, descriptor, start, len: 0, bands: 0, cells: 0 }
     }
 
@@ -78,8 +85,8 @@ impl<'s> Features<'s> {
         self.at.get(index).copied()
     }
 
-    /// Sorts candidates in and describes them by `gradient`, whose rows are `width` apart. The first that fit are kept; returns how
-    /// many were dropped.
+    /// Sorts candidates in and describes them by `gradient`, whose rows are `width` apart. The
+    /// first that fit are kept; returns how many were dropped.
     #[inline(always)]
     pub(super) fn fill(
         &mut self,
@@ -96,8 +103,12 @@ impl<'s> Features<'s> {
             self.clear();
             return candidates.count();
         };
-        let key = |c: Candidate| (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells + usize::from(c.u) / CELL_U;
-        // Count, turn counts into starts one entry to the right, then insert: each cell's cursor ends as the next one's start.
+        let key = |c: Candidate| {
+            (usize::from(c.class) * self.bands + usize::from(c.v) / CELL_V) * self.cells
+                + usize::from(c.u) / CELL_U
+        };
+        // Count, turn counts into starts one entry to the right, then insert: each cell's cursor
+        // ends as the next one's start.
         start.fill(0);
         for candidate in accepted.clone() {
             if let Some(count) = start.get_mut(key(candidate) + 1) {
@@ -114,9 +125,17 @@ impl<'s> Features<'s> {
             let Some(cursor) = start.get_mut(key(candidate)) else { continue };
             let slot = *cursor as usize;
             *cursor += 1;
-            if let (Some(at), Some(descriptor)) = (self.at.get_mut(slot), self.descriptor.get_mut(slot)) {
+            if let (Some(at), Some(descriptor)) =
+                (self.at.get_mut(slot), self.descriptor.get_mut(slot))
+            {
                 *at = [candidate.u, candidate.v];
-                describe(gradient, width, usize::from(candidate.u), usize::from(candidate.v), bytemuck::cast_mut(descriptor));
+                describe(
+                    gradient,
+                    width,
+                    usize::from(candidate.u),
+                    usize::from(candidate.v),
+                    bytemuck::cast_mut(descriptor),
+                );
             }
         }
         start.copy_within(..keys, 1);
@@ -129,7 +148,11 @@ impl<'s> Features<'s> {
     /// The class of a feature: features are sorted by it.
     pub(super) fn class(&self, index: usize) -> usize {
         let per_class = self.bands * self.cells;
-        (1..CLASSES).filter(|class| self.start.get(class * per_class).is_some_and(|&start| start as usize <= index)).count()
+        (1..CLASSES)
+            .filter(|class| {
+                self.start.get(class * per_class).is_some_and(|&start| start as usize <= index)
+            })
+            .count()
     }
 
     /// Descriptor of a feature.
@@ -137,13 +160,26 @@ impl<'s> Features<'s> {
         self.descriptor.get(index)
     }
 
-    /// The feature of `class` within the window whose descriptor is nearest; the first of equals in the set's order.
+    /// The feature of `class` within the window whose descriptor is nearest; the first of equals in
+    /// the set's order.
     #[inline(always)]
-    pub(super) fn nearest(&self, class: usize, window: Window, descriptor: &[Descriptor; 2], kernels: &impl Kernels) -> Option<usize> {
-        if window.u_max < 0 || window.v_max < 0 || window.u_min > window.u_max || window.v_min > window.v_max || self.bands == 0 {
+    pub(super) fn nearest(
+        &self,
+        class: usize,
+        window: Window,
+        descriptor: &[Descriptor; 2],
+        kernels: &impl Kernels,
+    ) -> Option<usize> {
+        if window.u_max < 0
+            || window.v_max < 0
+            || window.u_min > window.u_max
+            || window.v_min > window.v_max
+            || self.bands == 0
+        {
             return None;
         }
-        let [u_min, u_max, v_min, v_max] = [window.u_min, window.u_max, window.v_min, window.v_max].map(|x| x.max(0) as usize);
+        let [u_min, u_max, v_min, v_max] =
+            [window.u_min, window.u_max, window.v_min, window.v_max].map(|x| x.max(0) as usize);
         let (first_band, last_band) = (v_min / CELL_V, (v_max / CELL_V).min(self.bands - 1));
         let (first_cell, last_cell) = (u_min / CELL_U, (u_max / CELL_U).min(self.cells - 1));
         if first_cell > last_cell {
@@ -155,8 +191,13 @@ impl<'s> Features<'s> {
         let (mut origin, mut keys) = (0, [NO_FEATURE; LANES]);
         for band in first_band..=last_band {
             let row = (class * self.bands + band) * self.cells;
-            let (Some(&from), Some(&to)) = (self.start.get(row + first_cell), self.start.get(row + last_cell + 1)) else { continue };
-            // No 4 x 4 px hold two features of a class: a band's offsets fit, and mostly all bands'.
+            let (Some(&from), Some(&to)) =
+                (self.start.get(row + first_cell), self.start.get(row + last_cell + 1))
+            else {
+                continue;
+            };
+            // No 4 x 4 px hold two features of a class: a band's offsets fit, and mostly all
+            // bands'.
             if band == first_band || to.saturating_sub(origin) >> OFFSET_BITS != 0 {
                 best.take(origin, keys);
                 (origin, keys) = (from, [NO_FEATURE; LANES]);
@@ -166,7 +207,9 @@ impl<'s> Features<'s> {
                 let start = (origin + offset) as usize;
                 let inside = |at| Inside { at, low, span, offset, end };
                 keys = match (chunk(self.at, start), chunk(self.descriptor, start)) {
-                    (Some(at), Some(others)) => kernels.least_inside(keys, descriptor, others, &inside(at)),
+                    (Some(at), Some(others)) => {
+                        kernels.least_inside(keys, descriptor, others, &inside(at))
+                    }
                     _ => {
                         let (at, others) = self.last_eight(start);
                         kernels.least_inside(keys, descriptor, &others, &inside(&at))
@@ -184,7 +227,11 @@ impl<'s> Features<'s> {
     fn last_eight(&self, start: usize) -> (Eight<[u16; 2]>, Eight<[Descriptor; 2]>) {
         let mut eight = ([[0; 2]; LANES], [[Descriptor([0; 16]); 2]; LANES]);
         eight.0.iter_mut().zip(self.at.iter().skip(start)).for_each(|(to, at)| *to = *at);
-        eight.1.iter_mut().zip(self.descriptor.iter().skip(start)).for_each(|(to, descriptor)| *to = *descriptor);
+        eight
+            .1
+            .iter_mut()
+            .zip(self.descriptor.iter().skip(start))
+            .for_each(|(to, descriptor)| *to = *descriptor);
         eight
     }
 }
@@ -198,7 +245,8 @@ struct Best {
 }
 
 impl Best {
-    /// Takes in the least keys of features that are counted from `origin` on and come after those before.
+    /// Takes in the least keys of features that are counted from `origin` on and come after those
+    /// before.
     #[inline(always)]
     fn take(&mut self, origin: u32, keys: Eight<u32>) {
         let key = keys.into_iter().fold(NO_FEATURE, |a, b| a.min(b));

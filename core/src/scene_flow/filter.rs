@@ -1,6 +1,7 @@
 //! Gradients and the two feature filters, one pass over the image.
 //!
-//! Each row is summed down its columns first, which leaves every filter a short sum along the row: all in `i16`, all contiguous.
+//! Each row is summed down its columns first, which leaves every filter a short sum along the row:
+//! all in `i16`, all contiguous.
 //!
 //! | filter | kernel | range |
 //! |---|---|---|
@@ -37,18 +38,28 @@ pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) 
         return;
     }
     let inner = FILTER_MARGIN..width - FILTER_MARGIN;
-    let rows = gradient.chunks_exact_mut(width).zip(blob.chunks_exact_mut(width)).zip(corner.chunks_exact_mut(width));
-    for (v, ((gradient, blob), corner)) in rows.enumerate().take(height - FILTER_MARGIN).skip(FILTER_MARGIN) {
+    let rows = gradient
+        .chunks_exact_mut(width)
+        .zip(blob.chunks_exact_mut(width))
+        .zip(corner.chunks_exact_mut(width));
+    for (v, ((gradient, blob), corner)) in
+        rows.enumerate().take(height - FILTER_MARGIN).skip(FILTER_MARGIN)
+    {
         let rows = [v - 2, v - 1, v, v + 1, v + 2].map(|v| image.row(v));
         sum_columns(rows, sums);
-        let out = (gradient.get_mut(inner.clone()), blob.get_mut(inner.clone()), corner.get_mut(inner.clone()));
+        let out = (
+            gradient.get_mut(inner.clone()),
+            blob.get_mut(inner.clone()),
+            corner.get_mut(inner.clone()),
+        );
         if let (Some(gradient), Some(blob), Some(corner)) = out {
             sum_rows(sums, image.row(v), gradient, blob, corner);
         }
     }
 }
 
-/// Sums each column's five pixels in the five ways the filters need. Nothing where the rows or `sums` are too short.
+/// Sums each column's five pixels in the five ways the filters need. Nothing where the rows or
+/// `sums` are too short.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
 fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
@@ -73,8 +84,17 @@ fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
 
 /// Finishes the filters along one row, border columns excluded. Nothing where a row is too short.
 #[inline(always)]
-#[expect(clippy::indexing_slicing, reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length first")]
-fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16], corner: &mut [i16]) -> Option<()> {
+#[expect(
+    clippy::indexing_slicing,
+    reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length first"
+)]
+fn sum_rows(
+    sums: &[i16],
+    pixels: &[u8],
+    gradient: &mut [u16],
+    blob: &mut [i16],
+    corner: &mut [i16],
+) -> Option<()> {
     let n = gradient.len();
     let width = n + 2 * FILTER_MARGIN;
     let at = |row: usize, shift: usize| sums.get(row * width + shift..)?.get(..n);
@@ -83,14 +103,16 @@ fn sum_rows(sums: &[i16], pixels: &[u8], gradient: &mut [u16], blob: &mut [i16],
     let halves = [at(2, 0)?, at(2, 1)?, at(2, 3)?, at(2, 4)?];
     let smooth = [at(3, 1)?, at(3, 3)?];
     let step = [at(4, 1)?, at(4, 2)?, at(4, 3)?];
-    let (pixels, blob, corner) = (pixels.get(FILTER_MARGIN..)?.get(..n)?, blob.get_mut(..n)?, corner.get_mut(..n)?);
+    let (pixels, blob, corner) =
+        (pixels.get(FILTER_MARGIN..)?.get(..n)?, blob.get_mut(..n)?, corner.get_mut(..n)?);
     for u in 0..n {
         let square = five[0][u] + five[1][u] + five[2][u] + five[3][u] + five[4][u];
         blob[u] = 2 * (three[0][u] + three[1][u] + three[2][u]) - square + 7 * i16::from(pixels[u]);
         corner[u] = halves[2][u] + halves[3][u] - halves[0][u] - halves[1][u];
         let along = (smooth[1][u] - smooth[0][u]) >> 2;
         let down = (step[0][u] + 2 * step[1][u] + step[2][u]) >> 2;
-        gradient[u] = (along.clamp(-127, 127) + 128) as u16 | ((down.clamp(-127, 127) + 128) as u16) << 8;
+        gradient[u] =
+            (along.clamp(-127, 127) + 128) as u16 | ((down.clamp(-127, 127) + 128) as u16) << 8;
     }
     Some(())
 }
@@ -105,14 +127,24 @@ mod tests {
     fn equals_the_kernels_written_out_on_noise() {
         let (width, height) = (37, 23);
         let mut random = Random::new(1);
-        let pixels: Vec<u8> = (0..width * height).map(|_| if random.below(3) == 0 { 255 } else { random.below(256) as u8 }).collect();
+        let pixels: Vec<u8> = (0..width * height)
+            .map(|_| if random.below(3) == 0 { 255 } else { random.below(256) as u8 })
+            .collect();
         let image = View::new(&pixels, width, height).unwrap();
-        let (mut gradient, mut blob, mut corner) = (vec![0; width * height], vec![0; width * height], vec![0; width * height]);
+        let (mut gradient, mut blob, mut corner) =
+            (vec![0; width * height], vec![0; width * height], vec![0; width * height]);
         let out = Responses { gradient: &mut gradient, blob: &mut blob, corner: &mut corner };
         filter(image, out, &mut vec![0; COLUMN_SUMS * width]);
 
-        let blob_kernel = [[-1, -1, -1, -1, -1], [-1, 1, 1, 1, -1], [-1, 1, 8, 1, -1], [-1, 1, 1, 1, -1], [-1, -1, -1, -1, -1]];
-        let corner_kernel = [[-1, -1, 0, 1, 1], [-1, -1, 0, 1, 1], [0; 5], [1, 1, 0, -1, -1], [1, 1, 0, -1, -1]];
+        let blob_kernel = [
+            [-1, -1, -1, -1, -1],
+            [-1, 1, 1, 1, -1],
+            [-1, 1, 8, 1, -1],
+            [-1, 1, 1, 1, -1],
+            [-1, -1, -1, -1, -1],
+        ];
+        let corner_kernel =
+            [[-1, -1, 0, 1, 1], [-1, -1, 0, 1, 1], [0; 5], [1, 1, 0, -1, -1], [1, 1, 0, -1, -1]];
         let u_kernel = [[0; 5], [0, -1, 0, 1, 0], [0, -2, 0, 2, 0], [0, -1, 0, 1, 0], [0; 5]];
         let v_kernel = [[0; 5], [0, -1, -2, -1, 0], [0; 5], [0, 1, 2, 1, 0], [0; 5]];
         for v in 2..height - 2 {
@@ -134,7 +166,11 @@ mod tests {
     fn leaves_images_below_five_pixels_flat() {
         let image = View::new(&[9u8; 16], 4, 4).unwrap();
         let (mut gradient, mut blob, mut corner) = ([1; 16], [1; 16], [1; 16]);
-        filter(image, Responses { gradient: &mut gradient, blob: &mut blob, corner: &mut corner }, &mut [0; 20]);
+        filter(
+            image,
+            Responses { gradient: &mut gradient, blob: &mut blob, corner: &mut corner },
+            &mut [0; 20],
+        );
         assert_eq!((blob, corner, gradient), ([0; 16], [0; 16], [0x8080; 16]));
     }
 }

@@ -129,12 +129,14 @@ impl<'s> FlowMatcher<'s> {
         part(self.sparse, ..self.sparse_len)
     }
 
-    /// The dense pass' matches of the last frame that are supported by their neighbours, refined below the pixel.
+    /// The dense pass' matches of the last frame that are supported by their neighbours, refined
+    /// below the pixel.
     pub(crate) fn refined(&self) -> &[Match] {
         part(self.refined, ..self.refined_len)
     }
 
-    /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of each cell, cell by cell.
+    /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of
+    /// each cell, cell by cell.
     pub(crate) fn selection(&self) -> &[u32] {
         part(self.selection, ..self.selection_len)
     }
@@ -144,23 +146,39 @@ impl<'s> FlowMatcher<'s> {
         self.selection().iter().filter_map(|&index| self.refined().get(index as usize))
     }
 
-    /// Looks for a scene point where it is expected: the patch around its current left position, a whole pixel, is found again below the
-    /// pixel in the other three images. `None` without a frame before, where it is expected outside an image or at no number, and where it is
-    /// lost: no texture, or nothing alike within 1.75 px.
+    /// Looks for a scene point where it is expected: the patch around its current left position, a
+    /// whole pixel, is found again below the pixel in the other three images. `None` without a
+    /// frame before, where it is expected outside an image or at no number, and where it is lost:
+    /// no texture, or nothing alike within 1.75 px.
     pub(crate) fn find(&self, expected: &Match) -> Option<Match> {
         let expected = &expected.with_right(|at| self.correction.uncorrected(at));
         let [width, height] = self.last.filter(|_| self.matched)?;
-        let inside = |at: [f32; 2]| at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32;
-        let positions = [expected.previous_left, expected.previous_right, expected.current_left, expected.current_right];
-        let found = positions.into_iter().all(inside).then(|| find_back(expected, images(&self.left, &self.right, [width, height])))??;
+        let inside = |at: [f32; 2]| {
+            at[0] >= 0.0 && at[1] >= 0.0 && at[0] < width as f32 && at[1] < height as f32
+        };
+        let positions = [
+            expected.previous_left,
+            expected.previous_right,
+            expected.current_left,
+            expected.current_right,
+        ];
+        let found = positions
+            .into_iter()
+            .all(inside)
+            .then(|| find_back(expected, images(&self.left, &self.right, [width, height])))??;
         Some(found.with_right(|at| self.correction.corrected(at)))
     }
 
     /// Takes a disparity error out of the last frame's matches, and of those found later.
     pub(crate) fn correct(&mut self, correction: PixelCorrection) {
         self.correction = correction;
-        for matches in [self.sparse.get_mut(..self.sparse_len), self.refined.get_mut(..self.refined_len)] {
-            matches.unwrap_or_default().iter_mut().for_each(|m| *m = m.with_right(|at| correction.corrected(at)));
+        for matches in
+            [self.sparse.get_mut(..self.sparse_len), self.refined.get_mut(..self.refined_len)]
+        {
+            matches
+                .unwrap_or_default()
+                .iter_mut()
+                .for_each(|m| *m = m.with_right(|at| correction.corrected(at)));
         }
     }
 
@@ -175,7 +193,9 @@ impl<'s> FlowMatcher<'s> {
         for matches in [self.sparse(), self.refined()] {
             digest.u64(matches.len() as u64);
             for m in matches {
-                [m.previous_left, m.previous_right, m.current_left, m.current_right].iter().for_each(|&at| digest.f32s(at));
+                [m.previous_left, m.previous_right, m.current_left, m.current_right]
+                    .iter()
+                    .for_each(|&at| digest.f32s(at));
             }
         }
         self.selection().iter().for_each(|&index| digest.u64(u64::from(index)));
@@ -196,10 +216,19 @@ impl<'s> FlowMatcher<'s> {
 
     /// Says what must hold of the matches after a frame.
     pub(crate) fn audit(&self, audit: &mut Audit) {
-        audit.require(self.sparse_len <= self.sparse.len(), "no more sparse matches than there is memory for");
-        audit.require(self.refined_len <= self.refined.len(), "no more refined matches than there is memory for");
+        audit.require(
+            self.sparse_len <= self.sparse.len(),
+            "no more sparse matches than there is memory for",
+        );
+        audit.require(
+            self.refined_len <= self.refined.len(),
+            "no more refined matches than there is memory for",
+        );
         let selected = |&index: &u32| (index as usize) < self.refined_len;
-        audit.require(self.selection().iter().all(selected), "every selected match is a refined one");
+        audit.require(
+            self.selection().iter().all(selected),
+            "every selected match is a refined one",
+        );
     }
 
     /// Visits the last pair; [`FlowMatcher::rebuild`] must follow a reading.
@@ -249,7 +278,13 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Takes in a stereo frame and matches it with the one before.
-    pub fn push<E: Executor>(&mut self, config: &SceneFlowConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> FlowReport {
+    pub fn push<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        executor: &E,
+    ) -> FlowReport {
         self.push_within(config, left, right, None, executor)
     }
 
@@ -264,14 +299,20 @@ impl<'s> FlowMatcher<'s> {
     ) -> FlowReport {
         self.clear();
         let size = [left.width(), left.height()];
-        if size != [right.width(), right.height()] || size[0] > self.capacity[0] || size[1] > self.capacity[1] {
+        if size != [right.width(), right.height()]
+            || size[0] > self.capacity[0]
+            || size[1] > self.capacity[1]
+        {
             self.last = None;
             return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
         }
-        let [invalid_left, invalid_right] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+        let [invalid_left, invalid_right] =
+            [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
         let vectors = executor.vectors();
-        let (left, right) = executor
-            .join(|| self.left.take(left, invalid_left, config, vectors), || self.right.take(right, invalid_right, config, vectors));
+        let (left, right) = executor.join(
+            || self.left.take(left, invalid_left, config, vectors),
+            || self.right.take(right, invalid_right, config, vectors),
+        );
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         if self.last.replace(size) != Some(size) {
             return FlowReport { status: FlowStatus::First, ..report };
@@ -290,14 +331,27 @@ impl<'s> FlowMatcher<'s> {
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
         let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
         let (refined, score) = (part(self.refined, ..self.refined_len), &*self.score);
-        self.selection_len = select(refined, score, shape, usize::from(config.bucket_matches), &mut self.cells, self.selection);
+        self.selection_len = select(
+            refined,
+            score,
+            shape,
+            usize::from(config.bucket_matches),
+            &mut self.cells,
+            self.selection,
+        );
         report.bucketed = self.selection_len as u32;
         report
     }
 
     /// Matches the sparse features and learns from the supported ones where to look.
-    fn sparse_pass<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], executor: &E) -> PassCount {
-        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
+    fn sparse_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        executor: &E,
+    ) -> PassCount {
+        let ((left_before, left), (right_before, right)) =
+            (self.left.frames(), self.right.frames());
         let corners = Corners {
             previous_left: &left_before.sparse,
             previous_right: &right_before.sparse,
@@ -311,7 +365,11 @@ impl<'s> FlowMatcher<'s> {
         let matches = part(self.sparse, ..self.sparse_len);
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         support(matches, shape, config, &mut self.cells, self.motion, self.supported);
-        let supported = matches.iter().zip(&*self.supported).filter(|&(_, &supported)| supported == 1).map(|(m, _)| *m);
+        let supported = matches
+            .iter()
+            .zip(&*self.supported)
+            .filter(|&(_, &supported)| supported == 1)
+            .map(|(m, _)| *m);
         self.prior.learn(supported.clone(), width, height, config);
         PassCount {
             closed: closed as u32,
@@ -320,10 +378,16 @@ impl<'s> FlowMatcher<'s> {
         }
     }
 
-    /// Matches all features within what the sparse pass learned; leaves the matches in `refined` and who is supported in `supported`.
-    /// Returns its counts and how many there are.
-    fn dense_pass<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], executor: &E) -> (PassCount, usize) {
-        let ((left_before, left), (right_before, right)) = (self.left.frames(), self.right.frames());
+    /// Matches all features within what the sparse pass learned; leaves the matches in `refined`
+    /// and who is supported in `supported`. Returns its counts and how many there are.
+    fn dense_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        executor: &E,
+    ) -> (PassCount, usize) {
+        let ((left_before, left), (right_before, right)) =
+            (self.left.frames(), self.right.frames());
         let corners = Corners {
             previous_left: &left_before.dense,
             previous_right: &right_before.dense,
@@ -336,8 +400,16 @@ impl<'s> FlowMatcher<'s> {
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
         let matches = part(self.refined, ..stored);
-        support(matches, Shape::new(width, height, CELL_MIN_PX), config, &mut self.cells, self.motion, self.supported);
-        let supported = self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
+        support(
+            matches,
+            Shape::new(width, height, CELL_MIN_PX),
+            config,
+            &mut self.cells,
+            self.motion,
+            self.supported,
+        );
+        let supported =
+            self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
         let count = PassCount {
             closed: closed as u32,
             dropped: (closed - stored) as u32,
@@ -347,11 +419,18 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
-    fn refine_supported<E: Executor>(&mut self, config: &SceneFlowConfig, [width, height]: [usize; 2], closed: usize, executor: &E) {
+    fn refine_supported<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        closed: usize,
+        executor: &E,
+    ) {
         let images = images(&self.left, &self.right, [width, height]);
         if config.refine {
             let bands = Bands::of(closed);
-            let (matches, supported) = (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
+            let (matches, supported) =
+                (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
             let jobs = zip3(matches, supported, bands.split_mut(self.score, 1));
             each(executor, jobs, |(matches, supported, score)| {
                 executor.vectors().run(RefineSupported { images, matches, supported, score })
@@ -372,7 +451,11 @@ impl<'s> FlowMatcher<'s> {
 }
 
 /// The last two pairs, of that size.
-fn images<'a>(left: &'a Camera<'_>, right: &'a Camera<'_>, [width, height]: [usize; 2]) -> Images<'a> {
+fn images<'a>(
+    left: &'a Camera<'_>,
+    right: &'a Camera<'_>,
+    [width, height]: [usize; 2],
+) -> Images<'a> {
     let ((left_before, left), (right_before, right)) = (left.frames(), right.frames());
     let pixels = |data: &'a [u8]| Pixels { data: part(data, ..width * height), width };
     Images {

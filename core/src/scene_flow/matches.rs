@@ -2,8 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// One scene point seen four times. Positions are (u, v) in px from the centre of the top left pixel; of a refined match those of the middle
-/// of its patch, half a pixel above and to the left of the feature's pixel.
+/// One scene point seen four times. Positions are (u, v) in px from the centre of the top left
+/// pixel; of a refined match those of the middle of its patch, half a pixel above and to the left
+/// of the feature's pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Match {
@@ -37,7 +38,8 @@ impl Match {
         }
     }
 
-    /// Where the right image has it in the current frame, and how far below that the left one has it, px.
+    /// Where the right image has it in the current frame, and how far below that the left one has
+    /// it, px.
     pub(crate) fn row_difference(&self) -> ([f64; 2], f64) {
         (self.current_right.map(f64::from), f64::from(self.current_left[1] - self.current_right[1]))
     }

@@ -1,19 +1,23 @@
-//! Sparse scene flow: features of a stereo camera matched over two frames and two cameras (Geiger, Ziegler, Stiller: *StereoScan: Dense
-//! 3d Reconstruction in Real-time*, IV 2011, section III-A).
+//! Sparse scene flow: features of a stereo camera matched over two frames and two cameras (Geiger,
+//! Ziegler, Stiller: *StereoScan: Dense 3d Reconstruction in Real-time*, IV 2011, section III-A).
 //!
-//! Data flows through the files in this order: `filter` (blob, corner, Sobel) -> `suppression` (peaks, four classes) -> `strongest`
-//! -> `features` (descriptors, sorted for search) -> `circle` (left-previous, right-previous, right-current, left-current and back), once with the
-//! sparse features over the whole search radius, once with all of them where `prior` says the sparse ones went -> `support` (outliers)
-//! -> `refine` (below the pixel) -> `bucket` (a selection for egomotion). `camera` keeps two frames of each camera, swapped by index.
+//! Data flows through the files in this order: `filter` (blob, corner, Sobel) -> `suppression`
+//! (peaks, four classes) -> `strongest` -> `features` (descriptors, sorted for search) -> `circle`
+//! (left-previous, right-previous, right-current, left-current and back), once with the sparse
+//! features over the whole search radius, once with all of them where `prior` says the sparse ones
+//! went -> `support` (outliers) -> `refine` (below the pixel) -> `bucket` (a selection for
+//! egomotion). `camera` keeps two frames of each camera, swapped by index.
 //!
-//! **Memory.** 16.5 bytes per pixel (per camera two images, one gradient, two filter responses and a quarter byte of search tables),
-//! 216 bytes per feature (per camera two frames of 1.25 x 36 bytes and a candidate of 12; its partners 12) and 69
-//! bytes per match.
+//! **Memory.** 16.5 bytes per pixel (per camera two images, one gradient, two filter responses and
+//! a quarter byte of search tables), 216 bytes per feature (per camera two frames of 1.25 x 36
+//! bytes and a candidate of 12; its partners 12) and 69 bytes per match.
 //!
 //! **Time.** Linear in pixels and in features times the features in their windows.
 //!
-//! **What can go wrong.** Features and matches beyond the capacity are dropped and counted: the weakest features, matches in scan order. A first frame, or one of
-//! another size than the last, has no matches and says so. Images without texture have none either; the motion estimate then says so.
+//! **What can go wrong.** Features and matches beyond the capacity are dropped and counted: the
+//! weakest features, matches in scan order. A first frame, or one of another size than the last,
+//! has no matches and says so. Images without texture have none either; the motion estimate then
+//! says so.
 //!
 //! ```
 //! use dynvox_core::{Capacity, Serial, image::View, memory::Carver, scene_flow::{FlowMatcher, FlowStatus, SceneFlowConfig}};

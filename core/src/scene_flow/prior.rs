@@ -1,8 +1,10 @@
-//! What the sparse pass teaches the dense one: how far each side of a circle leads, for each bin of [`BIN_PX`].
+//! What the sparse pass teaches the dense one: how far each side of a circle leads, for each bin of
+//! [`BIN_PX`].
 //!
-//! A bin takes the extremes over the supported sparse matches in it and in the eight bins around it, widened by [`SLACK_PX`] on
-//! each side (so at least 20 px wide) and never beyond the configured radius. A bin without any takes those of the nearest bins that
-//! have some to its left, right, top and bottom; where no bin has any, the whole radius is searched.
+//! A bin takes the extremes over the supported sparse matches in it and in the eight bins around
+//! it, widened by [`SLACK_PX`] on each side (so at least 20 px wide) and never beyond the
+//! configured radius. A bin without any takes those of the nearest bins that have some to its left,
+//! right, top and bottom; where no bin has any, the whole radius is searched.
 //!
 //! Memory: 64 bytes per bin.
 
@@ -60,20 +62,32 @@ impl<'s> Prior<'s> {
     }
 
     /// Learns from the supported sparse matches of an image of that size.
-    pub(super) fn learn(&mut self, matches: impl Iterator<Item = Match>, width: usize, height: usize, config: &SceneFlowConfig) {
+    pub(super) fn learn(
+        &mut self,
+        matches: impl Iterator<Item = Match>,
+        width: usize,
+        height: usize,
+        config: &SceneFlowConfig,
+    ) {
         (self.columns, self.rows) = (width.div_ceil(BIN_PX), height.div_ceil(BIN_PX));
         self.learned.fill(NOTHING);
         for m in matches {
             // Previous left positions are inside the image, so the casts are exact.
-            let (column, row) = (m.previous_left[0] as usize / BIN_PX, m.previous_left[1] as usize / BIN_PX);
+            let (column, row) =
+                (m.previous_left[0] as usize / BIN_PX, m.previous_left[1] as usize / BIN_PX);
             let last_column = if column + 1 < self.columns { column + 1 } else { column };
             for row in row.saturating_sub(1)..=(row + 1).min(self.rows.saturating_sub(1)) {
-                let bins = row * self.columns + column.saturating_sub(1)..=row * self.columns + last_column;
+                let bins = row * self.columns + column.saturating_sub(1)
+                    ..=row * self.columns + last_column;
                 for bin in part_mut(self.learned, bins) {
-                    bin.to_previous_right = extended(bin.to_previous_right, m.previous_left, m.previous_right);
-                    bin.to_current_right = extended(bin.to_current_right, m.previous_right, m.current_right);
-                    bin.to_current_left = extended(bin.to_current_left, m.current_right, m.current_left);
-                    bin.to_previous_left = extended(bin.to_previous_left, m.current_left, m.previous_left);
+                    bin.to_previous_right =
+                        extended(bin.to_previous_right, m.previous_left, m.previous_right);
+                    bin.to_current_right =
+                        extended(bin.to_current_right, m.previous_right, m.current_right);
+                    bin.to_current_left =
+                        extended(bin.to_current_left, m.current_right, m.current_left);
+                    bin.to_previous_left =
+                        extended(bin.to_previous_left, m.current_left, m.previous_left);
                 }
             }
         }
@@ -83,7 +97,10 @@ impl<'s> Prior<'s> {
                 let near = self.near(column, row);
                 if let Some(reach) = self.reach.get_mut(row * self.columns + column) {
                     *reach = Reach {
-                        to_previous_right: widened(near.to_previous_right, widest.to_previous_right),
+                        to_previous_right: widened(
+                            near.to_previous_right,
+                            widest.to_previous_right,
+                        ),
                         to_current_right: widened(near.to_current_right, widest.to_current_right),
                         to_current_left: widened(near.to_current_left, widest.to_current_left),
                         to_previous_left: widened(near.to_previous_left, widest.to_previous_left),
@@ -95,8 +112,12 @@ impl<'s> Prior<'s> {
 
     /// What a bin learned itself, or else the nearest bins in the four directions.
     fn near(&self, column: usize, row: usize) -> Reach {
-        let taught =
-            |column: usize, row: usize| self.learned.get(row * self.columns + column).copied().filter(|bin| bin.to_previous_right != EMPTY);
+        let taught = |column: usize, row: usize| {
+            self.learned
+                .get(row * self.columns + column)
+                .copied()
+                .filter(|bin| bin.to_previous_right != EMPTY)
+        };
         if let Some(own) = taught(column, row) {
             return own;
         }

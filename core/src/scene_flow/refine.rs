@@ -1,8 +1,10 @@
-//! Sub-pixel refinement: the patch around the feature in the previous left image is found again in the other three images
-//! (inverse-compositional Lucas-Kanade; Baker & Matthews, *Lucas-Kanade 20 Years On*, IJCV 2004), for translation, gain and offset.
+//! Sub-pixel refinement: the patch around the feature in the previous left image is found again in
+//! the other three images (inverse-compositional Lucas-Kanade; Baker & Matthews, *Lucas-Kanade 20
+//! Years On*, IJCV 2004), for translation, gain and offset.
 //!
-//! Pixels and sums are integers (so their order is free and they vectorise); only the 2 x 2 step is in floats. The patch is sampled
-//! at sixteenths of a pixel; the step taken there is not rounded, so the result is finer than the sampling.
+//! Pixels and sums are integers (so their order is free and they vectorise); only the 2 x 2 step is
+//! in floats. The patch is sampled at sixteenths of a pixel; the step taken there is not rounded,
+//! so the result is finer than the sampling.
 
 use super::matches::Match;
 use crate::parallel::Work;
@@ -17,15 +19,18 @@ const STEPS: usize = 8;
 const FARTHEST_PX: f64 = 1.75;
 /// A step below this is the last one, px.
 pub(super) const SMALL_STEP_PX: f64 = 0.06;
-/// The same where a motion was supposed: what is left of the way errs towards that motion in every patch alike, and would confirm it.
+/// The same where a motion was supposed: what is left of the way errs towards that motion in every
+/// patch alike, and would confirm it.
 const GUESSED_STEP_PX: f64 = 0.01;
 /// Correlation with the template below which a patch that no descriptor vouches for is another.
 const ALIKE_MIN: f64 = 0.8;
-/// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot be placed.
+/// Smallest eigenvalue of a patch's structure matrix (of doubled gradients) below which it cannot
+/// be placed.
 const TEXTURE_MIN: f64 = 2_000.0;
 
-/// The middle of the patch around a pixel, px: the patch reaches a pixel farther up and to the left. As the camera comes nearer a patch grows
-/// about its middle, so that the middle alone stays the same scene point; the pixel would move off it by half a pixel's share of that growth.
+/// The middle of the patch around a pixel, px: the patch reaches a pixel farther up and to the
+/// left. As the camera comes nearer a patch grows about its middle, so that the middle alone stays
+/// the same scene point; the pixel would move off it by half a pixel's share of that growth.
 pub(super) fn middle(pixel: [f32; 2]) -> [f32; 2] {
     pixel.map(|px| px - 0.5)
 }
@@ -65,18 +70,25 @@ fn sum(a: &[[i16; SIDE]; SIDE]) -> i32 {
 }
 
 impl Template {
-    /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be placed.
+    /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be
+    /// placed.
     pub(super) fn extract(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
         let (left, top) = (u.checked_sub(SIDE / 2 + 1)?, v.checked_sub(SIDE / 2 + 1)?);
         if left + SIDE + 2 > image.width {
             return None;
         }
         let row = |y: usize| image.data.get((top + y) * image.width + left..)?.get(..SIDE + 2);
-        let (mut pixel, mut along, mut down) = ([[0; SIDE]; SIDE], [[0; SIDE]; SIDE], [[0; SIDE]; SIDE]);
-        for (y, ((pixel, along), down)) in pixel.iter_mut().zip(&mut along).zip(&mut down).enumerate() {
+        let (mut pixel, mut along, mut down) =
+            ([[0; SIDE]; SIDE], [[0; SIDE]; SIDE], [[0; SIDE]; SIDE]);
+        for (y, ((pixel, along), down)) in
+            pixel.iter_mut().zip(&mut along).zip(&mut down).enumerate()
+        {
             let (above, here, below) = (row(y)?, row(y + 1)?, row(y + 2)?);
-            for (((pixel, along), down), ((above, here), below)) in
-                pixel.iter_mut().zip(along).zip(down).zip(above.get(1..)?.iter().zip(here.windows(3)).zip(below.get(1..)?))
+            for (((pixel, along), down), ((above, here), below)) in pixel
+                .iter_mut()
+                .zip(along)
+                .zip(down)
+                .zip(above.get(1..)?.iter().zip(here.windows(3)).zip(below.get(1..)?))
             {
                 if let [before, here, after] = *here {
                     *pixel = i16::from(here);
@@ -86,12 +98,14 @@ impl Template {
             }
         }
         let mean = [sum(&pixel), sum(&along), sum(&down)].map(|sum| f64::from(sum) / AREA);
-        let spread = |a, b, mean_a: f64, mean_b: f64| f64::from(sum_products(a, b)) - AREA * mean_a * mean_b;
+        let spread =
+            |a, b, mean_a: f64, mean_b: f64| f64::from(sum_products(a, b)) - AREA * mean_a * mean_b;
         let pattern = spread(&pixel, &pixel, mean[0], mean[0]);
         if pattern <= 0.0 {
             return None;
         }
-        let with = [spread(&pixel, &along, mean[0], mean[1]), spread(&pixel, &down, mean[0], mean[2])];
+        let with =
+            [spread(&pixel, &along, mean[0], mean[1]), spread(&pixel, &down, mean[0], mean[2])];
         let uu = spread(&along, &along, mean[1], mean[1]) - with[0] * with[0] / pattern;
         let uv = spread(&along, &down, mean[1], mean[2]) - with[0] * with[1] / pattern;
         let vv = spread(&down, &down, mean[2], mean[2]) - with[1] * with[1] / pattern;
@@ -113,19 +127,34 @@ impl Template {
         })
     }
 
-    /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px` is the last one.
+    /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px`
+    /// is the last one.
     #[inline(always)]
-    pub(super) fn find(&self, image: Pixels<'_>, [u, v]: [f32; 2], small_step_px: f64) -> Option<[f32; 2]> {
+    pub(super) fn find(
+        &self,
+        image: Pixels<'_>,
+        [u, v]: [f32; 2],
+        small_step_px: f64,
+    ) -> Option<[f32; 2]> {
         let begin = [f64::from(u), f64::from(v)];
         let mut at = begin;
         for _ in 0..STEPS {
-            // Sixteenths of a pixel of the patch's corner; begin is an integer inside the image and `at` within 2 px of it.
+            // Sixteenths of a pixel of the patch's corner; begin is an integer inside the image and
+            // `at` within 2 px of it.
             let corner = at.map(|x| libm::floor(16.0 * (x - HALF) + 0.5) as i32);
             let error = self.error(image, corner)?;
             let step = self.step(&error);
-            let next = [f64::from(corner[0]) / 16.0 + HALF - step[0], f64::from(corner[1]) / 16.0 + HALF - step[1]];
-            let step_squared = (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
-            let far = |i: usize| libm::fabs(next.get(i).copied().unwrap_or(0.0) - begin.get(i).copied().unwrap_or(0.0));
+            let next = [
+                f64::from(corner[0]) / 16.0 + HALF - step[0],
+                f64::from(corner[1]) / 16.0 + HALF - step[1],
+            ];
+            let step_squared =
+                (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
+            let far = |i: usize| {
+                libm::fabs(
+                    next.get(i).copied().unwrap_or(0.0) - begin.get(i).copied().unwrap_or(0.0),
+                )
+            };
             if !(far(0) <= FARTHEST_PX && far(1) <= FARTHEST_PX) {
                 return None;
             }
@@ -137,7 +166,8 @@ impl Template {
         None
     }
 
-    /// The middles of the patch in three other images; `None` where it is lost in one, or what is found there is not accepted.
+    /// The middles of the patch in three other images; `None` where it is lost in one, or what is
+    /// found there is not accepted.
     #[inline(always)]
     fn find_all(
         &self,
@@ -147,29 +177,34 @@ impl Template {
     ) -> Option<[[f32; 2]; 3]> {
         let mut found = [[0.0; 2]; 3];
         for (found, (image, at)) in found.iter_mut().zip(sought) {
-            *found = middle(self.find(image, at, small_step_px).filter(|&at| is_accepted(image, at))?);
+            *found =
+                middle(self.find(image, at, small_step_px).filter(|&at| is_accepted(image, at))?);
         }
         Some(found)
     }
 
-    /// Whether another image shows the patch at a position: whether its pattern there is that of the template, independent of brightness and contrast.
+    /// Whether another image shows the patch at a position: whether its pattern there is that of
+    /// the template, independent of brightness and contrast.
     fn is_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> bool {
         let corner = at.map(|x| libm::floor(16.0 * (f64::from(x) - HALF) + 0.5) as i32);
         let Some(error) = self.error(image, corner) else { return false };
         let total = f64::from(sum(&error));
         let with = (f64::from(sum_products(&self.pixel, &error)) - self.mean[0] * total) / 32.0;
         // Not by `sum_products`: a square of 13 bits, 64 times over, is 32 bits.
-        let squares: f64 = error.as_flattened().iter().map(|&error| f64::from(error) * f64::from(error)).sum();
+        let squares: f64 =
+            error.as_flattened().iter().map(|&error| f64::from(error) * f64::from(error)).sum();
         let own = (squares - total * total / AREA) / 1024.0;
         // Covariance with the template, and the patch's own variance.
         let (both, there) = (self.pattern + with, self.pattern + 2.0 * with + own);
         both > 0.0 && both * both > ALIKE_MIN * ALIKE_MIN * self.pattern * there
     }
 
-    /// The image minus the template, in 1/32 grey levels, with the patch's corner at `corner` sixteenths of a pixel.
+    /// The image minus the template, in 1/32 grey levels, with the patch's corner at `corner`
+    /// sixteenths of a pixel.
     #[inline(always)]
     fn error(&self, image: Pixels<'_>, corner: [i32; 2]) -> Option<[[i16; SIDE]; SIDE]> {
-        let (left, top) = (usize::try_from(corner[0] >> 4).ok()?, usize::try_from(corner[1] >> 4).ok()?);
+        let (left, top) =
+            (usize::try_from(corner[0] >> 4).ok()?, usize::try_from(corner[1] >> 4).ok()?);
         let (along, down) = ((corner[0] & 15) as u16, (corner[1] & 15) as u16);
         if left + SIDE + 1 > image.width {
             return None;
@@ -200,21 +235,31 @@ impl Template {
     fn step(&self, error: &[[i16; SIDE]; SIDE]) -> [f64; 2] {
         let total = f64::from(sum(error));
         let pattern = f64::from(sum_products(&self.pixel, error)) - self.mean[0] * total;
-        let along = f64::from(sum_products(&self.along, error)) - self.mean[1] * total - self.share[0] * pattern;
-        let down = f64::from(sum_products(&self.down, error)) - self.mean[2] * total - self.share[1] * pattern;
+        let along = f64::from(sum_products(&self.along, error))
+            - self.mean[1] * total
+            - self.share[0] * pattern;
+        let down = f64::from(sum_products(&self.down, error))
+            - self.mean[2] * total
+            - self.share[1] * pattern;
         // Gradients are doubled and errors in 1/32 grey levels.
         let scale = 2.0 / 32.0;
-        [scale * (self.inverse[0] * along + self.inverse[1] * down), scale * (self.inverse[1] * along + self.inverse[2] * down)]
+        [
+            scale * (self.inverse[0] * along + self.inverse[1] * down),
+            scale * (self.inverse[1] * along + self.inverse[2] * down),
+        ]
     }
 }
 
-/// The patch around a match's current left position, which is a whole pixel, found again near where the match says it is in the other three
-/// images; `None` where it is lost.
+/// The patch around a match's current left position, which is a whole pixel, found again near where
+/// the match says it is in the other three images; `None` where it is lost.
 pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let [u, v] = m.current_left.map(|x| x as usize);
     let template = Template::extract(images.current_left, u, v)?;
-    let sought =
-        [(images.previous_left, m.previous_left), (images.previous_right, m.previous_right), (images.current_right, m.current_right)];
+    let sought = [
+        (images.previous_left, m.previous_left),
+        (images.previous_right, m.previous_right),
+        (images.current_right, m.current_right),
+    ];
     let [previous_left, previous_right, current_right] =
         template.find_all(sought, GUESSED_STEP_PX, |image, at| template.is_alike(image, at))?;
     let found = Match {
@@ -262,15 +307,20 @@ impl Work for RefineSupported<'_> {
     }
 }
 
-/// Refines one match that is still at whole pixels. Returns it with its texture (the better it can be placed, the larger), or `None`
-/// when the patch is lost in one of the images or loses its positive disparity.
+/// Refines one match that is still at whole pixels. Returns it with its texture (the better it can
+/// be placed, the larger), or `None` when the patch is lost in one of the images or loses its
+/// positive disparity.
 #[inline(always)]
 pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
     let [u, v] = m.previous_left.map(|x| x as usize);
     let template = Template::extract(images.previous_left, u, v)?;
-    let sought =
-        [(images.previous_right, m.previous_right), (images.current_left, m.current_left), (images.current_right, m.current_right)];
-    let [previous_right, current_left, current_right] = template.find_all(sought, SMALL_STEP_PX, |_, _| true)?;
+    let sought = [
+        (images.previous_right, m.previous_right),
+        (images.current_left, m.current_left),
+        (images.current_right, m.current_right),
+    ];
+    let [previous_right, current_left, current_right] =
+        template.find_all(sought, SMALL_STEP_PX, |_, _| true)?;
     let refined = Match {
         previous_left: middle(m.previous_left),
         previous_right,

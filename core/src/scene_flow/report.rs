@@ -12,12 +12,14 @@ pub enum FlowStatus {
     Matched,
     /// There is no previous frame, or it had another size: no matches.
     First,
-    /// One camera delivered its previous image again, bit for bit, and the other did not: no matches.
+    /// One camera delivered its previous image again, bit for bit, and the other did not: no
+    /// matches.
     Frozen,
-    /// Both cameras delivered their previous images again, bit for bit: matches were looked for and say that the camera stands. It does, or
-    /// the images are old ones.
+    /// Both cameras delivered their previous images again, bit for bit: matches were looked for and
+    /// say that the camera stands. It does, or the images are old ones.
     Repeated,
-    /// The images differ in size or exceed the capacity: nothing was done, and the next frame is a first one.
+    /// The images differ in size or exceed the capacity: nothing was done, and the next frame is a
+    /// first one.
     Refused,
 }
 

@@ -1,10 +1,12 @@
 //! The strongest features of every part of an image.
 //!
-//! An image has as many features as it has texture, and the time of matching grows with their square. Where cells have more than
-//! their share the weakest go, class by class: chosen over the whole image the strongest stand in trees and on walls, and it is those on
-//! the road that tell best how far the camera moved.
+//! An image has as many features as it has texture, and the time of matching grows with their
+//! square. Where cells have more than their share the weakest go, class by class: chosen over the
+//! whole image the strongest stand in trees and on walls, and it is those on the road that tell
+//! best how far the camera moved.
 //!
-//! Time: a look at each feature, and at those of its cell. Memory: 12 bytes for each that is kept, and 4 bytes for each class of a cell.
+//! Time: a look at each feature, and at those of its cell. Memory: 12 bytes for each that is kept,
+//! and 4 bytes for each class of a cell.
 
 use super::{
     cells::Shape,
@@ -51,8 +53,14 @@ pub(super) struct Strongest<'a> {
 }
 
 impl<'a> Strongest<'a> {
-    /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are slots; `last` has an entry for each of [`lists`].
-    pub(super) fn new(slots: &'a mut [Held], last: &'a mut [u32], [width, height]: [usize; 2], wanted: usize) -> Self {
+    /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are
+    /// slots; `last` has an entry for each of [`lists`].
+    pub(super) fn new(
+        slots: &'a mut [Held],
+        last: &'a mut [u32],
+        [width, height]: [usize; 2],
+        wanted: usize,
+    ) -> Self {
         let mut shift = CELL_SHIFT;
         let mut shape = Shape::new(width, height, 1 << shift);
         while shift < CELL_SHIFT_MAX && CLASSES * QUOTA_MIN * shape.cells() > wanted {
@@ -64,11 +72,15 @@ impl<'a> Strongest<'a> {
         Self { slots, len: 0, last, quota, columns: shape.columns, shift, dropped: 0 }
     }
 
-    /// Takes in the next one. It is kept while fewer of its class and cell than may be are as strong.
+    /// Takes in the next one. It is kept while fewer of its class and cell than may be are as
+    /// strong.
     #[inline(always)]
     pub(super) fn add(&mut self, candidate: Candidate) {
-        let cell = usize::from(candidate.v >> self.shift) * self.columns + usize::from(candidate.u >> self.shift);
-        let Some(last) = self.last.get_mut(cell * CLASSES + usize::from(candidate.class)) else { return };
+        let cell = usize::from(candidate.v >> self.shift) * self.columns
+            + usize::from(candidate.u >> self.shift);
+        let Some(last) = self.last.get_mut(cell * CLASSES + usize::from(candidate.class)) else {
+            return;
+        };
         let (mut at, mut weakest, mut least) = (*last, END, u16::MAX);
         for _ in 0..self.quota {
             let Some(held) = self.slots.get(at as usize) else {
@@ -144,7 +156,9 @@ mod tests {
             assert_eq!((kept.len(), dropped), (300, 0));
             for key in 0..CLASSES as u16 * 15 {
                 let of = |from: &[Candidate]| {
-                    let own = from.iter().filter(|c| (c.v / 32 * 5 + c.u / 32) * 4 + u16::from(c.class) == key);
+                    let own = from
+                        .iter()
+                        .filter(|c| (c.v / 32 * 5 + c.u / 32) * 4 + u16::from(c.class) == key);
                     let mut responses: Vec<u16> = own.map(|c| c.response).collect();
                     responses.sort_by_key(|response| core::cmp::Reverse(*response));
                     responses
@@ -158,7 +172,8 @@ mod tests {
     #[test]
     fn cells_grow_where_few_are_wanted_and_what_finds_no_slot_is_counted() {
         let found = scatter(&mut Random::new(8), 800);
-        // Of 32 px they would have three for each class; of 64 px there are six cells, of 128 px two.
+        // Of 32 px they would have three for each class; of 64 px there are six cells, of 128 px
+        // two.
         let kept_of = |wanted| keep(&found, 1_000, wanted).0.len();
         assert_eq!([240, 239, 96, 95, 32].map(kept_of), [240, 216, 96, 88, 32]);
         assert_eq!([31, 4, 3, 0].map(kept_of), [28, 4, 0, 0]);

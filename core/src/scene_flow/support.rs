@@ -1,9 +1,11 @@
 //! Outlier removal: a match without neighbours that move alike is removed.
 //!
-//! The paper asks for agreement along the edges of a Delaunay triangulation, where four of about six nearest neighbours must agree.
-//! Here a match's neighbours are those in the square of cells around it, which grows ring by ring until it holds [`NEIGHBOURS`] or
-//! reaches [`RINGS`]; a match is kept when at least `support_min` of them, and at least half of them, agree in disparity and flow.
-//! No mesh, bounded work, and where matches stand dense more neighbours than a triangulation has.
+//! The paper asks for agreement along the edges of a Delaunay triangulation, where four of about
+//! six nearest neighbours must agree. Here a match's neighbours are those in the square of cells
+//! around it, which grows ring by ring until it holds [`NEIGHBOURS`] or reaches [`RINGS`]; a match
+//! is kept when at least `support_min` of them, and at least half of them, agree in disparity and
+//! flow. No mesh, bounded work, and where matches stand dense more neighbours than a triangulation
+//! has.
 
 use crate::part::part;
 
@@ -31,19 +33,30 @@ pub(super) fn support(
     supported: &mut [u8],
 ) {
     let (start, order) = cells.sort(matches, shape);
-    for (motion, m) in motion.iter_mut().zip(order.iter().filter_map(|&index| matches.get(index as usize))) {
+    for (motion, m) in
+        motion.iter_mut().zip(order.iter().filter_map(|&index| matches.get(index as usize)))
+    {
         let [du, dv] = m.flow_px();
         *motion = [m.previous_disparity_px(), du, dv, 0.0];
     }
     let motion = part(motion, ..matches.len());
     for (&index, own) in order.iter().zip(motion) {
-        if let (Some(m), Some(supported)) = (matches.get(index as usize), supported.get_mut(index as usize)) {
+        if let (Some(m), Some(supported)) =
+            (matches.get(index as usize), supported.get_mut(index as usize))
+        {
             *supported = u8::from(is_supported(*own, shape.cell(m), shape, config, start, motion));
         }
     }
 }
 
-fn is_supported(own: Motion, [column, row]: [usize; 2], shape: Shape, config: &SceneFlowConfig, start: &[u32], motion: &[Motion]) -> bool {
+fn is_supported(
+    own: Motion,
+    [column, row]: [usize; 2],
+    shape: Shape,
+    config: &SceneFlowConfig,
+    start: &[u32],
+    motion: &[Motion],
+) -> bool {
     let needed = usize::from(config.support_min);
     if needed == 0 {
         return true;
@@ -54,10 +67,13 @@ fn is_supported(own: Motion, [column, row]: [usize; 2], shape: Shape, config: &S
         let (left, right) = (column.saturating_sub(ring), (column + ring).min(shape.columns - 1));
         for row in row.saturating_sub(ring)..=(row + ring).min(shape.rows - 1) {
             let (first, last) = (row * shape.columns + left, row * shape.columns + right);
-            let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else { continue };
+            let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else {
+                continue;
+            };
             let run = part(motion, from as usize..to as usize);
             neighbours += run.len();
-            agreeing += run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();
+            agreeing +=
+                run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();
         }
         if neighbours > NEIGHBOURS {
             break;

@@ -1,10 +1,11 @@
 //! Non-maximum suppression: what of the filters' responses is a feature.
 //!
-//! A pixel is a peak when it reaches the threshold and no pixel within `radius` rows and columns is stronger, nor as strong and
-//! earlier in scan order. Found four rows at a time: the strongest of each 7 x 7 px, first down the columns and then along the rows
-//! (each four rows share those that lie around all of them, as in van Herk's running maximum), leaves few pixels that are as strong
-//! as their surroundings; these are looked at one by one. Peaks of the wider radius are peaks of the narrower one, so the sparse pass
-//! only asks the dense one's features again.
+//! A pixel is a peak when it reaches the threshold and no pixel within `radius` rows and columns is
+//! stronger, nor as strong and earlier in scan order. Found four rows at a time: the strongest of
+//! each 7 x 7 px, first down the columns and then along the rows (each four rows share those that
+//! lie around all of them, as in van Herk's running maximum), leaves few pixels that are as strong
+//! as their surroundings; these are looked at one by one. Peaks of the wider radius are peaks of
+//! the narrower one, so the sparse pass only asks the dense one's features again.
 //!
 //! Time: some ten instructions of vectors of eight pixels, for each four rows, filter and sign.
 
@@ -16,7 +17,8 @@ pub(super) const DENSE_RADIUS: usize = 3;
 pub(super) const SPARSE_RADIUS: usize = 9;
 /// Distance features keep from the image's border, px: space for a descriptor and for refinement.
 pub(super) const FEATURE_MARGIN: usize = 8;
-/// Classes of features: blob maximum, blob minimum, corner maximum, corner minimum. Only equals are compared.
+/// Classes of features: blob maximum, blob minimum, corner maximum, corner minimum. Only equals are
+/// compared.
 pub(super) const CLASSES: usize = 4;
 /// Rows and columns of a block: of its pixels no two are farther apart than the radius.
 const BLOCK: usize = DENSE_RADIUS + 1;
@@ -48,10 +50,17 @@ pub(super) struct Field<'a> {
     pub width: usize,
 }
 
-/// Finds the features of both filters and hands them to `emit`: four rows by four rows, there by filter, there by four columns from left
-/// to right, maxima first; no 4 x 4 px hold two peaks of a class. `scratch` holds [`SCRATCH_ROWS`] rows.
+/// Finds the features of both filters and hands them to `emit`: four rows by four rows, there by
+/// filter, there by four columns from left to right, maxima first; no 4 x 4 px hold two peaks of a
+/// class. `scratch` holds [`SCRATCH_ROWS`] rows.
 #[inline(always)]
-pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, scratch: &mut [i16], mut emit: impl FnMut(Candidate)) {
+pub(super) fn suppress(
+    blob: Field<'_>,
+    corner: Field<'_>,
+    response_min: i16,
+    scratch: &mut [i16],
+    mut emit: impl FnMut(Candidate),
+) {
     let width = blob.width;
     if width <= 2 * FEATURE_MARGIN {
         return;
@@ -60,20 +69,30 @@ pub(super) fn suppress(blob: Field<'_>, corner: Field<'_>, response_min: i16, sc
     let inner = width - 2 * FEATURE_MARGIN;
     let Some((high, rest)) = scratch.split_at_mut_checked(BLOCK * width) else { return };
     let Some((low, flags)) = rest.split_at_mut_checked(BLOCK * width) else { return };
-    let Some(flags) = bytemuck::cast_slice_mut::<i16, u8>(flags).get_mut(..inner.next_multiple_of(BLOCK)) else { return };
+    let Some(flags) =
+        bytemuck::cast_slice_mut::<i16, u8>(flags).get_mut(..inner.next_multiple_of(BLOCK))
+    else {
+        return;
+    };
     for top in (FEATURE_MARGIN..end).step_by(BLOCK) {
         let rows = if end - top < BLOCK { end - top } else { BLOCK };
         for (class, field) in [(0, blob), (2, corner)] {
             flags.fill(0);
             flag_strongest::<1>(field, [top, rows], response_min, high, flags);
             flag_strongest::<-1>(field, [top, rows], response_min, low, flags);
-            for (left, &flagged) in (FEATURE_MARGIN..).step_by(BLOCK).zip(flags.as_chunks::<BLOCK>().0) {
+            for (left, &flagged) in
+                (FEATURE_MARGIN..).step_by(BLOCK).zip(flags.as_chunks::<BLOCK>().0)
+            {
                 let flagged = u32::from_le_bytes(flagged);
                 if flagged != 0 {
                     let maxima = Block::<1> { field, strongest: high, left, top, flagged }.peak();
-                    let minima = Block::<-1> { field, strongest: low, left, top, flagged: flagged >> BLOCK }.peak();
+                    let minima =
+                        Block::<-1> { field, strongest: low, left, top, flagged: flagged >> BLOCK }
+                            .peak();
                     maxima.into_iter().for_each(|found| emit(Candidate { class, ..found }));
-                    minima.into_iter().for_each(|found| emit(Candidate { class: class + 1, ..found }));
+                    minima
+                        .into_iter()
+                        .for_each(|found| emit(Candidate { class: class + 1, ..found }));
                 }
             }
         }
@@ -86,10 +105,17 @@ fn stronger<const SIGN: i16>(a: i16, b: i16) -> i16 {
     if SIGN > 0 { a.max(b) } else { a.min(b) }
 }
 
-/// Flags the pixels of rows `top..top + rows` that reach the threshold and that nothing within [`DENSE_RADIUS`] is stronger than: a bit a
-/// row, maxima below minima, for each column from [`FEATURE_MARGIN`] on.
+/// Flags the pixels of rows `top..top + rows` that reach the threshold and that nothing within
+/// [`DENSE_RADIUS`] is stronger than: a bit a row, maxima below minima, for each column from
+/// [`FEATURE_MARGIN`] on.
 #[inline(always)]
-fn flag_strongest<const SIGN: i16>(field: Field<'_>, [top, rows]: [usize; 2], response_min: i16, strongest: &mut [i16], flags: &mut [u8]) {
+fn flag_strongest<const SIGN: i16>(
+    field: Field<'_>,
+    [top, rows]: [usize; 2],
+    response_min: i16,
+    strongest: &mut [i16],
+    flags: &mut [u8],
+) {
     let width = field.width.max(1);
     down_columns::<SIGN>(field, top, strongest);
     let here = field.response.chunks_exact(width).skip(top).take(rows);
@@ -99,10 +125,15 @@ fn flag_strongest<const SIGN: i16>(field: Field<'_>, [top, rows]: [usize; 2], re
     }
 }
 
-/// The strongest of each column within [`DENSE_RADIUS`] of each of the rows `top..top + 4`, a row each. Nothing where rows are missing.
+/// The strongest of each column within [`DENSE_RADIUS`] of each of the rows `top..top + 4`, a row
+/// each. Nothing where rows are missing.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
-fn down_columns<const SIGN: i16>(field: Field<'_>, top: usize, strongest: &mut [i16]) -> Option<()> {
+fn down_columns<const SIGN: i16>(
+    field: Field<'_>,
+    top: usize,
+    strongest: &mut [i16],
+) -> Option<()> {
     let width = field.width;
     let row = |y: usize| field.response.get(y * width..)?.get(..width);
     let first = top.checked_sub(DENSE_RADIUS)?;
@@ -126,13 +157,21 @@ fn down_columns<const SIGN: i16>(field: Field<'_>, top: usize, strongest: &mut [
     Some(())
 }
 
-/// Flags what of a row is as strong as the strongest of the columns about it. Nothing where a row is too short.
+/// Flags what of a row is as strong as the strongest of the columns about it. Nothing where a row
+/// is too short.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "all slices are cut to the same length first")]
-fn along_row<const SIGN: i16>(row: &[i16], strongest: &[i16], response_min: i16, flag: u8, flags: &mut [u8]) -> Option<()> {
+fn along_row<const SIGN: i16>(
+    row: &[i16],
+    strongest: &[i16],
+    response_min: i16,
+    flag: u8,
+    flags: &mut [u8],
+) -> Option<()> {
     let n = row.len().checked_sub(2 * FEATURE_MARGIN)?;
     let from = |shift: usize| strongest.get(FEATURE_MARGIN - DENSE_RADIUS + shift..)?.get(..n);
-    let [a, b, c, d, e, f, g] = [from(0)?, from(1)?, from(2)?, from(3)?, from(4)?, from(5)?, from(6)?];
+    let [a, b, c, d, e, f, g] =
+        [from(0)?, from(1)?, from(2)?, from(3)?, from(4)?, from(5)?, from(6)?];
     let (row, flags) = (row.get(FEATURE_MARGIN..)?.get(..n)?, flags.get_mut(..n)?);
     for u in 0..n {
         let beside = stronger::<SIGN>(stronger::<SIGN>(a[u], b[u]), stronger::<SIGN>(f[u], g[u]));
@@ -155,7 +194,8 @@ struct Block<'a, const SIGN: i16> {
 }
 
 impl<const SIGN: i16> Block<'_, SIGN> {
-    /// The peak, if there is one: all flagged pixels are as strong, so that the first in scan order alone may be one.
+    /// The peak, if there is one: all flagged pixels are as strong, so that the first in scan order
+    /// alone may be one.
     #[inline(always)]
     fn peak(&self) -> Option<Candidate> {
         let row = (0..BLOCK).find(|row| self.columns(*row) != 0)?;
@@ -171,13 +211,22 @@ impl<const SIGN: i16> Block<'_, SIGN> {
     /// Whether no pixel within [`DENSE_RADIUS`] that is as strong comes earlier in scan order.
     #[inline(always)]
     fn is_first(&self, u: usize, v: usize, response: i16) -> Option<bool> {
-        // Eight columns of a row are one vector; those that are later, or too far, count as different.
+        // Eight columns of a row are one vector; those that are later, or too far, count as
+        // different.
         const { assert!(DENSE_RADIUS == 3) }
         const EARLIER: [i16; 8] = [0, 0, 0, -1, -1, -1, -1, -1];
         const ABOVE: [i16; 8] = [0, 0, 0, 0, 0, 0, 0, -1];
         let equal_in = |y: usize, ignored: [i16; 8]| {
-            let row = self.field.response.get(y * self.field.width + u - DENSE_RADIUS..)?.first_chunk::<8>()?;
-            Some(row.iter().zip(ignored).fold(false, |found, (x, ignored)| found | ((x ^ response) | ignored == 0)))
+            let row = self
+                .field
+                .response
+                .get(y * self.field.width + u - DENSE_RADIUS..)?
+                .first_chunk::<8>()?;
+            Some(
+                row.iter()
+                    .zip(ignored)
+                    .fold(false, |found, (x, ignored)| found | ((x ^ response) | ignored == 0)),
+            )
         };
         let above = equal_in(v - 3, ABOVE)? | equal_in(v - 2, ABOVE)? | equal_in(v - 1, ABOVE)?;
         Some(!(above | equal_in(v, EARLIER)?))
@@ -204,7 +253,8 @@ impl<const SIGN: i16> Block<'_, SIGN> {
     }
 }
 
-/// The columns within [`SPARSE_RADIUS`] of a pixel: more than a vector of 16 has, and fewer than two.
+/// The columns within [`SPARSE_RADIUS`] of a pixel: more than a vector of 16 has, and fewer than
+/// two.
 #[derive(Clone, Copy)]
 struct Surroundings {
     left: usize,
@@ -255,7 +305,14 @@ mod tests {
     use std::vec::Vec;
 
     /// The definition, pixel by pixel.
-    fn peaks(response: &[i16], width: usize, class: u8, sign: i16, radius: usize, response_min: i16) -> Vec<(u16, u16, u8)> {
+    fn peaks(
+        response: &[i16],
+        width: usize,
+        class: u8,
+        sign: i16,
+        radius: usize,
+        response_min: i16,
+    ) -> Vec<(u16, u16, u8)> {
         let height = response.len() / width;
         let mut found = Vec::new();
         for v in FEATURE_MARGIN..height - FEATURE_MARGIN {
@@ -282,15 +339,21 @@ mod tests {
         for seed in 0..4 {
             // Few distinct values: ties everywhere.
             let mut random = Random::new(seed);
-            let mut noise = || -> Vec<i16> { (0..width * height).map(|_| random.below(240) as i16 - 120).collect() };
+            let mut noise = || -> Vec<i16> {
+                (0..width * height).map(|_| random.below(240) as i16 - 120).collect()
+            };
             let (blob, corner) = (noise(), noise());
             let mut found = Vec::new();
             let fields = (Field { response: &blob, width }, Field { response: &corner, width });
-            suppress(fields.0, fields.1, 5, &mut [0; SCRATCH_ROWS * 67], |candidate| found.push(candidate));
+            suppress(fields.0, fields.1, 5, &mut [0; SCRATCH_ROWS * 67], |candidate| {
+                found.push(candidate)
+            });
             for sparse in [false, true] {
                 let radius = if sparse { SPARSE_RADIUS } else { DENSE_RADIUS };
                 let mut expected = Vec::new();
-                for (class, field, sign) in [(0, &blob, 1), (1, &blob, -1), (2, &corner, 1), (3, &corner, -1)] {
+                for (class, field, sign) in
+                    [(0, &blob, 1), (1, &blob, -1), (2, &corner, 1), (3, &corner, -1)]
+                {
                     expected.extend(peaks(field, width, class, sign, radius, 5));
                 }
                 let accepted = found.iter().filter(|c| !sparse || c.sparse == 1);

@@ -6,7 +6,8 @@ use std::vec::Vec;
 
 pub(crate) const WIDTH: usize = 400;
 pub(crate) const HEIGHT: usize = 160;
-pub(crate) const RIG: StereoRig = StereoRig { focal_px: 240.0, center_u_px: 198.3, center_v_px: 81.2, baseline_m: 0.5 };
+pub(crate) const RIG: StereoRig =
+    StereoRig { focal_px: 240.0, center_u_px: 198.3, center_v_px: 81.2, baseline_m: 0.5 };
 
 /// Corners of the box; the camera's world origin is inside.
 const LOW: [f64; 3] = [-4.0, -2.0, -6.0];

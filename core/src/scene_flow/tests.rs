@@ -76,7 +76,12 @@ fn matches_lie_where_the_scene_says_and_two_threads_change_nothing() {
     // Rectified: partners stand in one row. Nine of ten within a fifth of a pixel.
     let level = |m: &&Match| (m.current_left[1] - m.current_right[1]).abs() < 0.2;
     assert!(serial.refined().iter().filter(level).count() * 10 > serial.refined().len() * 9);
-    assert!(serial.refined().iter().all(|m| m.previous_disparity_px() > 0.0 && m.current_disparity_px() > 0.0));
+    assert!(
+        serial
+            .refined()
+            .iter()
+            .all(|m| m.previous_disparity_px() > 0.0 && m.current_disparity_px() > 0.0)
+    );
 }
 
 #[test]
@@ -103,9 +108,21 @@ fn noise_and_the_smallest_images_do_no_harm() {
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig { response_min: 1, support_min: 0, ..SceneFlowConfig::default() };
     let mut random = Random::new(5);
-    for [width, height] in [[1, 1], [5, 5], [16, 16], [17, 17], [18, 40], [1, HEIGHT], [WIDTH, 1], [WIDTH, HEIGHT], [199, 77]] {
+    for [width, height] in [
+        [1, 1],
+        [5, 5],
+        [16, 16],
+        [17, 17],
+        [18, 40],
+        [1, HEIGHT],
+        [WIDTH, 1],
+        [WIDTH, HEIGHT],
+        [199, 77],
+    ] {
         for _ in 0..3 {
-            let [left, right] = [(); 2].map(|()| (0..width * height).map(|_| random.next_u32() as u8).collect::<Vec<u8>>());
+            let [left, right] = [(); 2].map(|()| {
+                (0..width * height).map(|_| random.next_u32() as u8).collect::<Vec<u8>>()
+            });
             let image = |pixels| View::new(pixels, width, height).unwrap();
             let report = matcher.push(&config, image(&left), image(&right), &Serial);
             assert!(report.bucketed <= report.refined && report.refined <= report.dense.closed);
@@ -134,7 +151,11 @@ fn features_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
 }
 
 /// Features with random descriptors.
-fn scatter<'s>(carver: &mut Carver<'s>, random: &mut Random, count: usize) -> (Features<'s>, Vec<Candidate>) {
+fn scatter<'s>(
+    carver: &mut Carver<'s>,
+    random: &mut Random,
+    count: usize,
+) -> (Features<'s>, Vec<Candidate>) {
     let mut features = features_for(carver, count);
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|_| random.next_u32() as u16).collect();
     let position = |random: &mut Random| Candidate {
@@ -171,12 +192,21 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
             let [u, v] = [random.below(500) as i32 - 50, random.below(250) as i32 - 50];
             let [u_max, v_max] = [u + random.below(90) as i32, v + random.below(60) as i32];
             let window = Window { u_min: u, u_max, v_min: v, v_max };
-            let sought = [(); 2].map(|()| Descriptor(std::array::from_fn(|_| random.next_u32() as u8)));
+            let sought =
+                [(); 2].map(|()| Descriptor(std::array::from_fn(|_| random.next_u32() as u8)));
             let inside = |i: &usize| {
                 let [u, v] = features.at(*i).unwrap().map(i32::from);
-                features.class(*i) == class && (window.u_min..=window.u_max).contains(&u) && (window.v_min..=window.v_max).contains(&v)
+                features.class(*i) == class
+                    && (window.u_min..=window.u_max).contains(&u)
+                    && (window.v_min..=window.v_max).contains(&v)
             };
-            let sad = |i: &usize| -> u32 { sought.iter().zip(features.descriptor(*i).unwrap()).map(|(a, b)| distance(a, b)).sum() };
+            let sad = |i: &usize| -> u32 {
+                sought
+                    .iter()
+                    .zip(features.descriptor(*i).unwrap())
+                    .map(|(a, b)| distance(a, b))
+                    .sum()
+            };
             let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
             for vectors in Vectors::available() {
                 compare(vectors, Finds(&features, class, window, sought, expected));
@@ -192,12 +222,19 @@ fn only_circles_that_return_to_their_beginning_close() {
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|i| (i as u16).wrapping_mul(40_503)).collect();
     let mut position = |u: u16, v: u16, twin: bool| {
         let mut features = features_for(&mut carver, 4);
-        let candidates =
-            [Candidate { u, v, class: 2, ..Candidate::default() }, Candidate { u: u + 1, v, class: 2, ..Candidate::default() }];
+        let candidates = [
+            Candidate { u, v, class: 2, ..Candidate::default() },
+            Candidate { u: u + 1, v, class: 2, ..Candidate::default() },
+        ];
         features.fill(candidates.into_iter().take(1 + usize::from(twin)), &gradient, WIDTH, HEIGHT);
         features
     };
-    let images = [position(200, 60, true), position(190, 60, false), position(196, 64, false), position(210, 64, false)];
+    let images = [
+        position(200, 60, true),
+        position(190, 60, false),
+        position(196, 64, false),
+        position(210, 64, false),
+    ];
     let [previous_left, previous_right, current_right, current_left] = &images;
     let corners = Corners { previous_left, previous_right, current_right, current_left };
     let mut traced = [[0; 3]; 4];
@@ -207,7 +244,8 @@ fn only_circles_that_return_to_their_beginning_close() {
     // Both features of the first image lead to the same partners, which lead back to one of them.
     assert_eq!(corners.gather(&traced, &mut matches), 1);
     assert_eq!(matches[0].current_left, [210.0, 64.0]);
-    // The same circle with the right camera's features to the right of the left one's: behind the camera.
+    // The same circle with the right camera's features to the right of the left one's: behind the
+    // camera.
     let corners = Corners {
         previous_left: previous_right,
         previous_right: previous_left,
@@ -242,13 +280,31 @@ fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     let mut matches = crowd();
     matches[17].current_left[0] += 6.0;
     matches[31].previous_right[0] -= 6.0;
-    matches.push(Match { previous_left: [380.0, 150.0], previous_right: [371.0, 150.0], ..matches[0] });
+    matches.push(Match {
+        previous_left: [380.0, 150.0],
+        previous_right: [371.0, 150.0],
+        ..matches[0]
+    });
     let mut supported = vec![9; matches.len()];
-    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &config, &mut cells, &mut vec![[0.0; 4]; 100], &mut supported);
+    support(
+        &matches,
+        Shape::new(WIDTH, HEIGHT, 16),
+        &config,
+        &mut cells,
+        &mut vec![[0.0; 4]; 100],
+        &mut supported,
+    );
     let lost: Vec<usize> = (0..matches.len()).filter(|&i| supported[i] == 0).collect();
     assert_eq!(lost, [17, 31, 60], "the two that disagree and the one that is alone");
     let all = SceneFlowConfig { support_min: 0, ..config };
-    support(&matches, Shape::new(WIDTH, HEIGHT, 16), &all, &mut cells, &mut vec![[0.0; 4]; 100], &mut supported);
+    support(
+        &matches,
+        Shape::new(WIDTH, HEIGHT, 16),
+        &all,
+        &mut cells,
+        &mut vec![[0.0; 4]; 100],
+        &mut supported,
+    );
     assert!(supported.iter().all(|&supported| supported == 1));
 }
 
@@ -264,7 +320,8 @@ fn each_cell_gives_its_best_few() {
     let mut expected = Vec::new();
     for row in 0..shape.rows {
         for column in 0..shape.columns {
-            let mut members: Vec<usize> = (0..matches.len()).filter(|&i| shape.cell(&matches[i]) == [column, row]).collect();
+            let mut members: Vec<usize> =
+                (0..matches.len()).filter(|&i| shape.cell(&matches[i]) == [column, row]).collect();
             members.sort_by(|&a, &b| score[b].total_cmp(&score[a]));
             expected.extend(members.into_iter().take(2).map(|i| i as u32));
         }
@@ -274,11 +331,23 @@ fn each_cell_gives_its_best_few() {
 
 #[test]
 fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
-    let texture = |u: f64, v: f64| 100.0 + 40.0 * (u * 0.7).sin() * (v * 0.6).cos() + 25.0 * (u * 0.3 + v * 0.8).sin();
-    let render = |du: f64, dv: f64, gain: f64, offset: f64| -> Vec<u8> {
-        (0..64 * 64).map(|i| (gain * texture(f64::from(i % 64) - du, f64::from(i / 64) - dv) + offset).round() as u8).collect()
+    let texture = |u: f64, v: f64| {
+        100.0 + 40.0 * (u * 0.7).sin() * (v * 0.6).cos() + 25.0 * (u * 0.3 + v * 0.8).sin()
     };
-    let images = [render(0.0, 0.0, 1.0, 0.0), render(-6.3, 0.0, 1.15, 9.0), render(2.45, -1.7, 1.0, 0.0), render(-3.8, -1.62, 1.15, -7.0)];
+    let render = |du: f64, dv: f64, gain: f64, offset: f64| -> Vec<u8> {
+        (0..64 * 64)
+            .map(|i| {
+                (gain * texture(f64::from(i % 64) - du, f64::from(i / 64) - dv) + offset).round()
+                    as u8
+            })
+            .collect()
+    };
+    let images = [
+        render(0.0, 0.0, 1.0, 0.0),
+        render(-6.3, 0.0, 1.15, 9.0),
+        render(2.45, -1.7, 1.0, 0.0),
+        render(-3.8, -1.62, 1.15, -7.0),
+    ];
     let [previous_left, previous_right, current_left, current_right] =
         [&images[0], &images[1], &images[2], &images[3]].map(|data| Pixels { data, width: 64 });
     let coarse = Match {
@@ -289,19 +358,32 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     };
     let images = Images { previous_left, previous_right, current_left, current_right };
     let (fine, _) = refine(&coarse, images).unwrap();
-    let near = |found: [f32; 2], u: f32, v: f32| (found[0] - u).abs() < 0.04 && (found[1] - v).abs() < 0.04;
-    assert!(near(fine.previous_left, 29.5, 30.5) && near(fine.previous_right, 23.2, 30.5), "{fine:?}");
+    let near = |found: [f32; 2], u: f32, v: f32| {
+        (found[0] - u).abs() < 0.04 && (found[1] - v).abs() < 0.04
+    };
+    assert!(
+        near(fine.previous_left, 29.5, 30.5) && near(fine.previous_right, 23.2, 30.5),
+        "{fine:?}"
+    );
     assert!(near(fine.current_left, 31.95, 28.8), "{fine:?}");
     assert!(near(fine.current_right, 25.7, 28.88), "{fine:?}");
-    assert!(refine(&Match { current_left: [40.0, 45.0], ..coarse }, images).is_none(), "a lost patch is no match");
+    assert!(
+        refine(&Match { current_left: [40.0, 45.0], ..coarse }, images).is_none(),
+        "a lost patch is no match"
+    );
     let flat = Pixels { data: &[50; 64 * 64], width: 64 };
-    assert!(refine(&coarse, Images { previous_left: flat, ..images }).is_none(), "nothing to hold on to");
+    assert!(
+        refine(&coarse, Images { previous_left: flat, ..images }).is_none(),
+        "nothing to hold on to"
+    );
 }
 
 #[test]
 fn what_comes_nearer_stays_the_same_point() {
     const NEARER: f64 = 1.1;
-    let texture = |u: f64, v: f64| 100.0 + 40.0 * (u * 0.5).sin() * (v * 0.45).cos() + 25.0 * (u * 0.2 + v * 0.6).sin();
+    let texture = |u: f64, v: f64| {
+        100.0 + 40.0 * (u * 0.5).sin() * (v * 0.45).cos() + 25.0 * (u * 0.2 + v * 0.6).sin()
+    };
     let render = |size: f64| -> Vec<u8> {
         let from = |at: i32| 32.0 + (f64::from(at) - 32.0) / size;
         (0..64 * 64).map(|i| texture(from(i % 64), from(i / 64)).round() as u8).collect()
@@ -310,7 +392,9 @@ fn what_comes_nearer_stays_the_same_point() {
     let [far, near] = [&far, &near].map(|data| Pixels { data, width: 64 });
     let moved = |at: f32| 32.0 + (f64::from(at) - 32.0) * NEARER;
     let (mut error_px, mut count) = ([0.0; 2], 0.0);
-    for (u, v) in (20..=44).step_by(4).flat_map(|u| (20..=44).step_by(4).map(move |v| (u as f32, v as f32))) {
+    for (u, v) in
+        (20..=44).step_by(4).flat_map(|u| (20..=44).step_by(4).map(move |v| (u as f32, v as f32)))
+    {
         let guess = [moved(u), moved(v)].map(|at| at.round() as f32);
         let patch = Template::extract(far, u as usize, v as usize).unwrap();
         let Some(now) = patch.find(near, guess, SMALL_STEP_PX).map(middle) else { continue };
@@ -321,7 +405,10 @@ fn what_comes_nearer_stays_the_same_point() {
         count += 1.0;
     }
     // The pixel that names the patch would be off by half a pixel's tenth.
-    assert!(count > 30.0 && error_px.iter().all(|sum| (sum / count).abs() < 0.012), "{error_px:?} of {count}");
+    assert!(
+        count > 30.0 && error_px.iter().all(|sum| (sum / count).abs() < 0.012),
+        "{error_px:?} of {count}"
+    );
 }
 
 #[test]
@@ -338,11 +425,19 @@ fn bins_look_where_their_matches_went_and_empty_ones_where_their_neighbours_did(
     let matches = [at(75.0, 20.0, -30.0), at(80.0, 24.0, -28.0), at(325.0, 6.0, 50.0)];
     prior.learn(matches.into_iter(), WIDTH, HEIGHT, &config);
     let near = prior.reach([60, 60]).unwrap();
-    assert_eq!(near.to_previous_right, [-34, -10, -2, 2], "ten px beyond the extremes, the stereo tolerance in v");
+    assert_eq!(
+        near.to_previous_right,
+        [-34, -10, -2, 2],
+        "ten px beyond the extremes, the stereo tolerance in v"
+    );
     assert_eq!(near.to_current_right, [-40, -18, -9, 11]);
     assert_eq!(prior.reach([10, 110]), Some(near), "a bin beside it learns the same");
     let between = prior.reach([210, 60]).unwrap();
-    assert_eq!(between.to_previous_right, [-34, -1, -2, 2], "between two that know: both, and never behind the camera");
+    assert_eq!(
+        between.to_previous_right,
+        [-34, -1, -2, 2],
+        "between two that know: both, and never behind the camera"
+    );
     assert_eq!(between.to_current_right, [-40, 60, -9, 11]);
     prior.learn(std::iter::empty(), WIDTH, HEIGHT, &config);
     assert_eq!(prior.reach([60, 60]), Some(Reach::widest(&config)));
@@ -359,12 +454,20 @@ impl FlowMatcher<'_> {
 #[test]
 fn a_point_is_found_where_it_is_and_not_where_it_was_expected() {
     let mut slab = slab();
-    let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap());
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
     let expected = |at: [f32; 2], off: f32| {
         // The far wall, 14 m away before and 13.7 m now.
         let [f, b] = [RIG.focal_px, RIG.baseline_m];
-        let (x, y) = ((f64::from(at[0]) - RIG.center_u_px) * 13.7 / f, (f64::from(at[1]) - RIG.center_v_px) * 13.7 / f);
-        let project = |x: f64, z: f64| [(x * f / z + RIG.center_u_px) as f32 + off, (y * f / z + RIG.center_v_px) as f32];
+        let (x, y) = (
+            (f64::from(at[0]) - RIG.center_u_px) * 13.7 / f,
+            (f64::from(at[1]) - RIG.center_v_px) * 13.7 / f,
+        );
+        let project = |x: f64, z: f64| {
+            [(x * f / z + RIG.center_u_px) as f32 + off, (y * f / z + RIG.center_v_px) as f32]
+        };
         Match {
             previous_left: project(x, 14.0),
             previous_right: project(x - b, 14.0),
@@ -381,11 +484,15 @@ fn a_point_is_found_where_it_is_and_not_where_it_was_expected() {
     assert_eq!(matcher.find(&expected([200.0, 80.0], 0.0)), None, "there is no frame before");
     push(&mut matcher, 0.3);
     let (mut found, mut sought) = (0, 0);
-    for (u, v) in (150..240).step_by(10).flat_map(|u| (60..100).step_by(10).map(move |v| (u as f32, v as f32))) {
+    for (u, v) in (150..240)
+        .step_by(10)
+        .flat_map(|u| (60..100).step_by(10).map(move |v| (u as f32, v as f32)))
+    {
         sought += 1;
         let Some(m) = matcher.find(&expected([u, v], 0.8)) else { continue };
         let truth = expected(m.current_left, 0.0);
-        let near = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 0.15 && (a[1] - b[1]).abs() < 0.15;
+        let near =
+            |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 0.15 && (a[1] - b[1]).abs() < 0.15;
         found += i32::from(
             near(m.previous_left, truth.previous_left)
                 && near(m.previous_right, truth.previous_right)

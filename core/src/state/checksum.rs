@@ -1,18 +1,18 @@
 //! The checksum at the end of a snapshot.
 //!
-//! A visit hands over pieces, and each word of eight bytes of a piece goes into one word of state by
-//! steps that can be undone. So a change within one such word, a flipped bit or a whole byte, ends in
-//! another checksum for certain, wherever it is, as long as as many bytes are read; changes in several
-//! words do but for one chance in 2^64. A change that alters how many bytes are read, in a count, has
-//! the visit end before or after the checksum: the source ends too early, or other bytes are taken for
-//! the checksum, with the same chance. A caller whose source knows its end makes that certain too by
-//! asking that nothing is left.
+//! A visit hands over pieces, and each word of eight bytes of a piece goes into one word of state
+//! by steps that can be undone. So a change within one such word, a flipped bit or a whole byte,
+//! ends in another checksum for certain, wherever it is, as long as as many bytes are read; changes
+//! in several words do but for one chance in 2^64. A change that alters how many bytes are read, in
+//! a count, has the visit end before or after the checksum: the source ends too early, or other
+//! bytes are taken for the checksum, with the same chance. A caller whose source knows its end
+//! makes that certain too by asking that nothing is left.
 
 /// The fraction of the golden ratio, in 1/2^64: odd, so that multiplying by it can be undone.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// The checksum so far. Not a [`crate::digest::Digest`], whose steps cannot be undone: two states may
-/// become one there, if hardly ever.
+/// The checksum so far. Not a [`crate::digest::Digest`], whose steps cannot be undone: two states
+/// may become one there, if hardly ever.
 pub(super) struct Checksum(pub u64);
 
 impl Checksum {
@@ -41,20 +41,27 @@ mod tests {
 
     /// What the multiplier is undone by: each round doubles the bits that are right.
     fn inverse() -> u64 {
-        (0..6).fold(MULTIPLIER, |inverse, _| inverse.wrapping_mul(2u64.wrapping_sub(MULTIPLIER.wrapping_mul(inverse))))
+        (0..6).fold(MULTIPLIER, |inverse, _| {
+            inverse.wrapping_mul(2u64.wrapping_sub(MULTIPLIER.wrapping_mul(inverse)))
+        })
     }
 
     #[test]
     fn a_step_of_the_checksum_can_be_undone_so_that_one_changed_word_is_never_lost() {
         assert_eq!(MULTIPLIER.wrapping_mul(inverse()), 1);
         let mut random = Random::new(3);
-        let mut any = || u64::from(random.below(u32::MAX)) << 32 | u64::from(random.below(u32::MAX));
+        let mut any =
+            || u64::from(random.below(u32::MAX)) << 32 | u64::from(random.below(u32::MAX));
         for _ in 0..10_000 {
             let (state, word) = (any(), any());
             let mut sum = Checksum(state);
             sum.step(word);
             let undone = sum.0.rotate_right(29).wrapping_mul(inverse());
-            assert_eq!((undone ^ word, undone ^ state), (state, word), "the state from the word, and the word from the state");
+            assert_eq!(
+                (undone ^ word, undone ^ state),
+                (state, word),
+                "the state from the word, and the word from the state"
+            );
         }
     }
 

@@ -2,9 +2,9 @@
 //!
 //! What lives from frame to frame says once what it holds: a `visit` method hands every field to a
 //! [`Visitor`], in a stated order, by a pattern without `..`, so that a field added does not compile
-//! until it is visited. Three visitors make three uses of it: [`Writer`] writes the fields, [`Reader`]
-//! reads them back, [`Hasher`] hashes them. A snapshot and a digest can thus not differ in what they
-//! know of.
+//! until it is visited. Three visitors make three uses of it: [`Writer`] writes the fields,
+//! [`Reader`] reads them back, [`Hasher`] hashes them. A snapshot and a digest can thus not differ
+//! in what they know of.
 //!
 //! All numbers are little-endian and of a stated width, so the bytes are the same on every machine.
 //! What can be rebuilt is not visited: a `rebuild` method follows a reading.
@@ -32,7 +32,8 @@ pub(crate) trait Visitor {
     /// Notes that what was read cannot be.
     fn refuse(&mut self) {}
 
-    /// Visits values whose digest is kept up to date: a hash takes the digest and does not visit them.
+    /// Visits values whose digest is kept up to date: a hash takes the digest and does not visit
+    /// them.
     fn content(&mut self, _digest: u64, visit: impl FnOnce(&mut Self)) {
         visit(self);
     }
@@ -120,14 +121,24 @@ pub(crate) trait Visitor {
     }
 
     /// A value that goes by a number.
-    fn code<T: Copy>(&mut self, value: &mut T, code_of: impl Fn(T) -> u32, of_code: impl Fn(u32) -> T) {
+    fn code<T: Copy>(
+        &mut self,
+        value: &mut T,
+        code_of: impl Fn(T) -> u32,
+        of_code: impl Fn(u32) -> T,
+    ) {
         let mut code = code_of(*value);
         self.u32(&mut code);
         *value = of_code(code);
     }
 
     /// A value that may be absent; `blank` is filled in where one is read that was absent here.
-    fn option<T>(&mut self, value: &mut Option<T>, blank: impl FnOnce() -> T, visit: impl FnOnce(&mut Self, &mut T)) {
+    fn option<T>(
+        &mut self,
+        value: &mut Option<T>,
+        blank: impl FnOnce() -> T,
+        visit: impl FnOnce(&mut Self, &mut T),
+    ) {
         let mut present = u8::from(value.is_some());
         self.u8(&mut present);
         match present {

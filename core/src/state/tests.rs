@@ -156,14 +156,19 @@ fn a_count_beyond_its_bound_an_early_end_and_a_flipped_bit_are_refused() {
     let mut bytes = written(&mut Everything { used: 11, ..Everything::some() });
     assert_eq!(read(&bytes, &mut Everything::blank()), Err(ReadError::Damaged));
     bytes = written(&mut Everything::some());
-    assert_eq!(read(&bytes[..bytes.len() - 1], &mut Everything::blank()), Err(ReadError::Source("ended")));
+    assert_eq!(
+        read(&bytes[..bytes.len() - 1], &mut Everything::blank()),
+        Err(ReadError::Source("ended"))
+    );
     bytes[2] ^= 1;
     assert_eq!(read(&bytes, &mut Everything::blank()), Err(ReadError::Damaged));
 }
 
 #[test]
 fn content_with_a_digest_of_its_own_is_not_hashed_again() {
-    let hash = |digest: u64, mut value: u32| Hasher::digest(|hasher| hasher.content(digest, |hasher| hasher.u32(&mut value)));
+    let hash = |digest: u64, mut value: u32| {
+        Hasher::digest(|hasher| hasher.content(digest, |hasher| hasher.u32(&mut value)))
+    };
     assert_eq!(hash(1, 7), hash(1, 8));
     assert_ne!(hash(1, 7), hash(2, 7));
 }

@@ -4,7 +4,8 @@ use crate::problem::{Problems, require};
 
 /// Largest disparity the matcher can represent, px.
 pub const DISPARITY_LIMIT: u16 = 255;
-/// Smallest distance between two support candidates, px: the bound on support points follows from it.
+/// Smallest distance between two support candidates, px: the bound on support points follows from
+/// it.
 pub const MIN_CANDIDATE_STEP: usize = 5;
 /// Widest window to each side of a support point in which alike ones are counted, candidates.
 pub(super) const MAX_PLAUSIBLE_WINDOW: usize = 16;
@@ -15,9 +16,14 @@ const MEAN_PASSES_MAX: u8 = 4;
 /// Widest search around the prior plane, px.
 pub const MAX_PLANE_RADIUS: usize = 16;
 
-/// What fills a gap whose ends are two surfaces: they differ by [`StereoConfig::gap_discontinuity`] or more.
+/// What fills a gap whose ends are two surfaces: they differ by [`StereoConfig::gap_discontinuity`]
+/// or more.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase")
+)]
 pub enum GapEnds {
     /// Nothing: only gaps within a surface are filled.
     #[default]
@@ -26,9 +32,11 @@ pub enum GapEnds {
     Farther,
 }
 
-/// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving, [`StereoConfig::dynslam`] DynSLAM's, which fills wider
-/// gaps; [`Default`] trusts the images more and the planes between support points less (docs/decisions/0049-still-less-trust-in-planes.md), fills
-/// gaps only within a surface, wide ones too (docs/decisions/0028-gaps-within-a-surface.md), and asks less of a support match.
+/// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving,
+/// [`StereoConfig::dynslam`] DynSLAM's, which fills wider gaps; [`Default`] trusts the images more
+/// and the planes between support points less (docs/decisions/0049-still-less-trust-in-planes.md),
+/// fills gaps only within a surface, wide ones too (docs/decisions/0028-gaps-within-a-surface.md),
+/// and asks less of a support match.
 ///
 /// ```
 /// use dynvox_core::stereo::StereoConfig;
@@ -38,14 +46,19 @@ pub enum GapEnds {
 /// assert!(problems.is_empty());
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct StereoConfig {
     /// Largest disparity searched, px, 10..=255. Published: 255.
     pub disparity_max: u16,
     /// A support match must cost less than this share of the second best, above 0, at most 1. 0.9
     /// (docs/decisions/0035-support-matches-below-nine-tenths.md); published: 0.85.
     pub support_ratio: f32,
-    /// Least texture of a support point's descriptor: sum of gradient magnitudes over its 16 samples. Published: 10.
+    /// Least texture of a support point's descriptor: sum of gradient magnitudes over its 16
+    /// samples. Published: 10.
     pub support_texture: u16,
     /// Distance between support candidates, px, 5..=64. Published: 5.
     pub candidate_step: usize,
@@ -55,7 +68,8 @@ pub struct StereoConfig {
     pub plausible_threshold: u16,
     /// Least number of support points in the window, itself included. Published: 5.
     pub plausible_min: u16,
-    /// A support point between two alike ones at most so many candidates away, on a row or a column, is redundant; 0 keeps all. 8; published: 5.
+    /// A support point between two alike ones at most so many candidates away, on a row or a
+    /// column, is redundant; 0 keeps all. 8; published: 5.
     pub redundant_distance: usize,
     /// Alike is what differs by at most this, px. Published: 1.
     pub redundant_threshold: u16,
@@ -63,19 +77,22 @@ pub struct StereoConfig {
     pub grid_size: usize,
     /// Weight of the descriptor distance against the prior (beta), above 0. Published: 0.02.
     pub beta: f32,
-    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the plane costs. 10; published: 3.
+    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the
+    /// plane costs. 10; published: 3.
     pub gamma: f32,
     /// Standard deviation of disparities about the prior plane (sigma), px, above 0. Published: 1.
     pub sigma: f32,
     /// Disparities searched to each side of the prior plane, in sigmas, 0..=16. 1; published: 2.
     pub plane_radius_sigmas: f32,
-    /// A triangle steeper than this bridges two surfaces: its plane is searched but not preferred. Disparity per px,
-    /// 0..=1000. Own choice: 0.7; without a limit 4.8 instead of 4.5 % are off on KITTI 2012.
+    /// A triangle steeper than this bridges two surfaces: its plane is searched but not preferred.
+    /// Disparity per px, 0..=1000. Own choice: 0.7; without a limit 4.8 instead of 4.5 % are off on
+    /// KITTI 2012.
     pub plane_slope_max: f32,
     /// Least texture of a descriptor that is matched densely. Published: 1.
     pub match_texture: u16,
-    /// Whether disparities are refined to fractions of a pixel before they are smoothed. Published: no. On KITTI 2012 it takes the median
-    /// error from 0.268 to 0.257 px and the share off by more than 3 px from 4.8 to 4.5 %; on smooth surfaces it halves the error.
+    /// Whether disparities are refined to fractions of a pixel before they are smoothed. Published:
+    /// no. On KITTI 2012 it takes the median error from 0.268 to 0.257 px and the share off by more
+    /// than 3 px from 4.8 to 4.5 %; on smooth surfaces it halves the error.
     pub subpixel: bool,
     /// Largest difference between the disparities of left and right image, px. 1; published: 2.
     pub consistency_threshold: u16,
@@ -83,10 +100,12 @@ pub struct StereoConfig {
     pub speckle_similarity: u16,
     /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
     pub speckle_size: u32,
-    /// Lone segments smaller than this share of the image are removed as well: no pixel of another one that is as similar is within `lone_gap`
-    /// px along a row or column. 0..=1; 0 keeps all. 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
+    /// Lone segments smaller than this share of the image are removed as well: no pixel of another
+    /// one that is as similar is within `lone_gap` px along a row or column. 0..=1; 0 keeps all.
+    /// 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
     pub lone_share: f32,
-    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone. No more than `gap_width` counts. 70.
+    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone.
+    /// No more than `gap_width` counts. 70.
     pub lone_gap: usize,
     /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
     pub gap_width: usize,
@@ -94,8 +113,8 @@ pub struct StereoConfig {
     pub gap_discontinuity: u16,
     /// What fills a gap between two surfaces. Nothing; published: the farther one.
     pub gap_ends: GapEnds,
-    /// How often an edge-preserving mean smooths the result, 0..=4. It also yields fractions of a pixel. 2
-    /// (docs/decisions/0043-lone-segments.md); published: 1.
+    /// How often an edge-preserving mean smooths the result, 0..=4. It also yields fractions of a
+    /// pixel. 2 (docs/decisions/0043-lone-segments.md); published: 1.
     pub adaptive_mean: u8,
     /// Whether a 3 x 3 median follows. Published: no.
     pub median: bool,
@@ -144,18 +163,50 @@ impl StereoConfig {
     pub fn validate(&self, problems: &mut Problems) {
         let mut check = |satisfied, key, rule| require(problems, satisfied, key, rule);
         let positive = |value: f32| value.is_finite() && value > 0.0;
-        check((10..=DISPARITY_LIMIT).contains(&self.disparity_max), "stereo.disparity_max", "must be within 10..=255 px");
-        check(positive(self.support_ratio) && self.support_ratio <= 1.0, "stereo.support_ratio", "must be above 0 and at most 1");
-        check((MIN_CANDIDATE_STEP..=64).contains(&self.candidate_step), "stereo.candidate_step", "must be within 5..=64 px");
-        check((1..=MAX_PLAUSIBLE_WINDOW).contains(&self.plausible_window), "stereo.plausible_window", "must be within 1..=16 candidates");
-        check(self.redundant_distance <= 64, "stereo.redundant_distance", "must be at most 64 candidates");
-        check((MIN_GRID_SIZE..=256).contains(&self.grid_size), "stereo.grid_size", "must be within 10..=256 px");
+        check(
+            (10..=DISPARITY_LIMIT).contains(&self.disparity_max),
+            "stereo.disparity_max",
+            "must be within 10..=255 px",
+        );
+        check(
+            positive(self.support_ratio) && self.support_ratio <= 1.0,
+            "stereo.support_ratio",
+            "must be above 0 and at most 1",
+        );
+        check(
+            (MIN_CANDIDATE_STEP..=64).contains(&self.candidate_step),
+            "stereo.candidate_step",
+            "must be within 5..=64 px",
+        );
+        check(
+            (1..=MAX_PLAUSIBLE_WINDOW).contains(&self.plausible_window),
+            "stereo.plausible_window",
+            "must be within 1..=16 candidates",
+        );
+        check(
+            self.redundant_distance <= 64,
+            "stereo.redundant_distance",
+            "must be at most 64 candidates",
+        );
+        check(
+            (MIN_GRID_SIZE..=256).contains(&self.grid_size),
+            "stereo.grid_size",
+            "must be within 10..=256 px",
+        );
         check(positive(self.beta), "stereo.beta", "must be above 0");
         check(positive(self.gamma), "stereo.gamma", "must be above 0");
         check(positive(self.sigma), "stereo.sigma", "must be above 0 px");
         let radius = self.sigma * self.plane_radius_sigmas;
-        check((0.0..=MAX_PLANE_RADIUS as f32).contains(&radius), "stereo.plane_radius_sigmas", "times sigma must be within 0..=16 px");
-        check((0.0..=1e3).contains(&self.plane_slope_max), "stereo.plane_slope_max", "must be within 0..=1000");
+        check(
+            (0.0..=MAX_PLANE_RADIUS as f32).contains(&radius),
+            "stereo.plane_radius_sigmas",
+            "times sigma must be within 0..=16 px",
+        );
+        check(
+            (0.0..=1e3).contains(&self.plane_slope_max),
+            "stereo.plane_slope_max",
+            "must be within 0..=1000",
+        );
         check((0.0..=1.0).contains(&self.lone_share), "stereo.lone_share", "must be within 0..=1");
         check(self.lone_gap <= 4_096, "stereo.lone_gap", "must be at most 4096 px");
         check(self.gap_width <= 4_096, "stereo.gap_width", "must be at most 4096 px");

@@ -1,15 +1,19 @@
 //! Delaunay triangulation of points in scan order, exact, iterative, in fixed memory.
 //!
-//! Points are inserted in the order of their rows, then columns, so that each lies outside the hull of those before it: it is joined to
-//! the hull edges it sees, and the edges opposite to it are flipped until all are locally Delaunay (Lawson). The triangles about the
-//! new point form a fan from one hull neighbour to the other, so a walk along the fan visits every edge in question: no stack.
-//! Predicates are integer determinants: with coordinates below 2^13 the in-circle one stays below 2^57.
+//! Points are inserted in the order of their rows, then columns, so that each lies outside the hull
+//! of those before it: it is joined to the hull edges it sees, and the edges opposite to it are
+//! flipped until all are locally Delaunay (Lawson). The triangles about the new point form a fan
+//! from one hull neighbour to the other, so a walk along the fan visits every edge in question: no
+//! stack. Predicates are integer determinants: with coordinates below 2^13 the in-circle one stays
+//! below 2^57.
 //!
-//! Corners are below the number of points and half-edges below six times that, as a planar triangulation of n points has at most 2n
-//! triangles: reading beyond a table ([`Table`]) does not happen, and would be no half-edge; writing beyond it would do nothing.
+//! Corners are below the number of points and half-edges below six times that, as a planar
+//! triangulation of n points has at most 2n triangles: reading beyond a table ([`Table`]) does not
+//! happen, and would be no half-edge; writing beyond it would do nothing.
 //!
-//! Memory: 66 bytes a point. Time: about linear on street scenes (a few flips a point). Four points on one circle keep the diagonal
-//! that the order of insertion gives. Points on one line make no triangle.
+//! Memory: 66 bytes a point. Time: about linear on street scenes (a few flips a point). Four points
+//! on one circle keep the diagonal that the order of insertion gives. Points on one line make no
+//! triangle.
 
 use crate::{
     memory::{Carver, region_bytes},
@@ -49,8 +53,9 @@ impl Table<'_> {
     }
 }
 
-/// Triangles as half-edges: triangle t has the corners `corner[3t..3t + 3]`, half-edge h runs from `corner[h]` to the next corner of its
-/// triangle and `twin[h]` is the same edge seen from the other side.
+/// Triangles as half-edges: triangle t has the corners `corner[3t..3t + 3]`, half-edge h runs from
+/// `corner[h]` to the next corner of its triangle and `twin[h]` is the same edge seen from the
+/// other side.
 pub(super) struct Triangulation<'s> {
     points: &'s mut [SupportPoint],
     corner: Table<'s>,
@@ -80,7 +85,8 @@ struct Offset {
 impl Offset {
     #[inline(always)]
     fn new(point: SupportPoint, from: SupportPoint) -> Self {
-        let (x, y) = (i64::from(point.u) - i64::from(from.u), i64::from(point.v) - i64::from(from.v));
+        let (x, y) =
+            (i64::from(point.u) - i64::from(from.u), i64::from(point.v) - i64::from(from.v));
         Self { x, y, square: x * x + y * y }
     }
 
@@ -96,7 +102,8 @@ fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
     Offset::new(b, a).cross(Offset::new(c, a))
 }
 
-/// Whether the point from which a, b and c are seen lies strictly within the circle through them, whose orientation is positive.
+/// Whether the point from which a, b and c are seen lies strictly within the circle through them,
+/// whose orientation is positive.
 #[inline(always)]
 fn in_circle([a, b, c]: [Offset; 3]) -> bool {
     a.square * b.cross(c) - b.square * a.cross(c) + c.square * a.cross(b) > 0
@@ -105,7 +112,9 @@ fn in_circle([a, b, c]: [Offset; 3]) -> bool {
 impl<'s> Triangulation<'s> {
     /// Bytes of the slab for `points` points.
     pub const fn bytes(points: usize) -> usize {
-        region_bytes::<SupportPoint>(points) + 2 * region_bytes::<u32>(6 * points) + 3 * region_bytes::<u32>(points)
+        region_bytes::<SupportPoint>(points)
+            + 2 * region_bytes::<u32>(6 * points)
+            + 3 * region_bytes::<u32>(points)
     }
 
     /// Takes buffers for `points` points from the slab.
@@ -129,13 +138,16 @@ impl<'s> Triangulation<'s> {
         self.triangles = 0;
     }
 
-    /// Adds a point in scan order; within a row points may come in any order. The nearer of two points at one
-    /// pixel, with the larger disparity, stays. Returns whether a point was dropped: this one, as the buffer is full, or the farther one.
+    /// Adds a point in scan order; within a row points may come in any order. The nearer of two
+    /// points at one pixel, with the larger disparity, stays. Returns whether a point was dropped:
+    /// this one, as the buffer is full, or the farther one.
     pub fn add(&mut self, point: SupportPoint) -> bool {
         let key = |p: &SupportPoint| (p.v, p.u);
         let points = self.points.get_mut(..self.len).unwrap_or_default();
         let at = points.iter().rposition(|other| key(other) <= key(&point));
-        if let Some(twin) = at.and_then(|i| points.get_mut(i)).filter(|other| key(other) == key(&point)) {
+        if let Some(twin) =
+            at.and_then(|i| points.get_mut(i)).filter(|other| key(other) == key(&point))
+        {
             twin.disparity = twin.disparity.max(point.disparity);
             return true;
         }
@@ -172,7 +184,11 @@ impl<'s> Triangulation<'s> {
     /// Triangulates the points added so far.
     pub fn triangulate(&mut self) {
         self.triangles = 0;
-        let Some(apex) = (2..self.len as u32).find(|&i| orientation(self.point(0), self.point(1), self.point(i)) != 0) else { return };
+        let Some(apex) = (2..self.len as u32)
+            .find(|&i| orientation(self.point(0), self.point(1), self.point(i)) != 0)
+        else {
+            return;
+        };
         self.begin(apex);
         for p in apex + 1..self.len as u32 {
             let first = self.join(p);
@@ -180,7 +196,8 @@ impl<'s> Triangulation<'s> {
         }
     }
 
-    /// The points before `apex` lie on one line: a fan joins them to it, and there is no other triangulation.
+    /// The points before `apex` lie on one line: a fan joins them to it, and there is no other
+    /// triangulation.
     fn begin(&mut self, apex: u32) {
         let left_turn = orientation(self.point(0), self.point(1), self.point(apex)) > 0;
         // The hull in positive orientation: along the line, or back along it, then the apex.
@@ -199,9 +216,11 @@ impl<'s> Triangulation<'s> {
         self.hull_link(p, first, 2);
     }
 
-    /// Joins p to every hull edge it sees; returns the first of the new triangles in hull order. All have p as third corner.
+    /// Joins p to every hull edge it sees; returns the first of the new triangles in hull order.
+    /// All have p as third corner.
     fn join(&mut self, p: u32) -> u32 {
-        // The point before p is on the hull, and p sees at least one of its two hull edges: it comes after both in scan order.
+        // The point before p is on the hull, and p sees at least one of its two hull edges: it
+        // comes after both in scan order.
         let mut a = p - 1;
         while self.sees(p, self.hull_previous.get(a)) {
             a = self.hull_previous.get(a);
@@ -221,10 +240,12 @@ impl<'s> Triangulation<'s> {
         first
     }
 
-    /// Flips the edges opposite to p that are not Delaunay, walking along the fan about p from triangle t = (b, a, p).
+    /// Flips the edges opposite to p that are not Delaunay, walking along the fan about p from
+    /// triangle t = (b, a, p).
     fn legalise(&mut self, p: u32, mut t: u32) {
         let at_p = self.point(p);
-        let seen = |mesh: &Self, half_edge: u32| Offset::new(mesh.point(mesh.corner.get(half_edge)), at_p);
+        let seen =
+            |mesh: &Self, half_edge: u32| Offset::new(mesh.point(mesh.corner.get(half_edge)), at_p);
         // What the next triangle shares with this one is not asked for again.
         let (mut a, mut b) = (seen(self, 3 * t + 1), seen(self, 3 * t));
         loop {
@@ -246,12 +267,14 @@ impl<'s> Triangulation<'s> {
         }
     }
 
-    /// Makes of triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c) the triangles (c, a, p) and (b, c, p).
+    /// Makes of triangle t = (b, a, p) and, beyond its edge b-a, (a, b, c) the triangles (c, a, p)
+    /// and (b, c, p).
     fn flip(&mut self, p: u32, t: u32, opposite: u32) {
         let other = opposite / 3;
         let (after, before) = (previous(previous(opposite)), previous(opposite));
         let (b, c) = (self.corner.get(after), self.corner.get(before));
-        let (beyond_bc, beyond_ca, beyond_pb) = (self.twin.get(after), self.twin.get(before), self.twin.get(3 * t + 2));
+        let (beyond_bc, beyond_ca, beyond_pb) =
+            (self.twin.get(after), self.twin.get(before), self.twin.get(3 * t + 2));
         self.corner.set(3 * t, c);
         for (corner, point) in (3 * other..).zip([b, c, p]) {
             self.corner.set(corner, point);
@@ -309,8 +332,8 @@ mod tests {
         SupportPoint { u: u as u16, v: v as u16, disparity: 1 }
     }
 
-    /// Triangulates and checks everything that makes a Delaunay triangulation: every triangle turns left, none has a point within its
-    /// circle, together they fill the hull.
+    /// Triangulates and checks everything that makes a Delaunay triangulation: every triangle turns
+    /// left, none has a point within its circle, together they fill the hull.
     fn check(points: &[SupportPoint]) -> usize {
         let mut memory = vec![0u8; Triangulation::bytes(points.len()) + SLAB_ALIGN];
         let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
@@ -327,7 +350,10 @@ mod tests {
             assert!(orientation(a, b, c) > 0);
             area += orientation(a, b, c);
             assert!(
-                !mesh.points().iter().any(|&p| in_circle([a, b, c].map(|corner| Offset::new(corner, p)))),
+                !mesh
+                    .points()
+                    .iter()
+                    .any(|&p| in_circle([a, b, c].map(|corner| Offset::new(corner, p)))),
                 "a point within the circle of {a:?} {b:?} {c:?}"
             );
         }
@@ -340,7 +366,9 @@ mod tests {
         let half_hull = |points: &mut dyn Iterator<Item = SupportPoint>| {
             let mut hull: Vec<SupportPoint> = vec![];
             for p in points {
-                while hull.len() >= 2 && orientation(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0 {
+                while hull.len() >= 2
+                    && orientation(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0
+                {
                     hull.pop();
                 }
                 hull.push(p);
@@ -357,7 +385,9 @@ mod tests {
     fn random_points_have_empty_circles_and_fill_their_hull() {
         let mut random = Random::new(11);
         for (n, size) in [(3, 4), (7, 6), (40, 12), (150, 60), (300, 8_000)].repeat(12) {
-            let points: Vec<_> = (0..n).map(|_| point(random.below(size) as usize, random.below(size) as usize)).collect();
+            let points: Vec<_> = (0..n)
+                .map(|_| point(random.below(size) as usize, random.below(size) as usize))
+                .collect();
             check(&points);
         }
     }
@@ -365,11 +395,15 @@ mod tests {
     #[test]
     fn grids_full_of_cocircular_and_collinear_points_are_triangulated_whole() {
         for (columns, rows) in [(2, 2), (9, 7), (1, 9), (9, 1), (14, 3)] {
-            let points: Vec<_> = (0..columns * rows).map(|i| point(i % columns * 5, i / columns * 5)).collect();
+            let points: Vec<_> =
+                (0..columns * rows).map(|i| point(i % columns * 5, i / columns * 5)).collect();
             assert_eq!(check(&points), 2 * (columns - 1) * (rows - 1));
         }
         let mut random = Random::new(12);
-        let thinned: Vec<_> = (0..15 * 15).filter(|_| random.below(3) == 0).map(|i| point(i % 15 * 5, i / 15 * 5)).collect();
+        let thinned: Vec<_> = (0..15 * 15)
+            .filter(|_| random.below(3) == 0)
+            .map(|i| point(i % 15 * 5, i / 15 * 5))
+            .collect();
         check(&thinned);
     }
 
@@ -392,7 +426,8 @@ mod tests {
         let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
         let mut mesh = Triangulation::new_in(3, ["p", "t", "h"], &mut carver);
         let at = |u, disparity| SupportPoint { u, v: 2, disparity };
-        let dropped = [at(9, 4), at(5, 7), at(9, 6), at(5, 3), at(7, 1), at(8, 1)].map(|point| mesh.add(point));
+        let dropped = [at(9, 4), at(5, 7), at(9, 6), at(5, 3), at(7, 1), at(8, 1)]
+            .map(|point| mesh.add(point));
         assert_eq!(dropped, [false, false, true, true, false, true]);
         assert_eq!(mesh.points(), [at(5, 7), at(7, 1), at(9, 6)]);
     }

@@ -1,10 +1,13 @@
-//! Dense matching of both images, row by row (Geiger et al., section 3.3), and the check that they agree.
+//! Dense matching of both images, row by row (Geiger et al., section 3.3), and the check that they
+//! agree.
 //!
-//! Each pixel takes the disparity of least energy among those near the plane of its triangle and those of its grid cell. Both images'
-//! rows are matched while their descriptors are at hand, so the right image's disparities are never kept. Sixteen pixels are matched at
-//! a time (`eight`); fractions of a pixel are found last, for the disparities that are left (`fraction`).
+//! Each pixel takes the disparity of least energy among those near the plane of its triangle and
+//! those of its grid cell. Both images' rows are matched while their descriptors are at hand, so
+//! the right image's disparities are never kept. Sixteen pixels are matched at a time (`eight`);
+//! fractions of a pixel are found last, for the disparities that are left (`fraction`).
 //!
-//! Energies are integers: 16 times the descriptor distance plus the cost of leaving the plane. Of equal ones the smaller disparity wins.
+//! Energies are integers: 16 times the descriptor distance plus the cost of leaving the plane. Of
+//! equal ones the smaller disparity wins.
 
 mod eight;
 mod fraction;
@@ -26,7 +29,8 @@ use core::cell::Cell;
 
 /// A disparity of the working images: 1/64 px.
 pub(super) const WORKING_ONE_PX: i16 = 64;
-/// No disparity, in the working images: so far from any that no difference of two disparities comes near.
+/// No disparity, in the working images: so far from any that no difference of two disparities comes
+/// near.
 pub(super) const NONE: i16 = i16::MIN / 2;
 /// Set in a working disparity that was filled in; beyond what 255 px take.
 pub(super) const FILLED: i16 = 1 << 14;
@@ -86,7 +90,8 @@ impl DenseMatching<'_> {
             if describe_rows([(left_image, v, &mut *left_row), (right_image, v, &mut *right_row)]) {
                 self.match_row::<true>(left_row, right_row, v, left, kernels);
                 self.match_row::<false>(right_row, left_row, v, right, kernels);
-                let [matched, contradicted] = check_consistency(left, right, self.config.consistency_threshold);
+                let [matched, contradicted] =
+                    check_consistency(left, right, self.config.consistency_threshold);
                 band.counts[0] += matched;
                 band.counts[1] += contradicted;
                 refine_row(self.config, left_row, right_row, left, kernels);
@@ -98,7 +103,14 @@ impl DenseMatching<'_> {
 
     /// Replaces the planes of one row by disparities in px, or [`NO_PLANE`] where no plane lies.
     #[inline(always)]
-    fn match_row<const LEFT: bool>(&self, here: &[Descriptor], other: &[Descriptor], v: usize, planes: &mut [i16], kernels: &impl Kernels) {
+    fn match_row<const LEFT: bool>(
+        &self,
+        here: &[Descriptor],
+        other: &[Descriptor],
+        v: usize,
+        planes: &mut [i16],
+        kernels: &impl Kernels,
+    ) {
         let end = planes.len().saturating_sub(MARGIN);
         part_mut(planes, ..MARGIN).fill(NO_PLANE);
         part_mut(planes, end..).fill(NO_PLANE);
@@ -122,7 +134,8 @@ impl DenseMatching<'_> {
     }
 }
 
-/// The disparities of a set, ascending, each with the cost of leaving the plane in the bits from 8 on.
+/// The disparities of a set, ascending, each with the cost of leaving the plane in the bits from 8
+/// on.
 #[expect(clippy::indexing_slicing, reason = "the mask keeps members within the list")]
 fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) -> &'l [u32] {
     let mut count = 0;
@@ -144,21 +157,27 @@ fn load(row: &[i16], u: usize) -> Eight<i16> {
     padded(row, u, 0, NO_PLANE)
 }
 
-/// Takes from the left row what the right row contradicts; both in px, [`NO_PLANE`] where there is no disparity. Returns how many matches
-/// there were and how many of them went. The right row is used up.
+/// Takes from the left row what the right row contradicts; both in px, [`NO_PLANE`] where there is
+/// no disparity. Returns how many matches there were and how many of them went. The right row is
+/// used up.
 #[inline(always)]
 fn check_consistency(left: &mut [i16], right: &mut [i16], threshold: u16) -> [u32; 2] {
-    // First what cannot be done many at a time: the right row becomes that of each pixel's partner. None is to a pixel's right, so that
-    // from the end on none is gone before it is asked for.
+    // First what cannot be done many at a time: the right row becomes that of each pixel's partner.
+    // None is to a pixel's right, so that from the end on none is gone before it is asked for.
     let cells = Cell::from_mut(right).as_slice_of_cells();
     for ((u, disparity), cell) in left.iter().enumerate().zip(cells).rev() {
-        cell.set(cells.get(u.wrapping_sub(usize::from(disparity.unsigned_abs()))).map_or(NO_PLANE, Cell::get));
+        cell.set(
+            cells
+                .get(u.wrapping_sub(usize::from(disparity.unsigned_abs())))
+                .map_or(NO_PLANE, Cell::get),
+        );
     }
     let (mut matched, mut contradicted) = (0u16, 0u16);
     for (disparity, &back) in left.iter_mut().zip(&*right) {
         // Which pixels agree is a coin toss at edges: no branches.
         let d = *disparity;
-        let (is_match, agrees) = (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
+        let (is_match, agrees) =
+            (d != NO_PLANE, (back != NO_PLANE) & (back.abs_diff(d) <= threshold));
         matched += u16::from(is_match);
         contradicted += u16::from(is_match & !agrees);
         *disparity = if is_match & agrees { d } else { NO_PLANE };

@@ -1,6 +1,8 @@
-//! Support points that stand alone, or that add nothing, are taken back (Geiger et al., section 3.1; the published parameters).
+//! Support points that stand alone, or that add nothing, are taken back (Geiger et al., section
+//! 3.1; the published parameters).
 //!
-//! Every candidate of a row is asked at once, whether it has a match or not: which have one no processor can foresee.
+//! Every candidate of a row is asked at once, whether it has a match or not: which have one no
+//! processor can foresee.
 
 use crate::{
     parallel::Work,
@@ -14,7 +16,8 @@ const BLOCK: usize = 64;
 /// Those, and the widest window to both sides of them.
 const AROUND: usize = BLOCK + 2 * MAX_PLAUSIBLE_WINDOW;
 
-/// Removes from a grid of candidates, `columns` wide, the implausible and then the redundant points; says how many of each went.
+/// Removes from a grid of candidates, `columns` wide, the implausible and then the redundant
+/// points; says how many of each went.
 pub(super) struct FilterSupport<'a> {
     pub config: &'a StereoConfig,
     pub grid: &'a mut [i16],
@@ -30,14 +33,24 @@ impl Work for FilterSupport<'_> {
     fn run(self) -> [u32; 2] {
         let Self { config, grid, columns, scratch } = self;
         let scratch = part_mut(scratch, ..grid.len());
-        [remove_implausible(config, grid, columns, scratch), remove_redundant(config, grid, columns, scratch)]
+        [
+            remove_implausible(config, grid, columns, scratch),
+            remove_redundant(config, grid, columns, scratch),
+        ]
     }
 }
 
-/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all tested before any is removed.
+/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all
+/// tested before any is removed.
 #[inline(always)]
-fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, before: &mut [i16]) -> u32 {
-    let (window, threshold) = (config.plausible_window.min(MAX_PLAUSIBLE_WINDOW), config.plausible_threshold);
+fn remove_implausible(
+    config: &StereoConfig,
+    grid: &mut [i16],
+    width: usize,
+    before: &mut [i16],
+) -> u32 {
+    let (window, threshold) =
+        (config.plausible_window.min(MAX_PLAUSIBLE_WINDOW), config.plausible_threshold);
     let width = width.max(1);
     before.iter_mut().zip(&*grid).for_each(|(to, from)| *to = *from);
     let mut removed = 0;
@@ -48,14 +61,16 @@ fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, bef
             let (mut found, mut lonely) = ([0u16; BLOCK], [0; BLOCK]);
             for row in before.chunks_exact(width).skip(top).take(rows) {
                 // What lies left of the row is no match.
-                let around: [i16; AROUND] = padded(row, first.saturating_sub(window), window - window.min(first), NO_MATCH);
+                let around: [i16; AROUND] =
+                    padded(row, first.saturating_sub(window), window - window.min(first), NO_MATCH);
                 for others in around.array_windows::<BLOCK>().take(2 * window + 1) {
                     for ((found, &other), &point) in found.iter_mut().zip(others).zip(&here) {
                         *found += u16::from(are_alike(other, point, threshold));
                     }
                 }
                 for (lonely, (&found, &point)) in lonely.iter_mut().zip(found.iter().zip(&here)) {
-                    *lonely = u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
+                    *lonely =
+                        u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
                 }
                 // Most have found enough after a row or two.
                 if lonely.iter().fold(0, |any, lonely| any | lonely) == 0 {
@@ -68,9 +83,15 @@ fn remove_implausible(config: &StereoConfig, grid: &mut [i16], width: usize, bef
     removed
 }
 
-/// Removes the points that lie between two alike ones on their column, then on their row; in scan order, each tested against what is left.
+/// Removes the points that lie between two alike ones on their column, then on their row; in scan
+/// order, each tested against what is left.
 #[inline(always)]
-fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize, turned: &mut [i16]) -> u32 {
+fn remove_redundant(
+    config: &StereoConfig,
+    grid: &mut [i16],
+    width: usize,
+    turned: &mut [i16],
+) -> u32 {
     let height = grid.len() / width.max(1);
     let mut removed = 0;
     // Rows are the columns of the grid on its side; after the second turn it stands again.
@@ -86,7 +107,8 @@ fn remove_redundant(config: &StereoConfig, grid: &mut [i16], width: usize, turne
 /// Removes the points that lie between two alike ones on their column, from the top down.
 #[inline(always)]
 fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
-    let (reach, threshold, width) = (config.redundant_distance, config.redundant_threshold, width.max(1));
+    let (reach, threshold, width) =
+        (config.redundant_distance, config.redundant_threshold, width.max(1));
     let mut removed = 0;
     for start in (0..grid.len()).step_by(width) {
         let Some((above, rest)) = grid.split_at_mut_checked(start) else { break };
@@ -94,7 +116,10 @@ fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 
         for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
             let here: [i16; BLOCK] = padded(points, 0, 0, NO_MATCH);
             let mut between = [1; BLOCK];
-            for rows in [part(above, above.len().saturating_sub(reach * width)..), part(below, ..below.len().min(reach * width))] {
+            for rows in [
+                part(above, above.len().saturating_sub(reach * width)..),
+                part(below, ..below.len().min(reach * width)),
+            ] {
                 let any = any_alike(rows.chunks_exact(width), first, &here, threshold);
                 between.iter_mut().zip(any).for_each(|(between, any)| *between &= any);
             }
@@ -104,9 +129,15 @@ fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 
     removed
 }
 
-/// 1 for each of the points from column `first` on that has an alike one on its column in any of the rows, else 0.
+/// 1 for each of the points from column `first` on that has an alike one on its column in any of
+/// the rows, else 0.
 #[inline(always)]
-fn any_alike<'r>(rows: impl Iterator<Item = &'r [i16]>, first: usize, points: &[i16; BLOCK], threshold: u16) -> [u16; BLOCK] {
+fn any_alike<'r>(
+    rows: impl Iterator<Item = &'r [i16]>,
+    first: usize,
+    points: &[i16; BLOCK],
+    threshold: u16,
+) -> [u16; BLOCK] {
     let mut any = [0u16; BLOCK];
     for row in rows {
         let others: [i16; BLOCK] = padded(row, first, 0, NO_MATCH);
@@ -170,17 +201,27 @@ mod tests {
         let (window, threshold) = (config.plausible_window as i32, config.plausible_threshold);
         let mut random = Random::new(72);
         for (width, height, sparse) in [(23i32, 17i32, 4), (40, 9, 9), (5, 30, 2)] {
-            let before: Vec<i16> =
-                (0..width * height).map(|_| if random.below(sparse) > 0 { NO_MATCH } else { random.below(60) as i16 }).collect();
+            let before: Vec<i16> = (0..width * height)
+                .map(|_| if random.below(sparse) > 0 { NO_MATCH } else { random.below(60) as i16 })
+                .collect();
             let mut grid = before.clone();
-            let removed = remove_implausible(&config, &mut grid, width as usize, &mut vec![0; before.len()]);
+            let removed =
+                remove_implausible(&config, &mut grid, width as usize, &mut vec![0; before.len()]);
             let at = |u: i32, v: i32| before[(v * width + u) as usize];
-            for (u, v) in (0..width).flat_map(|u| (0..height).map(move |v| (u, v))).filter(|&(u, v)| at(u, v) != NO_MATCH) {
+            for (u, v) in (0..width)
+                .flat_map(|u| (0..height).map(move |v| (u, v)))
+                .filter(|&(u, v)| at(u, v) != NO_MATCH)
+            {
                 let rows = (v - window).max(0)..(v + window + 1).min(height);
                 let columns = (u - window).max(0)..(u + window + 1).min(width);
                 let alike = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-                let alike = alike.filter(|&(x, y)| at(x, y) != NO_MATCH && at(x, y).abs_diff(at(u, v)) <= threshold).count();
-                let expected = if alike < usize::from(config.plausible_min) { NO_MATCH } else { at(u, v) };
+                let alike = alike
+                    .filter(|&(x, y)| {
+                        at(x, y) != NO_MATCH && at(x, y).abs_diff(at(u, v)) <= threshold
+                    })
+                    .count();
+                let expected =
+                    if alike < usize::from(config.plausible_min) { NO_MATCH } else { at(u, v) };
                 assert_eq!(grid[(v * width + u) as usize], expected);
             }
             assert_eq!(removed as usize, before.iter().zip(&grid).filter(|(a, b)| a != b).count());
@@ -199,7 +240,12 @@ mod tests {
         assert!(removed > 31 * 17 * 8 / 10);
         // What is left still says 12 within the reach of every removed point.
         for v in 0..17usize {
-            assert!(v == 0 || v == 16 || (v.saturating_sub(5)..(v + 6).min(17)).any(|w| grid[w * 31..][..31].contains(&12)));
+            assert!(
+                v == 0
+                    || v == 16
+                    || (v.saturating_sub(5)..(v + 6).min(17))
+                        .any(|w| grid[w * 31..][..31].contains(&12))
+            );
         }
     }
 
@@ -208,16 +254,24 @@ mod tests {
         let config = StereoConfig::default();
         let mut random = Random::new(73);
         for (width, height) in [(23, 17), (150, 9), (64, 70), (1, 5), (5, 1)] {
-            let mut grid: Vec<i16> =
-                (0..width * height).map(|_| if random.below(5) == 0 { NO_MATCH } else { random.below(4) as i16 }).collect();
+            let mut grid: Vec<i16> = (0..width * height)
+                .map(|_| if random.below(5) == 0 { NO_MATCH } else { random.below(4) as i16 })
+                .collect();
             let mut expected = grid.clone();
-            for (stride, length, lines, line_stride) in [(width, height, width, 1), (1, width, height, width)] {
+            for (stride, length, lines, line_stride) in
+                [(width, height, width, 1), (1, width, height, width)]
+            {
                 for (line, i) in (0..lines).flat_map(|line| (0..length).map(move |i| (line, i))) {
                     let at = |k: usize| line * line_stride + k * stride;
                     let here = expected[at(i)];
-                    let alike = |k: usize| expected[at(k)] != NO_MATCH && expected[at(k)].abs_diff(here) <= config.redundant_threshold;
+                    let alike = |k: usize| {
+                        expected[at(k)] != NO_MATCH
+                            && expected[at(k)].abs_diff(here) <= config.redundant_threshold
+                    };
                     let reach = config.redundant_distance;
-                    if (i.saturating_sub(reach)..i).any(alike) && (i + 1..length.min(i + reach + 1)).any(alike) {
+                    if (i.saturating_sub(reach)..i).any(alike)
+                        && (i + 1..length.min(i + reach + 1)).any(alike)
+                    {
                         expected[at(i)] = NO_MATCH;
                     }
                 }

@@ -1,7 +1,8 @@
 //! Small gaps between disparities are filled, along rows and then along columns, and marked so.
 //!
-//! If both ends are one surface the gap gets their mean. Otherwise it stays, or, as published, gets the farther one's disparity: what is
-//! hidden from one camera is background. Memory: four bytes a column. Time: two walks over the image.
+//! If both ends are one surface the gap gets their mean. Otherwise it stays, or, as published, gets
+//! the farther one's disparity: what is hidden from one camera is background. Memory: four bytes a
+//! column. Time: two walks over the image.
 
 use super::{
     GapEnds, MAX_IMAGE_SIZE,
@@ -40,7 +41,8 @@ impl Filling {
     }
 }
 
-/// Fills the gaps of each of the rows, `width` pixels each; `edges` has a byte a column. Returns the pixels filled.
+/// Fills the gaps of each of the rows, `width` pixels each; `edges` has a byte a column. Returns
+/// the pixels filled.
 pub(super) struct FillRows<'a> {
     pub rows: &'a mut [i16],
     pub width: usize,
@@ -58,7 +60,8 @@ impl Work for FillRows<'_> {
         let width = width.max(1);
         let edges = part_mut(edges, ..width - 1);
         for row in rows.chunks_exact_mut(width) {
-            // Edges between pixels with and without disparity take turns: a gap lies between two of them.
+            // Edges between pixels with and without disparity take turns: a gap lies between two of
+            // them.
             for (edge, (&a, &b)) in edges.iter_mut().zip(row.iter().zip(part(row, 1..))) {
                 *edge = u8::from((a == NONE) != (b == NONE));
             }
@@ -99,7 +102,8 @@ fn fill_gap(row: &mut [i16], gap: Range<usize>, filling: Filling) -> u32 {
 const NEVER: u16 = 1 << 15;
 const _: () = assert!(2 * MAX_IMAGE_SIZE <= NEVER as usize);
 
-/// Fills the gaps of each column of an image; `last_row` and `ends` have an entry a column. Returns the pixels filled.
+/// Fills the gaps of each column of an image; `last_row` and `ends` have an entry a column. Returns
+/// the pixels filled.
 ///
 /// Columns are walked side by side, row by row: an image is read as it lies in memory.
 pub(super) struct FillColumns<'a> {
@@ -116,7 +120,10 @@ impl Work for FillColumns<'_> {
     #[inline(always)]
     fn run(self) -> u32 {
         let Self { image, width, filling, last_row, ends } = self;
-        let (Some(last_row), Some(ends)) = (last_row.get_mut(..width), ends.get_mut(..width)) else { return 0 };
+        let (Some(last_row), Some(ends)) = (last_row.get_mut(..width), ends.get_mut(..width))
+        else {
+            return 0;
+        };
         last_row.fill(NEVER);
         let mut filled = 0;
         let (width, widest) = (width.max(1), filling.width as u16);
@@ -130,8 +137,14 @@ impl Work for FillColumns<'_> {
             for_each_set(ends, |u| {
                 let (Some(&last), Some(&end)) = (last_row.get(u), here.get(u)) else { return };
                 // This column of the rows above, from the last one with a disparity on.
-                let mut column = above.get_mut(usize::from(last) * width + u..).unwrap_or_default().iter_mut().step_by(width);
-                let Some(value) = column.next().and_then(|start| filling.value(*start, end)) else { return };
+                let mut column = above
+                    .get_mut(usize::from(last) * width + u..)
+                    .unwrap_or_default()
+                    .iter_mut()
+                    .step_by(width);
+                let Some(value) = column.next().and_then(|start| filling.value(*start, end)) else {
+                    return;
+                };
                 for pixel in column {
                     *pixel = value;
                     filled += 1;
@@ -168,15 +181,22 @@ mod tests {
     #[test]
     fn rows_and_columns_equal_their_plain_twin() {
         let mut random = Random::new(31);
-        for (i, (width, height, none)) in [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6).into_iter().enumerate() {
+        for (i, (width, height, none)) in
+            [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6).into_iter().enumerate()
+        {
             let ends = if i % 3 == 0 { GapEnds::Farther } else { GapEnds::Surface };
             let filling = Filling { width: random.below(9) as usize, discontinuity: 192, ends };
-            let pixel = |random: &mut Random| if random.below(none) > 0 { NONE } else { random.below(500) as i16 };
+            let pixel = |random: &mut Random| {
+                if random.below(none) > 0 { NONE } else { random.below(500) as i16 }
+            };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
 
             let mut rows = image.clone();
-            let filled = FillRows { rows: &mut rows, width, filling, edges: &mut vec![0; width] }.run();
-            assert!(rows == image.chunks(width).flat_map(|row| plain(row, filling)).collect::<Vec<_>>());
+            let filled =
+                FillRows { rows: &mut rows, width, filling, edges: &mut vec![0; width] }.run();
+            assert!(
+                rows == image.chunks(width).flat_map(|row| plain(row, filling)).collect::<Vec<_>>()
+            );
             assert_eq!(filled as usize, image.iter().zip(&rows).filter(|(a, b)| a != b).count());
 
             let mut columns = rows.clone();
@@ -189,7 +209,9 @@ mod tests {
             }
             .run();
             for u in 0..width {
-                let column = |image: &[i16]| image.iter().skip(u).step_by(width).copied().collect::<Vec<_>>();
+                let column = |image: &[i16]| {
+                    image.iter().skip(u).step_by(width).copied().collect::<Vec<_>>()
+                };
                 assert!(column(&columns) == plain(&column(&rows), filling));
             }
         }
@@ -200,10 +222,16 @@ mod tests {
         let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther };
         let image = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
         let [surface, farther] = [670, 100].map(|disparity| disparity | FILLED);
-        let fill = |rows: &mut [i16], ends| FillRows { rows, width: 12, filling: Filling { ends, ..filling }, edges: &mut [0; 12] }.run();
+        let fill = |rows: &mut [i16], ends| {
+            FillRows { rows, width: 12, filling: Filling { ends, ..filling }, edges: &mut [0; 12] }
+                .run()
+        };
         let mut row = image;
         assert_eq!(fill(&mut row, GapEnds::Farther), 3);
-        assert_eq!(row, [640, surface, surface, 700, farther, 100, NONE, NONE, NONE, NONE, 100, NONE]);
+        assert_eq!(
+            row,
+            [640, surface, surface, 700, farther, 100, NONE, NONE, NONE, NONE, 100, NONE]
+        );
         let mut row = image;
         assert_eq!(fill(&mut row, GapEnds::Surface), 2);
         assert_eq!(row, [640, surface, surface, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE]);

@@ -22,9 +22,12 @@ impl Work for GradientRows<'_> {
     fn run(self) {
         let Self { image, first, du, dv } = self;
         let width = image.width().max(1);
-        for (v, (du, dv)) in (first..).zip(du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width))) {
+        for (v, (du, dv)) in
+            (first..).zip(du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width)))
+        {
             let is_inner = v > 0 && v + 1 < image.height();
-            if !is_inner || row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv).is_none() {
+            if !is_inner || row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv).is_none()
+            {
                 du.fill(FLAT);
                 dv.fill(FLAT);
             }
@@ -52,9 +55,15 @@ fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) ->
     let (du, dv) = (du.get_mut(1..)?.get_mut(..n)?, dv.get_mut(1..)?.get_mut(..n)?);
     let wide = i16::from;
     for i in 0..n {
-        let (right, left) = (wide(a2[i]) + 2 * wide(h2[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(h0[i]) + wide(b0[i]));
+        let (right, left) = (
+            wide(a2[i]) + 2 * wide(h2[i]) + wide(b2[i]),
+            wide(a0[i]) + 2 * wide(h0[i]) + wide(b0[i]),
+        );
         du[i] = quarter(right - left);
-        let (down, up) = (wide(b0[i]) + 2 * wide(b1[i]) + wide(b2[i]), wide(a0[i]) + 2 * wide(a1[i]) + wide(a2[i]));
+        let (down, up) = (
+            wide(b0[i]) + 2 * wide(b1[i]) + wide(b2[i]),
+            wide(a0[i]) + 2 * wide(a1[i]) + wide(a2[i]),
+        );
         dv[i] = quarter(down - up);
     }
     Some(())
@@ -68,11 +77,16 @@ mod tests {
     fn a_ramp_has_a_constant_gradient_and_an_edge_saturates() {
         let ramp: std::vec::Vec<u8> = (0..5 * 9).map(|i| ((i % 9) * 8) as u8).collect();
         let (mut du, mut dv) = (std::vec![0; 45], std::vec![0; 45]);
-        GradientRows { image: View::new(&ramp, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }.run();
-        assert!(du[9 + 1..9 + 8].iter().all(|&g| g == 128 + 16), "8 a pixel is a response of 64, a quarter of it 16");
+        GradientRows { image: View::new(&ramp, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }
+            .run();
+        assert!(
+            du[9 + 1..9 + 8].iter().all(|&g| g == 128 + 16),
+            "8 a pixel is a response of 64, a quarter of it 16"
+        );
         assert!(dv.iter().all(|&g| g == FLAT));
         let edge: std::vec::Vec<u8> = (0..45).map(|i| if i < 18 { 255 } else { 0 }).collect();
-        GradientRows { image: View::new(&edge, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }.run();
+        GradientRows { image: View::new(&edge, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }
+            .run();
         assert_eq!(dv[9 + 4], 0, "-1020 / 4 + 128 saturates");
         assert_eq!(du[9 + 4], FLAT);
     }

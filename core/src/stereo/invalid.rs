@@ -3,7 +3,8 @@
 use super::gradient::FLAT;
 use crate::image::{DISPARITY_ONE_PX, InvalidPair, InvalidPixels};
 
-/// Levels a plane of gradients at the pixels that are not to be used: descriptors of nothing but such pixels match nothing.
+/// Levels a plane of gradients at the pixels that are not to be used: descriptors of nothing but
+/// such pixels match nothing.
 pub(super) fn flatten(invalid: &InvalidPixels<'_>, width: usize, plane: &mut [u8]) {
     for (v, row) in plane.chunks_exact_mut(width.max(1)).enumerate() {
         for u in invalid.in_row(v) {
@@ -14,12 +15,14 @@ pub(super) fn flatten(invalid: &InvalidPixels<'_>, width: usize, plane: &mut [u8
     }
 }
 
-/// Takes away the disparities (1/256 px) of left pixels that are not to be used, or whose partner is not.
+/// Takes away the disparities (1/256 px) of left pixels that are not to be used, or whose partner
+/// is not.
 pub(super) fn remove(invalid: &InvalidPair<'_>, width: usize, disparity_q8: &mut [u16]) {
     for (v, row) in disparity_q8.chunks_exact_mut(width.max(1)).enumerate() {
         for (u, disparity) in row.iter_mut().enumerate().filter(|(_, disparity)| **disparity != 0) {
             let pixels = usize::from((*disparity + DISPARITY_ONE_PX / 2) / DISPARITY_ONE_PX);
-            let partner = u.checked_sub(pixels).is_none_or(|partner| invalid.right.contains(partner, v));
+            let partner =
+                u.checked_sub(pixels).is_none_or(|partner| invalid.right.contains(partner, v));
             if partner || invalid.left.contains(u, v) {
                 *disparity = 0;
             }

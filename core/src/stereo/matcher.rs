@@ -29,7 +29,8 @@ pub struct StereoMatcher<'s> {
     gradients: &'s mut [u32],
     /// Left planes, then left disparities in working units, in the end the result.
     disparity: &'s mut [u16],
-    /// Right planes, then right disparities, then the ends of the speckle filter's runs, then the image between two filters.
+    /// Right planes, then right disparities, then the ends of the speckle filter's runs, then the
+    /// image between two filters.
     other: &'s mut [i16],
     rows: &'s mut [Descriptor],
     support: &'s mut [i16],
@@ -67,25 +68,31 @@ impl Work for CorrectRows<'_> {
 
 impl core::fmt::Debug for StereoMatcher<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("StereoMatcher").field("width", &self.width).field("height", &self.height).finish_non_exhaustive()
+        f.debug_struct("StereoMatcher")
+            .field("width", &self.width)
+            .field("height", &self.height)
+            .finish_non_exhaustive()
     }
 }
 
 /// Support points there can be: one per candidate.
 const fn most_points(capacity: &Capacity) -> usize {
-    support::candidates(capacity.image_width, MIN_CANDIDATE_STEP) * support::candidates(capacity.image_height, MIN_CANDIDATE_STEP)
+    support::candidates(capacity.image_width, MIN_CANDIDATE_STEP)
+        * support::candidates(capacity.image_height, MIN_CANDIDATE_STEP)
 }
 
 /// Cells of the grid prior there can be.
 const fn most_cells(capacity: &Capacity) -> usize {
-    prior::cells(capacity.image_width, MIN_GRID_SIZE) * prior::cells(capacity.image_height, MIN_GRID_SIZE)
+    prior::cells(capacity.image_width, MIN_GRID_SIZE)
+        * prior::cells(capacity.image_height, MIN_GRID_SIZE)
 }
 
 const fn at_least_one(length: usize) -> usize {
     if length == 0 { 1 } else { length }
 }
 
-/// Entries of a region with one per pixel; one at least, so that there is an image to show before the first pair.
+/// Entries of a region with one per pixel; one at least, so that there is an image to show before
+/// the first pair.
 const fn most_pixels(capacity: &Capacity) -> usize {
     at_least_one(capacity.image_width) * at_least_one(capacity.image_height)
 }
@@ -93,7 +100,8 @@ const fn most_pixels(capacity: &Capacity) -> usize {
 impl<'s> StereoMatcher<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+        let (pixels, points, cells) =
+            (most_pixels(capacity), most_points(capacity), most_cells(capacity));
         region_bytes::<u32>(pixels)
             + region_bytes::<u16>(pixels)
             + region_bytes::<i16>(pixels)
@@ -106,7 +114,8 @@ impl<'s> StereoMatcher<'s> {
 
     /// Takes the matcher's buffers from the slab.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
-        let (pixels, points, cells) = (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+        let (pixels, points, cells) =
+            (most_pixels(capacity), most_points(capacity), most_cells(capacity));
         Self {
             gradients: carver.alloc("stereo.gradients", pixels),
             disparity: carver.alloc("stereo.disparity", pixels),
@@ -114,8 +123,16 @@ impl<'s> StereoMatcher<'s> {
             rows: carver.alloc("stereo.rows", BANDS * ROWS * capacity.image_width),
             support: carver.alloc("stereo.support", points),
             support_scratch: carver.alloc("stereo.support_scratch", points),
-            left_mesh: Triangulation::new_in(points, ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"], carver),
-            right_mesh: Triangulation::new_in(points, ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"], carver),
+            left_mesh: Triangulation::new_in(
+                points,
+                ["stereo.points_left", "stereo.triangles_left", "stereo.hull_left"],
+                carver,
+            ),
+            right_mesh: Triangulation::new_in(
+                points,
+                ["stereo.points_right", "stereo.triangles_right", "stereo.hull_right"],
+                carver,
+            ),
             left_cells: carver.alloc("stereo.cells_left", cells),
             right_cells: carver.alloc("stereo.cells_right", cells),
             columns: carver.alloc("stereo.columns", capacity.image_width),
@@ -138,20 +155,27 @@ impl<'s> StereoMatcher<'s> {
         digest.finish()
     }
 
-    /// Disparities of the left image, of the last pair given to [`StereoMatcher::compute`]: 1/256 px, 0 = none, exactly as large as the
-    /// image (as much of it as the capacity holds, all none, where the pair was refused).
+    /// Disparities of the left image, of the last pair given to [`StereoMatcher::compute`]: 1/256
+    /// px, 0 = none, exactly as large as the image (as much of it as the capacity holds, all none,
+    /// where the pair was refused).
     pub fn disparity_q8(&self) -> View<'_, u16> {
         // Both sides are at least 1 and their product is at most the region's length, by `begin`.
         View::new(self.disparity, self.width, self.height).unwrap_or(View::ONE_ZERO)
     }
 
     /// Computes the disparities of a rectified pair.
-    pub fn compute<E: Executor>(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>, executor: &E) -> StereoReport {
+    pub fn compute<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+        executor: &E,
+    ) -> StereoReport {
         self.compute_observed(config, left, right, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do those whose partner in the
-    /// right image is one of them.
+    /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do
+    /// those whose partner in the right image is one of them.
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
@@ -163,7 +187,8 @@ impl<'s> StereoMatcher<'s> {
         self.compute_steps(config, [left, right], invalid, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so a caller that times the steps does it there.
+    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so
+    /// a caller that times the steps does it there.
     pub fn compute_observed<E: Executor>(
         &mut self,
         config: &StereoConfig,
@@ -184,7 +209,11 @@ impl<'s> StereoMatcher<'s> {
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let status = self.begin(config, left, right);
-        let mut report = StereoReport { status, pixels: (self.width * self.height) as u32, ..StereoReport::default() };
+        let mut report = StereoReport {
+            status,
+            pixels: (self.width * self.height) as u32,
+            ..StereoReport::default()
+        };
         if report.status != StereoStatus::Matched {
             self.disparity.fill(0);
             return report;
@@ -215,8 +244,8 @@ impl<'s> StereoMatcher<'s> {
         report
     }
 
-    /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image larger than the capacity, which the mapper
-    /// refuses, what fits is taken.
+    /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image
+    /// larger than the capacity, which the mapper refuses, what fits is taken.
     pub(crate) fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
         self.width = disparity_q8.width().min(self.image_width).max(1);
         self.height = disparity_q8.height().min(self.image_height).max(1);
@@ -228,7 +257,9 @@ impl<'s> StereoMatcher<'s> {
         };
         // A match this far to the left lies outside the right image at every column.
         let absurd = self.width as u32 * u32::from(DISPARITY_ONE_PX);
-        for (to, from) in self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows()) {
+        for (to, from) in
+            self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows())
+        {
             for (to, &given) in to.iter_mut().zip(from) {
                 let accepted = u32::from(given) < absurd;
                 *to = if accepted { given } else { 0 };
@@ -243,13 +274,22 @@ impl<'s> StereoMatcher<'s> {
     pub(crate) fn correct<E: Executor>(&mut self, correction: PixelCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
         let bands = Bands::of(height);
-        each(executor, zip2(bands.first(), bands.split_mut(self.disparity, width)), |(first, rows)| {
-            executor.vectors().run(CorrectRows { correction, first, rows, width });
-        });
+        each(
+            executor,
+            zip2(bands.first(), bands.split_mut(self.disparity, width)),
+            |(first, rows)| {
+                executor.vectors().run(CorrectRows { correction, first, rows, width });
+            },
+        );
     }
 
     /// Checks the input, takes the image's size and blanks the result.
-    fn begin(&mut self, config: &StereoConfig, left: View<'_, u8>, right: View<'_, u8>) -> StereoStatus {
+    fn begin(
+        &mut self,
+        config: &StereoConfig,
+        left: View<'_, u8>,
+        right: View<'_, u8>,
+    ) -> StereoStatus {
         self.width = left.width().min(self.image_width).max(1);
         self.height = left.height().min(self.image_height).max(1);
         let mut problems = Problems::new();
@@ -258,7 +298,9 @@ impl<'s> StereoMatcher<'s> {
             StereoStatus::ConfigRefused
         } else if (left.width(), left.height()) != (right.width(), right.height()) {
             StereoStatus::SizesDiffer
-        } else if left.width() > self.image_width.min(MAX_IMAGE_SIZE) || left.height() > self.image_height.min(MAX_IMAGE_SIZE) {
+        } else if left.width() > self.image_width.min(MAX_IMAGE_SIZE)
+            || left.height() > self.image_height.min(MAX_IMAGE_SIZE)
+        {
             StereoStatus::TooLarge
         } else if left.width() < MIN_IMAGE_SIZE || left.height() < MIN_IMAGE_SIZE {
             StereoStatus::TooSmall

@@ -1,4 +1,5 @@
-//! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay. What was filled in stays marked so.
+//! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay. What
+//! was filled in stays marked so.
 
 use crate::part::part;
 
@@ -31,7 +32,8 @@ fn median_row(from: &[i16], width: usize, v: usize, to: &mut [i16]) -> Option<()
     Some(())
 }
 
-/// The median of nine by exchanges (Smith 1996): columns sorted, then the middle of (largest low, middle middle, smallest high).
+/// The median of nine by exchanges (Smith 1996): columns sorted, then the middle of (largest low,
+/// middle middle, smallest high).
 #[inline(always)]
 fn middle_of_nine([a, b, c, d, e, f, g, h, i]: [i16; 9]) -> i16 {
     let ([a, b, c], [d, e, f], [g, h, i]) = (sorted(a, b, c), sorted(d, e, f), sorted(g, h, i));
@@ -58,15 +60,19 @@ mod tests {
     fn equals_sorting_nine_pixels() {
         let mut random = Random::new(3);
         let (width, height) = (23, 11);
-        let from: std::vec::Vec<i16> =
-            (0..width * height).map(|_| if random.below(20) == 0 { NONE } else { random.below(400) as i16 }).collect();
+        let from: std::vec::Vec<i16> = (0..width * height)
+            .map(|_| if random.below(20) == 0 { NONE } else { random.below(400) as i16 })
+            .collect();
         let mut to = std::vec![0; from.len()];
         median(&from, width, 0, &mut to);
         for (i, &got) in to.iter().enumerate() {
             let (u, v) = (i % width, i / width);
             let inside = u > 0 && v > 0 && u + 1 < width && v + 1 < height;
-            let mut window: std::vec::Vec<i16> =
-                if inside { (0..9).map(|k| from[(v + k / 3 - 1) * width + u + k % 3 - 1]).collect() } else { std::vec![NONE] };
+            let mut window: std::vec::Vec<i16> = if inside {
+                (0..9).map(|k| from[(v + k / 3 - 1) * width + u + k % 3 - 1]).collect()
+            } else {
+                std::vec![NONE]
+            };
             window.sort_unstable();
             assert_eq!(got, if window[0] == NONE { from[i] } else { window[4] });
         }

@@ -1,8 +1,8 @@
-//! What the support points say about every pixel (Geiger et al., section 3.2): the plane of its triangle, and the disparities of the
-//! support points near it.
+//! What the support points say about every pixel (Geiger et al., section 3.2): the plane of its
+//! triangle, and the disparities of the support points near it.
 //!
-//! Planes are rasterised, triangle by triangle, into the image that will receive the disparities: no memory of their own. The grid prior is a
-//! set of 256 bits per cell.
+//! Planes are rasterised, triangle by triangle, into the image that will receive the disparities:
+//! no memory of their own. The grid prior is a set of 256 bits per cell.
 
 use crate::{
     lanes::{self, LANES},
@@ -24,8 +24,9 @@ pub(super) const STEEP: i16 = 256;
 /// Disparities about a plane, at most.
 pub(super) const PLANE_WIDTH: usize = 2 * MAX_PLANE_RADIUS + 1;
 
-/// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole px, plus [`STEEP`], or [`NO_PLANE`].
-/// Triangles are rasterised to the pixels beyond their edges; the later one wins.
+/// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole
+/// px, plus [`STEEP`], or [`NO_PLANE`]. Triangles are rasterised to the pixels beyond their edges;
+/// the later one wins.
 pub(super) struct RasterisePlanes<'a, 'm> {
     pub mesh: &'a Triangulation<'m>,
     pub slope_max: f32,
@@ -44,7 +45,9 @@ impl Work for RasterisePlanes<'_, '_> {
 }
 
 #[inline(always)]
-fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: RasterisePlanes<'_, '_>) {
+fn rasterise_planes(
+    RasterisePlanes { mesh, slope_max, first, width, out }: RasterisePlanes<'_, '_>,
+) {
     out.fill(NO_PLANE);
     let width = width.max(1);
     let rows = out.len() / width;
@@ -59,13 +62,22 @@ fn rasterise_planes(RasterisePlanes { mesh, slope_max, first, width, out }: Rast
         corners.sort_unstable_by_key(|point| (point.v, point.u));
         let [top, middle, bottom] = corners;
         let Some(plane) = Plane::through(corners, slope_max) else { continue };
-        let (long, upper, lower) = (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
+        let (long, upper, lower) =
+            (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
         for v in from..to {
             let at = v as i32;
-            let (a, b) = (long.column(at), if v < usize::from(middle.v) { upper.column(at) } else { lower.column(at) });
+            let (a, b) = (
+                long.column(at),
+                if v < usize::from(middle.v) { upper.column(at) } else { lower.column(at) },
+            );
             let (left, right) = ((a.min(b) >> SHIFT) as usize, (a.max(b) >> SHIFT) as usize + 1);
             let count = width.min(right + 1).saturating_sub(left);
-            plane.rasterise(left as i64, at.into(), part_mut(out, (v - first) * width + left..), count);
+            plane.rasterise(
+                left as i64,
+                at.into(),
+                part_mut(out, (v - first) * width + left..),
+                count,
+            );
         }
     }
 }
@@ -75,7 +87,8 @@ const SHIFT: u32 = 16;
 /// One px in that unit.
 const ONE: i64 = 1 << SHIFT;
 
-/// An edge of a triangle, downwards. Coordinates are below 2^13: 32 bits hold its columns, and their division is a short one.
+/// An edge of a triangle, downwards. Coordinates are below 2^13: 32 bits hold its columns, and
+/// their division is a short one.
 struct Edge {
     from: SupportPoint,
     slope: i32,
@@ -83,7 +96,8 @@ struct Edge {
 
 impl Edge {
     fn new(from: SupportPoint, to: SupportPoint) -> Self {
-        let (columns, rows) = (i32::from(to.u) - i32::from(from.u), i32::from(to.v) - i32::from(from.v));
+        let (columns, rows) =
+            (i32::from(to.u) - i32::from(from.u), i32::from(to.v) - i32::from(from.v));
         // An edge along the row is met in its own row only, where the other edges give its ends.
         Self { from, slope: (columns << SHIFT).checked_div(rows).unwrap_or(0) }
     }
@@ -131,9 +145,11 @@ impl Plane {
     /// Fills the first `count` of the pixels from column `left` of row `v` on.
     #[inline(always)]
     fn rasterise(&self, left: i64, v: i64, pixels: &mut [i16], count: usize) {
-        let offset = self.slope_u * (left - i64::from(self.origin.u)) + self.slope_v * (v - i64::from(self.origin.v));
+        let offset = self.slope_u * (left - i64::from(self.origin.u))
+            + self.slope_v * (v - i64::from(self.origin.v));
         let mut start = (i64::from(self.origin.disparity) * ONE + offset + ONE / 2) as i32;
-        // Spans are short, and how long no processor foresees: eight pixels at a time. Those beyond the span stay as they are.
+        // Spans are short, and how long no processor foresees: eight pixels at a time. Those beyond
+        // the span stay as they are.
         for first in (0..count).step_by(LANES) {
             let own = lanes::first(count - first);
             match pixels.get_mut(first..).and_then(|pixels| pixels.first_chunk_mut()) {
@@ -144,9 +160,11 @@ impl Plane {
         }
     }
 
-    /// Replaces the pixels whose bits are set in `own` by the plane's, which are `start` at the first one.
+    /// Replaces the pixels whose bits are set in `own` by the plane's, which are `start` at the
+    /// first one.
     ///
-    /// Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its plane is not preferred anyway.
+    /// Within a triangle all fits; a pixel beyond the edge of a very steep one may wrap, and its
+    /// plane is not preferred anyway.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
     fn fill(&self, eight: &mut [i16; LANES], start: i32, own: &[i16; LANES]) {
@@ -182,13 +200,20 @@ pub(super) const fn cells(length: usize, size: usize) -> usize {
     if size == 0 { 0 } else { length.div_ceil(size) }
 }
 
-/// Marks each support point's disparity and the two beside it in its cell and the eight about it. `out` is `columns` wide.
-pub(super) fn mark_cells(config: &StereoConfig, points: &[SupportPoint], columns: usize, out: &mut [DisparitySet]) {
+/// Marks each support point's disparity and the two beside it in its cell and the eight about it.
+/// `out` is `columns` wide.
+pub(super) fn mark_cells(
+    config: &StereoConfig,
+    points: &[SupportPoint],
+    columns: usize,
+    out: &mut [DisparitySet],
+) {
     out.fill([0; 4]);
     let (size, columns) = (config.grid_size.max(1), columns.max(1));
     for point in points {
         let (cu, cv) = (usize::from(point.u) / size, usize::from(point.v) / size);
-        let (low, high) = (point.disparity.saturating_sub(1), (point.disparity + 1).min(config.disparity_max));
+        let (low, high) =
+            (point.disparity.saturating_sub(1), (point.disparity + 1).min(config.disparity_max));
         for row in out.chunks_exact_mut(columns).skip(cv.saturating_sub(1)).take(cv.min(1) + 2) {
             for cell in row.iter_mut().skip(cu.saturating_sub(1)).take(cu.min(1) + 2) {
                 for disparity in low..=high {
@@ -201,8 +226,8 @@ pub(super) fn mark_cells(config: &StereoConfig, points: &[SupportPoint], columns
     }
 }
 
-/// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 / 2 sigma^2)) / beta at k px from it,
-/// lowered so that k = 0 costs nothing.
+/// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 /
+/// 2 sigma^2)) / beta at k px from it, lowered so that k = 0 costs nothing.
 pub(super) struct PlaneCost {
     /// At -radius..=radius px from the plane.
     pub about_plane: [u32; PLANE_WIDTH],
@@ -225,9 +250,13 @@ impl PlaneCost {
             let density = libm::expf(-0.5 * deviation * deviation);
             libm::logf(1.0 + density / config.gamma) / config.beta * 16.0
         };
-        // Extreme parameters overflow to infinity or to nothing: both are clamped at what the energies can bear.
-        let clamped = |cost: f32| if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 };
-        let (radius, elsewhere) = (config.plane_radius().min(MAX_PLANE_RADIUS), clamped(preference(0)));
+        // Extreme parameters overflow to infinity or to nothing: both are clamped at what the
+        // energies can bear.
+        let clamped = |cost: f32| {
+            if cost < Self::MOST { libm::roundf(cost) as u32 } else { Self::MOST as u32 }
+        };
+        let (radius, elsewhere) =
+            (config.plane_radius().min(MAX_PLANE_RADIUS), clamped(preference(0)));
         let mut about_plane = [elsewhere; PLANE_WIDTH];
         for (i, cost) in about_plane.iter_mut().enumerate() {
             *cost = elsewhere - clamped(preference(i.abs_diff(radius))).min(elsewhere);

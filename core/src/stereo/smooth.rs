@@ -1,8 +1,9 @@
 //! Smoothing: an edge-preserving mean, and a median as an option.
 //!
-//! The adaptive mean averages nine pixels along the row, then nine along the column, each weighted by how near its disparity is to the
-//! centre's: from full weight when equal to none at 4 px. All in 16-bit integers, but for one division per pixel in `f32`, whose operands
-//! are integers below 2^15 and which is therefore the same everywhere.
+//! The adaptive mean averages nine pixels along the row, then nine along the column, each weighted
+//! by how near its disparity is to the centre's: from full weight when equal to none at 4 px. All
+//! in 16-bit integers, but for one division per pixel in `f32`, whose operands are integers below
+//! 2^15 and which is therefore the same everywhere.
 
 use crate::{
     geometry::scalar::rounded_i32,
@@ -14,7 +15,8 @@ use super::dense::NONE;
 
 /// Pixels to each side.
 const REACH: usize = 4;
-/// Differences are in 1/64 px; from here on a pixel has no weight. A little below 4 px, so that eight products stay within `i16`.
+/// Differences are in 1/64 px; from here on a pixel has no weight. A little below 4 px, so that
+/// eight products stay within `i16`.
 const CUT: i16 = 252;
 
 /// Pixels worked on at once: their sums stay in the nearest cache.
@@ -25,7 +27,8 @@ type Taps<'a> = [&'a [i16]; 2 * REACH];
 
 /// The weighted mean of each centre and its taps. Centre, taps and `to` are of one length.
 ///
-/// For a block of pixels the sums first and then their quotients, which are twice as wide: each loop has vectors of its own.
+/// For a block of pixels the sums first and then their quotients, which are twice as wide: each
+/// loop has vectors of its own.
 #[inline(always)]
 fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     for (block, (centre, to)) in centre.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
@@ -33,19 +36,24 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
         let [a, b, c, d, e, f, g, h] = taps.map(|tap| part(tap, block * BLOCK..));
         let taps = a.iter().zip(b).zip(c.iter().zip(d)).zip(e.iter().zip(f).zip(g.iter().zip(h)));
         let sums = numerators.iter_mut().zip(&mut denominators);
-        for ((numerator, denominator), (&centre, (((a, b), (c, d)), ((e, f), (g, h))))) in sums.zip(centre.iter().zip(taps)) {
-            // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the denominator 63.
+        for ((numerator, denominator), (&centre, (((a, b), (c, d)), ((e, f), (g, h))))) in
+            sums.zip(centre.iter().zip(taps))
+        {
+            // At most 8 x 31 x 126 = 31,248 in the numerator; the centre alone makes the
+            // denominator 63.
             (*numerator, *denominator) = (0i16, CUT >> 2);
             for tap in [a, b, c, d, e, f, g, h] {
-                // Against NONE, and between what was measured and what was filled in, the difference is so large that nothing is left of the
-                // weight.
+                // Against NONE, and between what was measured and what was filled in, the
+                // difference is so large that nothing is left of the weight.
                 let difference = tap.saturating_sub(centre);
                 let weight = (CUT - difference.max(difference.saturating_neg()).min(CUT)) >> 2;
                 *numerator = numerator.wrapping_add(weight.wrapping_mul(difference));
                 *denominator = denominator.wrapping_add(weight);
             }
         }
-        for ((to, &centre), (&numerator, &denominator)) in to.iter_mut().zip(centre).zip(numerators.iter().zip(&denominators)) {
+        for ((to, &centre), (&numerator, &denominator)) in
+            to.iter_mut().zip(centre).zip(numerators.iter().zip(&denominators))
+        {
             let offset = rounded_i32(f32::from(numerator) / f32::from(denominator)) as i16;
             *to = if centre == NONE { NONE } else { centre.wrapping_add(offset) };
         }
@@ -59,7 +67,8 @@ pub(super) enum Along {
     Columns,
 }
 
-/// Smooths rows `to` of the image `from`, from row `first` on. Pixels nearer than four to an end of their row or column stay as they are.
+/// Smooths rows `to` of the image `from`, from row `first` on. Pixels nearer than four to an end of
+/// their row or column stay as they are.
 pub(super) struct Smooth<'a> {
     pub from: &'a [i16],
     pub width: usize,
@@ -118,7 +127,8 @@ mod tests {
             numerator += weight * difference;
             denominator += weight;
         }
-        let (quotient, rest) = (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
+        let (quotient, rest) =
+            (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
         let up = 2 * rest > denominator || (2 * rest == denominator && quotient % 2 != 0);
         image[i] + (quotient + i64::from(up)) as i16
     }

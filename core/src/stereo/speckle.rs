@@ -1,8 +1,11 @@
-//! Removal of small segments. A segment is what hangs together by neighbours (left, right, above, below) of similar disparity.
+//! Removal of small segments. A segment is what hangs together by neighbours (left, right, above,
+//! below) of similar disparity.
 //!
-//! Runs of similar pixels along a row are united with those of the row above that they touch: a union-find over runs, whose roots hold
-//! the sizes. Where runs end is remembered, so that a second walk over runs, not pixels, blanks the small ones. Memory: six bytes a pixel
-//! (in the worst case each is a run) and three a column. Time: one walk over the image in bytes side by side, and one over its runs.
+//! Runs of similar pixels along a row are united with those of the row above that they touch: a
+//! union-find over runs, whose roots hold the sizes. Where runs end is remembered, so that a second
+//! walk over runs, not pixels, blanks the small ones. Memory: six bytes a pixel (in the worst case
+//! each is a run) and three a column. Time: one walk over the image in bytes side by side, and one
+//! over its runs.
 
 use super::dense::{FILLED, NONE};
 use crate::{
@@ -14,7 +17,8 @@ use crate::{
 pub(super) struct Scratch<'a> {
     /// An entry a pixel: each run's parent, or its size as a negative if it is a root.
     pub runs: &'a mut [i32],
-    /// An entry a pixel: for each row, from its first pixel's place on, one past the last column of each run.
+    /// An entry a pixel: for each row, from its first pixel's place on, one past the last column of
+    /// each run.
     pub ends: &'a mut [u16],
     /// Three bytes a column.
     pub flags: &'a mut [u8],
@@ -24,7 +28,8 @@ pub(super) struct Scratch<'a> {
 struct Runs<'a>(&'a mut [i32]);
 
 impl Runs<'_> {
-    /// A run's entry. Runs are numbered below the number of pixels, and as many entries there are: beyond them it is an empty root.
+    /// A run's entry. Runs are numbered below the number of pixels, and as many entries there are:
+    /// beyond them it is an empty root.
     #[inline(always)]
     fn get(&self, run: usize) -> i32 {
         self.0.get(run).copied().unwrap_or(-1)
@@ -53,7 +58,8 @@ impl Runs<'_> {
     /// The size of a run's segment, asked of one run after the other, from the first on.
     #[inline(always)]
     fn size_of_next(&mut self, run: usize) -> u32 {
-        // Parents are earlier runs: they know their root by now, so that no loop, which no processor foresees, leads to it.
+        // Parents are earlier runs: they know their root by now, so that no loop, which no
+        // processor foresees, leads to it.
         let entry = self.get(run);
         let parent = usize::try_from(entry).unwrap_or(run);
         let root = usize::try_from(self.get(parent)).unwrap_or(parent);
@@ -82,8 +88,9 @@ pub(super) struct Blanked {
     pub filled: u32,
 }
 
-/// Blanks segments of fewer than `smallest` pixels, measured or filled, in an image `width` wide; neighbours differ by at most `similarity`,
-/// in the unit of the pixels and less than NONE is away from any.
+/// Blanks segments of fewer than `smallest` pixels, measured or filled, in an image `width` wide;
+/// neighbours differ by at most `similarity`, in the unit of the pixels and less than NONE is away
+/// from any.
 pub(super) struct RemoveSpeckles<'a> {
     pub disparity: &'a mut [i16],
     pub width: usize,
@@ -97,7 +104,8 @@ impl Work for RemoveSpeckles<'_> {
 
     #[inline(always)]
     fn run(self) -> Blanked {
-        let Self { disparity, width, similarity, smallest, scratch: Scratch { runs, ends, flags } } = self;
+        let Self { disparity, width, similarity, smallest, scratch: Scratch { runs, ends, flags } } =
+            self;
         let (pixels, width) = (disparity.len(), width.max(1));
         let mut blanked = Blanked::default();
         if smallest <= 1 || runs.len() < pixels || ends.len() < pixels || flags.len() < 3 * width {
@@ -129,18 +137,31 @@ impl Work for RemoveSpeckles<'_> {
     }
 }
 
-/// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its bit of filled pixels taken, too.
+/// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its
+/// bit of filled pixels taken, too.
 #[inline(always)]
 fn difference(a: i16, b: i16) -> u16 {
     (a & !FILLED).abs_diff(b & !FILLED)
 }
 
-/// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites them.
+/// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites
+/// them.
 #[inline(always)]
-fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Runs<'_>, ends: &mut [u16], flags: &mut [u8]) {
+fn find_segments(
+    disparity: &[i16],
+    width: usize,
+    similarity: u16,
+    runs: &mut Runs<'_>,
+    ends: &mut [u16],
+    flags: &mut [u8],
+) {
     let width = width.max(1);
     let mut flags = flags.chunks_exact_mut(width);
-    let (Some(mut breaks_above), Some(mut breaks), Some(touches)) = (flags.next(), flags.next(), flags.next()) else { return };
+    let (Some(mut breaks_above), Some(mut breaks), Some(touches)) =
+        (flags.next(), flags.next(), flags.next())
+    else {
+        return;
+    };
     let mut above: &[i16] = &[];
     let (mut above_run, mut here_run) = (0, 0);
     for (here, ends) in disparity.chunks_exact(width).zip(ends.chunks_exact_mut(width)) {
@@ -161,7 +182,9 @@ fn find_segments(disparity: &[i16], width: usize, similarity: u16, runs: &mut Ru
             for (touch, (&up, &here)) in touches.iter_mut().zip(above.iter().zip(here)) {
                 *touch = u8::from(difference(up, here) <= similarity) & u8::from(here != NONE);
             }
-            for_each_contact(touches, [breaks_above, breaks], |[a, b]| runs.unite(above_run + a, here_run + b));
+            for_each_contact(touches, [breaks_above, breaks], |[a, b]| {
+                runs.unite(above_run + a, here_run + b)
+            });
         }
         (above, above_run, here_run) = (here, here_run, next_run);
         core::mem::swap(&mut breaks_above, &mut breaks);
@@ -179,8 +202,8 @@ fn break_up(row: &[i16], similarity: u16, breaks: &mut [u8]) {
     }
 }
 
-/// Calls `each` with the numbers, from the row's first one on, of every two runs that touch: of two rows, whose runs end where `breaks` are
-/// set. Eight pixels at a time.
+/// Calls `each` with the numbers, from the row's first one on, of every two runs that touch: of two
+/// rows, whose runs end where `breaks` are set. Eight pixels at a time.
 #[inline(always)]
 fn for_each_contact(touches: &[u8], [above, here]: [&[u8]; 2], mut each: impl FnMut([usize; 2])) {
     // The number of flags that are set: the highest byte of the product is the sum of all.
@@ -221,9 +244,17 @@ mod tests {
             while let Some(&i) = segment.get(next) {
                 next += 1;
                 let u = i % width;
-                let beside = [(u > 0).then(|| i - 1), (u + 1 < width).then_some(i + 1), i.checked_sub(width), Some(i + width)];
+                let beside = [
+                    (u > 0).then(|| i - 1),
+                    (u + 1 < width).then_some(i + 1),
+                    i.checked_sub(width),
+                    Some(i + width),
+                ];
                 for j in beside.into_iter().flatten().filter(|&j| j < disparity.len()) {
-                    if !visited[j] && disparity[j] != NONE && difference(disparity[i], disparity[j]) <= similarity as u16 {
+                    if !visited[j]
+                        && disparity[j] != NONE
+                        && difference(disparity[i], disparity[j]) <= similarity as u16
+                    {
                         visited[j] = true;
                         segment.push(j);
                     }
@@ -239,7 +270,10 @@ mod tests {
     #[test]
     fn equals_a_flood_fill_on_noise_of_every_roughness() {
         let mut random = Random::new(21);
-        for (width, height, levels, smallest) in [(31, 17, 3, 5), (40, 30, 6, 12), (64, 9, 2, 30), (1, 50, 3, 4), (50, 1, 3, 4)].repeat(8) {
+        for (width, height, levels, smallest) in
+            [(31, 17, 3, 5), (40, 30, 6, 12), (64, 9, 2, 30), (1, 50, 3, 4), (50, 1, 3, 4)]
+                .repeat(8)
+        {
             let pixel = |random: &mut Random| match random.below(6) {
                 0 => NONE,
                 1 => (random.below(levels) as i16 * 64) | FILLED,
@@ -247,11 +281,17 @@ mod tests {
             };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
             let mut fast = image.clone();
-            let (mut runs, mut ends, mut flags) = (vec![7; image.len()], vec![7; image.len()], vec![7; 3 * width]);
+            let (mut runs, mut ends, mut flags) =
+                (vec![7; image.len()], vec![7; image.len()], vec![7; 3 * width]);
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };
-            let blanked = RemoveSpeckles { disparity: &mut fast, width, similarity: 64, smallest, scratch }.run();
+            let blanked =
+                RemoveSpeckles { disparity: &mut fast, width, similarity: 64, smallest, scratch }
+                    .run();
             assert!(fast == plain(&image, width, 64, smallest as usize));
-            let removed = |bit| image.iter().zip(&fast).filter(|(a, b)| a != b && **a & FILLED == bit).count() as u32;
+            let removed = |bit| {
+                image.iter().zip(&fast).filter(|(a, b)| a != b && **a & FILLED == bit).count()
+                    as u32
+            };
             assert_eq!(blanked, Blanked { measured: removed(0), filled: removed(FILLED) });
         }
     }

@@ -1,11 +1,11 @@
-//! Support points: sparse matches on a grid of candidates, found over the whole disparity range and kept when they are distinct and
-//! agree from left to right and back (Geiger et al., section 3.1).
+//! Support points: sparse matches on a grid of candidates, found over the whole disparity range and
+//! kept when they are distinct and agree from left to right and back (Geiger et al., section 3.1).
 //!
-//! A candidate is compared by four descriptors at the corners of a 5 x 5 square about it: 64 gradient samples. Only two rows of
-//! descriptors per image and row of candidates are ever needed.
+//! A candidate is compared by four descriptors at the corners of a 5 x 5 square about it: 64
+//! gradient samples. Only two rows of descriptors per image and row of candidates are ever needed.
 //!
-//! Memory: two bytes a candidate, four rows of descriptors. Time: candidates x disparities x 4 descriptor distances, and once more for
-//! those that pass the other tests.
+//! Memory: two bytes a candidate, four rows of descriptors. Time: candidates x disparities x 4
+//! descriptor distances, and once more for those that pass the other tests.
 
 use crate::{
     lanes::{Eight, LANES},
@@ -58,12 +58,24 @@ impl Rows<'_> {
     /// The four corner descriptors of column `u`.
     fn corners(&self, u: usize) -> Option<[Descriptor; 4]> {
         let (west, east) = (u.checked_sub(CORNER)?, u + CORNER);
-        Some([*self.above.get(west)?, *self.above.get(east)?, *self.below.get(west)?, *self.below.get(east)?])
+        Some([
+            *self.above.get(west)?,
+            *self.above.get(east)?,
+            *self.below.get(west)?,
+            *self.below.get(east)?,
+        ])
     }
 
-    /// What each column from `first` on costs, eight at a time. Those beyond the row, which have no descriptors, mean nothing.
+    /// What each column from `first` on costs, eight at a time. Those beyond the row, which have no
+    /// descriptors, mean nothing.
     #[inline(always)]
-    fn costs(&self, point: &[Descriptor; 4], first: usize, costs: &mut [Eight<i16>], kernels: &impl Kernels) {
+    fn costs(
+        &self,
+        point: &[Descriptor; 4],
+        first: usize,
+        costs: &mut [Eight<i16>],
+        kernels: &impl Kernels,
+    ) {
         let (west, east) = (first - CORNER, first + CORNER);
         let from = [(self.above, west), (self.above, east), (self.below, west), (self.below, east)];
         let columns = from.map(|(row, at)| part(row, at..).as_chunks().0);
@@ -73,9 +85,16 @@ impl Rows<'_> {
         if let Some(last) = costs.get_mut(whole..) {
             let mut spare = [UNTEXTURED; 4];
             for (i, costs) in (whole..).zip(last) {
-                let mut from = from.iter().zip(&mut spare).map(|(&(row, at), spare)| [*eight(row, at + i * LANES, spare)]);
+                let mut from = from
+                    .iter()
+                    .zip(&mut spare)
+                    .map(|(&(row, at), spare)| [*eight(row, at + i * LANES, spare)]);
                 let columns = [(); 4].map(|()| from.next().unwrap_or([UNTEXTURED]));
-                kernels.costs(point, columns.each_ref().map(|columns| &columns[..]), core::slice::from_mut(costs));
+                kernels.costs(
+                    point,
+                    columns.each_ref().map(|columns| &columns[..]),
+                    core::slice::from_mut(costs),
+                );
             }
         }
     }
@@ -102,25 +121,50 @@ impl Comparison for MatchRows<'_, '_> {
 
 impl SupportMatching<'_> {
     #[inline(always)]
-    fn match_rows(&self, first: usize, grid: &mut [i16], scratch: &mut [Descriptor], kernels: &impl Kernels) {
+    fn match_rows(
+        &self,
+        first: usize,
+        grid: &mut [i16],
+        scratch: &mut [Descriptor],
+        kernels: &impl Kernels,
+    ) {
         let (width, step) = (self.left.width, self.config.candidate_step);
         grid.fill(NO_MATCH);
         let Some((left, right)) = scratch.split_at_mut_checked(2 * width) else { return };
-        let (Some((l0, l1)), Some((r0, r1))) = (left.split_at_mut_checked(width), right.split_at_mut_checked(width)) else { return };
+        let (Some((l0, l1)), Some((r0, r1))) =
+            (left.split_at_mut_checked(width), right.split_at_mut_checked(width))
+        else {
+            return;
+        };
         for (j, out) in grid.chunks_exact_mut(candidates(width, step).max(1)).enumerate() {
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };
             let below = v + CORNER;
-            let rows =
-                [(self.left, above, &mut *l0), (self.left, below, &mut *l1), (self.right, above, &mut *r0), (self.right, below, &mut *r1)];
+            let rows = [
+                (self.left, above, &mut *l0),
+                (self.left, below, &mut *l1),
+                (self.right, above, &mut *r0),
+                (self.right, below, &mut *r1),
+            ];
             if describe_rows(rows) {
-                self.match_row(&Rows { above: l0, below: l1 }, &Rows { above: r0, below: r1 }, out, kernels);
+                self.match_row(
+                    &Rows { above: l0, below: l1 },
+                    &Rows { above: r0, below: r1 },
+                    out,
+                    kernels,
+                );
             }
         }
     }
 
     #[inline(always)]
-    fn match_row(&self, left: &Rows<'_>, right: &Rows<'_>, out: &mut [i16], kernels: &impl Kernels) {
+    fn match_row(
+        &self,
+        left: &Rows<'_>,
+        right: &Rows<'_>,
+        out: &mut [i16],
+        kernels: &impl Kernels,
+    ) {
         let (first, end) = (MARGIN + CORNER, self.left.width.saturating_sub(MARGIN + CORNER));
         let most = usize::from(self.config.disparity_max);
         let tolerance = usize::from(self.config.consistency_threshold);
@@ -129,15 +173,24 @@ impl SupportMatching<'_> {
             if u < first || u >= end {
                 continue;
             }
-            let Some(x) = self.best(left.corners(u), right, first.max(u.saturating_sub(most))..=u, kernels) else { continue };
-            let Some(back) = self.best(right.corners(x), left, x..=(end - 1).min(x + most), kernels) else { continue };
+            let Some(x) =
+                self.best(left.corners(u), right, first.max(u.saturating_sub(most))..=u, kernels)
+            else {
+                continue;
+            };
+            let Some(back) =
+                self.best(right.corners(x), left, x..=(end - 1).min(x + most), kernels)
+            else {
+                continue;
+            };
             if back.abs_diff(u) <= tolerance {
                 *out = (u - x) as i16;
             }
         }
     }
 
-    /// The column among these of the other image that looks like `point`, if one does and no other nearly as much.
+    /// The column among these of the other image that looks like `point`, if one does and no other
+    /// nearly as much.
     #[inline(always)]
     fn best(
         &self,
@@ -155,7 +208,8 @@ impl SupportMatching<'_> {
         if count < MIN_CHOICE {
             return None;
         }
-        // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction everywhere.
+        // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction
+        // everywhere.
         let mut costs = [[i16::MAX; LANES]; (DISPARITY_LIMIT as usize + 1) / LANES];
         other.costs(&point, first, part_mut(&mut costs, ..count.div_ceil(LANES)), kernels);
         let costs = costs.as_flattened_mut();
@@ -169,12 +223,20 @@ impl SupportMatching<'_> {
     #[inline(always)]
     fn distinct(&self, blocks: &mut [[i16; BLOCK]]) -> Option<usize> {
         // By whole blocks, as many at a time as there are lanes.
-        let least = |blocks: &[[i16; BLOCK]]| blocks.as_flattened().iter().fold(i16::MAX, |a, &b| a.min(b));
+        let least =
+            |blocks: &[[i16; BLOCK]]| blocks.as_flattened().iter().fold(i16::MAX, |a, &b| a.min(b));
         let best = least(blocks);
-        let block = blocks.iter().position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;
+        let block = blocks
+            .iter()
+            .position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;
         let at = block * BLOCK + blocks.get(block)?.iter().position(|&cost| cost == best)?;
         // The second best is sought in what is left.
-        for near in blocks.as_flattened_mut().iter_mut().take(at + NEIGHBOURHOOD + 1).skip(at.saturating_sub(NEIGHBOURHOOD)) {
+        for near in blocks
+            .as_flattened_mut()
+            .iter_mut()
+            .take(at + NEIGHBOURHOOD + 1)
+            .skip(at.saturating_sub(NEIGHBOURHOOD))
+        {
             *near = i16::MAX;
         }
         (f32::from(best) < self.config.support_ratio * f32::from(least(blocks))).then_some(at)
@@ -203,7 +265,9 @@ mod tests {
         let mut random = Random::new(71);
         let mut found = 0;
         for count in (1..=256).chain(1..=256) {
-            let costs: Vec<i16> = (0..count).map(|_| 400 + random.below(40 + 4_000 * (count as u32 % 3)) as i16).collect();
+            let costs: Vec<i16> = (0..count)
+                .map(|_| 400 + random.below(40 + 4_000 * (count as u32 % 3)) as i16)
+                .collect();
             let mut blocks = [[i16::MAX; BLOCK]; 256 / BLOCK];
             blocks.as_flattened_mut()[..count].copy_from_slice(&costs);
             let distinct = matching.distinct(&mut blocks[..count.div_ceil(BLOCK)]);

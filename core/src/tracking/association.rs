@@ -1,13 +1,15 @@
 //! Association: which instance of a frame continues which track.
 //!
-//! Every pair of an instance and a track of agreeing class gets a score: overlap (of masks, the track's moved by its velocity in the image, or
-//! of boxes) times the geometric mean of the two detector scores times a discount for frames missed: 1, 1/2, 1/4 (Section III-B of the
-//! paper). The best pair is joined, then the best of the rest, down to `association_min`; between equals the instance of higher
-//! score, then the older track comes first. Of the rest those are joined that something passed in front of (`occlusion`). An instance
-//! without a track begins one.
+//! Every pair of an instance and a track of agreeing class gets a score: overlap (of masks, the
+//! track's moved by its velocity in the image, or of boxes) times the geometric mean of the two
+//! detector scores times a discount for frames missed: 1, 1/2, 1/4 (Section III-B of the paper).
+//! The best pair is joined, then the best of the rest, down to `association_min`; between equals
+//! the instance of higher score, then the older track comes first. Of the rest those are joined
+//! that something passed in front of (`occlusion`). An instance without a track begins one.
 //!
-//! When the table is full the track undetected for longest is evicted, between equals the older one; a track detected in the last frame
-//! or this one stays, and the new instance is refused, and counted.
+//! When the table is full the track undetected for longest is evicted, between equals the older
+//! one; a track detected in the last frame or this one stays, and the new instance is refused, and
+//! counted.
 //!
 //! Memory: [`Track`] a track and 4 bytes for each pair.
 
@@ -59,7 +61,8 @@ pub(super) struct TrackTable<'s> {
 
 impl<'s> TrackTable<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
-        region_bytes::<Track>(capacity.tracks) + region_bytes::<f32>(capacity.tracks * capacity.detections)
+        region_bytes::<Track>(capacity.tracks)
+            + region_bytes::<f32>(capacity.tracks * capacity.detections)
     }
 
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
@@ -71,13 +74,23 @@ impl<'s> TrackTable<'s> {
         }
     }
 
-    /// Says what must hold of the tracks after frame `frame`, in which there were so many instances.
+    /// Says what must hold of the tracks after frame `frame`, in which there were so many
+    /// instances.
     pub fn audit(&self, frame: u32, instances: usize, audit: &mut Audit) {
-        audit.require(self.len <= self.tracks.len(), "the table has no more tracks than its capacity");
+        audit.require(
+            self.len <= self.tracks.len(),
+            "the table has no more tracks than its capacity",
+        );
         for track in self.all() {
             audit.require(track.id != 0, "a track has a number");
-            audit.require(track.first_frame <= track.last_frame && track.last_frame <= frame, "a track was seen before it was seen last");
-            audit.require(track.instance.get().is_none_or(|index| index < instances), "a track's instance is one of this frame");
+            audit.require(
+                track.first_frame <= track.last_frame && track.last_frame <= frame,
+                "a track was seen before it was seen last",
+            );
+            audit.require(
+                track.instance.get().is_none_or(|index| index < instances),
+                "a track's instance is one of this frame",
+            );
         }
     }
 
@@ -98,7 +111,8 @@ impl<'s> TrackTable<'s> {
         part_mut(self.tracks, ..self.len)
     }
 
-    /// Associates the instances of frame `frame` with tracks, or begins new ones. A track keeps the mask of the frame before until
+    /// Associates the instances of frame `frame` with tracks, or begins new ones. A track keeps the
+    /// mask of the frame before until
     /// [`TrackTable::commit`].
     pub fn associate(
         &mut self,
@@ -114,7 +128,8 @@ impl<'s> TrackTable<'s> {
         count
     }
 
-    /// Associates the instances from position `first` on with the tracks that have none yet, or begins new ones.
+    /// Associates the instances from position `first` on with the tracks that have none yet, or
+    /// begins new ones.
     pub fn associate_from(
         &mut self,
         first: usize,
@@ -124,16 +139,26 @@ impl<'s> TrackTable<'s> {
         masks: &TwoFrames<MaskStore<'_>>,
         count: &mut TrackCount,
     ) {
-        let by_overlap = |instance: &Instance, track: &Track| affinity(config, frame, instance, track, masks);
-        count.detected += self.join_best(first, config.association_min, frame, instances, by_overlap);
-        count.detected += self.join_best(first, 0.0, frame, instances, |instance, track| extent_affinity(config, frame, instance, track));
+        let by_overlap =
+            |instance: &Instance, track: &Track| affinity(config, frame, instance, track, masks);
+        count.detected +=
+            self.join_best(first, config.association_min, frame, instances, by_overlap);
+        count.detected += self.join_best(first, 0.0, frame, instances, |instance, track| {
+            extent_affinity(config, frame, instance, track)
+        });
         for index in first..instances.len() {
-            let Some(instance) = instances.get(index).copied().filter(|instance| !instance.track.is_some()) else { continue };
+            let Some(instance) =
+                instances.get(index).copied().filter(|instance| !instance.track.is_some())
+            else {
+                continue;
+            };
             if !self.free_entry(frame, instances, count) {
                 count.refused += 1;
                 continue;
             }
-            let (Some(slot), Some(begun)) = (self.tracks.get_mut(self.len), instances.get_mut(index)) else {
+            let (Some(slot), Some(begun)) =
+                (self.tracks.get_mut(self.len), instances.get_mut(index))
+            else {
                 debug_assert!(false, "an entry is free");
                 continue;
             };
@@ -146,7 +171,8 @@ impl<'s> TrackTable<'s> {
         count.tracks = self.len as u32;
     }
 
-    /// Joins the best pair, then the best of the rest, while its score is above `score_min`. Returns how many it joined.
+    /// Joins the best pair, then the best of the rest, while its score is above `score_min`.
+    /// Returns how many it joined.
     fn join_best(
         &mut self,
         first: usize,
@@ -165,9 +191,15 @@ impl<'s> TrackTable<'s> {
     }
 
     /// Fills the table of scores, a row for each instance; 0 where either is associated already.
-    fn score(&mut self, first: usize, instances: &[Instance], affinity: impl Fn(&Instance, &Track) -> f32) {
+    fn score(
+        &mut self,
+        first: usize,
+        instances: &[Instance],
+        affinity: impl Fn(&Instance, &Track) -> f32,
+    ) {
         let tracks = part(self.tracks, ..self.len);
-        let rows = self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
+        let rows =
+            self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
         for (at, (row, instance)) in rows {
             for (score, track) in row.iter_mut().zip(tracks) {
                 let is_free = at >= first && !instance.track.is_some() && !track.instance.is_some();
@@ -179,7 +211,9 @@ impl<'s> TrackTable<'s> {
     /// The best pair left, by position of the instance and of the track.
     fn best_pair(&self, score_min: f32, instances: usize) -> Option<(usize, usize)> {
         let mut best = (score_min, None);
-        for (d, row) in self.scores.chunks_exact(self.tracks.len().max(1)).take(instances).enumerate() {
+        for (d, row) in
+            self.scores.chunks_exact(self.tracks.len().max(1)).take(instances).enumerate()
+        {
             for (t, &score) in row.iter().take(self.len).enumerate() {
                 if score > best.0 {
                     best = (score, Some((d, t)));
@@ -191,7 +225,9 @@ impl<'s> TrackTable<'s> {
 
     fn join(&mut self, d: usize, t: usize, instances: &mut [Instance], frame: u32) {
         let width = self.tracks.len().max(1);
-        for (row_index, row) in self.scores.chunks_exact_mut(width.max(1)).take(instances.len()).enumerate() {
+        for (row_index, row) in
+            self.scores.chunks_exact_mut(width.max(1)).take(instances.len()).enumerate()
+        {
             if row_index == d {
                 row.fill(0.0);
             } else if let Some(score) = row.get_mut(t) {
@@ -222,12 +258,23 @@ impl<'s> TrackTable<'s> {
     }
 
     /// Whether another track fits, if need be in place of the one undetected for longest.
-    fn free_entry(&mut self, frame: u32, instances: &mut [Instance], count: &mut TrackCount) -> bool {
+    fn free_entry(
+        &mut self,
+        frame: u32,
+        instances: &mut [Instance],
+        count: &mut TrackCount,
+    ) -> bool {
         if self.len < self.tracks.len() {
             return true;
         }
-        let undetected = self.all().iter().enumerate().filter(|(_, track)| frame.wrapping_sub(track.last_frame) > 1);
-        let Some((oldest, _)) = undetected.max_by_key(|&(at, track)| (frame.wrapping_sub(track.last_frame), usize::MAX - at)) else {
+        let undetected = self
+            .all()
+            .iter()
+            .enumerate()
+            .filter(|(_, track)| frame.wrapping_sub(track.last_frame) > 1);
+        let Some((oldest, _)) = undetected
+            .max_by_key(|&(at, track)| (frame.wrapping_sub(track.last_frame), usize::MAX - at))
+        else {
             return false;
         };
         remove_at(self.tracks.get_mut(..self.len).unwrap_or_default(), oldest);
@@ -242,8 +289,15 @@ impl<'s> TrackTable<'s> {
         true
     }
 
-    /// Ends a frame: detected tracks take over their instance's mask, the masks of the others move to this frame's store.
-    pub fn commit(&mut self, instances: &[Instance], size: [usize; 2], masks: &mut TwoFrames<MaskStore<'_>>, count: &mut TrackCount) {
+    /// Ends a frame: detected tracks take over their instance's mask, the masks of the others move
+    /// to this frame's store.
+    pub fn commit(
+        &mut self,
+        instances: &[Instance],
+        size: [usize; 2],
+        masks: &mut TwoFrames<MaskStore<'_>>,
+        count: &mut TrackCount,
+    ) {
         let (current, previous) = masks.split_mut();
         for track in self.all_mut() {
             let instance = track.instance.get().and_then(|index| instances.get(index));
@@ -260,7 +314,13 @@ impl<'s> TrackTable<'s> {
 }
 
 /// How well an instance continues a track; 0 where it does not.
-fn affinity(config: &TrackingConfig, frame: u32, instance: &Instance, track: &Track, masks: &TwoFrames<MaskStore<'_>>) -> f32 {
+fn affinity(
+    config: &TrackingConfig,
+    frame: u32,
+    instance: &Instance,
+    track: &Track,
+    masks: &TwoFrames<MaskStore<'_>>,
+) -> f32 {
     if !instance.class().agrees_with(track.class()) {
         return 0.0;
     }
@@ -271,7 +331,12 @@ fn affinity(config: &TrackingConfig, frame: u32, instance: &Instance, track: &Tr
         _ => 0.25,
     };
     let overlap = match config.overlap {
-        Overlap::Mask => masks.current().overlap(&instance.mask, masks.previous(), &track.mask, track.predicted_shift_px(gap)),
+        Overlap::Mask => masks.current().overlap(
+            &instance.mask,
+            masks.previous(),
+            &track.mask,
+            track.predicted_shift_px(gap),
+        ),
         Overlap::Box => instance.mask.pixels.overlap(&track.mask.pixels),
     };
     overlap * libm::sqrtf(instance.score * track.score) * discount

@@ -1,6 +1,7 @@
 //! Classes that detectors name, independent of the data set, and how each class is treated.
 
-/// The class of an object. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to it by [`Class::from_name`].
+/// The class of an object. One neutral list; names of PASCAL VOC, COCO, Cityscapes and KITTI map to
+/// it by [`Class::from_name`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -38,7 +39,8 @@ pub enum Class {
 pub enum Treatment {
     /// Rigid and possibly moving: tracked and reconstructed in a volume of its own.
     Reconstruct,
-    /// Possibly moving, but not rigid or not to be modelled: kept out of the static map, tracked, not reconstructed.
+    /// Possibly moving, but not rigid or not to be modelled: kept out of the static map, tracked,
+    /// not reconstructed.
     KeepOut,
     /// Part of the static world.
     Ignore,
@@ -153,14 +155,21 @@ impl Class {
     /// What is done with it.
     pub const fn treatment(self) -> Treatment {
         match self {
-            Self::Car | Self::Bus | Self::Truck | Self::Van | Self::MovingObject => Treatment::Reconstruct,
-            Self::Train | Self::Person | Self::Rider | Self::Bicycle | Self::Motorcycle | Self::Animal => Treatment::KeepOut,
+            Self::Car | Self::Bus | Self::Truck | Self::Van | Self::MovingObject => {
+                Treatment::Reconstruct
+            }
+            Self::Train
+            | Self::Person
+            | Self::Rider
+            | Self::Bicycle
+            | Self::Motorcycle
+            | Self::Animal => Treatment::KeepOut,
             Self::Other => Treatment::Ignore,
         }
     }
 
-    /// Whether a detector may give one object both classes from frame to frame: four-wheelers flicker among each other, and so do
-    /// people and what they ride.
+    /// Whether a detector may give one object both classes from frame to frame: four-wheelers
+    /// flicker among each other, and so do people and what they ride.
     pub fn agrees_with(self, other: Self) -> bool {
         let group = |class: Self| match class {
             Self::Car | Self::Bus | Self::Truck | Self::Van => 1,
@@ -169,8 +178,11 @@ impl Class {
             _ => 0,
         };
         let is_found_by_motion = self == Self::MovingObject || other == Self::MovingObject;
-        let may_move = self.treatment() != Treatment::Ignore && other.treatment() != Treatment::Ignore;
-        self == other || (is_found_by_motion && may_move) || (group(self) == group(other) && group(self) != 0)
+        let may_move =
+            self.treatment() != Treatment::Ignore && other.treatment() != Treatment::Ignore;
+        self == other
+            || (is_found_by_motion && may_move)
+            || (group(self) == group(other) && group(self) != 0)
     }
 }
 
@@ -201,7 +213,9 @@ mod tests {
     fn four_wheelers_are_reconstructed_what_else_may_move_is_kept_out_and_the_rest_is_the_street() {
         for class in Class::ALL {
             let expected = match class {
-                Class::Car | Class::Bus | Class::Truck | Class::Van | Class::MovingObject => Treatment::Reconstruct,
+                Class::Car | Class::Bus | Class::Truck | Class::Van | Class::MovingObject => {
+                    Treatment::Reconstruct
+                }
                 Class::Other => Treatment::Ignore,
                 _ => Treatment::KeepOut,
             };
@@ -218,9 +232,14 @@ mod tests {
             &[Class::Train],
             &[Class::Animal],
         ];
-        for (one, other) in Class::ALL.iter().flat_map(|one| Class::ALL.iter().map(move |other| (*one, *other))) {
-            let by_motion = [one, other].contains(&Class::MovingObject) && ![one, other].contains(&Class::Other);
-            let alike = one == other || by_motion || kinds.iter().any(|kind| kind.contains(&one) && kind.contains(&other));
+        for (one, other) in
+            Class::ALL.iter().flat_map(|one| Class::ALL.iter().map(move |other| (*one, *other)))
+        {
+            let by_motion = [one, other].contains(&Class::MovingObject)
+                && ![one, other].contains(&Class::Other);
+            let alike = one == other
+                || by_motion
+                || kinds.iter().any(|kind| kind.contains(&one) && kind.contains(&other));
             assert_eq!(one.agrees_with(other), alike, "{one:?} and {other:?}");
         }
     }

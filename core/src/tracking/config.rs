@@ -1,4 +1,5 @@
-//! Settings of tracking. Speeds are in metres per second of real time: other frame rates need no other thresholds.
+//! Settings of tracking. Speeds are in metres per second of real time: other frame rates need no
+//! other thresholds.
 
 use super::motion_segmentation::SegmentationConfig;
 use crate::{
@@ -11,7 +12,11 @@ const REFERENCE_WIDTH: u64 = 1242;
 
 /// How a detection is compared with a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase")
+)]
 pub enum Overlap {
     /// Intersection over union of the masks.
     #[default]
@@ -20,22 +25,29 @@ pub enum Overlap {
     Box,
 }
 
-/// How detections are accepted and tracked. Defaults are the original's published ones unless said otherwise.
+/// How detections are accepted and tracked. Defaults are the original's published ones unless said
+/// otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct TrackingConfig {
-    /// Whether objects that may move are kept out of the static map. Without, everything goes into one map (the paper's robust odometry
-    /// baseline).
+    /// Whether objects that may move are kept out of the static map. Without, everything goes into
+    /// one map (the paper's robust odometry baseline).
     pub dynamic: bool,
     /// Time between two frames, s; above 0; 0.1.
     pub frame_interval_s: f32,
     /// Scores below are ignored; 0 to 1; 0.
     pub score_min: f32,
-    /// A detection's box must be larger than this to be reconstructed, and to be kept out of the static map in every state, px at an image
-    /// width of 1242, at other widths in proportion to the width squared; 2025.
+    /// A detection's box must be larger than this to be reconstructed, and to be kept out of the
+    /// static map in every state, px at an image width of 1242, at other widths in proportion to
+    /// the width squared; 2025.
     pub area_min_px: u32,
-    /// It must be larger than this to be tracked, and kept out of the static map once it is known to move; 900: the 18 matches a first
-    /// motion takes, 7 px apart. The original: as `area_min_px`.
+    /// It must be larger than this to be tracked, and kept out of the static map once it is known
+    /// to move; 900: the 18 matches a first motion takes, 7 px apart. The original: as
+    /// `area_min_px`.
     pub track_area_min_px: u32,
     /// Scale of the mask under which nothing enters the static map, 1/1000; 1000 to 4000; 1200.
     pub delete_permille: u16,
@@ -43,14 +55,16 @@ pub struct TrackingConfig {
     pub small_permille: u16,
     /// What is compared in associating a detection with a track. The original: boxes.
     pub overlap: Overlap,
-    /// Overlap times the geometric mean of both scores times the discount for frames missed must be above this; 0 to 1; 0.1.
+    /// Overlap times the geometric mean of both scores times the discount for frames missed must be
+    /// above this; 0 to 1; 0.1.
     pub association_min: f32,
-    /// Frames without a detection over which a track is found again by how far it reached when it was last seen whole; at most 1000; 0
-    /// never; 10. The original: 0.
+    /// Frames without a detection over which a track is found again by how far it reached when it
+    /// was last seen whole; at most 1000; 0 never; 10. The original: 0.
     pub extent_frames: u16,
     /// Frames after which a track not detected again is forgotten; 1 to 10000; 50.
     pub forget_frames: u16,
-    /// Share of the image beyond which an object of unknown state is kept out of the camera's egomotion; 0 to 1; 0.05. The original: 1.
+    /// Share of the image beyond which an object of unknown state is kept out of the camera's
+    /// egomotion; 0 to 1; 0.05. The original: 1.
     pub large_share: f32,
     /// How motions are estimated.
     pub motion: MotionConfig,
@@ -83,7 +97,8 @@ impl Default for TrackingConfig {
 }
 
 impl TrackingConfig {
-    /// Whether a box of `area_px` in an image of that width can be reconstructed: strictly larger than the least area.
+    /// Whether a box of `area_px` in an image of that width can be reconstructed: strictly larger
+    /// than the least area.
     pub fn is_reconstructable(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.area_min_px, width)
     }
@@ -96,7 +111,8 @@ impl TrackingConfig {
     /// How much the delete mask of a box is scaled, 1/1000.
     pub(crate) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
         let least = least(self.area_min_px, width);
-        let is_small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < least * u64::from(self.small_permille);
+        let is_small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000
+            < least * u64::from(self.small_permille);
         let once = u32::from(self.delete_permille);
         if is_small { once * once / 1000 } else { once }
     }
@@ -105,15 +121,45 @@ impl TrackingConfig {
     pub fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let share = |value: f32| (0.0..=1.0).contains(&value);
-        require(problems, positive(self.frame_interval_s), "tracking.frame_interval_s", "must be above 0");
+        require(
+            problems,
+            positive(self.frame_interval_s),
+            "tracking.frame_interval_s",
+            "must be above 0",
+        );
         require(problems, share(self.score_min), "tracking.score_min", "must be from 0 to 1");
-        require(problems, self.area_min_px <= 1 << 20, "tracking.area_min_px", "must be at most 1048576");
+        require(
+            problems,
+            self.area_min_px <= 1 << 20,
+            "tracking.area_min_px",
+            "must be at most 1048576",
+        );
         let tracked = self.track_area_min_px <= 1 << 20;
         require(problems, tracked, "tracking.track_area_min_px", "must be at most 1048576");
-        require(problems, (1000..=4000).contains(&self.delete_permille), "tracking.delete_permille", "must be in 1000..=4000");
-        require(problems, share(self.association_min), "tracking.association_min", "must be from 0 to 1");
-        require(problems, self.extent_frames <= 1000, "tracking.extent_frames", "must be at most 1000");
-        require(problems, (1..=10_000).contains(&self.forget_frames), "tracking.forget_frames", "must be in 1..=10000");
+        require(
+            problems,
+            (1000..=4000).contains(&self.delete_permille),
+            "tracking.delete_permille",
+            "must be in 1000..=4000",
+        );
+        require(
+            problems,
+            share(self.association_min),
+            "tracking.association_min",
+            "must be from 0 to 1",
+        );
+        require(
+            problems,
+            self.extent_frames <= 1000,
+            "tracking.extent_frames",
+            "must be at most 1000",
+        );
+        require(
+            problems,
+            (1..=10_000).contains(&self.forget_frames),
+            "tracking.forget_frames",
+            "must be in 1..=10000",
+        );
         require(problems, share(self.large_share), "tracking.large_share", "must be from 0 to 1");
         self.motion.validate(problems);
         self.state.validate(problems);
@@ -128,25 +174,34 @@ fn least(area_px: u32, width: usize) -> u64 {
 
 /// How an object's motion is estimated and filtered. The original: no filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct MotionConfig {
     /// Fewest matches for a first motion; 6 to 1000; 12 (the original: 18).
     pub matches_min: u16,
     /// Fewest matches once a motion is known; 6 to 1000; 9 (the original: 18 always).
     pub matches_again: u16,
-    /// Refined matches from which on sparse ones are not used; at most 10000; 60 (the original: sparse ones only).
+    /// Refined matches from which on sparse ones are not used; at most 10000; 60 (the original:
+    /// sparse ones only).
     pub matches_enough: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
-    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2. At the last refinement three quarters of it.
+    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2.
+    /// At the last refinement three quarters of it.
     pub inlier_px: f32,
     /// Least error of a match coordinate, px; above 0.
     pub noise_px: f32,
-    /// How far from the median depth a match may lie and still be on the object, m; its error comes on top; above 0.
+    /// How far from the median depth a match may lie and still be on the object, m; its error comes
+    /// on top; above 0.
     pub extent_m: f32,
-    /// Errors of one object's matches are correlated: no more than this many count as independent; 3 to 1000.
+    /// Errors of one object's matches are correlated: no more than this many count as independent;
+    /// 3 to 1000.
     pub independent_matches: u16,
-    /// How fast an object may rotate about the vertical when it is first detected, one sigma, rad/s; above 0.
+    /// How fast an object may rotate about the vertical when it is first detected, one sigma,
+    /// rad/s; above 0.
     pub yaw_rad_s: f32,
     /// The same about any other axis, which the road limits; above 0.
     pub tilt_rad_s: f32,
@@ -158,13 +213,15 @@ pub struct MotionConfig {
     pub yaw_acceleration_rad_s2: f32,
     /// The same about any other axis; above 0.
     pub tilt_acceleration_rad_s2: f32,
-    /// By how much all disparities may be too small, px; at least 0. To a moving camera a static object then seems to move, by twice
-    /// this share of its disparity of the speed it passes by.
+    /// By how much all disparities may be too small, px; at least 0. To a moving camera a static
+    /// object then seems to move, by twice this share of its disparity of the speed it passes by.
     pub bias_px: f32,
-    /// The same, by the residual lens distortion after rectification, at the left and right edge of the picture, px; at least 0. Grows with
-    /// the fourth power of the distance from the middle. KITTI's colour cameras: 3, as parked cars 30 m away show.
+    /// The same, by the residual lens distortion after rectification, at the left and right edge of
+    /// the picture, px; at least 0. Grows with the fourth power of the distance from the middle.
+    /// KITTI's colour cameras: 3, as parked cars 30 m away show.
     pub lens_px: f32,
-    /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like speed; at least 0.
+    /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like
+    /// speed; at least 0.
     pub camera_rad: f32,
 }
 
@@ -209,53 +266,117 @@ impl MotionConfig {
 
     fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(problems, (6..=1000).contains(&self.matches_min), "tracking.motion.matches_min", "must be in 6..=1000");
-        require(problems, (6..=1000).contains(&self.matches_again), "tracking.motion.matches_again", "must be in 6..=1000");
-        require(problems, self.matches_enough <= 10_000, "tracking.motion.matches_enough", "must be at most 10000");
-        require(problems, (1..=10_000).contains(&self.samples), "tracking.motion.samples", "must be in 1..=10000");
+        require(
+            problems,
+            (6..=1000).contains(&self.matches_min),
+            "tracking.motion.matches_min",
+            "must be in 6..=1000",
+        );
+        require(
+            problems,
+            (6..=1000).contains(&self.matches_again),
+            "tracking.motion.matches_again",
+            "must be in 6..=1000",
+        );
+        require(
+            problems,
+            self.matches_enough <= 10_000,
+            "tracking.motion.matches_enough",
+            "must be at most 10000",
+        );
+        require(
+            problems,
+            (1..=10_000).contains(&self.samples),
+            "tracking.motion.samples",
+            "must be in 1..=10000",
+        );
         require(problems, positive(self.inlier_px), "tracking.motion.inlier_px", "must be above 0");
         require(problems, positive(self.noise_px), "tracking.motion.noise_px", "must be above 0");
         require(problems, positive(self.extent_m), "tracking.motion.extent_m", "must be above 0");
-        require(problems, (3..=1000).contains(&self.independent_matches), "tracking.motion.independent_matches", "must be in 3..=1000");
+        require(
+            problems,
+            (3..=1000).contains(&self.independent_matches),
+            "tracking.motion.independent_matches",
+            "must be in 3..=1000",
+        );
         require(problems, positive(self.yaw_rad_s), "tracking.motion.yaw_rad_s", "must be above 0");
-        require(problems, positive(self.tilt_rad_s), "tracking.motion.tilt_rad_s", "must be above 0");
+        require(
+            problems,
+            positive(self.tilt_rad_s),
+            "tracking.motion.tilt_rad_s",
+            "must be above 0",
+        );
         let tilt = positive(self.tilt_acceleration_rad_s2);
         require(problems, tilt, "tracking.motion.tilt_acceleration_rad_s2", "must be above 0");
         require(problems, positive(self.speed_m_s), "tracking.motion.speed_m_s", "must be above 0");
-        require(problems, positive(self.acceleration_m_s2), "tracking.motion.acceleration_m_s2", "must be above 0");
-        require(problems, positive(self.yaw_acceleration_rad_s2), "tracking.motion.yaw_acceleration_rad_s2", "must be above 0");
-        require(problems, self.bias_px.is_finite() && self.bias_px >= 0.0, "tracking.motion.bias_px", "must be at least 0");
-        require(problems, self.lens_px.is_finite() && self.lens_px >= 0.0, "tracking.motion.lens_px", "must be at least 0");
-        require(problems, self.camera_rad.is_finite() && self.camera_rad >= 0.0, "tracking.motion.camera_rad", "must be at least 0");
+        require(
+            problems,
+            positive(self.acceleration_m_s2),
+            "tracking.motion.acceleration_m_s2",
+            "must be above 0",
+        );
+        require(
+            problems,
+            positive(self.yaw_acceleration_rad_s2),
+            "tracking.motion.yaw_acceleration_rad_s2",
+            "must be above 0",
+        );
+        require(
+            problems,
+            self.bias_px.is_finite() && self.bias_px >= 0.0,
+            "tracking.motion.bias_px",
+            "must be at least 0",
+        );
+        require(
+            problems,
+            self.lens_px.is_finite() && self.lens_px >= 0.0,
+            "tracking.motion.lens_px",
+            "must be at least 0",
+        );
+        require(
+            problems,
+            self.camera_rad.is_finite() && self.camera_rad >= 0.0,
+            "tracking.motion.camera_rad",
+            "must be at least 0",
+        );
     }
 }
 
 /// When an object is classified as dynamic or static.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct StateConfig {
-    /// Certainly faster: dynamic, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a frame), its experiments: 2.
+    /// Certainly faster: dynamic, m/s; at least `static_m_s`. The published code: 5.5 (0.55 m a
+    /// frame), its experiments: 2.
     pub dynamic_m_s: f32,
-    /// Possibly slower than this and likely slower than `slow_m_s`: static, m/s; above 0. The published code: 0.3.
+    /// Possibly slower than this and likely slower than `slow_m_s`: static, m/s; above 0. The
+    /// published code: 0.3.
     pub static_m_s: f32,
-    /// What is not known to move is static only if it is likely slower than this, m/s; at least `static_m_s`; 1.2, slower than a
-    /// pedestrian. A dynamic object becomes static only if it is likely slower than `dynamic_m_s`.
+    /// What is not known to move is static only if it is likely slower than this, m/s; at least
+    /// `static_m_s`; 1.2, slower than a pedestrian. A dynamic object becomes static only if it is
+    /// likely slower than `dynamic_m_s`.
     pub slow_m_s: f32,
     /// How many sigmas are "certainly"; at least 0. The published code: 0.
     pub sigmas: f32,
     /// How many sigmas are "likely"; at least 0. The published code: 0.
     pub static_sigmas: f32,
-    /// Consecutive frames that confirm an uncertain object as dynamic; 1 to 100. The published code: 1.
+    /// Consecutive frames that confirm an uncertain object as dynamic; 1 to 100. The published
+    /// code: 1.
     pub confirm_frames: u8,
-    /// The same for static; 1 to 100; 2: the filter has averaged over several frames by then. The published code: 1.
+    /// The same for static; 1 to 100; 2: the filter has averaged over several frames by then. The
+    /// published code: 1.
     pub confirm_static_frames: u8,
-    /// Consecutive frames that change a dynamic object to static, or the other way round; 1 to 100. The published code has no such
-    /// change.
+    /// Consecutive frames that change a dynamic object to static, or the other way round; 1 to 100.
+    /// The published code has no such change.
     pub change_frames: u8,
     /// Frames without a motion over which a static object stays static; 0 to 255; 5.
     pub static_frames: u8,
-    /// Frames without a motion over which a dynamic object stays dynamic; 0 to 255; 3: the filter predicts its motion. The published
-    /// code: 1, its experiments: 2.
+    /// Frames without a motion over which a dynamic object stays dynamic; 0 to 255; 3: the filter
+    /// predicts its motion. The published code: 1, its experiments: 2.
     pub dynamic_frames: u8,
 }
 
@@ -279,16 +400,51 @@ impl Default for StateConfig {
 impl StateConfig {
     fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(problems, positive(self.static_m_s), "tracking.state.static_m_s", "must be above 0");
+        require(
+            problems,
+            positive(self.static_m_s),
+            "tracking.state.static_m_s",
+            "must be above 0",
+        );
         let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
-        require(problems, above, "tracking.state.dynamic_m_s", "must be at least tracking.state.static_m_s");
+        require(
+            problems,
+            above,
+            "tracking.state.dynamic_m_s",
+            "must be at least tracking.state.static_m_s",
+        );
         let slow = positive(self.slow_m_s) && self.slow_m_s >= self.static_m_s;
-        require(problems, slow, "tracking.state.slow_m_s", "must be at least tracking.state.static_m_s");
-        require(problems, self.sigmas.is_finite() && self.sigmas >= 0.0, "tracking.state.sigmas", "must be at least 0");
+        require(
+            problems,
+            slow,
+            "tracking.state.slow_m_s",
+            "must be at least tracking.state.static_m_s",
+        );
+        require(
+            problems,
+            self.sigmas.is_finite() && self.sigmas >= 0.0,
+            "tracking.state.sigmas",
+            "must be at least 0",
+        );
         let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
         require(problems, likely, "tracking.state.static_sigmas", "must be at least 0");
-        require(problems, (1..=100).contains(&self.confirm_frames), "tracking.state.confirm_frames", "must be in 1..=100");
-        require(problems, (1..=100).contains(&self.confirm_static_frames), "tracking.state.confirm_static_frames", "must be in 1..=100");
-        require(problems, (1..=100).contains(&self.change_frames), "tracking.state.change_frames", "must be in 1..=100");
+        require(
+            problems,
+            (1..=100).contains(&self.confirm_frames),
+            "tracking.state.confirm_frames",
+            "must be in 1..=100",
+        );
+        require(
+            problems,
+            (1..=100).contains(&self.confirm_static_frames),
+            "tracking.state.confirm_static_frames",
+            "must be in 1..=100",
+        );
+        require(
+            problems,
+            (1..=100).contains(&self.change_frames),
+            "tracking.state.change_frames",
+            "must be in 1..=100",
+        );
     }
 }

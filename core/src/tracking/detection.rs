@@ -62,7 +62,8 @@ pub struct DetectionCount {
     pub bad_mask: u32,
     /// Class that is left to the static map.
     pub ignored: u32,
-    /// Box not larger than the least area to be reconstructed, even if its mask is unusable or does not fit.
+    /// Box not larger than the least area to be reconstructed, even if its mask is unusable or does
+    /// not fit.
     pub too_small: u32,
     /// How many of these are tracked.
     pub tracked_only: u32,

@@ -7,12 +7,14 @@ use crate::{
     part::part_mut,
 };
 
-/// Frames over which the depth under an undetected track's predicted mask is removed: detectors miss an object now and then.
+/// Frames over which the depth under an undetected track's predicted mask is removed: detectors
+/// miss an object now and then.
 const UNDETECTED_FRAMES: u32 = 3;
 
 impl Tracker<'_> {
-    /// Sets the depth under the delete masks to 0: of every instance, and of tracks with at least two sightings that are not detected
-    /// in this frame; but not of what is tracked only, unless it is known to move. Returns how many pixels had depth.
+    /// Sets the depth under the delete masks to 0: of every instance, and of tracks with at least
+    /// two sightings that are not detected in this frame; but not of what is tracked only, unless
+    /// it is known to move. Returns how many pixels had depth.
     pub(super) fn mask_dynamic_depth(&self, depth_m: &mut ViewMut<'_, f32>) -> u32 {
         let mut removed = 0;
         for instance in self.instances.all() {
@@ -23,8 +25,17 @@ impl Tracker<'_> {
         }
         for track in self.tracks.all().iter().filter(|track| !track.instance.is_some()) {
             let gap = self.frame.wrapping_sub(track.last_frame);
-            if gap <= UNDETECTED_FRAMES && track.sightings > 1 && (!track.tracked_only.get() || track.moves()) {
-                let predicted = predicted_delete_mask(&self.config, track, gap, self.masks.previous(), depth_m.width());
+            if gap <= UNDETECTED_FRAMES
+                && track.sightings > 1
+                && (!track.tracked_only.get() || track.moves())
+            {
+                let predicted = predicted_delete_mask(
+                    &self.config,
+                    track,
+                    gap,
+                    self.masks.previous(),
+                    depth_m.width(),
+                );
                 removed += remove_depth(depth_m, &predicted);
             }
         }
@@ -32,7 +43,8 @@ impl Tracker<'_> {
     }
 }
 
-/// The delete mask of a track last detected `gap` frames ago, where its velocity in the image predicts it.
+/// The delete mask of a track last detected `gap` frames ago, where its velocity in the image
+/// predicts it.
 fn predicted_delete_mask<'m, 's>(
     config: &TrackingConfig,
     track: &Track,

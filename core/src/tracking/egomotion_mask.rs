@@ -17,16 +17,18 @@ use heapless::Vec;
 pub struct CameraMotion {
     /// Camera to world, now.
     pub t_world_camera: Transform,
-    /// Previous camera to current camera; `None` in the first frame and where it is only extrapolated.
+    /// Previous camera to current camera; `None` in the first frame and where it is only
+    /// extrapolated.
     pub t_current_previous: Option<Transform>,
 }
 
 /// Most objects found by their motion whose matches are excluded before they are found again.
 const MOVING_MAX: usize = 16;
 
-/// The matches that egomotion may use: none on a dynamic object, and none on a large one of unknown state, which may be most of what
-/// the camera sees. Among the rest RANSAC decides. Objects found by their motion are only found again once the camera's is known: of
-/// these the matches that came from the last mask are excluded.
+/// The matches that egomotion may use: none on a dynamic object, and none on a large one of unknown
+/// state, which may be most of what the camera sees. Among the rest RANSAC decides. Objects found
+/// by their motion are only found again once the camera's is known: of these the matches that came
+/// from the last mask are excluded.
 #[derive(Clone, Debug)]
 pub struct EgomotionMask<'t, 's> {
     owner_codes: &'t [OwnerCode],
@@ -51,7 +53,11 @@ impl EgomotionMask<'_, '_> {
 
     /// Whether the match was under the last mask of an object that was found by its motion.
     fn is_on_moving(&self, index: u32) -> bool {
-        let at = self.refined.get(index as usize).filter(|_| !self.moving.is_empty()).map(|m| pixel(m.previous_left));
+        let at = self
+            .refined
+            .get(index as usize)
+            .filter(|_| !self.moving.is_empty())
+            .map(|m| pixel(m.previous_left));
         at.is_some_and(|(u, v)| self.moving.iter().any(|mask| self.previous.contains(mask, u, v)))
     }
 }
@@ -62,11 +68,15 @@ impl<'s> Tracker<'s> {
         let large_px = f64::from(self.config.large_share) * width as f64 * height as f64;
         let mut excluded = 0u64;
         for (bit, instance) in self.instances.all().iter().enumerate() {
-            let state = self.track_of(instance).map_or(MotionState::Uncertain, |track| track.motion_state.state());
+            let state = self
+                .track_of(instance)
+                .map_or(MotionState::Uncertain, |track| track.motion_state.state());
             let is_excluded = match state {
                 MotionState::Dynamic => true,
                 MotionState::Static => false,
-                MotionState::Uncertain => self.masks.current().area(&instance.mask) as f64 > large_px,
+                MotionState::Uncertain => {
+                    self.masks.current().area(&instance.mask) as f64 > large_px
+                }
             };
             excluded |= u64::from(is_excluded) << bit;
         }
@@ -76,7 +86,14 @@ impl<'s> Tracker<'s> {
                 && !track.instance.is_some()
                 && self.frame.wrapping_sub(track.last_frame) == 1
         };
-        let moving = self.tracks.all().iter().filter(is_missing).map(|track| track.mask).take(MOVING_MAX).collect();
+        let moving = self
+            .tracks
+            .all()
+            .iter()
+            .filter(is_missing)
+            .map(|track| track.mask)
+            .take(MOVING_MAX)
+            .collect();
         EgomotionMask {
             owner_codes: self.refined_owner,
             refined,

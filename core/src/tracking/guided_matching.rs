@@ -1,9 +1,11 @@
 //! More matches on an object that has few: guided matching.
 //!
-//! Features are found where the whole image has its strongest patterns and matched where most of their neighbours moved: a small car,
-//! or one that appears from behind another, gets few. Here the pixels of its mask, on a grid, are searched for where an assumed motion
-//! projects them: each has a depth, and so a position in the three other images. A patch that is found is a match like any other; one
-//! that moved otherwise is not found within the 1.75 px that are searched, or is found to have moved otherwise.
+//! Features are found where the whole image has its strongest patterns and matched where most of
+//! their neighbours moved: a small car, or one that appears from behind another, gets few. Here the
+//! pixels of its mask, on a grid, are searched for where an assumed motion projects them: each has
+//! a depth, and so a position in the three other images. A patch that is found is a match like any
+//! other; one that moved otherwise is not found within the 1.75 px that are searched, or is found
+//! to have moved otherwise.
 //!
 //! Time: at most [`GUIDED_MATCHES_MAX`] refinements an object and frame.
 
@@ -21,7 +23,8 @@ pub(crate) const GUIDED_MATCHES_MAX: usize = 256;
 const STEP_MIN_PX: i32 = 3;
 /// Most lines of the grid in a direction, more than any image needs.
 const LINES_MAX: i32 = 4096;
-/// Half a patch and a pixel, px: all around it must lie under the mask, for at the rim a patch also shows what is behind.
+/// Half a patch and a pixel, px: all around it must lie under the mask, for at the rim a patch also
+/// shows what is behind.
 const RIM_PX: i32 = 5;
 
 /// Where more matches are searched for.
@@ -41,7 +44,8 @@ pub(super) struct ObjectMasks<'a, 's> {
 }
 
 impl ObjectMasks<'_, '_> {
-    /// Whether the patch around a pixel lies under the mask, by its middle, its corners and the middles of its sides.
+    /// Whether the patch around a pixel lies under the mask, by its middle, its corners and the
+    /// middles of its sides.
     fn contains_patch(&self, u: i32, v: i32) -> bool {
         let ((store, mask), steps) = (&self.current, [0, -RIM_PX, RIM_PX]);
         steps.iter().all(|dv| steps.iter().all(|du| store.contains(mask, u + du, v + dv)))
@@ -53,8 +57,9 @@ impl ObjectMasks<'_, '_> {
     }
 }
 
-/// Searches for an object's matches where `t_current_previous`, the motion of its points from the previous camera to the current
-/// one, projects them. Returns how many there are at the beginning of `found`.
+/// Searches for an object's matches where `t_current_previous`, the motion of its points from the
+/// previous camera to the current one, projects them. Returns how many there are at the beginning
+/// of `found`.
 pub(super) fn search_by_projection(
     search: &GuidedMatching<'_, '_>,
     rig: &StereoRig,
@@ -65,7 +70,11 @@ pub(super) fn search_by_projection(
     let t_previous_current = t_current_previous.inverse();
     let pixels = masks.current.1.pixels;
     let step_px = step_px(pixels.width, pixels.height);
-    let lines = |first: i32, length: i32| (0..LINES_MAX).map(move |line| first + line * step_px).take_while(move |at| *at < first + length);
+    let lines = |first: i32, length: i32| {
+        (0..LINES_MAX)
+            .map(move |line| first + line * step_px)
+            .take_while(move |at| *at < first + length)
+    };
     let mut slots = found.iter_mut();
     let mut count = 0;
     for v in lines(pixels.top, pixels.height) {
@@ -73,10 +82,21 @@ pub(super) fn search_by_projection(
             if !masks.contains_patch(u, v) {
                 continue;
             }
-            let disparity = search.disparity_q8.get(u as usize, v as usize).filter(|&disparity| disparity > 0);
-            let Some(disparity_px) = disparity.map(|q8| f64::from(q8) / f64::from(DISPARITY_ONE_PX)) else { continue };
-            let Some(expected) = expected(rig, [u, v], disparity_px, &t_previous_current) else { continue };
-            let Some(m) = search.matcher.find(&expected).filter(|m| masks.contained_before(m.previous_left)) else { continue };
+            let disparity =
+                search.disparity_q8.get(u as usize, v as usize).filter(|&disparity| disparity > 0);
+            let Some(disparity_px) =
+                disparity.map(|q8| f64::from(q8) / f64::from(DISPARITY_ONE_PX))
+            else {
+                continue;
+            };
+            let Some(expected) = expected(rig, [u, v], disparity_px, &t_previous_current) else {
+                continue;
+            };
+            let Some(m) =
+                search.matcher.find(&expected).filter(|m| masks.contained_before(m.previous_left))
+            else {
+                continue;
+            };
             let Some(slot) = slots.next() else { return count };
             *slot = m;
             count += 1;
@@ -85,7 +105,8 @@ pub(super) fn search_by_projection(
     count
 }
 
-/// Distance of the grid's lines, so that a box has no more than about [`GUIDED_MATCHES_MAX`] points.
+/// Distance of the grid's lines, so that a box has no more than about [`GUIDED_MATCHES_MAX`]
+/// points.
 pub(crate) fn step_px(width: i32, height: i32) -> i32 {
     let area = f64::from(width) * f64::from(height);
     let step = libm::ceil(libm::sqrt(area / GUIDED_MATCHES_MAX as f64)) as i32;
@@ -93,7 +114,12 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
 }
 
 /// Where a pixel of the current left image is in all four.
-pub(super) fn expected(rig: &StereoRig, [u, v]: [i32; 2], disparity_px: f64, t_previous_current: &Transform) -> Option<Match> {
+pub(super) fn expected(
+    rig: &StereoRig,
+    [u, v]: [i32; 2],
+    disparity_px: f64,
+    t_previous_current: &Transform,
+) -> Option<Match> {
     let current_left = [u as f32, v as f32];
     let current_right = [(f64::from(u) - disparity_px) as f32, v as f32];
     let current = rig.triangulate(&rig.observation(current_left, current_right))?;

@@ -1,15 +1,18 @@
 //! Instances: the detections of a frame that were accepted, with their masks.
 //!
-//! A detection is refused, and counted, when its score is not a number in 0..=1, its box is empty or outside the image, or its mask
-//! is shorter than its box or empty. Above `capacity.detections` the lowest scores are refused. A detection of a class that does not
-//! move is left to the static map. Where masks overlap the higher score is on top: the other loses the pixels.
+//! A detection is refused, and counted, when its score is not a number in 0..=1, its box is empty
+//! or outside the image, or its mask is shorter than its box or empty. Above `capacity.detections`
+//! the lowest scores are refused. A detection of a class that does not move is left to the static
+//! map. Where masks overlap the higher score is on top: the other loses the pixels.
 //!
-//! A detection whose box is not larger than `area_min_px` is too small to be reconstructed, and left to the static map as well; but
-//! it may be a car that drives far ahead. If it is larger than `track_area_min_px` it is *tracked only*, with what space and pixels
-//! the larger ones leave; once it is known to move the static map is kept clear of it.
+//! A detection whose box is not larger than `area_min_px` is too small to be reconstructed, and
+//! left to the static map as well; but it may be a car that drives far ahead. If it is larger than
+//! `track_area_min_px` it is *tracked only*, with what space and pixels the larger ones leave; once
+//! it is known to move the static map is kept clear of it.
 //!
-//! The order in the caller's list does not matter: detections are sorted by score, then class, box and mask; two that agree in all of
-//! these are interchangeable. Time: linear in the pixels of the masks.
+//! The order in the caller's list does not matter: detections are sorted by score, then class, box
+//! and mask; two that agree in all of these are interchangeable. Time: linear in the pixels of the
+//! masks.
 
 use super::{
     Class, Detection, DetectionCount, MAX_DETECTIONS, TrackingConfig, Treatment,
@@ -130,7 +133,14 @@ impl<'s> Instances<'s> {
             self.all().iter().for_each(|above| store.subtract(&mask, &above.mask));
             if store.area(&mask) == 0 {
                 store.free_last(mask);
-                candidate.drop(&mut count, if was_empty { |count| &mut count.bad_mask } else { |count| &mut count.covered });
+                candidate.drop(
+                    &mut count,
+                    if was_empty {
+                        |count| &mut count.bad_mask
+                    } else {
+                        |count| &mut count.covered
+                    },
+                );
                 continue;
             }
             if let Some(slot) = self.table.get_mut(self.len) {
@@ -143,7 +153,8 @@ impl<'s> Instances<'s> {
                     tracked_only: candidate.tracked_only.into(),
                 };
                 self.len += 1;
-                let [accepted, too_small] = [!candidate.tracked_only, candidate.tracked_only].map(u32::from);
+                let [accepted, too_small] =
+                    [!candidate.tracked_only, candidate.tracked_only].map(u32::from);
                 count.accepted += accepted;
                 count.too_small += too_small;
                 count.tracked_only += too_small;
@@ -154,8 +165,16 @@ impl<'s> Instances<'s> {
 }
 
 impl Instances<'_> {
-    /// Adds an instance that was not detected, with its mask. Whether the table had an entry for it.
-    pub fn add(&mut self, config: &TrackingConfig, mask: MaskHandle, class: Class, score: f32, width: usize) -> bool {
+    /// Adds an instance that was not detected, with its mask. Whether the table had an entry for
+    /// it.
+    pub fn add(
+        &mut self,
+        config: &TrackingConfig,
+        mask: MaskHandle,
+        class: Class,
+        score: f32,
+        width: usize,
+    ) -> bool {
         let Some(slot) = self.table.get_mut(self.len) else { return false };
         let area_px = mask.pixels.area();
         *slot = Instance {
@@ -182,7 +201,9 @@ fn select_best(
     let mut best = Vec::<Candidate, MAX_DETECTIONS>::new();
     let most = most.min(MAX_DETECTIONS);
     for (index, detection) in (0..).zip(given) {
-        let Some(mut candidate) = validate(config, detection, index, image, count) else { continue };
+        let Some(mut candidate) = validate(config, detection, index, image, count) else {
+            continue;
+        };
         let full = best.len() >= most;
         // The digest is expensive: it is computed only for what may stay.
         if full && best.last().is_none_or(|worst| worst.rank() < candidate.rank()) {
@@ -190,7 +211,11 @@ fn select_best(
             continue;
         }
         let mut digest = Digest::default();
-        detection.mask.get(..candidate.whole.area() as usize).into_iter().for_each(|mask| digest.bytes(mask));
+        detection
+            .mask
+            .get(..candidate.whole.area() as usize)
+            .into_iter()
+            .for_each(|mask| digest.bytes(mask));
         candidate.digest = digest.finish();
         let at = best.iter().position(|other| candidate.key() < other.key()).unwrap_or(best.len());
         if full {
@@ -259,8 +284,16 @@ fn validate(
 }
 
 /// Copies a caller's mask into the store.
-fn copy_mask(detection: &Detection<'_>, whole: &PixelBox, mask: &MaskHandle, store: &mut MaskStore<'_>) {
-    let rows = detection.mask.chunks_exact(detection.width.max(1) as usize).take(detection.height as usize);
+fn copy_mask(
+    detection: &Detection<'_>,
+    whole: &PixelBox,
+    mask: &MaskHandle,
+    store: &mut MaskStore<'_>,
+) {
+    let rows = detection
+        .mask
+        .chunks_exact(detection.width.max(1) as usize)
+        .take(detection.height as usize);
     for (v, row) in (whole.top..).zip(rows) {
         store.set_row(mask, v, whole.left, row);
     }

@@ -14,10 +14,12 @@ pub struct InstanceAt {
 }
 
 impl Tracker<'_> {
-    /// The best instance of the last frame whose copy mask has the pixel, in constant time per instance; `None` for the static map.
+    /// The best instance of the last frame whose copy mask has the pixel, in constant time per
+    /// instance; `None` for the static map.
     pub(crate) fn instance_at(&self, u: i32, v: i32) -> Option<InstanceAt> {
         let masks = self.masks.current();
-        let instance = self.instances.all().iter().find(|instance| masks.contains(&instance.mask, u, v))?;
+        let instance =
+            self.instances.all().iter().find(|instance| masks.contains(&instance.mask, u, v))?;
         let track = self.track_of(instance);
         Some(InstanceAt {
             class: instance.class(),

@@ -67,7 +67,8 @@ pub(crate) struct FrameMatches<'m> {
 }
 
 impl Tracker<'_> {
-    /// Assigns each match to the instance whose copy mask it lies under or else to the best one whose delete mask it lies under.
+    /// Assigns each match to the instance whose copy mask it lies under or else to the best one
+    /// whose delete mask it lies under.
     pub(super) fn assign_matches(&mut self, matches: &FrameMatches<'_>) {
         let tables = [&mut *self.refined_owner, &mut *self.sparse_owner];
         for (codes, matches) in tables.into_iter().zip([matches.refined, matches.sparse]) {
@@ -82,7 +83,8 @@ impl Tracker<'_> {
         let (instances, tracks) = (self.instances.all(), self.tracks.all());
         // Two cars parked one behind the other in the distance keep their matches.
         let distinct = |other: &Instance| {
-            let moves = || other.track.get().and_then(|at| tracks.get(at)).is_some_and(Track::moves);
+            let moves =
+                || other.track.get().and_then(|at| tracks.get(at)).is_some_and(Track::moves);
             !other.tracked_only.get() || moves()
         };
         let refined = self.refined_owner.iter_mut().zip(matches.refined);
@@ -91,11 +93,17 @@ impl Tracker<'_> {
                 continue;
             }
             let (u, v) = pixel(m.current_left);
-            let best = |mut under: &mut dyn FnMut(&Instance) -> bool| instances.iter().skip(first).position(&mut under);
+            let best = |mut under: &mut dyn FnMut(&Instance) -> bool| {
+                instances.iter().skip(first).position(&mut under)
+            };
             let copy = best(&mut |instance| masks.contains(&instance.mask, u, v));
-            let found = copy.or_else(|| best(&mut |instance| instance.delete_mask(masks).contains(u, v))).map(|at| at + first);
+            let found = copy
+                .or_else(|| best(&mut |instance| instance.delete_mask(masks).contains(u, v)))
+                .map(|at| at + first);
             *code = OwnerCode::from(match found {
-                Some(at) if is_between(instances, distinct, masks, at, u, v) => MatchOwner::Ambiguous,
+                Some(at) if is_between(instances, distinct, masks, at, u, v) => {
+                    MatchOwner::Ambiguous
+                }
                 Some(at) => MatchOwner::Instance(at),
                 None => MatchOwner::None,
             });
@@ -103,9 +111,17 @@ impl Tracker<'_> {
     }
 }
 
-/// Whether a pixel of instance `at` lies next to the copy mask of another: what is seen there may belong to either, for a feature is
-/// several pixels wide, and the silhouette of an object in front moves with that object. Only others that are `distinct` count.
-fn is_between(instances: &[Instance], distinct: impl Fn(&Instance) -> bool, masks: &MaskStore<'_>, at: usize, u: i32, v: i32) -> bool {
+/// Whether a pixel of instance `at` lies next to the copy mask of another: what is seen there may
+/// belong to either, for a feature is several pixels wide, and the silhouette of an object in front
+/// moves with that object. Only others that are `distinct` count.
+fn is_between(
+    instances: &[Instance],
+    distinct: impl Fn(&Instance) -> bool,
+    masks: &MaskStore<'_>,
+    at: usize,
+    u: i32,
+    v: i32,
+) -> bool {
     let around = PixelBox {
         left: u - FEATURE_PX,
         top: v - FEATURE_PX,
@@ -113,10 +129,14 @@ fn is_between(instances: &[Instance], distinct: impl Fn(&Instance) -> bool, mask
         height: 2 * FEATURE_PX + 1,
     };
     let rim = [-FEATURE_PX, 0, FEATURE_PX];
-    instances.iter().enumerate().filter(|&(other, instance)| other != at && distinct(instance)).any(|(_, other)| {
-        around.intersection(&other.mask.pixels).area() > 0
-            && rim.iter().any(|dv| rim.iter().any(|du| masks.contains(&other.mask, u + du, v + dv)))
-    })
+    instances.iter().enumerate().filter(|&(other, instance)| other != at && distinct(instance)).any(
+        |(_, other)| {
+            around.intersection(&other.mask.pixels).area() > 0
+                && rim
+                    .iter()
+                    .any(|dv| rim.iter().any(|du| masks.contains(&other.mask, u + du, v + dv)))
+        },
+    )
 }
 
 /// Whether two keypoints are one.

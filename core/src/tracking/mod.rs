@@ -1,45 +1,52 @@
-//! Objects that move or may move, from frame to frame: detected as instances, associated with tracks, their motions estimated
-//! (Sections III-B and III-D of Bârsan et al., ICRA 2018).
+//! Objects that move or may move, from frame to frame: detected as instances, associated with
+//! tracks, their motions estimated (Sections III-B and III-D of Bârsan et al., ICRA 2018).
 //!
 //! A frame passes through these values, each made from the one before:
 //!
-//! 1. `Tracker::detect` -> `Detected`: detections are validated, their masks packed, and associated with tracks,
-//!    which move in the image as the matches of the scene flow say;
-//! 2. `Detected::assign_matches` -> `Assigned`: each match of the scene flow is assigned to the instance it lies on;
-//!    `Assigned::egomotion_mask` then tells which matches the camera's egomotion may use, and with its motion
-//!    `Assigned::segment_motion` adds instances of what moves and no detector found;
+//! 1. `Tracker::detect` -> `Detected`: detections are validated, their masks packed, and associated
+//!    with tracks, which move in the image as the matches of the scene flow say;
+//! 2. `Detected::assign_matches` -> `Assigned`: each match of the scene flow is assigned to the
+//!    instance it lies on; `Assigned::egomotion_mask` then tells which matches the camera's
+//!    egomotion may use, and with its motion `Assigned::segment_motion` adds instances of what
+//!    moves and no detector found;
 //! 3. `Assigned::estimate_motions` -> `Tracked`: each track's motion, state and pose;
-//!    `Tracked::mask_dynamic_depth` removes the depth under every delete mask, also where an object missed for a frame is predicted;
+//!    `Tracked::mask_dynamic_depth` removes the depth under every delete mask, also where an object
+//!    missed for a frame is predicted;
 //! 4. `Tracked::commit`: masks are kept for the next frame.
 //!
 //! # Motion over ground
 //!
-//! Relative to an object the camera moves as well: `t_current_previous` estimated from the object's matches alone maps its points from
-//! the previous camera to the current one. What remains after the camera's own motion is the object's over ground, between the frames:
+//! Relative to an object the camera moves as well: `t_current_previous` estimated from the object's
+//! matches alone maps its points from the previous camera to the current one. What remains after
+//! the camera's own motion is the object's over ground, between the frames:
 //!
 //! `motion_world = t_world_camera(now) * t_current_previous(object) * t_world_camera(before)^-1`
 //!
-//! and the object's frame moves by it: `t_world_object(now) = motion_world * t_world_object(before)`. For a static object both
-//! `t_current_previous` agree and the motion is the identity, which it is set to once the state is static.
-//! The speed is that of the object's centre: how far a motion moves the camera's position, as the original takes it, grows with the
-//! distance and the slightest rotation.
+//! and the object's frame moves by it:
+//! `t_world_object(now) = motion_world * t_world_object(before)`. For a static object both
+//! `t_current_previous` agree and the motion is the identity, which it is set to once the state is
+//! static. The speed is that of the object's centre: how far a motion moves the camera's position,
+//! as the original takes it, grows with the distance and the slightest rotation.
 //!
 //! # Which matches
 //!
-//! Those whose current left keypoint lies under the delete mask (and under no other's copy mask) and whose previous one lay in the
-//! track's previous mask: the matches refined below the pixel and, where these are fewer than `matches_enough`, sparse ones of other
-//! features, which are found also where few neighbours move alike, and those of guided matching (`GuidedMatching`). At least
-//! `matches_min` the first time, at least `matches_again` once a motion is known. The estimator removes the outliers, starting from
-//! the last motion, with random samples of its own for each track and frame; the filter ([`MotionConfig`]) averages over frames.
+//! Those whose current left keypoint lies under the delete mask (and under no other's copy mask)
+//! and whose previous one lay in the track's previous mask: the matches refined below the pixel
+//! and, where these are fewer than `matches_enough`, sparse ones of other features, which are found
+//! also where few neighbours move alike, and those of guided matching (`GuidedMatching`). At least
+//! `matches_min` the first time, at least `matches_again` once a motion is known. The estimator
+//! removes the outliers, starting from the last motion, with random samples of its own for each
+//! track and frame; the filter ([`MotionConfig`]) averages over frames.
 //!
 //! # Memory
 //!
-//! Two buffers of `mask_words` 8-byte words; the tables of instances and tracks; a byte a match; 256 matches for guided matching.
+//! Two buffers of `mask_words` 8-byte words; the tables of instances and tracks; a byte a match;
+//! 256 matches for guided matching.
 //!
 //! # What can go wrong
 //!
-//! Every error of the detector, and each is counted. A mask that covers two cars is one track and gets the motion of the one with more
-//! matches.
+//! Every error of the detector, and each is counted. A mask that covers two cars is one track and
+//! gets the motion of the one with more matches.
 
 mod association;
 mod class;
@@ -129,7 +136,11 @@ impl<'s> Tracker<'s> {
     }
 
     /// Allocates its regions.
-    pub(crate) fn new_in(capacity: &Capacity, config: &TrackingConfig, carver: &mut Carver<'s>) -> Self {
+    pub(crate) fn new_in(
+        capacity: &Capacity,
+        config: &TrackingConfig,
+        carver: &mut Carver<'s>,
+    ) -> Self {
         Self {
             config: *config,
             masks: TwoFrames::new([
@@ -141,15 +152,23 @@ impl<'s> Tracker<'s> {
             refined_owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
             guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
-            segmenter: carver.group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),
+            segmenter: carver
+                .group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),
             frame: 0,
             size: [0; 2],
             report: TrackingReport::default(),
         }
     }
 
-    /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks.
-    fn ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], matches: &FrameMatches<'_>) {
+    /// Begins frame `frame` of images of that size: validates its detections and associates them
+    /// with tracks.
+    fn ingest(
+        &mut self,
+        frame: u32,
+        detections: &[Detection<'_>],
+        size: [usize; 2],
+        matches: &FrameMatches<'_>,
+    ) {
         (self.frame, self.size) = (frame, size);
         self.report = TrackingReport::default();
         let given = if self.config.dynamic { detections } else { &[] };
@@ -158,12 +177,18 @@ impl<'s> Tracker<'s> {
         current.clear();
         self.report.detections = self.instances.ingest(&self.config, given, size, current);
         measure_image_velocities(self.tracks.all_mut(), frame, matches, self.masks.previous());
-        self.report.tracks = self.tracks.associate(&self.config, frame, self.instances.all_mut(), &self.masks);
+        self.report.tracks =
+            self.tracks.associate(&self.config, frame, self.instances.all_mut(), &self.masks);
     }
 
     /// Ends a frame: masks are kept for the next one.
     fn commit(&mut self) {
-        self.tracks.commit(self.instances.all(), self.size, &mut self.masks, &mut self.report.tracks);
+        self.tracks.commit(
+            self.instances.all(),
+            self.size,
+            &mut self.masks,
+            &mut self.report.tracks,
+        );
     }
 
     /// Sets the time from the frame before to the one that comes next, s.
@@ -182,8 +207,11 @@ impl<'s> Tracker<'s> {
     }
 
     /// The tracks, by age, each with its instance if it was detected in this frame.
-    pub(crate) fn tracks_with_instances(&self) -> impl Iterator<Item = (&Track, Option<&Instance>)> {
-        let instance_of = |track: &Track| track.instance.get().and_then(|index| self.instances.all().get(index));
+    pub(crate) fn tracks_with_instances(
+        &self,
+    ) -> impl Iterator<Item = (&Track, Option<&Instance>)> {
+        let instance_of =
+            |track: &Track| track.instance.get().and_then(|index| self.instances.all().get(index));
         self.tracks.all().iter().map(move |track| (track, instance_of(track)))
     }
 
@@ -194,6 +222,10 @@ impl<'s> Tracker<'s> {
 
     /// Adds what is in use to a footprint.
     pub(crate) fn note_use(&self, footprint: &mut Footprint) {
-        footprint.set_use::<Track>("tracking.track", self.tracks.all().len(), self.tracks.all().len());
+        footprint.set_use::<Track>(
+            "tracking.track",
+            self.tracks.all().len(),
+            self.tracks.all().len(),
+        );
     }
 }

@@ -1,7 +1,8 @@
 //! One object's motion in one frame: an estimate that removes the outliers, then the filter.
 //!
-//! An object's points lie close together: a match much nearer or farther than the median (by disparity) is not on the object but on
-//! what occludes it, or behind it. A nearer one would outweigh all of the object's own.
+//! An object's points lie close together: a match much nearer or farther than the median (by
+//! disparity) is not on the object but on what occludes it, or behind it. A nearer one would
+//! outweigh all of the object's own.
 
 use super::{
     config::MotionConfig,
@@ -28,7 +29,8 @@ pub(super) struct MotionFrame<'a> {
 
 /// How more matches are found where there are few.
 pub(super) struct GuidedSearch<'m, F> {
-    /// Searches where a motion from the previous camera to the current one projects them; returns how many it wrote.
+    /// Searches where a motion from the previous camera to the current one projects them; returns
+    /// how many it wrote.
     pub find: F,
     /// Where it writes them.
     pub found: &'m mut [Match],
@@ -41,7 +43,8 @@ pub(super) struct ObjectMotion {
     pub measured: bool,
 }
 
-/// The disparities matches of one object can have. Their median is found to half a pixel, up to 256 px.
+/// The disparities matches of one object can have. Their median is found to half a pixel, up to 256
+/// px.
 #[derive(Clone, Copy)]
 struct DisparityRange {
     least_px: f64,
@@ -50,7 +53,11 @@ struct DisparityRange {
 
 impl DisparityRange {
     /// Those no more than `config.extent_m` and three sigmas nearer or farther than the median.
-    fn of<'m>(config: &MotionConfig, rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
+    fn of<'m>(
+        config: &MotionConfig,
+        rig: &StereoRig,
+        matches: impl Iterator<Item = &'m Match> + Clone,
+    ) -> Self {
         let mut disparities = Histogram::new();
         for m in matches {
             // What is not a number counts as 0.
@@ -60,7 +67,8 @@ impl DisparityRange {
         let slack_px = 3.0 * core::f64::consts::SQRT_2 * f64::from(config.noise_px) + 0.5;
         let depth_m = rig.focal_baseline_px_m() / median_px;
         let nearest_m = depth_m - f64::from(config.extent_m);
-        let most_px = if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
+        let most_px =
+            if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
         Self {
             least_px: rig.focal_baseline_px_m() / (depth_m + f64::from(config.extent_m)) - slack_px,
             most_px: most_px + slack_px,
@@ -78,10 +86,11 @@ fn disparity(m: &Match) -> f64 {
     f64::from(m.previous_left[0]) - f64::from(m.previous_right[0])
 }
 
-/// Estimates a motion from an object's matches and updates the filter, already predicted, by its inliers.
+/// Estimates a motion from an object's matches and updates the filter, already predicted, by its
+/// inliers.
 ///
-/// `search`, given where matches are few, finds more: by the motion so far or, of an object without one, by that of the few matches;
-/// where they have none, by that of a static object.
+/// `search`, given where matches are few, finds more: by the motion so far or, of an object without
+/// one, by that of the few matches; where they have none, by that of a static object.
 pub(super) fn estimate_motion<'m>(
     config: &MotionConfig,
     frame: &MotionFrame<'_>,
@@ -100,7 +109,13 @@ pub(super) fn estimate_motion<'m>(
         if !filter.is_known() {
             let range = DisparityRange::of(config, frame.rig, matches.clone());
             let matches = matches.clone().filter(|m| range.contains(m));
-            let guess = estimator.estimate(&settings, frame.rig, matches, &mut Random::new(frame.seed), Some(&expected));
+            let guess = estimator.estimate(
+                &settings,
+                frame.rig,
+                matches,
+                &mut Random::new(frame.seed),
+                Some(&expected),
+            );
             expected = guess.t_current_previous.unwrap_or(expected);
         }
         let count = find(&expected, buffer);
@@ -116,16 +131,32 @@ pub(super) fn estimate_motion<'m>(
     if points < u32::from(needed) {
         return outcome;
     }
-    let estimate = estimator.estimate(&settings, frame.rig, matches.clone(), &mut Random::new(frame.seed), Some(&expected));
+    let estimate = estimator.estimate(
+        &settings,
+        frame.rig,
+        matches.clone(),
+        &mut Random::new(frame.seed),
+        Some(&expected),
+    );
     if estimate.t_current_previous.is_none() {
         return outcome;
     }
     outcome.inliers = estimate.inliers;
     let inliers = Inliers { indexed: (0u32..).zip(matches), inliers: estimator.inliers() };
-    let noise_px =
-        if estimate.residual_rms_px > f64::from(config.noise_px) { estimate.residual_rms_px } else { f64::from(config.noise_px) };
+    let noise_px = if estimate.residual_rms_px > f64::from(config.noise_px) {
+        estimate.residual_rms_px
+    } else {
+        f64::from(config.noise_px)
+    };
     let observations = inliers.filter_map(|m| observation(m, frame));
-    outcome.measured = filter.update(config, frame.rig, frame.t_world_camera, frame.interval_s, noise_px, observations);
+    outcome.measured = filter.update(
+        config,
+        frame.rig,
+        frame.t_world_camera,
+        frame.interval_s,
+        noise_px,
+        observations,
+    );
     outcome
 }
 
@@ -145,10 +176,12 @@ impl<'m, M: Iterator<Item = (u32, &'m Match)>, I: Iterator<Item = u32>> Iterator
     }
 }
 
-/// A match as the filter takes it: its point is triangulated in the previous camera and predicted as a static one.
+/// A match as the filter takes it: its point is triangulated in the previous camera and predicted
+/// as a static one.
 fn observation(m: &Match, frame: &MotionFrame<'_>) -> Option<Observation> {
     let rig = frame.rig;
-    let previous = Point3::from(rig.triangulate(&rig.observation(m.previous_left, m.previous_right))?);
+    let previous =
+        Point3::from(rig.triangulate(&rig.observation(m.previous_left, m.previous_right))?);
     Some(Observation {
         static_prediction: frame.t_current_previous.transform_point(previous),
         left: rig.centered(m.current_left),

@@ -1,14 +1,17 @@
 //! An object's velocity and angular velocity over frames: an extended information filter.
 //!
-//! The state is the velocity and angular velocity over ground at the object's centre, in world axes. Between frames it may change by a
-//! random acceleration (constant-velocity model). A frame's matches enter by their reprojection errors, not by a motion computed from
-//! them alone: Gauss-Newton minimises `sum |error|^2 / noise^2 + |rate - predicted|^2` (weighted by the inverse of the prediction's
-//! covariance), so what a frame does not determine, as the rotation and the depth of a car far away, is taken from the frames before.
-//! The inverse of the matrix it solves is the covariance, which tells the motion state how certain a speed is.
+//! The state is the velocity and angular velocity over ground at the object's centre, in world
+//! axes. Between frames it may change by a random acceleration (constant-velocity model). A frame's
+//! matches enter by their reprojection errors, not by a motion computed from them alone:
+//! Gauss-Newton minimises `sum |error|^2 / noise^2 + |rate - predicted|^2` (weighted by the inverse
+//! of the prediction's covariance), so what a frame does not determine, as the rotation and the
+//! depth of a car far away, is taken from the frames before. The inverse of the matrix it solves is
+//! the covariance, which tells the motion state how certain a speed is.
 //!
-//! A point that the camera's motion alone would predict at `q` (in the current camera) is expected at
-//! `c + R(angular velocity dt) (q - c) + velocity dt`, where c is the mean of all q. Errors of matches of one object are not
-//! independent (one mask, one rectification): no more than `independent_matches` count.
+//! A point that the camera's motion alone would predict at `q` (in the current camera) is expected
+//! at `c + R(angular velocity dt) (q - c) + velocity dt`, where c is the mean of all q. Errors of
+//! matches of one object are not independent (one mask, one rectification): no more than
+//! `independent_matches` count.
 
 use super::config::MotionConfig;
 use crate::geometry::{StereoObservation, StereoRig, Transform};
@@ -18,11 +21,12 @@ use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 
 /// Gauss-Newton steps per frame; what is left after them is far below the noise.
 const STEPS: usize = 4;
-/// Squared Mahalanobis distance from the prediction beyond which a frame contradicts it: chi-square, 6 degrees of freedom, 1e-5.
+/// Squared Mahalanobis distance from the prediction beyond which a frame contradicts it:
+/// chi-square, 6 degrees of freedom, 1e-5.
 const CONTRADICTION: f64 = 34.0;
 
-/// A point of an object: where it would be in the current camera if the object were static, and where it is observed, px from the
-/// principal point.
+/// A point of an object: where it would be in the current camera if the object were static, and
+/// where it is observed, px from the principal point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observation {
     pub static_prediction: Point3<f64>,
@@ -75,18 +79,24 @@ impl MotionFilter {
         Point3::from(self.center_world)
     }
 
-    /// Speed over ground, its error along the direction of motion and its error in all directions together, m/s.
+    /// Speed over ground, its error along the direction of motion and its error in all directions
+    /// together, m/s.
     pub fn speed(&self) -> [f64; 3] {
         let velocity = self.velocity();
         let speed = libm::sqrt(velocity.dot(&velocity));
         let covariance = Matrix6::from(self.covariance);
         let part: Matrix3<f64> = covariance.fixed_view::<3, 3>(3, 3).into_owned();
         // Without a velocity there is no direction: the mean over all directions counts.
-        let variance = if speed > 1e-6 { velocity.dot(&(part * velocity)) / (speed * speed) } else { part.trace() / 3.0 };
+        let variance = if speed > 1e-6 {
+            velocity.dot(&(part * velocity)) / (speed * speed)
+        } else {
+            part.trace() / 3.0
+        };
         [speed, libm::sqrt(variance), libm::sqrt(part.trace())]
     }
 
-    /// The motion over ground within a frame: maps points of the object in the world from where they were to where they are.
+    /// The motion over ground within a frame: maps points of the object in the world from where
+    /// they were to where they are.
     pub fn motion(&self, interval_s: f64) -> Transform {
         let turn = Transform::new(self.angular_velocity() * interval_s, Vector3::zeros());
         let center = self.center_world().coords;
@@ -98,17 +108,26 @@ impl MotionFilter {
     pub fn predict(&mut self, config: &MotionConfig, interval_s: f64) {
         let square = |x: f32| f64::from(x) * f64::from(x);
         if self.frames == 0 {
-            let [tilt, yaw, speed] = [config.tilt_rad_s, config.yaw_rad_s, config.speed_m_s].map(square);
+            let [tilt, yaw, speed] =
+                [config.tilt_rad_s, config.yaw_rad_s, config.speed_m_s].map(square);
             self.rate = [0.0; 6];
-            self.covariance = Matrix6::from_diagonal(&Vector6::new(tilt, yaw, tilt, speed, speed, speed)).into();
+            self.covariance =
+                Matrix6::from_diagonal(&Vector6::new(tilt, yaw, tilt, speed, speed, speed)).into();
             return;
         }
-        let turned = Transform::new(self.angular_velocity() * interval_s, Vector3::zeros()).rotate(self.velocity());
+        let turned = Transform::new(self.angular_velocity() * interval_s, Vector3::zeros())
+            .rotate(self.velocity());
         let [.., x, y, z] = &mut self.rate;
         (*x, *y, *z) = (turned.x, turned.y, turned.z);
-        let [tilt, yaw, speed] = [config.tilt_acceleration_rad_s2, config.yaw_acceleration_rad_s2, config.acceleration_m_s2]
-            .map(|change| square(change) * interval_s * interval_s);
-        for (i, (row, growth)) in self.covariance.iter_mut().zip([tilt, yaw, tilt, speed, speed, speed]).enumerate() {
+        let [tilt, yaw, speed] = [
+            config.tilt_acceleration_rad_s2,
+            config.yaw_acceleration_rad_s2,
+            config.acceleration_m_s2,
+        ]
+        .map(|change| square(change) * interval_s * interval_s);
+        for (i, (row, growth)) in
+            self.covariance.iter_mut().zip([tilt, yaw, tilt, speed, speed, speed]).enumerate()
+        {
             if let Some(entry) = row.get_mut(i) {
                 *entry += growth;
             }
@@ -120,9 +139,11 @@ impl MotionFilter {
         self.center_world = (self.center_world() + self.velocity() * interval_s).coords.into();
     }
 
-    /// Updates by a frame's observations, after [`MotionFilter::predict`]. `noise_px` is the error of one coordinate. Afterwards
-    /// `center_world` is where the centre was before the frame's motion. `false`, and the rates unchanged, when the observations cannot
-    /// be used or contradict the prediction: if the next frame contradicts it as well, the filter starts anew from that one.
+    /// Updates by a frame's observations, after [`MotionFilter::predict`]. `noise_px` is the error
+    /// of one coordinate. Afterwards `center_world` is where the centre was before the frame's
+    /// motion. `false`, and the rates unchanged, when the observations cannot be used or contradict
+    /// the prediction: if the next frame contradicts it as well, the filter starts anew from that
+    /// one.
     pub fn update(
         &mut self,
         config: &MotionConfig,
@@ -138,8 +159,16 @@ impl MotionFilter {
         let mut corrected = Self { contradictions: 0, ..*self };
         let mut restarted = Self { contradictions: 0, frames: 0, ..*self };
         restarted.predict(config, interval_s);
-        let fits = corrected.correct(config, rig, t_world_camera, interval_s, noise_px, observations.clone());
-        let updated = fits || restarted.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
+        let fits = corrected.correct(
+            config,
+            rig,
+            t_world_camera,
+            interval_s,
+            noise_px,
+            observations.clone(),
+        );
+        let updated = fits
+            || restarted.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
         if updated {
             *self = if fits { corrected } else { restarted };
         }
@@ -161,19 +190,31 @@ impl MotionFilter {
             sum += observation.static_prediction.coords;
             count += 1.0;
         }
-        let Some(information) = Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse()) else { return false };
+        let Some(information) =
+            Cholesky::new(Matrix6::from(self.covariance)).map(|factor| factor.inverse())
+        else {
+            return false;
+        };
         let center = sum / count;
         // False for NaN as well.
         if !(count >= 3.0 && center.iter().all(|x| x.is_finite())) {
             return false;
         }
         let independent = f64::from(config.independent_matches);
-        let weight = (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
+        let weight =
+            (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
         let world_camera = t_world_camera.quaternion().to_rotation_matrix();
         let predicted = Vector6::from(self.rate);
         let mut rate = predicted;
         for step in 0..=STEPS {
-            let equations = NormalEquations::over(observations.clone(), rig, &center, &world_camera, interval_s, &rate);
+            let equations = NormalEquations::over(
+                observations.clone(),
+                rig,
+                &center,
+                &world_camera,
+                interval_s,
+                &rate,
+            );
             let (matrix, vector) = equations.in_world(&world_camera, interval_s);
             let Some(factor) = Cholesky::new(information + matrix * weight) else { return false };
             if step == STEPS {
@@ -228,10 +269,19 @@ impl NormalEquations {
         equations
     }
 
-    /// Adds a point at `at` in the camera, `arm` from the centre. One behind the camera adds nothing.
-    fn add(&mut self, rig: &StereoRig, arm: &Vector3<f64>, at: &Vector3<f64>, observed: &Observation) {
+    /// Adds a point at `at` in the camera, `arm` from the centre. One behind the camera adds
+    /// nothing.
+    fn add(
+        &mut self,
+        rig: &StereoRig,
+        arm: &Vector3<f64>,
+        at: &Vector3<f64>,
+        observed: &Observation,
+    ) {
         let at = (*at).into();
-        let Some(StereoObservation { u_left_px, v_px, u_right_px }) = rig.project(at) else { return };
+        let Some(StereoObservation { u_left_px, v_px, u_right_px }) = rig.project(at) else {
+            return;
+        };
         // Derivatives of a coordinate by the point (gx, gy, gz), and by the rotation: arm x g.
         let row = |g: [f64; 3]| {
             let turn = arm.cross(&Vector3::from(g));
@@ -253,11 +303,16 @@ impl NormalEquations {
     }
 
     /// The same by rates in world axes.
-    fn in_world(&self, world_camera: &Rotation3<f64>, interval_s: f64) -> (Matrix6<f64>, Vector6<f64>) {
+    fn in_world(
+        &self,
+        world_camera: &Rotation3<f64>,
+        interval_s: f64,
+    ) -> (Matrix6<f64>, Vector6<f64>) {
         let mut turn = Matrix6::zeros();
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(world_camera.matrix());
         turn.fixed_view_mut::<3, 3>(3, 3).copy_from(world_camera.matrix());
-        let matrix = turn * Matrix6::from(self.matrix) * turn.transpose() * (interval_s * interval_s);
+        let matrix =
+            turn * Matrix6::from(self.matrix) * turn.transpose() * (interval_s * interval_s);
         (symmetric(&matrix), turn * Vector6::from(self.vector) * interval_s)
     }
 }
@@ -268,7 +323,8 @@ mod tests {
     use crate::random::Random;
     use std::vec::Vec;
 
-    const RIG: StereoRig = StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 721.5, center_u_px: 609.6, center_v_px: 172.9, baseline_m: 0.54 };
     const INTERVAL_S: f64 = 0.1;
 
     /// A number about 0 with a standard deviation of 1: the sum of twelve uniform ones.
@@ -276,10 +332,12 @@ mod tests {
         (0..12).map(|_| f64::from(random.below(1 << 20)) / f64::from(1 << 20)).sum::<f64>() - 6.0
     }
 
-    /// Points on a car's back, `depth_m` before the camera, that moved by `rate` and are seen with an error; those before as well.
+    /// Points on a car's back, `depth_m` before the camera, that moved by `rate` and are seen with
+    /// an error; those before as well.
     fn frame(random: &mut Random, depth_m: f64, rate: [f64; 6], noise_px: f64) -> Vec<Observation> {
         let center = Vector3::new(1.0, 0.5, depth_m);
-        let turn = Transform::new(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
+        let turn =
+            Transform::new(Vector3::new(rate[0], rate[1], rate[2]) * INTERVAL_S, Vector3::zeros());
         let project = |p: Vector3<f64>| {
             let per_m = RIG.focal_px / p.z;
             ([p.x * per_m, p.y * per_m], [(p.x - RIG.baseline_m) * per_m, p.y * per_m])
@@ -292,8 +350,14 @@ mod tests {
                 let mut noise = || normal(random) * noise_px;
                 let disparity = before[0] + noise() - before_right[0] - noise();
                 let per_px = RIG.baseline_m / disparity;
-                let static_prediction = Point3::new((before[0] + noise()) * per_px, (before[1] + noise()) * per_px, RIG.focal_px * per_px);
-                let moved = center + turn.rotate(point - center) + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
+                let static_prediction = Point3::new(
+                    (before[0] + noise()) * per_px,
+                    (before[1] + noise()) * per_px,
+                    RIG.focal_px * per_px,
+                );
+                let moved = center
+                    + turn.rotate(point - center)
+                    + Vector3::new(rate[3], rate[4], rate[5]) * INTERVAL_S;
                 let (left, right) = project(moved);
                 Observation {
                     static_prediction,
@@ -304,7 +368,12 @@ mod tests {
             .collect()
     }
 
-    fn track(depth_m: f64, noise_px: f64, frames: usize, rate: impl Fn(usize) -> [f64; 6]) -> Vec<MotionFilter> {
+    fn track(
+        depth_m: f64,
+        noise_px: f64,
+        frames: usize,
+        rate: impl Fn(usize) -> [f64; 6],
+    ) -> Vec<MotionFilter> {
         let mut random = Random::new(7);
         let mut filter = MotionFilter::default();
         let config = MotionConfig::default();
@@ -313,7 +382,14 @@ mod tests {
                 filter.predict(&config, INTERVAL_S);
                 let seen = frame(&mut random, depth_m, rate(n), noise_px);
                 let noise = if noise_px > 0.1 { noise_px * 1.5 } else { 0.1 };
-                assert!(filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, noise, seen.iter().copied()));
+                assert!(filter.update(
+                    &config,
+                    &RIG,
+                    &Transform::IDENTITY,
+                    INTERVAL_S,
+                    noise,
+                    seen.iter().copied()
+                ));
                 filter
             })
             .collect()
@@ -325,23 +401,36 @@ mod tests {
         let filter = track(12.0, 0.0, 1, |_| rate)[0];
         let error = (filter.velocity() - Vector3::new(2.0, 0.0, 9.0)).norm();
         assert!(error < 0.1, "{error} m/s");
-        assert!((filter.angular_velocity() - Vector3::new(0.0, 0.3, 0.0)).norm() < 0.05, "{}", filter.angular_velocity());
+        assert!(
+            (filter.angular_velocity() - Vector3::new(0.0, 0.3, 0.0)).norm() < 0.05,
+            "{}",
+            filter.angular_velocity()
+        );
     }
 
     #[test]
     fn a_far_car_is_known_better_after_ten_frames_than_after_one_and_says_so() {
         let filters = track(30.0, 0.3, 40, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 8.0]);
-        let error = |filter: &MotionFilter| (filter.velocity() - Vector3::new(0.0, 0.0, 8.0)).norm();
+        let error =
+            |filter: &MotionFilter| (filter.velocity() - Vector3::new(0.0, 0.0, 8.0)).norm();
         let late: f64 = filters[10..].iter().map(error).sum::<f64>() / 30.0;
         assert!(late * INTERVAL_S < 0.05, "{late} m/s");
-        assert!(filters[20].speed()[1] < 0.7 * filters[0].speed()[1], "{:?} {:?}", filters[20].speed(), filters[0].speed());
-        let within = filters.iter().filter(|filter| error(filter) < 3.0 * filter.speed()[1]).count();
+        assert!(
+            filters[20].speed()[1] < 0.7 * filters[0].speed()[1],
+            "{:?} {:?}",
+            filters[20].speed(),
+            filters[0].speed()
+        );
+        let within =
+            filters.iter().filter(|filter| error(filter) < 3.0 * filter.speed()[1]).count();
         assert!(within >= 38, "the error is what it says to be: {within} of 40");
     }
 
     #[test]
     fn a_car_that_brakes_is_followed() {
-        let filters = track(15.0, 0.3, 30, |n| [0.0, 0.0, 0.0, 0.0, 0.0, if n < 10 { 8.0 } else { 8.0 - 0.3 * (n - 10) as f64 }]);
+        let filters = track(15.0, 0.3, 30, |n| {
+            [0.0, 0.0, 0.0, 0.0, 0.0, if n < 10 { 8.0 } else { 8.0 - 0.3 * (n - 10) as f64 }]
+        });
         let late = filters[29].speed();
         assert!((late[0] - 2.3).abs() < 0.8, "{late:?}");
     }
@@ -356,7 +445,17 @@ mod tests {
         let mut take = |rate: [f64; 6]| {
             filter.predict(&config, INTERVAL_S);
             let seen = frame(&mut random, 12.0, rate, 0.3);
-            (filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, 0.4, seen.iter().copied()), filter.speed()[0])
+            (
+                filter.update(
+                    &config,
+                    &RIG,
+                    &Transform::IDENTITY,
+                    INTERVAL_S,
+                    0.4,
+                    seen.iter().copied(),
+                ),
+                filter.speed()[0],
+            )
         };
         for _ in 0..5 {
             assert!(take(still).0);
@@ -388,7 +487,14 @@ mod tests {
             left: [0.0; 2],
             right: [0.0; 2],
         }; 4];
-        assert!(!filter.update(&config, &RIG, &Transform::IDENTITY, INTERVAL_S, 0.3, bad.iter().copied()));
+        assert!(!filter.update(
+            &config,
+            &RIG,
+            &Transform::IDENTITY,
+            INTERVAL_S,
+            0.3,
+            bad.iter().copied()
+        ));
         assert_eq!(filter, before);
     }
 }

@@ -1,11 +1,13 @@
 //! Uncertain, static, dynamic: the motion state of an object, with hysteresis.
 //!
-//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It is classified *dynamic* when the speed
-//! less the bias and `sigmas` times the error is above `dynamic_m_s`; *static* when that is below `static_m_s` and the speed plus
-//! `static_sigmas` times the error in all directions is below `slow_m_s`, for a dynamic object below `dynamic_m_s`; otherwise neither.
-//! So a far car that may be static and is certainly slower than a pedestrian is static, and one that may be faster stays uncertain; but
-//! a dynamic object must be measured to have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this
-//! is the published rule (Section III-D).
+//! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It is
+//! classified *dynamic* when the speed less the bias and `sigmas` times the error is above
+//! `dynamic_m_s`; *static* when that is below `static_m_s` and the speed plus `static_sigmas` times
+//! the error in all directions is below `slow_m_s`, for a dynamic object below `dynamic_m_s`;
+//! otherwise neither. So a far car that may be static and is certainly slower than a pedestrian is
+//! static, and one that may be faster stays uncertain; but a dynamic object must be measured to
+//! have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is
+//! the published rule (Section III-D).
 //!
 //! ```text
 //!      confirm_static_frames or confirm_frames agree         change_frames agree
@@ -14,8 +16,9 @@
 //!     +------------------------------------+  no motion for more than static_frames or dynamic_frames frames
 //! ```
 //!
-//! A frame in which the object is not detected is a frame without a motion. It neither confirms nor refutes: what the frames before
-//! were classified as still counts until the state is lost, or for as long without a state.
+//! A frame in which the object is not detected is a frame without a motion. It neither confirms nor
+//! refutes: what the frames before were classified as still counts until the state is lost, or for
+//! as long without a state.
 
 use super::config::StateConfig;
 use crate::state::Visitor;
@@ -70,7 +73,8 @@ pub(crate) struct MotionEvidence {
     pub sigma_m_s: f32,
     /// Its error in all directions together, m/s: of what seems static the direction means nothing.
     pub spread_m_s: f32,
-    /// By how much the cameras' own errors may make it too high, m/s: they can make a static object seem to move.
+    /// By how much the cameras' own errors may make it too high, m/s: they can make a static object
+    /// seem to move.
     pub bias_m_s: f32,
 }
 
@@ -79,7 +83,8 @@ impl MotionEvidence {
     fn classify(&self, config: &StateConfig, state: MotionState) -> MotionState {
         let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
         let most = self.speed_m_s + config.static_sigmas * self.spread_m_s;
-        let slow_m_s = if state == MotionState::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
+        let slow_m_s =
+            if state == MotionState::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
         if least > config.dynamic_m_s {
             MotionState::Dynamic
         } else if least < config.static_m_s && most < slow_m_s {
@@ -114,7 +119,11 @@ impl MotionHysteresis {
     }
 
     /// Updates by a frame, with a motion or without. Returns the new state.
-    pub fn update(&mut self, config: &StateConfig, motion_evidence: Option<MotionEvidence>) -> MotionState {
+    pub fn update(
+        &mut self,
+        config: &StateConfig,
+        motion_evidence: Option<MotionEvidence>,
+    ) -> MotionState {
         match motion_evidence {
             Some(observed) => self.confirm(config, observed.classify(config, self.state())),
             None => self.expire(config),
@@ -125,7 +134,11 @@ impl MotionHysteresis {
     /// Counts a frame with a motion.
     fn confirm(&mut self, config: &StateConfig, classified: MotionState) {
         self.since_motion = 0;
-        self.consecutive = if classified.code() == self.classified { self.consecutive.saturating_add(1) } else { 1 };
+        self.consecutive = if classified.code() == self.classified {
+            self.consecutive.saturating_add(1)
+        } else {
+            1
+        };
         self.classified = classified.code();
         let required = match (self.state(), classified) {
             (MotionState::Uncertain, MotionState::Static) => config.confirm_static_frames,
@@ -177,7 +190,10 @@ mod tests {
         })
     }
 
-    fn states(config: &StateConfig, frames: &[Option<MotionEvidence>]) -> std::vec::Vec<MotionState> {
+    fn states(
+        config: &StateConfig,
+        frames: &[Option<MotionEvidence>],
+    ) -> std::vec::Vec<MotionState> {
         let mut hysteresis = MotionHysteresis::default();
         frames.iter().map(|observed| hysteresis.update(config, *observed)).collect()
     }
@@ -203,19 +219,38 @@ mod tests {
     #[test]
     fn every_motion_starts_the_count_of_frames_without_one_anew() {
         let script = [seen(0.6), None, seen(0.4), None, seen(0.4), None, None];
-        assert_eq!(states(&PUBLISHED, &script), [Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Uncertain]);
+        assert_eq!(
+            states(&PUBLISHED, &script),
+            [Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Dynamic, Uncertain]
+        );
     }
 
     #[test]
     fn between_the_thresholds_a_state_is_kept_and_none_is_won() {
         let script = [seen(0.3), seen(0.3), seen(0.01), seen(0.3), seen(0.3), seen(0.3)];
-        assert_eq!(states(&PUBLISHED, &script), [Uncertain, Uncertain, Static, Static, Static, Static]);
+        assert_eq!(
+            states(&PUBLISHED, &script),
+            [Uncertain, Uncertain, Static, Static, Static, Static]
+        );
     }
 
     #[test]
     fn stopping_and_starting_need_two_frames_in_a_row() {
-        let script = [seen(1.0), seen(0.0), seen(1.0), seen(0.0), seen(0.0), seen(1.0), seen(0.0), seen(1.0), seen(1.0)];
-        assert_eq!(states(&PUBLISHED, &script), [Dynamic, Dynamic, Dynamic, Dynamic, Static, Static, Static, Static, Dynamic]);
+        let script = [
+            seen(1.0),
+            seen(0.0),
+            seen(1.0),
+            seen(0.0),
+            seen(0.0),
+            seen(1.0),
+            seen(0.0),
+            seen(1.0),
+            seen(1.0),
+        ];
+        assert_eq!(
+            states(&PUBLISHED, &script),
+            [Dynamic, Dynamic, Dynamic, Dynamic, Static, Static, Static, Static, Dynamic]
+        );
     }
 
     #[test]
@@ -231,8 +266,14 @@ mod tests {
     fn standing_and_moving_are_confirmed_by_counts_of_their_own() {
         let config = StateConfig { confirm_frames: 3, confirm_static_frames: 2, ..PUBLISHED };
         assert_eq!(states(&config, &[seen(0.0), seen(0.0)]), [Uncertain, Static]);
-        assert_eq!(states(&config, &[seen(1.0), seen(1.0), seen(1.0)]), [Uncertain, Uncertain, Dynamic]);
-        assert_eq!(states(&config, &[seen(0.0), seen(0.2), seen(0.0), seen(0.0)]), [Uncertain, Uncertain, Uncertain, Static]);
+        assert_eq!(
+            states(&config, &[seen(1.0), seen(1.0), seen(1.0)]),
+            [Uncertain, Uncertain, Dynamic]
+        );
+        assert_eq!(
+            states(&config, &[seen(0.0), seen(0.2), seen(0.0), seen(0.0)]),
+            [Uncertain, Uncertain, Uncertain, Static]
+        );
     }
 
     #[test]
@@ -241,7 +282,10 @@ mod tests {
         let last = |script: &[Option<MotionEvidence>]| *states(&config, script).last().unwrap();
         assert_eq!(last(&[seen(1.0), seen(1.0), None, seen(1.0)]), Dynamic);
         assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0)]), Uncertain);
-        assert_eq!(last(&[seen(1.0), seen(1.0), None, None, seen(1.0), seen(1.0), seen(1.0)]), Dynamic);
+        assert_eq!(
+            last(&[seen(1.0), seen(1.0), None, None, seen(1.0), seen(1.0), seen(1.0)]),
+            Dynamic
+        );
     }
 
     #[test]
@@ -252,7 +296,9 @@ mod tests {
             change_frames: 1,
             ..StateConfig::default()
         };
-        let far = |speed_m_s| Some(MotionEvidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 });
+        let far = |speed_m_s| {
+            Some(MotionEvidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 })
+        };
         assert_eq!(states(&config, &[far(0.6)]), [Static]);
         assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");
         assert_eq!(states(&config, &[seen(1.0), far(0.6), far(0.05)]), [Dynamic, Dynamic, Static]);
@@ -262,13 +308,28 @@ mod tests {
     fn a_noisy_motion_proves_nothing() {
         let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
         let classified = |speed_m_s, sigma_m_s| {
-            MotionEvidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }.classify(&config, Uncertain)
+            MotionEvidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }
+                .classify(&config, Uncertain)
         };
         assert_eq!([classified(8.0, 1.0), classified(8.0, 1.5)], [Dynamic, Uncertain]);
-        // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give or take 2 nothing can be told.
-        assert_eq!([classified(2.0, 1.5), classified(2.0, 2.0), classified(2.0, 0.5)], [Static, Uncertain, Uncertain]);
-        let biased = |bias_m_s| MotionEvidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }.classify(&config, Uncertain);
-        assert_eq!([biased(2.0), biased(3.0)], [Dynamic, Uncertain], "nor does one the lens could make");
-        assert_eq!([classified(f32::NAN, 0.0), classified(0.0, f32::INFINITY)], [Uncertain, Uncertain]);
+        // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give
+        // or take 2 nothing can be told.
+        assert_eq!(
+            [classified(2.0, 1.5), classified(2.0, 2.0), classified(2.0, 0.5)],
+            [Static, Uncertain, Uncertain]
+        );
+        let biased = |bias_m_s| {
+            MotionEvidence { speed_m_s: 8.0, sigma_m_s: 0.0, spread_m_s: 0.0, bias_m_s }
+                .classify(&config, Uncertain)
+        };
+        assert_eq!(
+            [biased(2.0), biased(3.0)],
+            [Dynamic, Uncertain],
+            "nor does one the lens could make"
+        );
+        assert_eq!(
+            [classified(f32::NAN, 0.0), classified(0.0, f32::INFINITY)],
+            [Uncertain, Uncertain]
+        );
     }
 }

@@ -32,14 +32,20 @@ pub struct MotionInput<'a, 's> {
 
 impl Tracker<'_> {
     /// Each track's motion, state and pose in this frame, from the matches assigned to it.
-    pub(super) fn estimate_motions(&mut self, input: &MotionInput<'_, '_>, estimator: &mut Estimator<'_>) {
+    pub(super) fn estimate_motions(
+        &mut self,
+        input: &MotionInput<'_, '_>,
+        estimator: &mut Estimator<'_>,
+    ) {
         let interval_s = f64::from(self.config.frame_interval_s);
         for index in 0..self.tracks.all().len() {
             let Some(track) = self.tracks.all_mut().get_mut(index) else { break };
             let was_known = track.motion_state.state() != MotionState::Uncertain;
             track.filter.predict(&self.config.motion, interval_s);
             (track.matches, track.inliers, track.measured) = (0, 0, false.into());
-            if let (Some(t_current_previous), true) = (&input.camera.t_current_previous, track.sightings > 1) {
+            if let (Some(t_current_previous), true) =
+                (&input.camera.t_current_previous, track.sightings > 1)
+            {
                 self.estimate_motion(index, t_current_previous, input, estimator);
             }
             let Some(track) = self.tracks.all_mut().get_mut(index) else { break };
@@ -65,22 +71,34 @@ impl Tracker<'_> {
             debug_assert!(false, "a track names an instance of this frame");
             return;
         };
-        let (current, previous, previous_mask) = (self.masks.current(), self.masks.previous(), track.mask);
+        let (current, previous, previous_mask) =
+            (self.masks.current(), self.masks.previous(), track.mask);
         let was_under_mask = |m: &Match| {
             let (u, v) = pixel(m.previous_left);
             previous.contains(&previous_mask, u, v)
         };
         // Few matches belong to one track: the owner code, which costs less, is compared first.
         let is_own = |&(m, code): &(&Match, &OwnerCode)| code.is_instance(at) && was_under_mask(m);
-        let own = input.matches.refined.iter().zip(&*self.refined_owner).filter(is_own).map(|(m, _)| m);
+        let own =
+            input.matches.refined.iter().zip(&*self.refined_owner).filter(is_own).map(|(m, _)| m);
         let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
         // Sparse matches of the same features say nothing new.
-        for (m, code) in input.matches.sparse.iter().zip(self.sparse_owner.iter_mut()).filter(|(_, code)| code.is_instance(at)) {
-            if enough || own.clone().any(|other| is_same_keypoint(m.current_left, other.current_left)) {
+        for (m, code) in input
+            .matches
+            .sparse
+            .iter()
+            .zip(self.sparse_owner.iter_mut())
+            .filter(|(_, code)| code.is_instance(at))
+        {
+            if enough
+                || own.clone().any(|other| is_same_keypoint(m.current_left, other.current_left))
+            {
                 *code = MatchOwner::None.into();
             }
         }
-        let own = own.chain(input.matches.sparse.iter().zip(&*self.sparse_owner).filter(is_own).map(|(m, _)| m));
+        let own = own.chain(
+            input.matches.sparse.iter().zip(&*self.sparse_owner).filter(is_own).map(|(m, _)| m),
+        );
         let frame = MotionFrame {
             rig: input.rig,
             t_world_camera: &input.camera.t_world_camera,
@@ -88,38 +106,48 @@ impl Tracker<'_> {
             interval_s: f64::from(self.config.frame_interval_s),
             seed: SEED ^ u64::from(track.id) << 32 ^ u64::from(self.frame),
         };
-        let masks = ObjectMasks { current: (current, instance.mask), previous: (previous, previous_mask) };
+        let masks =
+            ObjectMasks { current: (current, instance.mask), previous: (previous, previous_mask) };
         let search = input.search.filter(|_| !enough).map(|search| GuidedSearch {
-            find: move |motion: &Transform, found: &mut [Match]| search_by_projection(&search, input.rig, &masks, motion, found),
+            find: move |motion: &Transform, found: &mut [Match]| {
+                search_by_projection(&search, input.rig, &masks, motion, found)
+            },
             found: &mut *self.guided_matches,
         });
-        let estimate = estimate_motion(&self.config.motion, &frame, own, search, &mut track.filter, estimator);
-        (track.matches, track.inliers, track.measured) = (estimate.matches, estimate.inliers, estimate.measured.into());
+        let estimate =
+            estimate_motion(&self.config.motion, &frame, own, search, &mut track.filter, estimator);
+        (track.matches, track.inliers, track.measured) =
+            (estimate.matches, estimate.inliers, estimate.measured.into());
     }
 }
 
 /// Updates a track's state by a frame's motion, or by its lack.
 fn classify(config: &TrackingConfig, rig: &StereoRig, camera: &CameraMotion, track: &mut Track) {
-    let motion_evidence = camera.t_current_previous.filter(|_| track.measured.get()).map(|t_current_previous| {
-        let interval_s = f64::from(config.frame_interval_s);
-        let [speed, sigma, spread] = track.filter.speed();
-        let camera_world = camera.t_world_camera.inverse();
-        let static_prediction = camera_world.transform_point(track.filter.center_world());
-        let now = static_prediction + camera_world.rotate(track.filter.velocity()) * interval_s;
-        let passing = (now - t_current_previous.inverse().transform_point(static_prediction)).norm() / interval_s;
-        let rotation_error = f64::from(config.motion.camera_rad) * static_prediction.z / interval_s;
-        track.sigma_m_s = libm::sqrt(sigma * sigma + rotation_error * rotation_error) as f32;
-        // Depth goes with the inverse of disparity, its change with the inverse square.
-        let side = rig.focal_px * static_prediction.x / (static_prediction.z * rig.center_u_px);
-        let error_px = f64::from(config.motion.bias_px) + f64::from(config.motion.lens_px) * side * side * side * side;
-        let bias = passing * 2.0 * error_px * static_prediction.z / rig.focal_baseline_px_m();
-        MotionEvidence {
-            speed_m_s: speed as f32,
-            sigma_m_s: track.sigma_m_s,
-            spread_m_s: libm::sqrt(spread * spread + rotation_error * rotation_error) as f32,
-            bias_m_s: bias as f32,
-        }
-    });
+    let motion_evidence =
+        camera.t_current_previous.filter(|_| track.measured.get()).map(|t_current_previous| {
+            let interval_s = f64::from(config.frame_interval_s);
+            let [speed, sigma, spread] = track.filter.speed();
+            let camera_world = camera.t_world_camera.inverse();
+            let static_prediction = camera_world.transform_point(track.filter.center_world());
+            let now = static_prediction + camera_world.rotate(track.filter.velocity()) * interval_s;
+            let passing = (now - t_current_previous.inverse().transform_point(static_prediction))
+                .norm()
+                / interval_s;
+            let rotation_error =
+                f64::from(config.motion.camera_rad) * static_prediction.z / interval_s;
+            track.sigma_m_s = libm::sqrt(sigma * sigma + rotation_error * rotation_error) as f32;
+            // Depth goes with the inverse of disparity, its change with the inverse square.
+            let side = rig.focal_px * static_prediction.x / (static_prediction.z * rig.center_u_px);
+            let error_px = f64::from(config.motion.bias_px)
+                + f64::from(config.motion.lens_px) * side * side * side * side;
+            let bias = passing * 2.0 * error_px * static_prediction.z / rig.focal_baseline_px_m();
+            MotionEvidence {
+                speed_m_s: speed as f32,
+                sigma_m_s: track.sigma_m_s,
+                spread_m_s: libm::sqrt(spread * spread + rotation_error * rotation_error) as f32,
+                bias_m_s: bias as f32,
+            }
+        });
     track.motion_state.update(&config.state, motion_evidence);
 }
 
@@ -134,7 +162,8 @@ pub(super) fn motion_world(track: &Track, interval_s: f64) -> Transform {
 /// Continues a track's trajectory segment, begins a new one or ends it.
 fn advance_pose(track: &mut Track, t_world_camera: &Transform, was_known: bool, interval_s: f64) {
     let state = track.motion_state.state();
-    let connects = track.segment_len > 0 && (track.measured.get() || state != MotionState::Uncertain);
+    let connects =
+        track.segment_len > 0 && (track.measured.get() || state != MotionState::Uncertain);
     if connects {
         let advanced = (motion_world(track, interval_s) * track.t_world_object).normalized();
         let is_new_static = state == MotionState::Static && !was_known;

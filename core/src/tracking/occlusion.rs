@@ -1,8 +1,9 @@
 //! Which instance continues a track whose object something passes in front of.
 //!
-//! Then the mask is cut to what is seen of the object, on one side in one frame and on the other in the next: the two need not overlap.
-//! So a track remembers how far its object reached when it was last seen whole, its *extent*, and moves that with its velocity in the
-//! image. A detection of agreeing class within it, with the same top or bottom, is the object again.
+//! Then the mask is cut to what is seen of the object, on one side in one frame and on the other in
+//! the next: the two need not overlap. So a track remembers how far its object reached when it was
+//! last seen whole, its *extent*, and moves that with its velocity in the image. A detection of
+//! agreeing class within it, with the same top or bottom, is the object again.
 
 use super::{TrackingConfig, instance::Instance, track::Track};
 use crate::masks::PixelBox;
@@ -14,13 +15,20 @@ const WITHIN_TENTHS: i64 = 8;
 /// Most by which the tops, or the bottoms, may differ, as a part of the extent's height.
 const EDGE_PART: i32 = 6;
 
-/// How well an instance continues a track that was cut, or is cut now, by its extent: the overlap of both; 0 where it does not.
-pub(super) fn extent_affinity(config: &TrackingConfig, frame: u32, instance: &Instance, track: &Track) -> f32 {
+/// How well an instance continues a track that was cut, or is cut now, by its extent: the overlap
+/// of both; 0 where it does not.
+pub(super) fn extent_affinity(
+    config: &TrackingConfig,
+    frame: u32,
+    instance: &Instance,
+    track: &Track,
+) -> f32 {
     let (seen, extent) = (instance.mask.pixels, track.expected_extent());
     let gap = frame.wrapping_sub(track.last_frame);
     let was_cut = gap > 1 || track.extent != track.mask.pixels;
     let edge = extent.height / EDGE_PART;
-    let has_edge = (seen.top - extent.top).abs() <= edge || (seen.top + seen.height - extent.top - extent.height).abs() <= edge;
+    let has_edge = (seen.top - extent.top).abs() <= edge
+        || (seen.top + seen.height - extent.top - extent.height).abs() <= edge;
     let continues = gap <= u32::from(config.extent_frames)
         && (was_cut || is_cut(&seen, &extent))
         && has_edge
@@ -29,12 +37,21 @@ pub(super) fn extent_affinity(config: &TrackingConfig, frame: u32, instance: &In
     if continues { seen.overlap(&extent) } else { 0.0 }
 }
 
-/// The extent of a track after a frame of images of that size, in which its object was seen in the box `seen` or not at all.
-pub(super) fn next_extent(track: &Track, seen: Option<PixelBox>, [width, height]: [usize; 2]) -> PixelBox {
+/// The extent of a track after a frame of images of that size, in which its object was seen in the
+/// box `seen` or not at all.
+pub(super) fn next_extent(
+    track: &Track,
+    seen: Option<PixelBox>,
+    [width, height]: [usize; 2],
+) -> PixelBox {
     let expected = track.expected_extent();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
     match seen {
-        Some(seen) if is_cut(&seen, &expected.intersection(&image)) && is_within(&seen, &expected) => expected,
+        Some(seen)
+            if is_cut(&seen, &expected.intersection(&image)) && is_within(&seen, &expected) =>
+        {
+            expected
+        }
         Some(seen) => seen,
         None => expected,
     }

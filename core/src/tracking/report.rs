@@ -1,6 +1,9 @@
 //! Reports of detections and tracks, as plain values.
 
-use super::{Class, DetectionCount, MotionState, SegmentationReport, TrackCount, Tracker, motions::motion_world};
+use super::{
+    Class, DetectionCount, MotionState, SegmentationReport, TrackCount, Tracker,
+    motions::motion_world,
+};
 use crate::{geometry::Transform, masks::PixelBox};
 
 /// A track as it stands after a frame.
@@ -25,8 +28,9 @@ pub struct TrackReport {
     pub sightings: u32,
     /// Box in the left image, where it was last detected.
     pub pixels: PixelBox,
-    /// Speed over ground and its error, one sigma, m/s; `None` while no motion was ever measured, and once the last one is too old to
-    /// tell a state. For a static object it is what was measured, although its motion is taken to be the identity.
+    /// Speed over ground and its error, one sigma, m/s; `None` while no motion was ever measured,
+    /// and once the last one is too old to tell a state. For a static object it is what was
+    /// measured, although its motion is taken to be the identity.
     pub speed_m_s: Option<[f32; 2]>,
     /// Whether the motion was measured in this frame; if not it is extrapolated.
     pub measured: bool,
@@ -63,28 +67,33 @@ pub struct TrackingReport {
 }
 
 impl Tracker<'_> {
-    /// The tracks of this frame, by age; without tentative ones, which are too small to be reconstructed and never had a measured motion.
-    /// Volumes are not known here: [`TrackReport::blocks`] is 0.
+    /// The tracks of this frame, by age; without tentative ones, which are too small to be
+    /// reconstructed and never had a measured motion. Volumes are not known here:
+    /// [`TrackReport::blocks`] is 0.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         let interval_s = f64::from(self.config.frame_interval_s);
-        self.tracks.all().iter().filter(|track| !track.is_tentative()).map(move |track| TrackReport {
-            id: track.id,
-            class: track.class(),
-            state: track.motion_state.state(),
-            score: track.score,
-            detected: track.instance.is_some(),
-            first_frame: track.first_frame,
-            last_frame: track.last_frame,
-            sightings: track.sightings,
-            pixels: track.mask.pixels,
-            speed_m_s: track.has_speed().then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
-            measured: track.measured.get(),
-            center_world_m: track.filter.center_world().coords.into(),
-            motion_world: motion_world(track, interval_s),
-            t_world_object: (track.segment_len > 0).then_some(track.t_world_object),
-            matches: track.matches,
-            inliers: track.inliers,
-            blocks: 0,
+        self.tracks.all().iter().filter(|track| !track.is_tentative()).map(move |track| {
+            TrackReport {
+                id: track.id,
+                class: track.class(),
+                state: track.motion_state.state(),
+                score: track.score,
+                detected: track.instance.is_some(),
+                first_frame: track.first_frame,
+                last_frame: track.last_frame,
+                sightings: track.sightings,
+                pixels: track.mask.pixels,
+                speed_m_s: track
+                    .has_speed()
+                    .then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
+                measured: track.measured.get(),
+                center_world_m: track.filter.center_world().coords.into(),
+                motion_world: motion_world(track, interval_s),
+                t_world_object: (track.segment_len > 0).then_some(track.t_world_object),
+                matches: track.matches,
+                inliers: track.inliers,
+                blocks: 0,
+            }
         })
     }
 }

@@ -1,6 +1,9 @@
 //! The stages of tracking in a frame, each a value that the next one takes.
 
-use super::{CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker, TrackingReport, Trail};
+use super::{
+    CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker,
+    TrackingReport, Trail,
+};
 use crate::{
     egomotion::Estimator,
     geometry::{StereoRig, Transform},
@@ -8,8 +11,8 @@ use crate::{
 };
 
 impl<'s> Tracker<'s> {
-    /// Begins frame `frame` of images of that size: validates its detections and associates them with tracks, which move in the image
-    /// as the matches of the scene flow say.
+    /// Begins frame `frame` of images of that size: validates its detections and associates them
+    /// with tracks, which move in the image as the matches of the scene flow say.
     pub(crate) fn detect<'m>(
         &mut self,
         frame: u32,
@@ -53,8 +56,9 @@ impl<'t, 's> Assigned<'t, '_, 's> {
         self.tracker.egomotion_mask(self.matches.refined)
     }
 
-    /// Adds instances of what moves and no detector found, if that is asked for ([`super::SegmentationConfig`]). `search` is where more
-    /// matches are searched for on objects that have few.
+    /// Adds instances of what moves and no detector found, if that is asked for
+    /// ([`super::SegmentationConfig`]). `search` is where more matches are searched for on objects
+    /// that have few.
     pub(crate) fn segment_motion(
         self,
         rig: &StereoRig,
@@ -66,7 +70,8 @@ impl<'t, 's> Assigned<'t, '_, 's> {
         self
     }
 
-    /// Estimates each track's motion, state and pose. `search` is where more matches are searched for on objects that have few.
+    /// Estimates each track's motion, state and pose. `search` is where more matches are searched
+    /// for on objects that have few.
     pub(crate) fn estimate_motions(
         self,
         rig: &StereoRig,

@@ -9,7 +9,13 @@ pub(crate) use motion_filter::{MotionFilter, Observation};
 
 /// The stages one by one, so that what lies between two of them can be looked at.
 impl<'s> Tracker<'s> {
-    pub(crate) fn test_ingest(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], matches: FrameMatches<'_>) {
+    pub(crate) fn test_ingest(
+        &mut self,
+        frame: u32,
+        detections: &[Detection<'_>],
+        size: [usize; 2],
+        matches: FrameMatches<'_>,
+    ) {
         self.ingest(frame, detections, size, &matches);
     }
 

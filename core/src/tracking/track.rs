@@ -29,8 +29,8 @@ pub(crate) struct Track {
     pub mask: MaskHandle,
     /// How far it reached in the image when it was last seen whole, moved since with its velocity.
     pub extent: PixelBox,
-    /// Velocity in the image between the last two sightings, px a frame: of its matches or, where these are few, of its box's centre
-    /// unless that is cut.
+    /// Velocity in the image between the last two sightings, px a frame: of its matches or, where
+    /// these are few, of its box's centre unless that is cut.
     pub velocity_px: [i32; 2],
     pub motion_state: MotionHysteresis,
     /// From 1, never used again.
@@ -82,14 +82,18 @@ impl Track {
         }
     }
 
-    /// Continues it in frame `frame` with the instance at `index`; its mask stays that of the frame before until the frame is
-    /// committed.
+    /// Continues it in frame `frame` with the instance at `index`; its mask stays that of the frame
+    /// before until the frame is committed.
     pub fn continue_with(&mut self, frame: u32, index: usize, instance: &Instance) {
         let gap = frame.wrapping_sub(self.last_frame).clamp(1, 1 << 16) as i32;
         // The middle of what is left of a box does not move with the object.
-        if !self.velocity_measured.get() && !is_cut(&instance.mask.pixels, &self.expected_extent()) {
-            let twice_center = |mask: &MaskHandle| [2 * mask.pixels.left + mask.pixels.width, 2 * mask.pixels.top + mask.pixels.height];
-            let ([u, v], [u_before, v_before]) = (twice_center(&instance.mask), twice_center(&self.mask));
+        if !self.velocity_measured.get() && !is_cut(&instance.mask.pixels, &self.expected_extent())
+        {
+            let twice_center = |mask: &MaskHandle| {
+                [2 * mask.pixels.left + mask.pixels.width, 2 * mask.pixels.top + mask.pixels.height]
+            };
+            let ([u, v], [u_before, v_before]) =
+                (twice_center(&instance.mask), twice_center(&self.mask));
             self.velocity_px = [(u - u_before) / (2 * gap), (v - v_before) / (2 * gap)];
         }
         self.vote_class(instance.class);
@@ -104,14 +108,16 @@ impl Track {
         Class::from_code(self.class)
     }
 
-    /// Whether it is too small to be reconstructed and no motion of it was ever measured: it is not reported then.
+    /// Whether it is too small to be reconstructed and no motion of it was ever measured: it is not
+    /// reported then.
     pub fn is_tentative(&self) -> bool {
         self.tracked_only.get() && !self.filter.is_known()
     }
 
     /// Whether its speed is known: measured in this frame, or lately enough for a state.
     pub fn has_speed(&self) -> bool {
-        self.filter.is_known() && (self.measured.get() || self.motion_state.state() != MotionState::Uncertain)
+        self.filter.is_known()
+            && (self.measured.get() || self.motion_state.state() != MotionState::Uncertain)
     }
 
     /// How far its velocity moves its mask within `gap` frames, px.

@@ -9,7 +9,8 @@ impl Tracker<'_> {
         self.tracks.audit(self.frame, self.instances.all().len(), audit);
     }
 
-    /// Visits all that outlives a frame. Only this frame's mask store does: the next frame empties the other one.
+    /// Visits all that outlives a frame. Only this frame's mask store does: the next frame empties
+    /// the other one.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             masks,

@@ -1,4 +1,5 @@
-//! What leaves a map on demand: the picture a camera would take of it, and its surface as triangles.
+//! What leaves a map on demand: the picture a camera would take of it, and its surface as
+//! triangles.
 //!
 //! A view reads a [`Volume`](crate::volume::Volume) and keeps no part of it.
 

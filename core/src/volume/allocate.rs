@@ -1,16 +1,22 @@
 //! Making the blocks that a depth image runs through, and finding which are visible.
 //!
-//! Along the ray of every second pixel of every second row, staggered, each block within `allocation_m` of the depth is visited exactly
-//! once, farther where the next rays end farther off, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray
-//! Tracing*, 1987). Near surfaces, whose blocks are many pixels wide, have a quarter or a sixteenth of these rays. Which pixels are taken changes
-//! from frame to frame (docs/decisions/0018-allocation-from-every-fourth-pixel.md, 0047-fewer-rays-where-blocks-are-wide.md). A point
-//! belongs to the block of its nearest lattice point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
-//! Blocks farther from the surface hold none of it (docs/decisions/0046-blocks-near-the-surface.md).
+//! Along the ray of every second pixel of every second row, staggered, each block within
+//! `allocation_m` of the depth is visited exactly once, farther where the next rays end farther
+//! off, by walking the block grid (Amanatides, Woo: *A Fast Voxel Traversal Algorithm for Ray
+//! Tracing*, 1987). Near surfaces, whose blocks are many pixels wide, have a quarter or a sixteenth
+//! of these rays. Which pixels are taken changes from frame to frame
+//! (docs/decisions/0018-allocation-from-every-fourth-pixel.md,
+//! 0047-fewer-rays-where-blocks-are-wide.md). A point belongs to the block of its nearest lattice
+//! point: a block's lattice points are its centre of mass, so nothing is shifted by half a voxel.
+//! Blocks farther from the surface hold none of it
+//! (docs/decisions/0046-blocks-near-the-surface.md).
 //!
-//! Rows are walked in four fixed bands; what they ask for is made band by band, in the order in which it was met.
+//! Rows are walked in four fixed bands; what they ask for is made band by band, in the order in
+//! which it was met.
 //!
-//! Memory: 128 KiB, half of it a direct-mapped cache of the blocks met, which spares the index most look-ups, half for requests. Time:
-//! linear in pixels times blocks per ray, at most [`MAX_BLOCKS_PER_RAY`].
+//! Memory: 128 KiB, half of it a direct-mapped cache of the blocks met, which spares the index most
+//! look-ups, half for requests. Time: linear in pixels times blocks per ray, at most
+//! [`MAX_BLOCKS_PER_RAY`].
 
 use super::{
     BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
@@ -22,10 +28,12 @@ use crate::{
 };
 use nalgebra::Vector3;
 
-/// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three axes, and one at either end.
+/// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three
+/// axes, and one at either end.
 pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
 
-/// What one frame's allocation did. Requests refused repeat when several rays ask for the same block.
+/// What one frame's allocation did. Requests refused repeat when several rays ask for the same
+/// block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -46,8 +54,8 @@ pub struct AllocationReport {
 }
 
 impl Volume<'_> {
-    /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists what is visible. Blocks that must leave go
-    /// to `store`, and those it kept come back.
+    /// Makes the blocks around the surface that `depth_m` (0 none) shows from `view`, and lists
+    /// what is visible. Blocks that must leave go to `store`, and those it kept come back.
     pub fn allocate<S: BlockStore, E: Executor>(
         &mut self,
         view: &Viewpoint,
@@ -58,7 +66,8 @@ impl Volume<'_> {
         let mut report = AllocationReport::default();
         self.visible.begin_frame();
 
-        // Block coordinates relative to the camera's block keep their precision however far the camera has come.
+        // Block coordinates relative to the camera's block keep their precision however far the
+        // camera has come.
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
         let half_voxel = 0.5 / BLOCK_SIDE as f64;
         let camera = view.t_world_camera.translation() / block_m + Vector3::repeat(half_voxel);
@@ -66,7 +75,9 @@ impl Volume<'_> {
             report.beyond = depth_m.rows().flatten().filter(|&&depth| depth > 0.0).count() as u32;
             return report;
         };
-        let start = (camera - Vector3::new(f64::from(base[0]), f64::from(base[1]), f64::from(base[2]))).cast::<f32>();
+        let start = (camera
+            - Vector3::new(f64::from(base[0]), f64::from(base[1]), f64::from(base[2])))
+        .cast::<f32>();
         let rays = Rays::new(&self.config, view, depth_m, start, self.visible.frame());
         // Out of the volume while its bands ask for blocks.
         let mut requested = core::mem::take(&mut self.requested);
@@ -84,8 +95,16 @@ impl Volume<'_> {
     }
 
     /// Finds or makes the block `base + block` and lists it.
-    pub(super) fn request<S: BlockStore>(&mut self, block: [i32; 3], base: [i32; 3], store: &mut S, report: &mut AllocationReport) {
-        let Some(coord) = BlockCoord::new(base[0] + block[0], base[1] + block[1], base[2] + block[2]) else {
+    pub(super) fn request<S: BlockStore>(
+        &mut self,
+        block: [i32; 3],
+        base: [i32; 3],
+        store: &mut S,
+        report: &mut AllocationReport,
+    ) {
+        let Some(coord) =
+            BlockCoord::new(base[0] + block[0], base[1] + block[1], base[2] + block[2])
+        else {
             report.beyond += 1;
             return;
         };
@@ -149,7 +168,12 @@ impl Volume<'_> {
             let u = view.rig.focal_px * at.x + view.rig.center_u_px * at.z;
             let v = view.rig.focal_px * at.y + view.rig.center_v_px * at.z;
             // Inside the picture, without dividing by a depth that may be 0.
-            let inside = at.z > 0.0 && at.z <= farthest && u >= 0.0 && v >= 0.0 && u < width * at.z && v < height * at.z;
+            let inside = at.z > 0.0
+                && at.z <= farthest
+                && u >= 0.0
+                && v >= 0.0
+                && u < width * at.z
+                && v < height * at.z;
             if inside {
                 self.list(slot, report);
             }

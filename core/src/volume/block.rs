@@ -1,5 +1,5 @@
-//! What blocks hold: an array of records, and beside it one for what is read without the voxels and one for colour
-//! (docs/decisions/0017-blocks-as-records.md).
+//! What blocks hold: an array of records, and beside it one for what is read without the voxels and
+//! one for colour (docs/decisions/0017-blocks-as-records.md).
 //!
 //! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
 
@@ -33,7 +33,11 @@ pub struct BlockCoord {
 impl BlockCoord {
     /// The block at these coordinates; `None` beyond 16 bits (13 km at 5 cm), where the map ends.
     pub fn new(x: i32, y: i32, z: i32) -> Option<Self> {
-        Some(Self { x: i16::try_from(x).ok()?, y: i16::try_from(y).ok()?, z: i16::try_from(z).ok()? })
+        Some(Self {
+            x: i16::try_from(x).ok()?,
+            y: i16::try_from(y).ok()?,
+            z: i16::try_from(z).ok()?,
+        })
     }
 
     /// The block that holds a lattice point.
@@ -43,7 +47,11 @@ impl BlockCoord {
 
     /// The block `offset` blocks away; `None` beyond the map.
     pub(crate) fn offset(self, offset: [i32; 3]) -> Option<Self> {
-        Self::new(i32::from(self.x) + offset[0], i32::from(self.y) + offset[1], i32::from(self.z) + offset[2])
+        Self::new(
+            i32::from(self.x) + offset[0],
+            i32::from(self.y) + offset[1],
+            i32::from(self.z) + offset[2],
+        )
     }
 
     /// The first lattice point of the block.
@@ -56,7 +64,8 @@ impl BlockCoord {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Voxels {
-    /// Signed distance in units of truncation / 32,767: positive before the surface, meaningless where the weight is 0.
+    /// Signed distance in units of truncation / 32,767: positive before the surface, meaningless
+    /// where the weight is 0.
     pub sdf: [i16; BLOCK_VOXELS],
     /// Observations, up to `max_weight`; 0 is never observed.
     pub weight: [u8; BLOCK_VOXELS],
@@ -86,7 +95,8 @@ pub(super) struct Header {
     /// Digest of the block's coordinates and content; 0 until the block is first fused.
     pub digest: u64,
     coord: [i16; 3],
-    /// Least weight of the observed voxels, so that pruning need not read them; 0 where it is not known.
+    /// Least weight of the observed voxels, so that pruning need not read them; 0 where it is not
+    /// known.
     pub min_weight: u8,
     reserved: u8,
 }
@@ -117,7 +127,9 @@ pub struct Blocks<'s> {
 impl<'s> Blocks<'s> {
     /// Bytes of the slab.
     pub(crate) const fn bytes(blocks: usize, colour: bool) -> usize {
-        region_bytes::<Header>(blocks) + region_bytes::<Voxels>(blocks) + if colour { region_bytes::<Colour>(blocks) } else { 0 }
+        region_bytes::<Header>(blocks)
+            + region_bytes::<Voxels>(blocks)
+            + if colour { region_bytes::<Colour>(blocks) } else { 0 }
     }
 
     /// Cuts the memory of `capacity.blocks` blocks.
@@ -125,16 +137,24 @@ impl<'s> Blocks<'s> {
         Self {
             header: carver.alloc("volume.header", capacity.blocks),
             voxels: carver.alloc_as_found("volume.voxels", capacity.blocks),
-            colour: if capacity.colour { carver.alloc_as_found("volume.colour", capacity.blocks) } else { &mut [] },
+            colour: if capacity.colour {
+                carver.alloc_as_found("volume.colour", capacity.blocks)
+            } else {
+                &mut []
+            },
         }
     }
 
-    /// Visits the block in a slot: its coordinates, its voxels and what they were last summed up to. The digest of a block that was made and
-    /// never fused is 0, which its voxels would not tell.
+    /// Visits the block in a slot: its coordinates, its voxels and what they were last summed up
+    /// to. The digest of a block that was made and never fused is 0, which its voxels would not
+    /// tell.
     pub(super) fn visit(&mut self, slot: Slot, visitor: &mut impl Visitor) {
         let Self { header, voxels, colour } = self;
-        if let (Some(header), Some(voxels)) = (header.get_mut(slot.index()), voxels.get_mut(slot.index())) {
-            let (Header { coord, digest, min_weight, reserved: _ }, Voxels { sdf, weight }) = (header, voxels);
+        if let (Some(header), Some(voxels)) =
+            (header.get_mut(slot.index()), voxels.get_mut(slot.index()))
+        {
+            let (Header { coord, digest, min_weight, reserved: _ }, Voxels { sdf, weight }) =
+                (header, voxels);
             visitor.i16s(coord);
             visitor.i16s(sdf);
             visitor.bytes(weight);
@@ -183,5 +203,9 @@ impl<'s> Blocks<'s> {
 /// Least weight of the seen voxels; 0 where none is seen.
 pub(super) fn least_weight(weight: &[u8; BLOCK_VOXELS]) -> u8 {
     // Never seen wraps around to the most there is, and back.
-    weight.iter().map(|weight| weight.wrapping_sub(1)).fold(u8::MAX, |least, one| if one < least { one } else { least }).wrapping_add(1)
+    weight
+        .iter()
+        .map(|weight| weight.wrapping_sub(1))
+        .fold(u8::MAX, |least, one| if one < least { one } else { least })
+        .wrapping_add(1)
 }

@@ -1,9 +1,11 @@
 //! Erasing: what a moving object left in the map before it was known to move goes.
 //!
-//! Voxels in a box that were seen no more often than the object can have been there are reset; a block without a seen voxel left goes back to the
-//! pool. What was mapped there before, and what the object merely stood before, was seen more often and stays.
+//! Voxels in a box that were seen no more often than the object can have been there are reset; a
+//! block without a seen voxel left goes back to the pool. What was mapped there before, and what
+//! the object merely stood before, was seen more often and stays.
 //!
-//! Time: a look-up for each block of the box, or a look at each block of the map where these are fewer, and at each voxel of those in the box.
+//! Time: a look-up for each block of the box, or a look at each block of the map where these are
+//! fewer, and at each voxel of those in the box.
 
 use super::{BLOCK_SIDE, BlockCoord, Slot, Volume, block::Voxels};
 use crate::geometry::OrientedBox;
@@ -11,10 +13,16 @@ use crate::geometry::OrientedBox;
 impl Volume<'_> {
     /// Resets the voxels within a box that were seen in at most so many frames. Returns how many.
     pub(crate) fn erase(&mut self, within: &OrientedBox, frames: u32) -> u32 {
-        let weight_most = u8::try_from(frames.saturating_mul(self.config.observation_weight.most())).unwrap_or(u8::MAX);
+        let weight_most =
+            u8::try_from(frames.saturating_mul(self.config.observation_weight.most()))
+                .unwrap_or(u8::MAX);
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
-        let [low, high] = within.bounds_m().map(|corner| corner.map(|c| libm::floor(c / block_m) as i32));
-        let sides = low.iter().zip(&high).map(|(low, high)| (i64::from(*high) - i64::from(*low)).saturating_add(1));
+        let [low, high] =
+            within.bounds_m().map(|corner| corner.map(|c| libm::floor(c / block_m) as i32));
+        let sides = low
+            .iter()
+            .zip(&high)
+            .map(|(low, high)| (i64::from(*high) - i64::from(*low)).saturating_add(1));
         let blocks = sides.fold(1, i64::saturating_mul);
         let mut reset = 0;
         if blocks > self.pool.len() as i64 {
@@ -47,7 +55,11 @@ impl Volume<'_> {
         let mut planes = self.blocks.colour.get_mut(at);
         let mut reset = 0;
         for (index, (sdf, weight)) in sdf.iter_mut().zip(weight.iter_mut()).enumerate() {
-            let offset = [index % BLOCK_SIDE, index / BLOCK_SIDE % BLOCK_SIDE, index / (BLOCK_SIDE * BLOCK_SIDE)];
+            let offset = [
+                index % BLOCK_SIDE,
+                index / BLOCK_SIDE % BLOCK_SIDE,
+                index / (BLOCK_SIDE * BLOCK_SIDE),
+            ];
             let mut point_m = [0.0; 3];
             for ((point, origin), offset) in point_m.iter_mut().zip(origin).zip(offset) {
                 *point = voxel_m * (f64::from(origin) + offset as f64);

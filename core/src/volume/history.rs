@@ -1,11 +1,14 @@
-//! Which blocks were visible in each of the last frames: the paper's fixed-lag window (Section III-F).
+//! Which blocks were visible in each of the last frames: the paper's fixed-lag window (Section
+//! III-F).
 //!
-//! A ring of bit sets over the pool's slots, one per frame. A slot that was freed and given out again since is told apart by the frame its
-//! block was allocated in. Walking a set visits slots in ascending order, on every machine.
+//! A ring of bit sets over the pool's slots, one per frame. A slot that was freed and given out
+//! again since is told apart by the frame its block was allocated in. Walking a set visits slots in
+//! ascending order, on every machine.
 //!
-//! Memory: `frames * ceil(blocks / 64) * 8` bytes, one more set for what a frame could not finish, and 4 bytes a block: 1.7 MiB for 200
-//! frames of 70,000 blocks, where lists of coordinates would take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit
-//! per visible block to enter a frame; a pass over one set to take one out.
+//! Memory: `frames * ceil(blocks / 64) * 8` bytes, one more set for what a frame could not finish,
+//! and 4 bytes a block: 1.7 MiB for 200 frames of 70,000 blocks, where lists of coordinates would
+//! take 13.7 MiB (docs/decisions/0005-history-of-bit-sets.md). Time: one bit per visible block to
+//! enter a frame; a pass over one set to take one out.
 
 use super::Slot;
 use crate::state::Visitor;
@@ -83,7 +86,8 @@ impl<'s> VisibleHistory<'s> {
         }
     }
 
-    /// Notes that the block in `slot` is gone: it is no longer due, and what the ring says of it is void.
+    /// Notes that the block in `slot` is gone: it is no longer due, and what the ring says of it is
+    /// void.
     pub(super) fn on_free(&mut self, slot: Slot) {
         self.allocated_at(slot, u32::MAX);
         if let Some(word) = self.due.get_mut(slot.index() / 64) {
@@ -91,7 +95,8 @@ impl<'s> VisibleHistory<'s> {
         }
     }
 
-    /// Appends the slots visible in `frame`, which must follow the last frame of the ring. The ring must not be full.
+    /// Appends the slots visible in `frame`, which must follow the last frame of the ring. The ring
+    /// must not be full.
     pub(super) fn push(&mut self, frame: u32, visible: &[Slot]) {
         if self.len == 0 {
             self.oldest = frame;
@@ -139,7 +144,8 @@ impl<'s> VisibleHistory<'s> {
         visitor.count(len, capacity);
         visitor.count(peak, capacity);
         for age in 0..*len as u32 {
-            let at = (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
+            let at =
+                (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
             visitor.u64s(part_mut(sets, at..at + used));
         }
         visitor.u64s(part_mut(due, ..used));

@@ -1,8 +1,9 @@
 //! From block coordinates to the block's slot: a hash table whose entries are integers.
 //!
-//! The table is `hashbrown::HashTable<Slot>`: entries are slots of the block pool, keys stay in the pool. It is built once, in the slab,
-//! for twice the blocks it will ever hold, so that deletion debris is cleaned in place and no second allocation is asked for; one that
-//! was would be refused and reported as [`Full`]. Nothing iterates the table, so its order is never observable.
+//! The table is `hashbrown::HashTable<Slot>`: entries are slots of the block pool, keys stay in the
+//! pool. It is built once, in the slab, for twice the blocks it will ever hold, so that deletion
+//! debris is cleaned in place and no second allocation is asked for; one that was would be refused
+//! and reported as [`Full`]. Nothing iterates the table, so its order is never observable.
 //!
 //! Memory: 5 bytes a bucket; buckets are the power of two at or above 16/7 of the blocks.
 
@@ -20,14 +21,19 @@ pub struct BlockIndex<'s> {
 
 impl core::fmt::Debug for BlockIndex<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("BlockIndex").field("len", &self.table.len()).field("capacity", &self.table.capacity()).finish()
+        f.debug_struct("BlockIndex")
+            .field("len", &self.table.len())
+            .field("capacity", &self.table.capacity())
+            .finish()
     }
 }
 
-/// Coordinates mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit finaliser: hashbrown looks at both ends).
+/// Coordinates mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit
+/// finaliser: hashbrown looks at both ends).
 pub(super) fn hash(coord: BlockCoord) -> u64 {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
-    let mixed = x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
+    let mixed =
+        x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     mixed ^ (mixed >> 29)
 }
@@ -65,13 +71,22 @@ impl<'s> BlockIndex<'s> {
 
     /// The slot of the block at `coord`; `coord_of` tells where the block in a slot lies.
     #[inline]
-    pub fn find(&self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> Option<Slot> {
+    pub fn find(
+        &self,
+        coord: BlockCoord,
+        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+    ) -> Option<Slot> {
         self.table.find(hash(coord), |&slot| coord_of(slot) == Some(coord)).copied()
     }
 
-    /// As [`BlockIndex::find`], and with how many blocks' coordinates were compared: 1 where nothing collides.
+    /// As [`BlockIndex::find`], and with how many blocks' coordinates were compared: 1 where
+    /// nothing collides.
     #[inline]
-    pub fn probe(&self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> (Option<Slot>, u32) {
+    pub fn probe(
+        &self,
+        coord: BlockCoord,
+        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+    ) -> (Option<Slot>, u32) {
         let mut compared = 0;
         let same = |&slot: &Slot| {
             compared += 1;
@@ -80,11 +95,18 @@ impl<'s> BlockIndex<'s> {
         (self.table.find(hash(coord), same).copied(), compared)
     }
 
-    /// Enters `slot`, whose block `coord_of` must say lies at `coord`, and which must not be in the index yet.
-    pub fn insert(&mut self, coord: BlockCoord, slot: Slot, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> Result<(), Full> {
+    /// Enters `slot`, whose block `coord_of` must say lies at `coord`, and which must not be in the
+    /// index yet.
+    pub fn insert(
+        &mut self,
+        coord: BlockCoord,
+        slot: Slot,
+        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+    ) -> Result<(), Full> {
         let rehash = |&slot: &Slot| coord_of(slot).map_or(0, hash);
         self.table.try_reserve(1, rehash).map_err(|_| Full)?;
-        // Known from the line above to the table, but not to the compiler, which else keeps the way to a panic.
+        // Known from the line above to the table, but not to the compiler, which else keeps the way
+        // to a panic.
         if self.table.capacity() == self.table.len() {
             return Err(Full);
         }
@@ -93,7 +115,11 @@ impl<'s> BlockIndex<'s> {
     }
 
     /// Removes the block at `coord`. Whether it was there.
-    pub fn remove(&mut self, coord: BlockCoord, coord_of: impl Fn(Slot) -> Option<BlockCoord>) -> bool {
+    pub fn remove(
+        &mut self,
+        coord: BlockCoord,
+        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+    ) -> bool {
         match self.table.find_entry(hash(coord), |&slot| coord_of(slot) == Some(coord)) {
             Ok(entry) => {
                 entry.remove();
@@ -137,7 +163,10 @@ mod tests {
             }
             let (found, compared) = index.probe(coord, |slot| Some(coords[slot.index()]));
             assert_eq!(found, model.get(&coord).copied());
-            assert!(compared >= u32::from(found.is_some()) && compared < 64, "{compared} blocks compared");
+            assert!(
+                compared >= u32::from(found.is_some()) && compared < 64,
+                "{compared} blocks compared"
+            );
             assert_eq!(index.len(), model.len());
         }
         for (&coord, &slot) in &model {
@@ -146,19 +175,33 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_the_least_power_of_two_that_holds_twice_the_blocks_and_fits_its_bytes_exactly() {
+    fn the_table_is_the_least_power_of_two_that_holds_twice_the_blocks_and_fits_its_bytes_exactly()
+    {
         for blocks in (0..200).chain([BLOCKS, 895, 896, 897, 5_000]) {
             // hashbrown fills a table up to 7/8.
-            let buckets = (4..).map(|shift| 1usize << shift).find(|buckets| buckets * 7 / 8 >= 2 * blocks).unwrap();
-            assert_eq!(BlockIndex::bytes(blocks), (5 * buckets + 64).next_multiple_of(64), "{blocks} blocks");
+            let buckets = (4..)
+                .map(|shift| 1usize << shift)
+                .find(|buckets| buckets * 7 / 8 >= 2 * blocks)
+                .unwrap();
+            assert_eq!(
+                BlockIndex::bytes(blocks),
+                (5 * buckets + 64).next_multiple_of(64),
+                "{blocks} blocks"
+            );
             let mut slab = vec![[0u64; 8]; BlockIndex::bytes(blocks) / 64 + 1];
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
             let mut carver = Carver::new(bytes, BlockIndex::bytes(blocks)).unwrap();
             let index = BlockIndex::new_in(blocks, &mut carver);
-            assert_eq!((carver.check(), carver.footprint().bytes()), (Ok(()), BlockIndex::bytes(blocks)));
+            assert_eq!(
+                (carver.check(), carver.footprint().bytes()),
+                (Ok(()), BlockIndex::bytes(blocks))
+            );
             assert!(index.table.capacity() >= 2 * blocks && index.is_empty());
             let text = std::format!("{index:?}");
-            assert_eq!(text, std::format!("BlockIndex {{ len: 0, capacity: {} }}", index.table.capacity()));
+            assert_eq!(
+                text,
+                std::format!("BlockIndex {{ len: 0, capacity: {} }}", index.table.capacity())
+            );
         }
     }
 
@@ -168,14 +211,20 @@ mod tests {
         for apart in [1, 16] {
             let (mut buckets, mut tags, mut both) = ([0u32; 256], [0u32; 128], vec![0u32; 1 << 15]);
             for at in 0..1i32 << 15 {
-                let coord = BlockCoord::new(apart * (at % 32 - 16), apart * (at / 32 % 32 - 16), apart * (at / 1_024 - 16)).unwrap();
+                let coord = BlockCoord::new(
+                    apart * (at % 32 - 16),
+                    apart * (at / 32 % 32 - 16),
+                    apart * (at / 1_024 - 16),
+                )
+                .unwrap();
                 let (bucket, tag) = ((hash(coord) % 256) as usize, (hash(coord) >> 57) as usize);
                 buckets[bucket] += 1;
                 tags[tag] += 1;
                 both[bucket * 128 + tag] += 1;
             }
-            // Chance leaves the means, 128 and 256, by six standard deviations nowhere. One bucket and tag have one block of the 32,768 on average;
-            // chance has up to nine, these multipliers up to 13.
+            // Chance leaves the means, 128 and 256, by six standard deviations nowhere. One bucket
+            // and tag have one block of the 32,768 on average; chance has up to nine, these
+            // multipliers up to 13.
             assert!(buckets.iter().all(|count| (60..=196).contains(count)), "{buckets:?}");
             assert!(tags.iter().all(|count| (160..=352).contains(count)), "{tags:?}");
             let most = both.iter().max().unwrap();
@@ -186,10 +235,12 @@ mod tests {
     #[test]
     fn a_block_beside_another_of_its_hash_is_compared_and_one_that_is_not_there_is_not_found() {
         let mut slab = vec![[0u64; 8]; BlockIndex::bytes(8) / 64 + 1];
-        let mut carver = Carver::new(bytemuck::cast_slice_mut(&mut slab), BlockIndex::bytes(8)).unwrap();
+        let mut carver =
+            Carver::new(bytemuck::cast_slice_mut(&mut slab), BlockIndex::bytes(8)).unwrap();
         let mut index = BlockIndex::new_in(8, &mut carver);
         let coord = BlockCoord::new(3, -2, 1).unwrap();
-        // Two slots whose blocks lie at the same place: the table cannot tell, but both are compared until one is right.
+        // Two slots whose blocks lie at the same place: the table cannot tell, but both are
+        // compared until one is right.
         let (wrong, right) = (Slot::new(4), Slot::new(7));
         index.insert(coord, wrong, |_| Some(coord)).unwrap();
         index.insert(coord, right, |_| Some(coord)).unwrap();
@@ -199,6 +250,9 @@ mod tests {
         assert!((1..=2).contains(&compared));
         assert_eq!((index.probe(coord, |_| None), index.find(coord, |_| None)), ((None, 2), None));
         assert_eq!((index.remove(coord, |_| None), index.len()), (false, 2));
-        assert_eq!((index.remove(coord, coord_of), index.find(coord, |_| Some(coord))), (true, Some(wrong)));
+        assert_eq!(
+            (index.remove(coord, coord_of), index.find(coord, |_| Some(coord))),
+            (true, Some(wrong))
+        );
     }
 }

@@ -1,9 +1,12 @@
-//! The voxel-hashed map (Section III-E of the paper; Nießner et al., *Real-time 3D Reconstruction at Scale using Voxel Hashing*, 2013).
+//! The voxel-hashed map (Section III-E of the paper; Nießner et al., *Real-time 3D Reconstruction
+//! at Scale using Voxel Hashing*, 2013).
 //!
-//! Space is a lattice of points `voxel_size_m` apart; lattice point (i, j, k) lies at `voxel_size_m * (i, j, k)` in the map's frame.
-//! 8 x 8 x 8 of them are a block. Each point keeps a signed distance, how often it was seen and, where the profile has it, a colour.
-//! A depth image is fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]), then every visible
-//! block is updated by integer averages ([`Volume::fuse`]); what was visible a fixed lag ago is rid of noise (`Volume::prune`).
+//! Space is a lattice of points `voxel_size_m` apart; lattice point (i, j, k) lies at
+//! `voxel_size_m * (i, j, k)` in the map's frame. 8 x 8 x 8 of them are a block. Each point keeps a
+//! signed distance, how often it was seen and, where the profile has it, a colour. A depth image is
+//! fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]),
+//! then every visible block is updated by integer averages ([`Volume::fuse`]); what was visible a
+//! fixed lag ago is rid of noise (`Volume::prune`).
 
 mod allocate;
 pub(crate) mod block;
@@ -118,15 +121,19 @@ impl<'s> Volume<'s> {
         Sampler::new(&self.index, &self.blocks)
     }
 
-    /// Digest of the coordinates and contents of all blocks, in any order they were made: the wrapping sum of theirs.
+    /// Digest of the coordinates and contents of all blocks, in any order they were made: the
+    /// wrapping sum of theirs.
     pub fn digest(&self) -> u64 {
         self.digest
     }
 
-    /// Sums a block up anew after its content changed, and corrects the map's digest by the difference.
+    /// Sums a block up anew after its content changed, and corrects the map's digest by the
+    /// difference.
     fn update_digest(&mut self, slot: Slot) {
         let at = slot.index();
-        if let (Some(header), Some(voxels)) = (self.blocks.header.get_mut(at), self.blocks.voxels.get(at)) {
+        if let (Some(header), Some(voxels)) =
+            (self.blocks.header.get_mut(at), self.blocks.voxels.get(at))
+        {
             let new = fuse::block_digest(header.coord(), voxels, self.blocks.colour.get(at));
             self.digest = self.digest.wrapping_sub(header.digest).wrapping_add(new);
             header.digest = new;
@@ -142,6 +149,10 @@ impl<'s> Volume<'s> {
         footprint.set_use::<block::Colour>("volume.colour", now, peak);
         let [history, history_peak] = self.history.words_in_use();
         footprint.set_use::<u64>("volume.history", history, history_peak);
-        footprint.set_use::<Slot>("volume.visible", self.visible.slots().len(), self.visible.peak());
+        footprint.set_use::<Slot>(
+            "volume.visible",
+            self.visible.slots().len(),
+            self.visible.peak(),
+        );
     }
 }

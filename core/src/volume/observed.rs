@@ -1,14 +1,19 @@
-//! The depth image that is fused: from disparity, without what the matcher makes up, and with a note at each pixel on how it is to be taken.
+//! The depth image that is fused: from disparity, without what the matcher makes up, and with a
+//! note at each pixel on how it is to be taken.
 //!
-//! *Edges.* The matcher widens what is near: beside its edge, what is behind gets its disparity. Pixels nearer than something within `edge_reach_px`, by
-//! more than [`EDGE_Q8`], are left out. What is left within [`COLOUR_REACH`] of an edge, or of a pixel without disparity, may still show the colour of what
-//! is behind, or of the sky.
+//! *Edges.* The matcher widens what is near: beside its edge, what is behind gets its disparity.
+//! Pixels nearer than something within `edge_reach_px`, by more than [`EDGE_Q8`], are left out.
+//! What is left within [`COLOUR_REACH`] of an edge, or of a pixel without disparity, may still show
+//! the colour of what is behind, or of the sky.
 //!
-//! *Obliqueness.* A plane's disparity is linear in the pixel. With slopes `a`, `b` of the disparity `d` and the pixel (x, y) from the principal point, the
-//! plane's normal is along `(f a, f b, d - x a - y b)` and its product with the pixel's ray is `d`: so the cosine between the two is `d / |normal|` times
-//! the length of a ray of depth 1, and distance along the normal is distance along z times `d / |normal|`.
+//! *Obliqueness.* A plane's disparity is linear in the pixel. With slopes `a`, `b` of the disparity
+//! `d` and the pixel (x, y) from the principal point, the plane's normal is along
+//! `(f a, f b, d - x a - y b)` and its product with the pixel's ray is `d`: so the cosine between
+//! the two is `d / |normal|` times the length of a ray of depth 1, and distance along the normal is
+//! distance along z times `d / |normal|`.
 //!
-//! Both are written into the lowest bits of the depth: five of 24, 60 µm at 20 m. Memory: none. Time: linear in pixels.
+//! Both are written into the lowest bits of the depth: five of 24, 60 µm at 20 m. Memory: none.
+//! Time: linear in pixels.
 
 use super::{DistanceAlong, VolumeConfig};
 use crate::{
@@ -65,7 +70,9 @@ impl ObservedDepth<'_> {
         let width = depth_m.width().max(1);
         let bands = Bands::of(depth_m.pixels_mut().len() / width);
         let jobs = zip2(bands.first(), bands.split_mut(depth_m.pixels_mut(), width));
-        each(executor, jobs, |(first, depths)| executor.vectors().run(WriteRows { observed: self, first, width, depths }));
+        each(executor, jobs, |(first, depths)| {
+            executor.vectors().run(WriteRows { observed: self, first, width, depths })
+        });
     }
 
     #[inline(always)]
@@ -97,22 +104,31 @@ impl ObservedDepth<'_> {
         };
         let edges = behind.iter().zip(&spoiling);
         let notes = here.iter().zip(edges).zip(&levels);
-        for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in depths.iter_mut().zip(&within).zip(notes) {
+        for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in
+            depths.iter_mut().zip(&within).zip(notes)
+        {
             let spoiled = if disparity > spoiling.saturating_add(EDGE_Q8) { SPOILED } else { 0 };
             let noted = f32::from_bits(within.to_bits() & !NOTES | u32::from(level) | spoiled);
-            *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) { noted } else { 0.0 };
+            *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) {
+                noted
+            } else {
+                0.0
+            };
         }
     }
 
     /// The disparities of a block, moved by so many pixels; 0 outside the image.
     #[inline(always)]
     fn tap(&self, first: usize, v: usize, du: isize, dv: isize) -> [u16; BLOCK] {
-        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else { return [0; BLOCK] };
+        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else {
+            return [0; BLOCK];
+        };
         let outside = du.min(0).unsigned_abs().saturating_sub(first).min(BLOCK);
         padded(self.disparity_q8.row(v), first.saturating_add_signed(du), outside, 0)
     }
 
-    /// The least disparity about each pixel of a block: of what has one within the reach of edges, and of all, none being 0, within that of colours.
+    /// The least disparity about each pixel of a block: of what has one within the reach of edges,
+    /// and of all, none being 0, within that of colours.
     #[inline(always)]
     fn farthest(&self, first: usize, v: usize) -> [[u16; BLOCK]; 2] {
         let edge_reach = usize::from(self.config.edge_reach_px);
@@ -127,10 +143,16 @@ impl ObservedDepth<'_> {
                 let tap = self.tap(first, v, du, dv);
                 if step <= edge_reach {
                     // None wraps around to the largest.
-                    behind.iter_mut().zip(&tap).for_each(|(least, tap)| *least = least_of(*least, tap.wrapping_sub(1)));
+                    behind
+                        .iter_mut()
+                        .zip(&tap)
+                        .for_each(|(least, tap)| *least = least_of(*least, tap.wrapping_sub(1)));
                 }
                 if step <= COLOUR_REACH {
-                    spoiling.iter_mut().zip(&tap).for_each(|(least, tap)| *least = least_of(*least, *tap));
+                    spoiling
+                        .iter_mut()
+                        .zip(&tap)
+                        .for_each(|(least, tap)| *least = least_of(*least, *tap));
                 }
             }
         }
@@ -139,16 +161,25 @@ impl ObservedDepth<'_> {
 
     /// Levels of obliqueness of a block with these slopes along columns and rows.
     #[inline(always)]
-    fn levels(&self, first: usize, v: usize, here: &[u16; BLOCK], [along_u, along_v]: [&[f32; BLOCK]; 2]) -> [u16; BLOCK] {
+    fn levels(
+        &self,
+        first: usize,
+        v: usize,
+        here: &[u16; BLOCK],
+        [along_u, along_v]: [&[f32; BLOCK]; 2],
+    ) -> [u16; BLOCK] {
         let focal = self.rig.focal_px as f32;
         let y = (v as f64 - self.rig.center_v_px) as f32;
         let x_first = (first as f64 - self.rig.center_u_px) as f32;
         let mut squares = [0i16; BLOCK];
         let slopes = along_u.iter().zip(along_v);
-        for (i, ((square, &disparity), (&a, &b))) in (0u16..).zip(squares.iter_mut().zip(here).zip(slopes)) {
+        for (i, ((square, &disparity), (&a, &b))) in
+            (0u16..).zip(squares.iter_mut().zip(here).zip(slopes))
+        {
             let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
             let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
-            // The square of the cosine is compared: a root has no vectors everywhere. Without a disparity it may be any number.
+            // The square of the cosine is compared: a root has no vectors everywhere. Without a
+            // disparity it may be any number.
             *square = fixed(d * d / (nu * nu + nv * nv + nz * nz));
         }
         let mut levels = [0; BLOCK];
@@ -160,7 +191,8 @@ impl ObservedDepth<'_> {
 /// A square of 1 in fixed point.
 const SQUARE_ONE: f32 = 32_768.0;
 
-/// Squares of what lies between two levels of obliqueness, in fixed point, where all of them are whole numbers.
+/// Squares of what lies between two levels of obliqueness, in fixed point, where all of them are
+/// whole numbers.
 #[expect(clippy::indexing_slicing, reason = "the loop ends with the array")]
 const BETWEEN_LEVELS: [i16; LEVELS as usize - 1] = {
     let mut squares = [0; LEVELS as usize - 1];
@@ -217,7 +249,9 @@ fn least_of(a: u16, b: u16) -> u16 {
 fn slope(here: &[u16; BLOCK], after: &[u16; BLOCK], before: &[u16; BLOCK]) -> [f32; BLOCK] {
     const HALF: f32 = 0.5 / (SLOPE_REACH as f32 * 256.0);
     let mut slopes = [0.0; BLOCK];
-    for (slope, ((&here, &after), &before)) in slopes.iter_mut().zip(here.iter().zip(after).zip(before)) {
+    for (slope, ((&here, &after), &before)) in
+        slopes.iter_mut().zip(here.iter().zip(after).zip(before))
+    {
         let has_after = (after > 0) & (after.abs_diff(here) < SLOPE_MOST_Q8);
         let has_before = (before > 0) & (before.abs_diff(here) < SLOPE_MOST_Q8);
         // Differences so small have 16 bits with their signs.
@@ -234,14 +268,20 @@ mod tests {
     use crate::Serial;
     use std::vec::Vec;
 
-    const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 150.0, center_v_px: 40.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 200.0, center_u_px: 150.0, center_v_px: 40.0, baseline_m: 0.5 };
     const SIZE: [usize; 2] = [300, 80];
 
     fn observed(config: &VolumeConfig, disparity_q8: impl Fn(usize, usize) -> u16) -> Vec<f32> {
         let [width, height] = SIZE;
-        let pixels: Vec<u16> = (0..width * height).map(|at| disparity_q8(at % width, at / width)).collect();
+        let pixels: Vec<u16> =
+            (0..width * height).map(|at| disparity_q8(at % width, at / width)).collect();
         let mut depth_m = std::vec![-1.0; width * height];
-        let observed = ObservedDepth { config, rig: &RIG, disparity_q8: View::new(&pixels, width, height).unwrap() };
+        let observed = ObservedDepth {
+            config,
+            rig: &RIG,
+            disparity_q8: View::new(&pixels, width, height).unwrap(),
+        };
         observed.write(&mut ViewMut::new(&mut depth_m, width, height).unwrap(), &Serial);
         depth_m
     }
@@ -250,24 +290,39 @@ mod tests {
     fn a_road_is_seen_obliquely_and_a_wall_is_not() {
         let config = VolumeConfig::default();
         // A road 1.5 m below the camera: d = f B / z and z = 1.5 f / y, so d = B y / 1.5.
-        let road = observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5) as u16);
+        let road =
+            observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5) as u16);
         let wall = observed(&config, |_, _| 10 * 256);
         for (u, v) in [(5, 70), (150, 60), (290, 72)] {
             let depth_m = f64::from(road[v * SIZE[0] + u]);
             let exact = 1.5 / depth_m;
-            // The normal is (0, 1, 0): distance along z times the product with the ray of depth 1 is the camera's height over depth.
-            assert!((f64::from(obliqueness(depth_m as f32)) - exact).abs() < 1.0 / 16.0, "{u} {v}: {depth_m} m, {exact}");
+            // The normal is (0, 1, 0): distance along z times the product with the ray of depth 1
+            // is the camera's height over depth.
+            assert!(
+                (f64::from(obliqueness(depth_m as f32)) - exact).abs() < 1.0 / 16.0,
+                "{u} {v}: {depth_m} m, {exact}"
+            );
             assert!((depth_m - 1.5 * RIG.focal_px / (v as f64 - RIG.center_v_px)).abs() < 0.1);
             let at_wall = wall[v * SIZE[0] + u];
-            assert!((at_wall - 10.0).abs() < 1e-3 && obliqueness(at_wall) == 1.0 && !is_spoiled(at_wall));
+            assert!(
+                (at_wall - 10.0).abs() < 1e-3
+                    && obliqueness(at_wall) == 1.0
+                    && !is_spoiled(at_wall)
+            );
         }
-        let along_z = observed(&VolumeConfig { distance: DistanceAlong::Ray, ..config }, |_, v| 256 * (2 + v as u16 / 4));
+        let along_z = observed(&VolumeConfig { distance: DistanceAlong::Ray, ..config }, |_, v| {
+            256 * (2 + v as u16 / 4)
+        });
         assert!(along_z.iter().all(|&depth_m| obliqueness(depth_m) == 1.0 || depth_m == 0.0));
     }
 
     #[test]
     fn levels_in_fixed_point_are_those_of_floats() {
-        let plain = |square: f32| (0..LEVELS - 1).filter(|&i| square >= ((i as f32 + 1.5) / LEVELS as f32).powi(2)).count();
+        let plain = |square: f32| {
+            (0..LEVELS - 1)
+                .filter(|&i| square >= ((i as f32 + 1.5) / LEVELS as f32).powi(2))
+                .count()
+        };
         let borders = (0..LEVELS - 1).map(|i| ((i as f32 + 1.5) / LEVELS as f32).powi(2));
         let beside = borders.flat_map(|border| [border.next_down(), border, border.next_up()]);
         for square in beside.chain((0..=4_000).map(|i| i as f32 / 3_217.0)) {
@@ -277,20 +332,29 @@ mod tests {
 
     #[test]
     fn nothing_is_fused_where_all_is_too_far() {
-        assert!(observed(&VolumeConfig::default(), |_, _| 256).iter().all(|&depth_m| depth_m == 0.0));
+        assert!(
+            observed(&VolumeConfig::default(), |_, _| 256).iter().all(|&depth_m| depth_m == 0.0)
+        );
     }
 
     #[test]
     fn the_rim_of_what_is_near_is_left_out_and_colour_beside_an_edge_is_doubtful() {
         // Near from column 100 on, far before; nothing from column 200 on.
         let disparity = |u: usize, _: usize| [10 * 256, 20 * 256, 0][u / 100];
-        let depth_m = observed(&VolumeConfig { edge_reach_px: 2, ..VolumeConfig::default() }, disparity);
+        let depth_m =
+            observed(&VolumeConfig { edge_reach_px: 2, ..VolumeConfig::default() }, disparity);
         let row = &depth_m[SIZE[0] * 30..][..SIZE[0]];
         let fused: Vec<usize> = (95..105).filter(|&u| row[u] > 0.0).collect();
-        assert_eq!(fused, [95, 96, 97, 98, 99, 102, 103, 104], "two pixels of the near side are the matcher's");
-        let spoiled: Vec<usize> = (0..SIZE[0]).filter(|&u| row[u] > 0.0 && is_spoiled(row[u])).collect();
+        assert_eq!(
+            fused,
+            [95, 96, 97, 98, 99, 102, 103, 104],
+            "two pixels of the near side are the matcher's"
+        );
+        let spoiled: Vec<usize> =
+            (0..SIZE[0]).filter(|&u| row[u] > 0.0 && is_spoiled(row[u])).collect();
         assert_eq!(spoiled, [0, 1, 2, 102, 197, 198, 199], "three px beside an edge or nothing");
-        let all = observed(&VolumeConfig { edge_reach_px: 0, ..VolumeConfig::default() }, disparity);
+        let all =
+            observed(&VolumeConfig { edge_reach_px: 0, ..VolumeConfig::default() }, disparity);
         assert!(all[..200].iter().all(|&depth_m| depth_m > 0.0 && !is_spoiled(depth_m)));
     }
 }

@@ -1,9 +1,11 @@
 //! A pool of numbered slots with a free list.
 //!
-//! The pool hands out positions, not memory: the owner of the payload keeps it in arrays of the same length.
+//! The pool hands out positions, not memory: the owner of the payload keeps it in arrays of the
+//! same length.
 //!
-//! Memory: 4 bytes and 1 bit per slot (a free-list entry, whether the slot is taken). Time: constant; a walk over the slots taken visits
-//! 64 of them a step where none is. Order: a new pool gives out 0, 1, 2, …; a freed slot is the next one given out.
+//! Memory: 4 bytes and 1 bit per slot (a free-list entry, whether the slot is taken). Time:
+//! constant; a walk over the slots taken visits 64 of them a step where none is. Order: a new pool
+//! gives out 0, 1, 2, …; a freed slot is the next one given out.
 
 use crate::{
     memory::{Carver, region_bytes},
@@ -151,14 +153,17 @@ impl<'s> SlotPool<'s> {
         (0u32..).zip(words).flat_map(|(i, &word)| bits(word).map(move |bit| Slot(64 * i + bit)))
     }
 
-    /// The first slot at or after position `from` that is taken: a walk that may free slots on its way.
+    /// The first slot at or after position `from` that is taken: a walk that may free slots on its
+    /// way.
     pub(crate) fn next_live(&self, from: u32) -> Option<Slot> {
         let first = from / 64;
         let words = (first..).zip(self.live.iter().skip(first as usize));
-        words.map(|(i, &word)| (i, if i == first { word & u64::MAX << (from % 64) } else { word })).find_map(|(i, word)| {
-            let bit = bits(word).next()?;
-            Some(Slot(64 * i + bit))
-        })
+        words
+            .map(|(i, &word)| (i, if i == first { word & u64::MAX << (from % 64) } else { word }))
+            .find_map(|(i, word)| {
+                let bit = bits(word).next()?;
+                Some(Slot(64 * i + bit))
+            })
     }
 
     fn set_live(&mut self, slot: Slot, live: bool) {
@@ -168,7 +173,8 @@ impl<'s> SlotPool<'s> {
         }
     }
 
-    /// Visits every field: how many slots were given out, and in which order the freed ones will be given out again.
+    /// Visits every field: how many slots were given out, and in which order the freed ones will be
+    /// given out again.
     /// [`SlotPool::rebuild`] must follow a reading.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { live: _, freed, freed_len, fresh, peak } = self;
@@ -178,12 +184,15 @@ impl<'s> SlotPool<'s> {
         visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(part_mut(freed, ..*freed_len)));
     }
 
-    /// Finds which slots are taken: those given out and not in the free list. Whether that list can be: each slot in it given out, and once.
+    /// Finds which slots are taken: those given out and not in the free list. Whether that list can
+    /// be: each slot in it given out, and once.
     pub(crate) fn rebuild(&mut self) -> bool {
         self.live.fill(0);
         (0..self.fresh as u32).for_each(|position| self.set_live(Slot(position), true));
         for at in 0..self.freed_len {
-            let Some(slot) = self.freed.get(at).copied().filter(|&slot| self.is_live(slot)) else { return false };
+            let Some(slot) = self.freed.get(at).copied().filter(|&slot| self.is_live(slot)) else {
+                return false;
+            };
             self.set_live(slot, false);
         }
         true
@@ -209,7 +218,11 @@ mod tests {
         let bytes = SlotPool::bytes(slots);
         let memory = Box::leak(vec![0u8; bytes + SLAB_ALIGN].into_boxed_slice());
         let start = memory.as_ptr().align_offset(SLAB_ALIGN);
-        SlotPool::new_in(&mut Carver::new(&mut memory[start..], bytes).unwrap(), slots, ["live", "freed"])
+        SlotPool::new_in(
+            &mut Carver::new(&mut memory[start..], bytes).unwrap(),
+            slots,
+            ["live", "freed"],
+        )
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! Pruning: what noise left behind goes, a fixed lag after it was last looked at (Section III-F of the paper).
+//! Pruning: what noise left behind goes, a fixed lag after it was last looked at (Section III-F of
+//! the paper).
 //!
-//! After frame n the blocks visible in frame n - lag are visited. Each voxel with 0 < weight <= `prune_weight` is reset; a block without
-//! a seen voxel left goes back to the pool, and so does one that was not visible since and whose smallest |distance| exceeds `prune_distance`
-//! (Nießner et al., 2013, Section 5.3; off by default). At most `prune_blocks_per_frame` blocks are visited per frame; the rest stays due and comes
-//! first in the next.
+//! After frame n the blocks visible in frame n - lag are visited. Each voxel with 0 < weight <=
+//! `prune_weight` is reset; a block without a seen voxel left goes back to the pool, and so does
+//! one that was not visible since and whose smallest |distance| exceeds `prune_distance` (Nießner
+//! et al., 2013, Section 5.3; off by default). At most `prune_blocks_per_frame` blocks are visited
+//! per frame; the rest stays due and comes first in the next.
 //!
 //! With `prune_weight` and `prune_distance` 0 pruning is off, bit for bit.
 
@@ -58,7 +60,11 @@ impl Volume<'_> {
             report.early += u32::from(self.history.capacity() < self.config.prune_lag as usize);
         }
         self.history.push(frame, self.visible.slots());
-        while self.history.oldest().is_some_and(|oldest| frame.wrapping_sub(oldest) >= self.config.prune_lag) {
+        while self
+            .history
+            .oldest()
+            .is_some_and(|oldest| frame.wrapping_sub(oldest) >= self.config.prune_lag)
+        {
             self.history.expire();
         }
         self.visit_due(self.config.prune_blocks_per_frame, &mut report);
@@ -78,7 +84,8 @@ impl Volume<'_> {
         let mut report = PruneReport::default();
         let mut from = 0;
         while let Some(slot) = self.pool.next_live(from) {
-            let (reset, freed) = self.prune_block(slot, Rule { weight: prune_weight, ..self.rule() });
+            let (reset, freed) =
+                self.prune_block(slot, Rule { weight: prune_weight, ..self.rule() });
             report.add(reset, freed);
             from = slot.get() + 1;
         }
@@ -90,7 +97,8 @@ impl Volume<'_> {
         Rule { weight: self.config.prune_weight, distance: self.config.prune_distance }
     }
 
-    /// Visits blocks that are due. Those visible in the window will be due again, and do not go for their distance.
+    /// Visits blocks that are due. Those visible in the window will be due again, and do not go for
+    /// their distance.
     fn visit_due(&mut self, most: u32, report: &mut PruneReport) {
         let mut from = 0;
         while report.visited < most
@@ -108,14 +116,19 @@ impl Volume<'_> {
         report.carried_over = self.history.due();
     }
 
-    /// Resets the voxels of low weight in a block, and frees it when nothing near a surface is left. How many were reset, and whether it was freed.
+    /// Resets the voxels of low weight in a block, and frees it when nothing near a surface is
+    /// left. How many were reset, and whether it was freed.
     pub(super) fn prune_block(&mut self, slot: Slot, rule: Rule) -> (u32, bool) {
         let (at, prune_weight, by_distance) = (slot.index(), rule.weight, rule.distance > 0.0);
         // Most blocks are known to hold no voxel of low weight without reading them.
-        if !by_distance && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight) {
+        if !by_distance
+            && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight)
+        {
             return (0, false);
         }
-        let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return (0, false) };
+        let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else {
+            return (0, false);
+        };
         let census = Census::of(weight, prune_weight);
         // A block that leaves is not cleared: the next block in its slot does that.
         if census.remaining == 0 {
@@ -138,7 +151,9 @@ impl Volume<'_> {
     pub(super) fn free_block(&mut self, slot: Slot) {
         let Some(coord) = self.blocks.coord(slot) else { return };
         self.index.remove(coord, |slot| self.blocks.coord(slot));
-        self.digest = self.digest.wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
+        self.digest = self
+            .digest
+            .wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
         self.history.on_free(slot);
         self.recency.remove(slot);
         self.pool.free(slot);
@@ -154,17 +169,25 @@ struct Census {
     remaining: u32,
 }
 
-/// Voxels counted at a time: their number fits into a byte, so that the count runs in vectors of bytes.
+/// Voxels counted at a time: their number fits into a byte, so that the count runs in vectors of
+/// bytes.
 const GROUP: usize = 128;
 
 impl Census {
-    /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its cost.
+    /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its
+    /// cost.
     fn of(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {
         let mut census = Self { low_weight: 0, remaining: 0 };
         for group in weight.as_chunks::<GROUP>().0 {
             // Weight 0 becomes 255, which no prune weight exceeds.
-            census.low_weight += u32::from(group.iter().map(|&weight| u8::from(weight.wrapping_sub(1) < prune_weight)).sum::<u8>());
-            census.remaining += u32::from(group.iter().map(|&weight| u8::from(weight > prune_weight)).sum::<u8>());
+            census.low_weight += u32::from(
+                group
+                    .iter()
+                    .map(|&weight| u8::from(weight.wrapping_sub(1) < prune_weight))
+                    .sum::<u8>(),
+            );
+            census.remaining +=
+                u32::from(group.iter().map(|&weight| u8::from(weight > prune_weight)).sum::<u8>());
         }
         census
     }
@@ -179,9 +202,14 @@ fn reset_low_weight(
 ) {
     let remaining = |weight: u8| weight > prune_weight;
     for plane in planes.into_iter().flatten() {
-        plane.iter_mut().zip(weight.iter()).for_each(|(channel, &weight)| *channel = if remaining(weight) { *channel } else { 0 });
+        plane
+            .iter_mut()
+            .zip(weight.iter())
+            .for_each(|(channel, &weight)| *channel = if remaining(weight) { *channel } else { 0 });
     }
-    sdf.iter_mut().zip(weight.iter()).for_each(|(sdf, &weight)| *sdf = if remaining(weight) { *sdf } else { 0 });
+    sdf.iter_mut()
+        .zip(weight.iter())
+        .for_each(|(sdf, &weight)| *sdf = if remaining(weight) { *sdf } else { 0 });
     weight.iter_mut().for_each(|weight| *weight = if remaining(*weight) { *weight } else { 0 });
 }
 

@@ -1,4 +1,5 @@
-//! Which block was seen last when: a doubly linked list through the slots, so that the one unseen for longest is at hand in constant time.
+//! Which block was seen last when: a doubly linked list through the slots, so that the one unseen
+//! for longest is at hand in constant time.
 //!
 //! Memory: 8 bytes a block.
 
@@ -74,7 +75,9 @@ impl<'s> Recency<'s> {
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {
-        if let Some(entry_links) = entry.checked_sub(1).and_then(|slot| self.links.get_mut(slot as usize)) {
+        if let Some(entry_links) =
+            entry.checked_sub(1).and_then(|slot| self.links.get_mut(slot as usize))
+        {
             *entry_links = links;
         }
     }
@@ -83,7 +86,8 @@ impl<'s> Recency<'s> {
     fn set(&mut self, entry: u32, side: usize, to: u32) {
         let neighbour = match entry.checked_sub(1) {
             Some(slot) => self.links.get_mut(slot as usize).and_then(|links| links.get_mut(side)),
-            // What follows the missing newer neighbour of the oldest is the oldest end, and the other way round.
+            // What follows the missing newer neighbour of the oldest is the oldest end, and the
+            // other way round.
             None => self.ends.get_mut(1 - side),
         };
         if let Some(neighbour) = neighbour {
@@ -103,7 +107,8 @@ mod tests {
         const SLOTS: u32 = 40;
         let mut slab = Box::new(Slab([0u8; Recency::bytes(SLOTS as usize)]));
         let len = slab.0.len();
-        let mut recency = Recency::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
+        let mut recency =
+            Recency::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
         let (mut model, mut random) = (Vec::<Slot>::new(), Random::new(1));
         for _ in 0..100_000 {
             let slot = Slot::new(random.below(SLOTS));

@@ -1,7 +1,8 @@
-//! Which blocks a depth image runs through: the walk along its rays, and what remembers the blocks met.
+//! Which blocks a depth image runs through: the walk along its rays, and what remembers the blocks
+//! met.
 //!
-//! Each band of rows has a cache of the blocks it met last and a list of those to ask the map for. A list that is full is emptied before its
-//! band goes on, so that no size of it loses a block.
+//! Each band of rows has a cache of the blocks it met last and a list of those to ask the map for.
+//! A list that is full is emptied before its band goes on, so that no size of it loses a block.
 
 use super::{BLOCK_SIDE, MAX_BLOCKS_PER_RAY, Viewpoint, VolumeConfig};
 use crate::{
@@ -12,8 +13,9 @@ use crate::{
 };
 use nalgebra::Vector3;
 
-/// Rows and columns from one pixel whose ray is walked to the next, where a block is narrower than [`WIDE_PX`]: at KITTI's focal length it is
-/// 14 px wide at 20 m. Twice as many from that width on, four times from twice that on (docs/decisions/0047-fewer-rays-where-blocks-are-wide.md).
+/// Rows and columns from one pixel whose ray is walked to the next, where a block is narrower than
+/// [`WIDE_PX`]: at KITTI's focal length it is 14 px wide at 20 m. Twice as many from that width on,
+/// four times from twice that on (docs/decisions/0047-fewer-rays-where-blocks-are-wide.md).
 const PIXEL_STEP: usize = 2;
 const WIDE_PX: f64 = 16.0;
 /// Entries of a band's cache, as a power of two, and of its list.
@@ -33,13 +35,20 @@ impl Tag {
     #[inline]
     fn of([x, y, z]: [i32; 3]) -> Self {
         const MASK: u64 = (1 << FIELD) - 1;
-        Self(1 << 63 | (x as u64 & MASK) << (2 * FIELD) | (y as u64 & MASK) << FIELD | (z as u64 & MASK))
+        Self(
+            1 << 63
+                | (x as u64 & MASK) << (2 * FIELD)
+                | (y as u64 & MASK) << FIELD
+                | (z as u64 & MASK),
+        )
     }
 
     /// The block again.
     #[inline]
     fn block(self) -> [i32; 3] {
-        [2, 1, 0].map(|field| (self.0 << (64 - FIELD - field * FIELD)) as i64 >> (64 - FIELD)).map(|c| c as i32)
+        [2, 1, 0]
+            .map(|field| (self.0 << (64 - FIELD - field * FIELD)) as i64 >> (64 - FIELD))
+            .map(|c| c as i32)
     }
 
     /// Where a cache keeps it.
@@ -119,7 +128,10 @@ impl Band<'_> {
     fn meet(&mut self, block: [i32; 3]) {
         let tag = Tag::of(block);
         let entry = self.cache.get_mut(tag.entry());
-        debug_assert!(entry.is_some() && self.len < self.list.len(), "a cache has an entry for each tag, and the list holds a ray");
+        debug_assert!(
+            entry.is_some() && self.len < self.list.len(),
+            "a cache has an entry for each tag, and the list holds a ray"
+        );
         if let (Some(entry), Some(request)) = (entry, self.list.get_mut(self.len))
             && *entry != tag.0
         {
@@ -142,13 +154,20 @@ pub(super) struct Rays<'a> {
     offset: [usize; 2],
     /// The same where fewer rays are walked, in steps.
     sparse_offset: [usize; 2],
-    /// Surfaces nearer than these have a half and a quarter of the rays across: blocks are wide there.
+    /// Surfaces nearer than these have a half and a quarter of the rays across: blocks are wide
+    /// there.
     wide_m: [f32; 2],
 }
 
 impl<'a> Rays<'a> {
     /// The rays of a camera at `start`; which pixels are taken changes from frame to frame.
-    pub fn new(config: &VolumeConfig, view: &Viewpoint, depth_m: View<'a, f32>, start: Vector3<f32>, frame: u32) -> Self {
+    pub fn new(
+        config: &VolumeConfig,
+        view: &Viewpoint,
+        depth_m: View<'a, f32>,
+        start: Vector3<f32>,
+        frame: u32,
+    ) -> Self {
         let block_m = f64::from(config.voxel_size_m) * BLOCK_SIDE as f64;
         Self {
             depth_m,
@@ -157,9 +176,13 @@ impl<'a> Rays<'a> {
             reach_m: [max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m],
             far_m: config.far_m,
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
-            // The larger change comes first: two steps from every frame, or every second one, to the next.
-            sparse_offset: [1, 0].map(|bit| (frame >> (bit + 2) & 1 | (frame >> bit ^ frame >> (bit + 4)) << 1 & 2) as usize),
-            wide_m: [WIDE_PX, 2.0 * WIDE_PX].map(|width_px| (view.rig.focal_px * block_m / width_px) as f32),
+            // The larger change comes first: two steps from every frame, or every second one, to
+            // the next.
+            sparse_offset: [1, 0].map(|bit| {
+                (frame >> (bit + 2) & 1 | (frame >> bit ^ frame >> (bit + 4)) << 1 & 2) as usize
+            }),
+            wide_m: [WIDE_PX, 2.0 * WIDE_PX]
+                .map(|width_px| (view.rig.focal_px * block_m / width_px) as f32),
         }
     }
 
@@ -181,13 +204,15 @@ impl<'a> Rays<'a> {
         ((row + self.sparse_offset[0]) | (column + self.sparse_offset[1])) & (steps - 1) == 0
     }
 
-    /// How far before and behind a surface its ray is walked: at least half of the way in depth to the rays above and to the left, so that no block
-    /// between them is missed where a road or a wall is seen at a grazing angle. `beside_m` are the depths one step off.
+    /// How far before and behind a surface its ray is walked: at least half of the way in depth to
+    /// the rays above and to the left, so that no block between them is missed where a road or a
+    /// wall is seen at a grazing angle. `beside_m` are the depths one step off.
     #[inline(always)]
     fn reach_m(&self, depth_m: f32, beside_m: [f32; 2], steps: usize) -> f32 {
         let [least_m, most_m] = self.reach_m;
         let half = 0.5 * steps as f32;
-        let [above, left] = beside_m.map(|beside_m| if beside_m > 0.0 { half * (beside_m - depth_m).abs() } else { 0.0 });
+        let [above, left] = beside_m
+            .map(|beside_m| if beside_m > 0.0 { half * (beside_m - depth_m).abs() } else { 0.0 });
         min_f32(max_f32(least_m, max_f32(above, left)), most_m)
     }
 
@@ -199,9 +224,11 @@ impl<'a> Rays<'a> {
             let v = PIXEL_STEP * row + self.offset[0];
             let ray = corner + per_row * v as f32;
             let first_u = self.first_column(row) + PIXEL_STEP * first;
-            let (here, above) = (self.depth_m.row(v), self.depth_m.row(v.saturating_sub(PIXEL_STEP)));
+            let (here, above) =
+                (self.depth_m.row(v), self.depth_m.row(v.saturating_sub(PIXEL_STEP)));
             let depths = here.iter().zip(above).skip(first_u).step_by(PIXEL_STEP);
-            let mut left_m = first_u.checked_sub(PIXEL_STEP).and_then(|u| here.get(u)).copied().unwrap_or(0.0);
+            let mut left_m =
+                first_u.checked_sub(PIXEL_STEP).and_then(|u| here.get(u)).copied().unwrap_or(0.0);
             for (i, (&depth_m, &above_m)) in depths.enumerate() {
                 let beside_m = [above_m, core::mem::replace(&mut left_m, depth_m)];
                 if !(depth_m > 0.0 && depth_m <= self.far_m) {
@@ -241,7 +268,8 @@ impl Axis {
     #[inline(always)]
     fn new(from: f32, to: f32) -> Self {
         let (at, last) = (floor_i32(from), floor_i32(to));
-        let (ahead, left) = (last > at, last.saturating_sub(at).saturating_abs().min(MAX_BLOCKS_PER_RAY as i32));
+        let (ahead, left) =
+            (last > at, last.saturating_sub(at).saturating_abs().min(MAX_BLOCKS_PER_RAY as i32));
         // Unused where no border is crossed.
         let per_block = 1.0 / (to - from);
         let border = at as f32 + if ahead { 1.0 } else { 0.0 };
@@ -302,18 +330,27 @@ mod tests {
     fn a_walk_goes_from_block_to_neighbouring_block_and_through_all_that_small_steps_find() {
         let mut random = Random::new(8);
         for _ in 0..2_000 {
-            let mut point = |scale: f32| Vector3::from([(); 3].map(|()| (random.below(2_001) as f32 / 1_000.0 - 1.0) * scale));
+            let mut point = |scale: f32| {
+                Vector3::from(
+                    [(); 3].map(|()| (random.below(2_001) as f32 / 1_000.0 - 1.0) * scale),
+                )
+            };
             let from = point(30.0);
             let to = from + point(4.0);
             let mut met: Vec<[i32; 3]> = Vec::new();
             walk(from, to, |block| met.push(block));
             let floor = |point: Vector3<f32>| [point.x, point.y, point.z].map(floor_i32);
             assert_eq!((met.first(), met.last()), (Some(&floor(from)), Some(&floor(to))));
-            let apart = |pair: &[[i32; 3]]| pair[0].iter().zip(pair[1]).map(|(a, b)| a.abs_diff(b)).sum::<u32>();
+            let apart = |pair: &[[i32; 3]]| {
+                pair[0].iter().zip(pair[1]).map(|(a, b)| a.abs_diff(b)).sum::<u32>()
+            };
             assert!(met.windows(2).all(|pair| apart(pair) == 1));
             let all: BTreeSet<_> = met.iter().copied().collect();
             // Steps that do not end on a corner, where rounding decides.
-            let missed = (0..=997).map(|i| floor(from + (to - from) * (i as f32 / 997.0))).filter(|block| !all.contains(block)).count();
+            let missed = (0..=997)
+                .map(|i| floor(from + (to - from) * (i as f32 / 997.0)))
+                .filter(|block| !all.contains(block))
+                .count();
             assert!(missed <= 1, "{missed} of 998 points");
         }
     }
@@ -322,21 +359,39 @@ mod tests {
     fn where_blocks_are_wide_fewer_rays_are_walked_and_each_has_its_turn() {
         const SIDE: usize = 48;
         let depth_m = vec![1.0; SIDE * SIDE];
-        let rig = StereoRig { focal_px: 100.0, center_u_px: 24.0, center_v_px: 24.0, baseline_m: 0.5 };
-        let view = Viewpoint { rig, width: SIDE, height: SIDE, t_world_camera: Transform::default() };
+        let rig =
+            StereoRig { focal_px: 100.0, center_u_px: 24.0, center_v_px: 24.0, baseline_m: 0.5 };
+        let view =
+            Viewpoint { rig, width: SIDE, height: SIDE, t_world_camera: Transform::default() };
         let mut walked = [[0; SIDE * SIDE]; 3];
         for frame in 0..64 {
-            let rays = Rays::new(&VolumeConfig::default(), &view, View::new(&depth_m, SIDE, SIDE).unwrap(), Vector3::zeros(), frame);
+            let rays = Rays::new(
+                &VolumeConfig::default(),
+                &view,
+                View::new(&depth_m, SIDE, SIDE).unwrap(),
+                Vector3::zeros(),
+                frame,
+            );
             // Blocks of .4 m are 16 px wide at 2.5 m.
             assert_eq!([2.6, 2.4, 1.3, 1.2].map(|depth_m| rays.steps(depth_m)), [1, 2, 2, 4]);
             for (steps, walked) in [1, 2, 4].into_iter().zip(&mut walked) {
-                for (row, column) in (0..SIDE / 2).flat_map(|row| (0..SIDE / 2).map(move |column| (row, column))) {
-                    let at = [PIXEL_STEP * row + rays.offset[0], rays.first_column(row) + PIXEL_STEP * column];
-                    walked[at[0] * SIDE + at[1]] += usize::from(rays.is_taken(steps, [row, column]));
+                for (row, column) in
+                    (0..SIDE / 2).flat_map(|row| (0..SIDE / 2).map(move |column| (row, column)))
+                {
+                    let at = [
+                        PIXEL_STEP * row + rays.offset[0],
+                        rays.first_column(row) + PIXEL_STEP * column,
+                    ];
+                    walked[at[0] * SIDE + at[1]] +=
+                        usize::from(rays.is_taken(steps, [row, column]));
                 }
             }
         }
-        assert_eq!([16, 4, 1].map(|turns| vec![turns; SIDE * SIDE]), walked.map(Vec::from), "times in 64 frames that each ray is walked");
+        assert_eq!(
+            [16, 4, 1].map(|turns| vec![turns; SIDE * SIDE]),
+            walked.map(Vec::from),
+            "times in 64 frames that each ray is walked"
+        );
     }
 
     #[test]
@@ -346,7 +401,11 @@ mod tests {
         let rays = Rays {
             depth_m,
             start: Vector3::new(0.3, 0.4, 0.5),
-            rays: [Vector3::new(-1.2, -0.9, 2.5), Vector3::new(0.04, 0.0, 0.0), Vector3::new(0.0, 0.04, 0.0)],
+            rays: [
+                Vector3::new(-1.2, -0.9, 2.5),
+                Vector3::new(0.04, 0.0, 0.0),
+                Vector3::new(0.0, 0.04, 0.0),
+            ],
             reach_m: [0.2, 0.75],
             far_m: 20.0,
             offset: [1, 0],

@@ -1,4 +1,5 @@
-//! Reading voxels one lattice point after the other, along a ray or around a cell: most reads fall into the block of the last one.
+//! Reading voxels one lattice point after the other, along a ray or around a cell: most reads fall
+//! into the block of the last one.
 
 use super::{BlockCoord, BlockIndex, Blocks, Slot};
 

@@ -1,8 +1,9 @@
 //! Where blocks go when the pool is full, and where they come back from.
 //!
-//! When a block is to be made and no slot is free, the block unseen for longest leaves, unless it was visible in this frame or the last:
-//! then the pool is too small for what is in view, and the new block is refused. What is still within the pruning window when it leaves is
-//! pruned first, as it would have been had it stayed. Constant work per block made, for maps of any size.
+//! When a block is to be made and no slot is free, the block unseen for longest leaves, unless it
+//! was visible in this frame or the last: then the pool is too small for what is in view, and the
+//! new block is refused. What is still within the pruning window when it leaves is pruned first, as
+//! it would have been had it stayed. Constant work per block made, for maps of any size.
 
 use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenFull};
 
@@ -34,11 +35,12 @@ pub struct LoadedBlock<'b> {
 
 /// The caller's memory for blocks: evicted blocks are stored in it and loaded from it.
 pub trait BlockStore {
-    /// Stores a block that leaves the map; the last one stored at its coordinates counts. `false` when it cannot be stored: it is lost,
-    /// and counted.
+    /// Stores a block that leaves the map; the last one stored at its coordinates counts. `false`
+    /// when it cannot be stored: it is lost, and counted.
     fn store(&mut self, block: EvictedBlock<'_>) -> bool;
 
-    /// Fills a block that is made again; `false` when none is stored at its coordinates; the block must then stay all zero.
+    /// Fills a block that is made again; `false` when none is stored at its coordinates; the block
+    /// must then stay all zero.
     fn load(&mut self, block: LoadedBlock<'_>) -> bool;
 }
 
@@ -74,7 +76,11 @@ pub struct EvictionReport {
 
 impl Volume<'_> {
     /// Evicts the block unseen for longest. Whether a slot is free now.
-    pub(super) fn evict<S: BlockStore>(&mut self, store: &mut S, report: &mut EvictionReport) -> bool {
+    pub(super) fn evict<S: BlockStore>(
+        &mut self,
+        store: &mut S,
+        report: &mut EvictionReport,
+    ) -> bool {
         let Some(slot) = self.recency.oldest() else { return false };
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
             return false;
@@ -121,8 +127,9 @@ impl Volume<'_> {
         report
     }
 
-    /// Loads the block stored at `coord` into the map, as when a map on disk is viewed part by part. Whether the block is in the map
-    /// now; where none is stored, or no slot is free, it is not.
+    /// Loads the block stored at `coord` into the map, as when a map on disk is viewed part by
+    /// part. Whether the block is in the map now; where none is stored, or no slot is free, it is
+    /// not.
     pub fn load<S: BlockStore>(&mut self, coord: BlockCoord, store: &mut S) -> bool {
         if self.find(coord).is_some() {
             return true;
@@ -136,7 +143,12 @@ impl Volume<'_> {
     }
 
     /// Fills a block that was just made from the store.
-    pub(super) fn load_into<S: BlockStore>(&mut self, slot: Slot, coord: BlockCoord, store: &mut S) -> bool {
+    pub(super) fn load_into<S: BlockStore>(
+        &mut self,
+        slot: Slot,
+        coord: BlockCoord,
+        store: &mut S,
+    ) -> bool {
         let at = slot.index();
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return false };
         let colour = self.blocks.colour.get_mut(at);

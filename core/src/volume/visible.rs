@@ -1,9 +1,11 @@
 //! The blocks visible in the current frame.
 //!
-//! A block is visible when the frame's depth runs through it, or when it was visible in the frame before and still lies in the picture:
-//! the second is what clears space where noise once put a surface.
+//! A block is visible when the frame's depth runs through it, or when it was visible in the frame
+//! before and still lies in the picture: the second is what clears space where noise once put a
+//! surface.
 //!
-//! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each was last visible in).
+//! Memory: 8 bytes per entry (this frame's list and the last one's) and 4 per block (the frame each
+//! was last visible in).
 
 use super::{Full, Slot};
 use crate::state::Visitor;
@@ -110,10 +112,12 @@ impl<'s> VisibleList<'s> {
         visitor.u32s(part_mut(last_visible, ..end));
     }
 
-    /// Orders the list by slot, which is the order of fusion and of memory; all slots are below `end`. Reads off which slots are
-    /// entered instead of comparing them: no more work than a sort, and no depth that depends on the list.
+    /// Orders the list by slot, which is the order of fusion and of memory; all slots are below
+    /// `end`. Reads off which slots are entered instead of comparing them: no more work than a
+    /// sort, and no depth that depends on the list.
     pub(super) fn sort(&mut self, end: usize) {
-        let entered = (0..).zip(self.last_visible.iter().take(end)).filter(|(_, last)| **last == self.frame);
+        let entered =
+            (0..).zip(self.last_visible.iter().take(end)).filter(|(_, last)| **last == self.frame);
         for (target, (slot, _)) in self.slots.iter_mut().take(self.len).zip(entered) {
             *target = Slot::new(slot);
         }

@@ -1,4 +1,5 @@
-//! A volume as state: slots as they were given out, what the blocks in use hold, and who was seen when.
+//! A volume as state: slots as they were given out, what the blocks in use hold, and who was seen
+//! when.
 
 use super::Volume;
 use crate::{audit::Audit, state::Visitor};
@@ -33,15 +34,28 @@ impl Volume<'_> {
 
     /// Says what must hold of the volume after a frame.
     pub(crate) fn audit(&self, audit: &mut Audit) {
-        audit.require(self.pool.len() <= self.pool.capacity(), "no more blocks are in use than the pool has");
-        audit.require(self.pool.is_empty() == self.recency.oldest().is_none(), "every block in use is in the list of recency");
-        audit.require(self.history.len() <= self.history.capacity(), "the window has no more frames than it can hold");
+        audit.require(
+            self.pool.len() <= self.pool.capacity(),
+            "no more blocks are in use than the pool has",
+        );
+        audit.require(
+            self.pool.is_empty() == self.recency.oldest().is_none(),
+            "every block in use is in the list of recency",
+        );
+        audit.require(
+            self.history.len() <= self.history.capacity(),
+            "the window has no more frames than it can hold",
+        );
         let end = self.pool.high_water();
-        audit.require(self.visible.slots().iter().all(|slot| slot.index() < end), "every visible slot was given out");
+        audit.require(
+            self.visible.slots().iter().all(|slot| slot.index() < end),
+            "every visible slot was given out",
+        );
     }
 
-    /// Inserts the blocks that were read into the index, in slot order, and sums their digests. Whether they can be: no coordinates twice,
-    /// space for all. Nothing that comes later depends on the order of insertion: the index answers for one block, and nothing walks it.
+    /// Inserts the blocks that were read into the index, in slot order, and sums their digests.
+    /// Whether they can be: no coordinates twice, space for all. Nothing that comes later depends
+    /// on the order of insertion: the index answers for one block, and nothing walks it.
     pub(crate) fn rebuild(&mut self) -> bool {
         for slot in self.pool.live() {
             let Some(coord) = self.blocks.coord(slot) else { return false };
@@ -50,7 +64,9 @@ impl Volume<'_> {
             {
                 return false;
             }
-            self.digest = self.digest.wrapping_add(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
+            self.digest = self.digest.wrapping_add(
+                self.blocks.header.get(slot.index()).map_or(0, |header| header.digest),
+            );
         }
         true
     }

@@ -8,12 +8,20 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// One value for each pixel; takes the values over without a copy.
-pub fn image<T: Element>(py: Python<'_>, pixels: Vec<T>, [height, width]: [usize; 2]) -> PyResult<Bound<'_, PyArray2<T>>> {
+pub fn image<T: Element>(
+    py: Python<'_>,
+    pixels: Vec<T>,
+    [height, width]: [usize; 2],
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     PyArray1::from_vec(py, pixels).reshape([height, width])
 }
 
 /// Three values for each pixel.
-pub fn colour<T: Element>(py: Python<'_>, pixels: Vec<[T; 3]>, [height, width]: [usize; 2]) -> PyResult<Bound<'_, PyArray3<T>>> {
+pub fn colour<T: Element>(
+    py: Python<'_>,
+    pixels: Vec<[T; 3]>,
+    [height, width]: [usize; 2],
+) -> PyResult<Bound<'_, PyArray3<T>>> {
     PyArray1::from_vec(py, pixels.into_flattened()).reshape([height, width, 3])
 }
 
@@ -40,15 +48,22 @@ impl Triangles {
     /// Moves the corners from an object's frame to the world.
     pub fn moved(mut self, t_world_object: &Transform) -> Self {
         for position_m in &mut self.positions_m {
-            *position_m = t_world_object.transform_point(position_m.map(f64::from)).map(|side| side as f32);
+            *position_m =
+                t_world_object.transform_point(position_m.map(f64::from)).map(|side| side as f32);
         }
         self
     }
 
     /// Two arrays of triangles x corners x 3.
-    pub fn arrays<'py>(self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<u8>>)> {
+    pub fn arrays<'py>(
+        self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<u8>>)> {
         let triangles = self.positions_m.len() / 3;
-        Ok((colour(py, self.positions_m, [triangles, 3])?, colour(py, self.colours, [triangles, 3])?))
+        Ok((
+            colour(py, self.positions_m, [triangles, 3])?,
+            colour(py, self.colours, [triangles, 3])?,
+        ))
     }
 }
 
@@ -76,9 +91,12 @@ impl Raycast {
         })
     }
 
-    /// The images by name. `objects` are the numbers of the tracks behind layers 1, 2 and on: `object` has for each pixel the track it shows.
+    /// The images by name. `objects` are the numbers of the tracks behind layers 1, 2 and on:
+    /// `object` has for each pixel the track it shows.
     pub fn dictionary<'py>(self, py: Python<'py>, objects: &[u32]) -> PyResult<Bound<'py, PyDict>> {
-        let track = |&layer: &u8| usize::from(layer).checked_sub(1).and_then(|at| objects.get(at)).copied().unwrap_or(0);
+        let track = |&layer: &u8| {
+            usize::from(layer).checked_sub(1).and_then(|at| objects.get(at)).copied().unwrap_or(0)
+        };
         let object = self.layer.iter().map(track).collect();
         let images = PyDict::new(py);
         images.set_item("depth_m", image(py, self.depth_m, self.size)?)?;

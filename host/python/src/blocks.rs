@@ -33,7 +33,9 @@ impl Blocks {
         let (path, temporary) = match choice {
             BlocksChoice::Lost if records.is_empty() => return Ok(Self::Lost),
             BlocksChoice::Lost => {
-                return Err(refuse("the snapshot has evicted blocks, and this mapper loses them. Make it with stream=True"));
+                return Err(refuse(
+                    "the snapshot has evicted blocks, and this mapper loses them. Make it with stream=True",
+                ));
             }
             BlocksChoice::Temporary => {
                 let path = tempfile::NamedTempFile::new().map_err(raise)?.into_temp_path();
@@ -43,13 +45,21 @@ impl Blocks {
         };
         let shown = path.display();
         if temporary.is_none() && records.is_empty() && path.exists() {
-            return Err(refuse(format!("{shown} exists. Name another file for evicted blocks, or remove it")));
+            return Err(refuse(format!(
+                "{shown} exists. Name another file for evicted blocks, or remove it"
+            )));
         }
         if !records.is_empty() {
             let written = File::create(&path).and_then(|mut file| file.write_all(records));
-            written.map_err(|error| refuse(format!("{shown} cannot be written: {error}. Name another file for evicted blocks")))?;
+            written.map_err(|error| {
+                refuse(format!(
+                    "{shown} cannot be written: {error}. Name another file for evicted blocks"
+                ))
+            })?;
         }
-        let (file, _) = BlockFile::open(&path, config.volume.voxel_size_m, config.volume.truncation_m).map_err(raise)?;
+        let (file, _) =
+            BlockFile::open(&path, config.volume.voxel_size_m, config.volume.truncation_m)
+                .map_err(raise)?;
         Ok(Self::Stored { file, path, _temporary: temporary })
     }
 

@@ -49,11 +49,16 @@ impl Dataset {
     ) -> PyResult<Self> {
         let path = path.map(|path| path.str().map(|path| path.to_string())).transpose()?;
         if path.as_deref() == Some("-") {
-            return Err(refuse("a stream is read by its own program. Give its pairs to Mapper.step"));
+            return Err(refuse(
+                "a stream is read by its own program. Give its pairs to Mapper.step",
+            ));
         }
         let line = options::dataset_line(path, options.as_ref())?;
         let plan = py.detach(|| plan_of(&line)).map_err(raise)?;
-        let poses = plan.poses.as_ref().map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>()));
+        let poses = plan
+            .poses
+            .as_ref()
+            .map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>()));
         Ok(Self { plan, poses, blocks: options::blocks(stream.as_ref())? })
     }
 
@@ -69,7 +74,11 @@ impl Dataset {
 
     #[getter]
     fn rig(&self) -> Rig {
-        Rig::of(self.plan.dataset.rig(), self.plan.dataset.size(), self.plan.dataset.rectification())
+        Rig::of(
+            self.plan.dataset.rig(),
+            self.plan.dataset.size(),
+            self.plan.dataset.rectification(),
+        )
     }
 
     #[getter]
@@ -112,7 +121,11 @@ impl Dataset {
     }
 
     /// Points of a frame's LiDAR scan in camera axes, m; None where there is no scan.
-    fn lidar<'py>(&self, py: Python<'py>, position: isize) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+    fn lidar<'py>(
+        &self,
+        py: Python<'py>,
+        position: isize,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
         let (_, number) = self.number(position)?;
         let scan = py.detach(|| self.plan.dataset.lidar(number)).map_err(raise)?;
         let Some(scan) = scan else { return Ok(None) };
@@ -132,7 +145,8 @@ impl Dataset {
             config_toml: config_toml.clone(),
             threads: *threads,
         };
-        dynvox::run::check_bounds(self.plan.dataset.size(), (profile, capacity), config).map_err(raise)?;
+        dynvox::run::check_bounds(self.plan.dataset.size(), (profile, capacity), config)
+            .map_err(raise)?;
         Mapper::of_plan(self.rig(), self.plan.dataset.size(), plan, self.blocks.clone())
     }
 
@@ -156,7 +170,11 @@ impl Dataset {
 
     fn __repr__(&self) -> String {
         let (width, height) = self.plan.dataset.size();
-        format!("Dataset({}, {} frames of {width} x {height} px)", self.plan.dataset.name(), self.__len__())
+        format!(
+            "Dataset({}, {} frames of {width} x {height} px)",
+            self.plan.dataset.name(),
+            self.__len__()
+        )
     }
 }
 
@@ -174,10 +192,15 @@ fn frame(py: Python<'_>, images: StereoImages) -> PyResult<Bound<'_, PyDict>> {
     }
     if let Some(depth) = depth {
         let size = [depth.disparity_q8.height(), depth.disparity_q8.width()];
-        frame.set_item("disparity_q8", arrays::image(py, depth.disparity_q8.into_pixels(), size)?)?;
+        frame
+            .set_item("disparity_q8", arrays::image(py, depth.disparity_q8.into_pixels(), size)?)?;
     }
     if !masks.instances.is_empty() {
-        let detections = masks.instances.into_iter().map(|of| Detection::of(py, of)).collect::<PyResult<Vec<_>>>()?;
+        let detections = masks
+            .instances
+            .into_iter()
+            .map(|of| Detection::of(py, of))
+            .collect::<PyResult<Vec<_>>>()?;
         frame.set_item("detections", PyList::new(py, detections)?)?;
     }
     Ok(frame)

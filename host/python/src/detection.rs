@@ -43,8 +43,12 @@ impl Detection {
 
 impl<'py> BorrowedDetection<'py> {
     pub fn new(object: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let of =
-            object.cast::<Detection>().map_err(|_| refuse("detections holds what is no dynvox.Detection. Pass a list of them"))?.borrow();
+        let of = object
+            .cast::<Detection>()
+            .map_err(|_| {
+                refuse("detections holds what is no dynvox.Detection. Pass a list of them")
+            })?
+            .borrow();
         let mask = Borrowed::new("mask", of.mask.bind(object.py()))?;
         Ok(Self { of, mask })
     }
@@ -53,7 +57,9 @@ impl<'py> BorrowedDetection<'py> {
     pub fn detection(&self) -> PyResult<CoreDetection<'_>> {
         let view = self.mask.view()?;
         if view.pixels().is_empty() {
-            return Err(refuse("mask has rows that do not lie one behind the other. Pass numpy.ascontiguousarray(mask)"));
+            return Err(refuse(
+                "mask has rows that do not lie one behind the other. Pass numpy.ascontiguousarray(mask)",
+            ));
         }
         Ok(CoreDetection {
             class: self.of.class,
@@ -71,9 +77,18 @@ impl<'py> BorrowedDetection<'py> {
 impl Detection {
     #[new]
     #[pyo3(signature = (mask, left, top, class_name="car", score=1.0))]
-    fn new(mask: Bound<'_, PyAny>, left: i32, top: i32, class_name: &str, score: f32) -> PyResult<Self> {
+    fn new(
+        mask: Bound<'_, PyAny>,
+        left: i32,
+        top: i32,
+        class_name: &str,
+        score: f32,
+    ) -> PyResult<Self> {
         // Truth values are bytes of 0 and 1.
-        let is_bool = mask.getattr("dtype").and_then(|dtype| dtype.getattr("kind")?.extract::<String>()).is_ok_and(|kind| kind == "b");
+        let is_bool = mask
+            .getattr("dtype")
+            .and_then(|dtype| dtype.getattr("kind")?.extract::<String>())
+            .is_ok_and(|kind| kind == "b");
         let mask = if is_bool { mask.call_method1("view", ("uint8",))? } else { mask };
         Borrowed::<u8>::new("mask", &mask)?.view()?;
         let class = Class::from_name(class_name).ok_or_else(|| {
@@ -93,6 +108,9 @@ impl Detection {
     }
 
     fn __repr__(&self) -> String {
-        format!("Detection({}, score {:.2}, at {}, {})", self.class_name, self.score, self.left, self.top)
+        format!(
+            "Detection({}, score {:.2}, at {}, {})",
+            self.class_name, self.score, self.left, self.top
+        )
     }
 }

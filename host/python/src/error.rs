@@ -4,7 +4,12 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
-create_exception!(dynvox, Error, PyException, "What is wrong, and what to do about it, in the sentences of the command line.");
+create_exception!(
+    dynvox,
+    Error,
+    PyException,
+    "What is wrong, and what to do about it, in the sentences of the command line."
+);
 
 /// An exception with this sentence.
 pub fn refuse(sentence: impl Into<String>) -> PyErr {

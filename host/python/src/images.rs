@@ -49,17 +49,22 @@ impl<'py, T: Element> Borrowed<'py, T> {
         let (name, shape, strides) = (self.name, self.array.shape(), self.array.strides());
         let wrong_shape = || {
             let wanted = if trailing.is_empty() { "height x width" } else { "height x width x 3" };
-            refuse(format!("{name} has the shape {shape:?}, and {wanted} is needed. Check its axes"))
+            refuse(format!(
+                "{name} has the shape {shape:?}, and {wanted} is needed. Check its axes"
+            ))
         };
-        let (&[height, width], rest) =
-            shape.split_at_checked(2).and_then(|(two, rest)| Some((two.first_chunk()?, rest))).ok_or_else(wrong_shape)?;
+        let (&[height, width], rest) = shape
+            .split_at_checked(2)
+            .and_then(|(two, rest)| Some((two.first_chunk()?, rest)))
+            .ok_or_else(wrong_shape)?;
         if rest != trailing || height == 0 || width == 0 {
             return Err(wrong_shape());
         }
         // Pixels of a row lie side by side, rows any whole number of pixels apart.
         let (size, value) = (size_of::<P>() as isize, size_of::<T>() as isize);
         let row = strides[0];
-        let dense = (width == 1 || strides[1] == size) && strides.get(2).is_none_or(|&channel| channel == value);
+        let dense = (width == 1 || strides[1] == size)
+            && strides.get(2).is_none_or(|&channel| channel == value);
         if !dense || (height > 1 && (row < size * width as isize || row % size != 0)) {
             return Err(refuse(format!(
                 "{name} has pixels that do not lie side by side in its rows. Pass numpy.ascontiguousarray({name})"
@@ -67,10 +72,13 @@ impl<'py, T: Element> Borrowed<'py, T> {
         }
         let stride = if height > 1 { (row / size) as usize } else { width };
         let len = (height - 1) * stride + width;
-        // SAFETY: the array has `height` rows of `width` pixels, `stride` pixels apart, as checked; `P` is one or several `T` without padding, of the
-        // alignment of `T`, which numpy's dtype check has established. It lives as long as the borrow, and its read-only borrow keeps other Rust code
-        // from writing. What other threads of Python write meanwhile shows in the map, as in any function of numpy that releases the interpreter.
-        let data = unsafe { slice::from_raw_parts(self.array.as_array().as_ptr().cast::<P>(), len) };
+        // SAFETY: the array has `height` rows of `width` pixels, `stride` pixels apart, as checked;
+        // `P` is one or several `T` without padding, of the alignment of `T`, which numpy's dtype
+        // check has established. It lives as long as the borrow, and its read-only borrow keeps
+        // other Rust code from writing. What other threads of Python write meanwhile shows in the
+        // map, as in any function of numpy that releases the interpreter.
+        let data =
+            unsafe { slice::from_raw_parts(self.array.as_array().as_ptr().cast::<P>(), len) };
         View::with_stride(data, width, height, stride).ok_or_else(wrong_shape)
     }
 }
@@ -104,12 +112,18 @@ impl<'a> Picture<'a> {
 
     /// The grey values.
     pub fn grey(&self) -> PyResult<View<'_, u8>> {
-        let computed = || self.colour.and_then(|colour| View::new(&self.computed, colour.width(), colour.height()));
-        self.given.or_else(computed).ok_or_else(|| refuse("a picture is empty. Pass one with pixels"))
+        let computed = || {
+            self.colour
+                .and_then(|colour| View::new(&self.computed, colour.width(), colour.height()))
+        };
+        self.given
+            .or_else(computed)
+            .ok_or_else(|| refuse("a picture is empty. Pass one with pixels"))
     }
 }
 
-/// Address of the first pixel that the core would read of a picture, and how many pixels apart its rows are: for the test that nothing is copied.
+/// Address of the first pixel that the core would read of a picture, and how many pixels apart its
+/// rows are: for the test that nothing is copied.
 #[pyfunction]
 pub fn _borrowed(array: Bound<'_, PyAny>) -> PyResult<(usize, usize)> {
     fn address<T>(view: &View<'_, T>) -> (usize, usize) {
@@ -117,5 +131,9 @@ pub fn _borrowed(array: Bound<'_, PyAny>) -> PyResult<(usize, usize)> {
         (pixels.as_ptr().addr(), stride)
     }
     let borrowed = Borrowed::<u8>::new("array", &array)?;
-    if borrowed.is_colour() { borrowed.colour().map(|view| address(&view)) } else { borrowed.view().map(|view| address(&view)) }
+    if borrowed.is_colour() {
+        borrowed.colour().map(|view| address(&view))
+    } else {
+        borrowed.view().map(|view| address(&view))
+    }
 }

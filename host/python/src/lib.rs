@@ -1,7 +1,9 @@
-//! The dynvox stereo mapper for Python: the core, and the host's readers of data sets and calibrations.
+//! The dynvox stereo mapper for Python: the core, and the host's readers of data sets and
+//! calibrations.
 //!
-//! `python/dynvox/__init__.pyi` describes what users see. Images are borrowed from numpy for the time of a step ([`images`]); what comes back is new
-//! arrays and dictionaries. The interpreter is free for other threads while a mapper works and while a frame is decoded.
+//! `python/dynvox/__init__.pyi` describes what users see. Images are borrowed from numpy for the
+//! time of a step ([`images`]); what comes back is new arrays and dictionaries. The interpreter is
+//! free for other threads while a mapper works and while a frame is decoded.
 
 mod arrays;
 mod blocks;

@@ -33,7 +33,12 @@ pub struct Mapper {
 
 impl Mapper {
     /// The mapper of a data set's run.
-    pub fn of_plan(rig: Rig, size: (usize, usize), plan: MapperPlan, blocks: BlocksChoice) -> PyResult<Self> {
+    pub fn of_plan(
+        rig: Rig,
+        size: (usize, usize),
+        plan: MapperPlan,
+        blocks: BlocksChoice,
+    ) -> PyResult<Self> {
         let recipe = Recipe { rig, line: Vec::new(), interval_s: None, plan: Some(plan), blocks };
         let mut state = State { recipe, running: None };
         state.running_for(size)?;
@@ -45,7 +50,11 @@ impl Mapper {
     }
 
     /// Runs `work` on the mapper while other threads of Python run.
-    fn with<R: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Running) -> PyResult<R> + Send) -> PyResult<R> {
+    fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Running) -> PyResult<R> + Send,
+    ) -> PyResult<R> {
         py.detach(|| work(self.lock()?.running()?))
     }
 }
@@ -95,16 +104,22 @@ impl Mapper {
         let (left, right) = (Borrowed::new("left", &left)?, Borrowed::new("right", &right)?);
         let colour = colour.map(|array| Borrowed::<u8>::new("colour", &array)).transpose()?;
         let classes = classes.map(|array| Borrowed::<u8>::new("classes", &array)).transpose()?;
-        let disparity_q8 = disparity_q8.map(|array| Borrowed::<u16>::new("disparity_q8", &array)).transpose()?;
-        let found = detections.map(|list| list.try_iter()?.map(|one| BorrowedDetection::new(&one?)).collect::<PyResult<Vec<_>>>());
+        let disparity_q8 =
+            disparity_q8.map(|array| Borrowed::<u16>::new("disparity_q8", &array)).transpose()?;
+        let found = detections.map(|list| {
+            list.try_iter()?.map(|one| BorrowedDetection::new(&one?)).collect::<PyResult<Vec<_>>>()
+        });
         let found = found.transpose()?.unwrap_or_default();
-        let detections = found.iter().map(BorrowedDetection::detection).collect::<PyResult<Vec<_>>>()?;
+        let detections =
+            found.iter().map(BorrowedDetection::detection).collect::<PyResult<Vec<_>>>()?;
         let (left, right) = (Picture::of(&left)?, Picture::of(&right)?);
         let frame = StereoFrame {
             colour: colour.as_ref().map(Borrowed::colour).transpose()?.or(left.colour),
             class: classes.as_ref().map(Borrowed::view).transpose()?,
             disparity_q8: disparity_q8.as_ref().map(Borrowed::view).transpose()?,
-            t_world_camera: t_world_camera.map(|pose| pose::given("t_world_camera", &pose)).transpose()?,
+            t_world_camera: t_world_camera
+                .map(|pose| pose::given("t_world_camera", &pose))
+                .transpose()?,
             time_ns,
             detections: &detections,
             ..StereoFrame::pair(left.grey()?, right.grey()?)
@@ -115,14 +130,21 @@ impl Mapper {
     }
 
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let pruned = self.with(py, |running| Ok(running.mapper.with_dependent_mut(|_, mapper| mapper.finish())))?;
+        let pruned = self.with(py, |running| {
+            Ok(running.mapper.with_dependent_mut(|_, mapper| mapper.finish()))
+        })?;
         Ok(pythonize(py, &pruned)?)
     }
 
     #[getter]
     fn tracks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let tracks: Vec<_> = self.with(py, |running| Ok(running.mapper.with_dependent(|_, mapper| mapper.tracks().collect())))?;
-        PyList::new(py, tracks.iter().map(|track| track_dictionary(py, track)).collect::<PyResult<Vec<_>>>()?)
+        let tracks: Vec<_> = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| mapper.tracks().collect()))
+        })?;
+        PyList::new(
+            py,
+            tracks.iter().map(|track| track_dictionary(py, track)).collect::<PyResult<Vec<_>>>()?,
+        )
     }
 
     #[pyo3(signature = (t_world_camera=None, *, objects=true, every=1))]
@@ -136,15 +158,23 @@ impl Mapper {
         let from = t_world_camera.map(|pose| pose::given("t_world_camera", &pose)).transpose()?;
         let (shown, ids) = self.with(py, |Running { mapper, threads, .. }| {
             mapper.with_dependent_mut(|_, mapper| {
-                let view = RaycastView { t_world_camera: from.unwrap_or(*mapper.t_world_camera()), every };
+                let view =
+                    RaycastView { t_world_camera: from.unwrap_or(*mapper.t_world_camera()), every };
                 let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
                 let cast = threads.run(|| match objects {
                     true => mapper.raycast_composed(view, threads).map(Raycast::of),
                     false => mapper.raycast(view, threads).map(Raycast::of),
                 });
                 let action = "Map a frame first, and look from a pose within the map";
-                let cast = cast.map_err(|error| refuse(format!("there is no picture of the map: {error}. {action}")))?;
-                Ok((cast.ok_or_else(|| refuse(format!("there is no picture of the map. {action}")))?, ids))
+                let cast = cast.map_err(|error| {
+                    refuse(format!("there is no picture of the map: {error}. {action}"))
+                })?;
+                Ok((
+                    cast.ok_or_else(|| {
+                        refuse(format!("there is no picture of the map. {action}"))
+                    })?,
+                    ids,
+                ))
             })
         })?;
         shown.dictionary(py, &ids)
@@ -152,12 +182,21 @@ impl Mapper {
 
     #[pyo3(signature = (ahead_s=0.0))]
     fn plan<'py>(&self, py: Python<'py>, ahead_s: f32) -> PyResult<Bound<'py, PyDict>> {
-        let plan = self.with(py, |running| Ok(running.mapper.with_dependent_mut(|_, mapper| Plan::of(mapper, ahead_s))))?;
-        plan.ok_or_else(|| refuse("the mapper has no window for planners. Make it with planning=\"200x200x20\""))?.dictionary(py)
+        let plan = self.with(py, |running| {
+            Ok(running.mapper.with_dependent_mut(|_, mapper| Plan::of(mapper, ahead_s)))
+        })?;
+        plan.ok_or_else(|| {
+            refuse("the mapper has no window for planners. Make it with planning=\"200x200x20\"")
+        })?
+        .dictionary(py)
     }
 
     #[pyo3(signature = (object=None))]
-    fn triangles<'py>(&self, py: Python<'py>, object: Option<u32>) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<u8>>)> {
+    fn triangles<'py>(
+        &self,
+        py: Python<'py>,
+        object: Option<u32>,
+    ) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<u8>>)> {
         let triangles = self.with(py, |running| match object {
             None => map_triangles(running),
             Some(id) => object_triangles(running, id),
@@ -167,25 +206,42 @@ impl Mapper {
 
     #[getter]
     fn t_world_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let of = self.with(py, |running| Ok(running.mapper.with_dependent(|_, mapper| *mapper.t_world_camera())))?;
+        let of = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| *mapper.t_world_camera()))
+        })?;
         pose::matrix(py, &of)
     }
 
     #[getter]
     fn disparity_q8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u16>>> {
-        let (pixels, size) =
-            self.with(py, |running| Ok(running.mapper.with_dependent(|_, mapper| arrays::copied(mapper.disparity_q8()))))?;
+        let (pixels, size) = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| arrays::copied(mapper.disparity_q8())))
+        })?;
         arrays::image(py, pixels, size)
     }
 
     #[getter]
     fn digest(&self, py: Python<'_>) -> PyResult<Option<u64>> {
-        py.detach(|| Ok(self.lock()?.running.as_ref().and_then(|running| running.report).map(|report| report.digest)))
+        py.detach(|| {
+            Ok(self
+                .lock()?
+                .running
+                .as_ref()
+                .and_then(|running| running.report)
+                .map(|report| report.digest))
+        })
     }
 
     #[getter]
     fn step_seconds(&self, py: Python<'_>) -> PyResult<Option<f64>> {
-        py.detach(|| Ok(self.lock()?.running.as_ref().and_then(|running| running.step_time).map(|time| time.as_secs_f64())))
+        py.detach(|| {
+            Ok(self
+                .lock()?
+                .running
+                .as_ref()
+                .and_then(|running| running.step_time)
+                .map(|time| time.as_secs_f64()))
+        })
     }
 
     #[getter]
@@ -199,7 +255,9 @@ impl Mapper {
     }
 
     fn footprint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        let footprint = self.with(py, |running| Ok(running.mapper.with_dependent(|_, mapper| mapper.footprint())))?;
+        let footprint = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| mapper.footprint()))
+        })?;
         let regions = footprint.regions().iter().map(|region| {
             let parts = PyDict::new(py);
             parts.set_item("name", region.name)?;
@@ -230,10 +288,17 @@ fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
     });
     if let Some(file) = running.blocks.file_mut() {
         let (config, colour) = (&running.plan.config, running.plan.capacity.colour);
-        let mut slab = HostSlab::map(MESH_BYTES).ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
+        let mut slab = HostSlab::map(MESH_BYTES)
+            .ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
         let how = (&config.volume, &config.mesh);
-        store::mesh::triangles(file, how, (slab.bytes_mut(), colour), &in_memory, &mut |triangle: Triangle| triangles.add(triangle))
-            .map_err(|error| raise(anyhow::anyhow!("{error}")))?;
+        store::mesh::triangles(
+            file,
+            how,
+            (slab.bytes_mut(), colour),
+            &in_memory,
+            &mut |triangle: Triangle| triangles.add(triangle),
+        )
+        .map_err(|error| raise(anyhow::anyhow!("{error}")))?;
     }
     Ok(triangles)
 }
@@ -275,7 +340,10 @@ fn track_dictionary<'py>(py: Python<'py>, of: &TrackReport) -> PyResult<Bound<'p
     parts.set_item("measured", of.measured)?;
     parts.set_item("center_world_m", of.center_world_m)?;
     parts.set_item("motion_world", pose::dictionary(py, &of.motion_world)?)?;
-    parts.set_item("t_world_object", of.t_world_object.map(|pose| pose::dictionary(py, &pose)).transpose()?)?;
+    parts.set_item(
+        "t_world_object",
+        of.t_world_object.map(|pose| pose::dictionary(py, &pose)).transpose()?,
+    )?;
     parts.set_item("matches", of.matches)?;
     parts.set_item("inliers", of.inliers)?;
     parts.set_item("blocks", of.blocks)?;

@@ -42,7 +42,9 @@ fn toml(value: &Bound<'_, PyAny>) -> PyResult<String> {
         return Ok(text.to_lowercase());
     }
     if text.contains('\n') {
-        return Err(refuse(format!("the setting {text:?} has more than one line. Give a number, a word or a list")));
+        return Err(refuse(format!(
+            "the setting {text:?} has more than one line. Give a number, a word or a list"
+        )));
     }
     Ok(text)
 }
@@ -90,7 +92,10 @@ pub fn mapper_line(options: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>>
 }
 
 /// The command line of a data set's run.
-pub fn dataset_line(path: Option<String>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
+pub fn dataset_line(
+    path: Option<String>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<String>> {
     line(path, options, &[&OF_DATASET, &OF_MAPPER], "Dataset")
 }
 
@@ -104,9 +109,15 @@ pub fn blocks(stream: Option<&Bound<'_, PyAny>>) -> PyResult<BlocksChoice> {
     }
 }
 
-/// The command line of a run with these options. `memory="48MiB"` is `--memory 48MiB`, `planning_3d=True` is `--planning-3d`, a list repeats its
-/// option, and `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
-fn line(path: Option<String>, options: Option<&Bound<'_, PyDict>>, known: &[&[&str]], of: &str) -> PyResult<Vec<String>> {
+/// The command line of a run with these options. `memory="48MiB"` is `--memory 48MiB`,
+/// `planning_3d=True` is `--planning-3d`, a list repeats its option, and
+/// `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
+fn line(
+    path: Option<String>,
+    options: Option<&Bound<'_, PyDict>>,
+    known: &[&[&str]],
+    of: &str,
+) -> PyResult<Vec<String>> {
     let mut line = vec!["dynvox".to_owned()];
     for (key, value) in options.into_iter().flat_map(|options| options.iter()) {
         let key: String = key.extract()?;

@@ -29,7 +29,14 @@ impl Plan {
 
     /// Everything by name.
     pub fn dictionary(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-        let PlanningLayers { size: [columns, rows], cell_m, t_world_corner, occupancy, distance_m, height_m } = self.layers;
+        let PlanningLayers {
+            size: [columns, rows],
+            cell_m,
+            t_world_corner,
+            occupancy,
+            distance_m,
+            height_m,
+        } = self.layers;
         let parts = PyDict::new(py);
         parts.set_item("occupancy", arrays::image(py, occupancy, [rows, columns])?)?;
         parts.set_item("distance_m", arrays::image(py, distance_m, [rows, columns])?)?;

@@ -6,7 +6,8 @@ use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A pose as a matrix of 4 x 4 or 3 x 4, or as reports have it: a dictionary with `rotation` (quaternion, x y z w) and `translation_m`.
+/// A pose as a matrix of 4 x 4 or 3 x 4, or as reports have it: a dictionary with `rotation`
+/// (quaternion, x y z w) and `translation_m`.
 pub fn given(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Transform> {
     let refused = || {
         refuse(format!(
@@ -21,14 +22,21 @@ pub fn given(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Transform> {
             translation_m: part("translation_m")?.extract().map_err(|_| refused())?,
         });
     }
-    let float64 = value.py().import("numpy")?.call_method1("asarray", (value, "float64")).map_err(|_| refused())?;
+    let float64 = value
+        .py()
+        .import("numpy")?
+        .call_method1("asarray", (value, "float64"))
+        .map_err(|_| refused())?;
     let matrix: PyReadonlyArray2<'_, f64> = float64.extract().map_err(|_| refused())?;
     let matrix = matrix.as_array();
     if !matches!(matrix.shape(), [3 | 4, 4]) {
         return Err(refused());
     }
     let row = |v: usize| [0, 1, 2].map(|u| matrix[[v, u]]);
-    Ok(Transform::from_rotation_matrix(&[row(0), row(1), row(2)], [0, 1, 2].map(|v| matrix[[v, 3]])))
+    Ok(Transform::from_rotation_matrix(
+        &[row(0), row(1), row(2)],
+        [0, 1, 2].map(|v| matrix[[v, 3]]),
+    ))
 }
 
 /// A matrix of 4 x 4.

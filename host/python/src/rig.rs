@@ -82,11 +82,14 @@ impl Rig {
 
     fn __repr__(&self) -> String {
         let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
-        format!("Rig(focal_px={focal_px}, center_u_px={center_u_px}, center_v_px={center_v_px}, baseline_m={baseline_m})")
+        format!(
+            "Rig(focal_px={focal_px}, center_u_px={center_u_px}, center_v_px={center_v_px}, baseline_m={baseline_m})"
+        )
     }
 }
 
-/// Reads the calibration of raw or rectified cameras, in any format that `dynvox calibration` reads.
+/// Reads the calibration of raw or rectified cameras, in any format that `dynvox calibration`
+/// reads.
 #[pyfunction]
 #[pyo3(signature = (*files, image=None, rectified=None, rectified_focal_px=None))]
 pub fn read_calibration(
@@ -96,11 +99,16 @@ pub fn read_calibration(
     rectified_focal_px: Option<f64>,
 ) -> PyResult<Rig> {
     if files.is_empty() {
-        return Err(refuse("no file of a calibration is given. Name one file with both cameras, or one for each"));
+        return Err(refuse(
+            "no file of a calibration is given. Name one file with both cameras, or one for each",
+        ));
     }
-    let cameras = CameraGeometry::read(&files, image.map(|(width, height)| [width, height])).map_err(raise)?;
+    let cameras = CameraGeometry::read(&files, image.map(|(width, height)| [width, height]))
+        .map_err(raise)?;
     let raw = match &cameras {
-        CameraGeometry::Rectified(rig) => return Rig::new(rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m),
+        CameraGeometry::Rectified(rig) => {
+            return Rig::new(rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m);
+        }
         CameraGeometry::Raw { calibration, .. } => &calibration.left,
     };
     let size = RectifiedSize {

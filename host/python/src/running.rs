@@ -22,8 +22,8 @@ self_cell!(
     }
 );
 
-/// What a snapshot begins with. Then follow, of 8 bytes each, width and height of the mapped pictures and the length of the core's snapshot; that, and
-/// the file of evicted blocks.
+/// What a snapshot begins with. Then follow, of 8 bytes each, width and height of the mapped
+/// pictures and the length of the core's snapshot; that, and the file of evicted blocks.
 const MAGIC: [u8; 8] = *b"DVXPYTHN";
 const HEAD: usize = 32;
 
@@ -71,7 +71,9 @@ impl<'a> Snapshot<'a> {
     fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (head, rest) = bytes.split_at_checked(HEAD)?;
         let (magic, numbers) = head.split_at_checked(MAGIC.len())?;
-        let mut numbers = numbers.chunks_exact(8).map(|number| usize::try_from(u64::from_le_bytes(number.try_into().ok()?)).ok());
+        let mut numbers = numbers
+            .chunks_exact(8)
+            .map(|number| usize::try_from(u64::from_le_bytes(number.try_into().ok()?)).ok());
         let mut number = || numbers.next().flatten();
         let (size, core) = ((number()?, number()?), number()?);
         let (core, blocks) = rest.split_at_checked(core)?;
@@ -84,7 +86,8 @@ impl Running {
     fn begin(plan: MapperPlan, size: (usize, usize), blocks: &BlocksChoice) -> PyResult<Self> {
         let slab = slab_of(&plan)?;
         let mapper = SlabMapper::try_new(slab, |slab| {
-            Mapper::new(&plan.capacity, &plan.config, slab.borrow_mut().bytes_mut()).map_err(|error| raise(anyhow::anyhow!("{error}")))
+            Mapper::new(&plan.capacity, &plan.config, slab.borrow_mut().bytes_mut())
+                .map_err(|error| raise(anyhow::anyhow!("{error}")))
         })?;
         Ok(Self {
             blocks: Blocks::begin(blocks, &plan.config, &[])?,
@@ -123,8 +126,12 @@ impl Running {
     fn step(&mut self, frame: &StereoFrame<'_>) -> PyResult<Report> {
         let Self { mapper, threads, blocks, .. } = self;
         let began = Instant::now();
-        let stepped = mapper.with_dependent_mut(|_, mapper| threads.run(|| mapper.step_with(frame, threads, blocks, &mut NoSink)));
-        let report = stepped.map_err(|error| refuse(format!("frame {} was refused: {}", self.next_frame, step_reason(error))))?;
+        let stepped = mapper.with_dependent_mut(|_, mapper| {
+            threads.run(|| mapper.step_with(frame, threads, blocks, &mut NoSink))
+        });
+        let report = stepped.map_err(|error| {
+            refuse(format!("frame {} was refused: {}", self.next_frame, step_reason(error)))
+        })?;
         self.step_time = Some(began.elapsed());
         self.next_frame = report.frame + 1;
         self.report = Some(report);
@@ -145,7 +152,9 @@ impl Running {
             field.copy_from_slice(&(number as u64).to_le_bytes());
         }
         let blocks = self.blocks.bytes();
-        bytes.extend(blocks.map_err(|error| refuse(format!("evicted blocks cannot be read back: {error}. Check the disk")))?);
+        bytes.extend(blocks.map_err(|error| {
+            refuse(format!("evicted blocks cannot be read back: {error}. Check the disk"))
+        })?);
         Ok(bytes)
     }
 }
@@ -163,7 +172,8 @@ impl State {
         match self.running {
             Some(ref mut running) => Ok(running),
             None => {
-                let running = Running::begin(self.recipe.plan_for(size)?, size, &self.recipe.blocks)?;
+                let running =
+                    Running::begin(self.recipe.plan_for(size)?, size, &self.recipe.blocks)?;
                 Ok(self.running.insert(running))
             }
         }
@@ -182,14 +192,22 @@ impl State {
 
     /// The mapper.
     pub fn running(&mut self) -> PyResult<&mut Running> {
-        let absent =
-            || refuse("the mapper has no picture yet, and so no size. Give it one with step, or its size with image=(width, height)");
+        let absent = || {
+            refuse(
+                "the mapper has no picture yet, and so no size. Give it one with step, or its size with image=(width, height)",
+            )
+        };
         self.running.as_mut().ok_or_else(absent)
     }
 
-    /// Puts a snapshot in place of the mapper. After an error the mapper is gone, and as it was made.
+    /// Puts a snapshot in place of the mapper. After an error the mapper is gone, and as it was
+    /// made.
     pub fn restore(&mut self, bytes: &[u8]) -> PyResult<()> {
-        let foreign = || refuse("the bytes are not a snapshot of a mapper of Python. Pass those that Mapper.snapshot() returned");
+        let foreign = || {
+            refuse(
+                "the bytes are not a snapshot of a mapper of Python. Pass those that Mapper.snapshot() returned",
+            )
+        };
         let snapshot = Snapshot::parse(bytes).ok_or_else(foreign)?;
         let plan = self.recipe.plan_for(snapshot.size)?;
         // Its file of evicted blocks is in the way otherwise, and two slabs are more than one.

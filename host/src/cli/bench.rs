@@ -18,9 +18,14 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
-    let line: Vec<String> = ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(args.run.iter().cloned()).collect();
+    let line: Vec<String> = ["dynvox", "--quiet"]
+        .into_iter()
+        .map(str::to_owned)
+        .chain(args.run.iter().cloned())
+        .collect();
     let plan = super::run::plan_of(&line)?;
-    let bench = run::bench(&plan, if args.baseline { Vectors::BASELINE } else { Vectors::detect() })?;
+    let bench =
+        run::bench(&plan, if args.baseline { Vectors::BASELINE } else { Vectors::detect() })?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&bench)?);
     } else {
@@ -31,8 +36,20 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
 
 fn print(bench: &Bench) {
     outln!("CPU time, ms, medians of {} frames, {} kernels", bench.frames, bench.vectors);
-    outln!("{:<13}{:>11}{:>19}{:>17}", "stage", "one thread", "two, at the least", "any, at the least");
+    outln!(
+        "{:<13}{:>11}{:>19}{:>17}",
+        "stage",
+        "one thread",
+        "two, at the least",
+        "any, at the least"
+    );
     for stage in &bench.stages {
-        outln!("{:<13}{:>11.2}{:>19.2}{:>17.2}", stage.name, stage.work_ms, stage.two_threads_ms, stage.span_ms);
+        outln!(
+            "{:<13}{:>11.2}{:>19.2}{:>17.2}",
+            stage.name,
+            stage.work_ms,
+            stage.two_threads_ms,
+            stage.span_ms
+        );
     }
 }

@@ -57,7 +57,11 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
             raw_image: args.raw.map_or([0; 2], |ImageSize(width, height)| [width, height]),
         };
         let capacity = super::capacity::solve(memory, (width, height), &options)?;
-        return if args.stack { targets::show(&[(memory.to_string(), capacity)], args.json) } else { solved(args, memory, &capacity) };
+        return if args.stack {
+            targets::show(&[(memory.to_string(), capacity)], args.json)
+        } else {
+            solved(args, memory, &capacity)
+        };
     }
     match &args.profile {
         Some(name) if args.stack => targets::show(&[super::profile(name)?], args.json)?,
@@ -96,9 +100,15 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
         return Ok(());
     }
     outln!("{} of {} bytes ({memory})", grouped(capacity.bytes() as u64), grouped(memory.0 as u64));
-    outln!("  distance before blocks are evicted: about {path_m:.0} m, by the synthetic street's blocks a metre");
+    outln!(
+        "  distance before blocks are evicted: about {path_m:.0} m, by the synthetic street's blocks a metre"
+    );
     outln!("  pruning window: {} frames", capacity.history_frames);
-    outln!("  objects reconstructed at once: {}, of {} blocks each", capacity.objects, grouped(capacity.object_blocks as u64));
+    outln!(
+        "  objects reconstructed at once: {}, of {} blocks each",
+        capacity.objects,
+        grouped(capacity.object_blocks as u64)
+    );
     outln!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
     outln!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
     outln!("\nas C:\n\n{}", to_c(capacity)?);
@@ -129,7 +139,17 @@ pub fn table(volume: &VolumeConfig) -> String {
     let _ = writeln!(
         table,
         "{:<10}{:>16}{:>10}{:>14}{:>10}{:>10}{:>10}{:>10}{:>8}{:>8}{:>10}",
-        "profile", "slab, bytes", "MiB", "image, px", "blocks", "m3", "path, s", "visible", "window", "matches", "colour"
+        "profile",
+        "slab, bytes",
+        "MiB",
+        "image, px",
+        "blocks",
+        "m3",
+        "path, s",
+        "visible",
+        "window",
+        "matches",
+        "colour"
     );
     let block_m = f64::from(volume.voxel_size_m) * BLOCK_SIDE as f64;
     for (name, capacity) in Capacity::PROFILES {
@@ -158,7 +178,8 @@ pub fn table(volume: &VolumeConfig) -> String {
     table
 }
 
-/// Metres of driving until so many blocks are full: surfaces of the same extent take fewer blocks of larger voxels, by the square of their side.
+/// Metres of driving until so many blocks are full: surfaces of the same extent take fewer blocks
+/// of larger voxels, by the square of their side.
 fn path_m(blocks: usize, volume: &VolumeConfig) -> f64 {
     let coarser = f64::from(volume.voxel_size_m) / f64::from(VolumeConfig::default().voxel_size_m);
     blocks as f64 / f64::from(BLOCKS_PER_M) * coarser * coarser
@@ -167,23 +188,42 @@ fn path_m(blocks: usize, volume: &VolumeConfig) -> f64 {
 /// Seconds until so many blocks are full; known for the voxels it was measured with.
 fn path_s(blocks: usize, volume: &VolumeConfig) -> Option<f64> {
     let measured = VolumeConfig::default();
-    let same =
-        volume.voxel_size_m == measured.voxel_size_m && volume.truncation_m == measured.truncation_m && volume.far_m == measured.far_m;
+    let same = volume.voxel_size_m == measured.voxel_size_m
+        && volume.truncation_m == measured.truncation_m
+        && volume.far_m == measured.far_m;
     same.then(|| blocks as f64 / f64::from(BLOCKS_PER_M) / SPEED_M_S)
 }
 
 fn regions(name: &str, capacity: &Capacity, json: bool) -> anyhow::Result<()> {
     let (bytes, footprint) = (capacity.bytes(), capacity.footprint());
     if json {
-        let regions: Vec<_> =
-            footprint.regions().iter().map(|region| serde_json::json!({ "name": region.name, "bytes": region.bytes })).collect();
-        outln!("{}", serde_json::to_string_pretty(&serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions }))?);
+        let regions: Vec<_> = footprint
+            .regions()
+            .iter()
+            .map(|region| serde_json::json!({ "name": region.name, "bytes": region.bytes }))
+            .collect();
+        outln!(
+            "{}",
+            serde_json::to_string_pretty(
+                &serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions })
+            )?
+        );
         return Ok(());
     }
     outln!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
     for region in footprint.regions() {
-        outln!("{:<34}{:>16}{:>8.1} %", region.name, grouped(region.bytes as u64), 100.0 * region.bytes as f64 / bytes as f64);
+        outln!(
+            "{:<34}{:>16}{:>8.1} %",
+            region.name,
+            grouped(region.bytes as u64),
+            100.0 * region.bytes as f64 / bytes as f64
+        );
     }
-    outln!("{:<34}{:>16}{:>8.1} %", "slab", grouped(footprint.bytes() as u64), 100.0 * footprint.bytes() as f64 / bytes as f64);
+    outln!(
+        "{:<34}{:>16}{:>8.1} %",
+        "slab",
+        grouped(footprint.bytes() as u64),
+        100.0 * footprint.bytes() as f64 / bytes as f64
+    );
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Which bounds a run has: a named profile, a byte budget, or a file; without any of them 256 MiB for the images that come.
+//! Which bounds a run has: a named profile, a byte budget, or a file; without any of them 256 MiB
+//! for the images that come.
 
 use crate::formats::CapacityFile;
 use anyhow::{Context, bail};
@@ -17,14 +18,16 @@ pub struct CapacityArgs {
     /// Bounds by name: tiny, small, onboard or desktop
     #[arg(long, value_name = "NAME", conflicts_with_all = ["memory", "capacity"])]
     profile: Option<String>,
-    /// Bytes of memory the map and all stages may take, divided for the images that come: 48MiB, 1GiB [default: 256MiB]
+    /// Bytes of memory the map and all stages may take, divided for the images that come: 48MiB,
+    /// 1GiB [default: 256MiB]
     #[arg(long, value_name = "BYTES", conflicts_with = "capacity")]
     memory: Option<Bytes>,
     /// Bounds from a file, as `dynvox budget --memory 48MiB --image 752x480` prints them
     #[arg(long, value_name = "FILE")]
     capacity: Option<PathBuf>,
-    /// Make a map for planners around the camera and write it to planning/: cells to the sides, ahead and behind, and upwards, of
-    /// planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x 4 m
+    /// Make a map for planners around the camera and write it to planning/: cells to the sides,
+    /// ahead and behind, and upwards, of planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x
+    /// 4 m
     #[arg(long, value_name = "CELLS", help_heading = "Results")]
     planning: Option<WindowSize>,
     /// Keep distances to obstacles for every cell of that window, and not for a slice of it alone
@@ -33,8 +36,8 @@ pub struct CapacityArgs {
 }
 
 impl CapacityArgs {
-    /// The bounds for images of a size, with their name for reports. Where raw images are rectified a budget holds that too; named bounds and
-    /// those of a file get it on top.
+    /// The bounds for images of a size, with their name for reports. Where raw images are rectified
+    /// a budget holds that too; named bounds and those of a file get it on top.
     pub fn resolve(
         &self,
         size: (usize, usize),
@@ -42,8 +45,9 @@ impl CapacityArgs {
         voxel_size_m: f32,
     ) -> anyhow::Result<(String, Capacity)> {
         let raw = rectified.map(|of| [of.left.raw, of.right.raw]);
-        let [raw_width, raw_height] =
-            raw.map_or([0; 2], |[left, right]| [left.width.max(right.width), left.height.max(right.height)].map(|side| side as usize));
+        let [raw_width, raw_height] = raw.map_or([0; 2], |[left, right]| {
+            [left.width.max(right.width), left.height.max(right.height)].map(|side| side as usize)
+        });
         let with_raw = |capacity: Capacity| Capacity {
             raw_width: capacity.raw_width.max(raw_width),
             raw_height: capacity.raw_height.max(raw_height),
@@ -63,14 +67,21 @@ impl CapacityArgs {
             ..BudgetOptions::default()
         };
         // A budget's 64 tracks have a box each in the window.
-        let images = Capacity { image_width: size.0, image_height: size.1, tracks: 64, ..Capacity::TINY };
+        let images =
+            Capacity { image_width: size.0, image_height: size.1, tracks: 64, ..Capacity::TINY };
         let window = Planning::bytes(&self.with_window(images));
-        Ok((memory.to_string(), self.with_window(solve(Bytes(memory.0.saturating_sub(window)), size, &options)?)))
+        Ok((
+            memory.to_string(),
+            self.with_window(solve(Bytes(memory.0.saturating_sub(window)), size, &options)?),
+        ))
     }
 
     /// The bounds with the planner's window, where one is asked for.
     fn with_window(&self, capacity: Capacity) -> Capacity {
-        let Some(WindowSize([planning_width, planning_length, planning_height])) = self.planning else { return capacity };
+        let Some(WindowSize([planning_width, planning_length, planning_height])) = self.planning
+        else {
+            return capacity;
+        };
         Capacity {
             planning_width,
             planning_length,
@@ -82,7 +93,11 @@ impl CapacityArgs {
 }
 
 /// The capacity for a budget; a refusal names the next action.
-pub fn solve(memory: Bytes, (width, height): (usize, usize), options: &BudgetOptions) -> anyhow::Result<Capacity> {
+pub fn solve(
+    memory: Bytes,
+    (width, height): (usize, usize),
+    options: &BudgetOptions,
+) -> anyhow::Result<Capacity> {
     Capacity::for_budget(memory.0, width, height, options).map_err(|error| match error {
         BudgetError::TooSmall { least } => anyhow::anyhow!(
             "{memory} are too few for images of {width} x {height} px: the least that works is {least} bytes. Give --memory {}, or smaller \
@@ -98,14 +113,24 @@ pub fn solve(memory: Bytes, (width, height): (usize, usize), options: &BudgetOpt
 pub struct Bytes(pub usize);
 
 /// Units by their names in lower case; the last one that divides a number evenly is shown.
-const UNITS: [(&str, usize); 8] =
-    [("", 1), ("b", 1), ("kb", 1_000), ("mb", 1_000_000), ("gb", 1_000_000_000), ("kib", 1 << 10), ("mib", 1 << 20), ("gib", 1 << 30)];
+const UNITS: [(&str, usize); 8] = [
+    ("", 1),
+    ("b", 1),
+    ("kb", 1_000),
+    ("mb", 1_000_000),
+    ("gb", 1_000_000_000),
+    ("kib", 1 << 10),
+    ("mib", 1 << 20),
+    ("gib", 1 << 30),
+];
 
 impl FromStr for Bytes {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is not a number of bytes: write 48MiB, 1GiB, 500MB or a plain number");
+        let wrong = || {
+            format!("`{text}` is not a number of bytes: write 48MiB, 1GiB, 500MB or a plain number")
+        };
         let unit_at = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
         let (number, unit) = text.split_at(unit_at);
         let unit = unit.trim().to_lowercase();
@@ -118,8 +143,12 @@ impl FromStr for Bytes {
 impl std::fmt::Display for Bytes {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
-            bytes if bytes >= 1 << 30 && bytes.is_multiple_of(1 << 30) => write!(f, "{} GiB", bytes >> 30),
-            bytes if bytes >= 1 << 20 && bytes.is_multiple_of(1 << 20) => write!(f, "{} MiB", bytes >> 20),
+            bytes if bytes >= 1 << 30 && bytes.is_multiple_of(1 << 30) => {
+                write!(f, "{} GiB", bytes >> 30)
+            }
+            bytes if bytes >= 1 << 20 && bytes.is_multiple_of(1 << 20) => {
+                write!(f, "{} MiB", bytes >> 20)
+            }
             bytes => write!(f, "{bytes} bytes"),
         }
     }
@@ -140,9 +169,12 @@ impl FromStr for ImageSize {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let sides =
-            text.split_once(['x', 'X', '×']).and_then(|(width, height)| Some((width.trim().parse().ok()?, height.trim().parse().ok()?)));
-        sides.map(|(width, height)| Self(width, height)).ok_or_else(|| format!("`{text}` is not an image size: write 752x480"))
+        let sides = text.split_once(['x', 'X', '×']).and_then(|(width, height)| {
+            Some((width.trim().parse().ok()?, height.trim().parse().ok()?))
+        });
+        sides
+            .map(|(width, height)| Self(width, height))
+            .ok_or_else(|| format!("`{text}` is not an image size: write 752x480"))
     }
 }
 
@@ -157,8 +189,12 @@ impl FromStr for WindowSize {
         let sides: Result<Vec<usize>, _> = text.split(['x', 'X', '×']).map(str::parse).collect();
         let within = |side: &usize| (1..=MAX_SIDE_CELLS).contains(side);
         match sides.as_deref() {
-            Ok(&[width, length, height]) if [width, length, height].iter().all(within) => Ok(Self([width, length, height])),
-            _ => Err(format!("`{text}` is not a window: write 200x200x20, cells from 1 to {MAX_SIDE_CELLS} to the sides, ahead, upwards")),
+            Ok(&[width, length, height]) if [width, length, height].iter().all(within) => {
+                Ok(Self([width, length, height]))
+            }
+            _ => Err(format!(
+                "`{text}` is not a window: write 200x200x20, cells from 1 to {MAX_SIDE_CELLS} to the sides, ahead, upwards"
+            )),
         }
     }
 }
@@ -175,10 +211,12 @@ pub fn to_json(capacity: &Capacity) -> anyhow::Result<serde_json::Value> {
 
 fn read(path: &Path) -> anyhow::Result<Capacity> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read. Check the path of --capacity"))?;
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("{shown} cannot be read. Check the path of --capacity"))?;
     let hint = "`dynvox budget --memory 48MiB --image 752x480` prints such a file";
-    let file: CapacityFile = toml::from_str(&text)
-        .map_err(|error| anyhow::anyhow!("{shown} is not a capacity: {}. {hint}", error.message().replace('\n', " ")))?;
+    let file: CapacityFile = toml::from_str(&text).map_err(|error| {
+        anyhow::anyhow!("{shown} is not a capacity: {}. {hint}", error.message().replace('\n', " "))
+    })?;
     if let Err(problem) = file.capacity.0.validate() {
         bail!("{shown} cannot be used: {problem}. {hint}");
     }
@@ -191,17 +229,33 @@ mod tests {
 
     #[test]
     fn bytes_are_read_as_people_write_them() {
-        for (text, bytes) in
-            [("48MiB", 48 << 20), ("1 GiB", 1 << 30), ("1gib", 1 << 30), ("1.5MiB", 3 << 19), ("500MB", 500_000_000), ("77", 77)]
-        {
+        for (text, bytes) in [
+            ("48MiB", 48 << 20),
+            ("1 GiB", 1 << 30),
+            ("1gib", 1 << 30),
+            ("1.5MiB", 3 << 19),
+            ("500MB", 500_000_000),
+            ("77", 77),
+        ] {
             assert_eq!(text.parse(), Ok(Bytes(bytes)), "{text}");
         }
-        assert!(["", "MiB", "48 pounds", "-1", "1e99", "99999999999GiB"].iter().all(|text| text.parse::<Bytes>().is_err()));
-        assert_eq!([Bytes(48 << 20), Bytes(3 << 30), Bytes(77)].map(|bytes| bytes.to_string()), ["48 MiB", "3 GiB", "77 bytes"]);
+        assert!(
+            ["", "MiB", "48 pounds", "-1", "1e99", "99999999999GiB"]
+                .iter()
+                .all(|text| text.parse::<Bytes>().is_err())
+        );
+        assert_eq!(
+            [Bytes(48 << 20), Bytes(3 << 30), Bytes(77)].map(|bytes| bytes.to_string()),
+            ["48 MiB", "3 GiB", "77 bytes"]
+        );
         assert_eq!("752x480".parse(), Ok(ImageSize(752, 480)));
         assert!("752".parse::<ImageSize>().is_err() && "x480".parse::<ImageSize>().is_err());
         assert_eq!("200x100x20".parse(), Ok(WindowSize([200, 100, 20])));
-        assert!(["200x100", "0x1x1", "2000x1x1", "axbxc"].iter().all(|text| text.parse::<WindowSize>().is_err()));
+        assert!(
+            ["200x100", "0x1x1", "2000x1x1", "axbxc"]
+                .iter()
+                .all(|text| text.parse::<WindowSize>().is_err())
+        );
     }
 
     #[test]
@@ -213,10 +267,16 @@ mod tests {
         };
         let (_, with) = args.resolve((1_242, 375), None, 0.05).unwrap();
         let (_, without) = CapacityArgs::default().resolve((1_242, 375), None, 0.05).unwrap();
-        assert!(with.bytes() <= 256 << 20 && with.blocks < without.blocks && with.planning_distance_3d);
+        assert!(
+            with.bytes() <= 256 << 20 && with.blocks < without.blocks && with.planning_distance_3d
+        );
         let named = CapacityArgs { profile: Some("tiny".to_owned()), ..args };
         let (_, tiny) = named.resolve((320, 96), None, 0.05).unwrap();
-        assert_eq!(tiny.bytes(), Capacity::TINY.bytes() + Planning::bytes(&tiny), "on top of named bounds");
+        assert_eq!(
+            tiny.bytes(),
+            Capacity::TINY.bytes() + Planning::bytes(&tiny),
+            "on top of named bounds"
+        );
     }
 
     #[test]
@@ -233,9 +293,16 @@ mod tests {
             format!("{:#}", args.resolve((752, 480), None, 0.05).unwrap_err())
         };
         assert!(refusal(&text.replace("matches = ", "matchs = ")).contains("dynvox budget"));
-        assert!(refusal(&text.replace("objects = ", "objects = 9")).contains("objects must be at most 16"));
-        let message = format!("{:#}", solve(Bytes(0), (752, 480), &BudgetOptions::default()).unwrap_err());
-        assert!(message.contains("the least that works is") && message.contains("--memory "), "{message}");
+        assert!(
+            refusal(&text.replace("objects = ", "objects = 9"))
+                .contains("objects must be at most 16")
+        );
+        let message =
+            format!("{:#}", solve(Bytes(0), (752, 480), &BudgetOptions::default()).unwrap_err());
+        assert!(
+            message.contains("the least that works is") && message.contains("--memory "),
+            "{message}"
+        );
     }
 
     #[test]
@@ -243,7 +310,10 @@ mod tests {
         for size in [(640, 480), (752, 480), (1_242, 375), (1_280, 720)] {
             let (name, capacity) = CapacityArgs::default().resolve(size, None, 0.05).unwrap();
             assert_eq!(name, "256 MiB");
-            assert!(capacity.bytes() <= 256 << 20 && capacity.blocks > 20_000 && capacity.colour, "{size:?}: {capacity:?}");
+            assert!(
+                capacity.bytes() <= 256 << 20 && capacity.blocks > 20_000 && capacity.colour,
+                "{size:?}: {capacity:?}"
+            );
         }
     }
 }

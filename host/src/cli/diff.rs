@@ -59,7 +59,8 @@ fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {
     let [a, b] = names.map(|name| name.display().to_string());
     let mut text = String::new();
     for setting in comparison.settings.iter().take(MOST_SETTINGS) {
-        let [one, other] = setting.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
+        let [one, other] =
+            setting.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
         text += &format!("setting {}: {one} in {a}, {other} in {b}\n", setting.key);
     }
     if comparison.settings.len() > MOST_SETTINGS {
@@ -68,18 +69,28 @@ fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {
     let shared = comparison.shared;
     text += &match (&comparison.divergence, comparison.prefix()) {
         (Some(divergence), _) => {
-            let stage = divergence.stage.map_or("the combined digest alone: a table was edited".to_owned(), |stage| stage.to_string());
-            let apart = format!("apart in frame {}: {}\napart at most: {}\n", divergence.frame, divergence.there, divergence.most);
+            let stage = divergence
+                .stage
+                .map_or("the combined digest alone: a table was edited".to_owned(), |stage| {
+                    stage.to_string()
+                });
+            let apart = format!(
+                "apart in frame {}: {}\napart at most: {}\n",
+                divergence.frame, divergence.there, divergence.most
+            );
             format!("first divergence: frame {}, {stage}\n{apart}", divergence.frame)
         }
         (None, Some(which)) => {
             let [short, long] = if which == 0 { [&a, &b] } else { [&b, &a] };
             let more = comparison.frames[1 - which][2] - shared;
-            format!("{short} is a prefix of {long}: equal in all its {shared} frames, {more} more follow\n")
+            format!(
+                "{short} is a prefix of {long}: equal in all its {shared} frames, {more} more follow\n"
+            )
         }
         (None, None) if comparison.equal() => format!("equal in all {shared} frames\n"),
         (None, None) => {
-            let range = |[first, last, count]: [usize; 3]| format!("{count} frames from {first} to {last}");
+            let range =
+                |[first, last, count]: [usize; 3]| format!("{count} frames from {first} to {last}");
             let [one, other] = comparison.frames.map(range);
             format!("equal in the {shared} frames they share; {a} has {one}, {b} has {other}\n")
         }

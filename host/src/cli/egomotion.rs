@@ -32,7 +32,8 @@ impl FromStr for EgomotionChoice {
 }
 
 impl EgomotionChoice {
-    /// Applies it to the settings, and reads the poses of the chosen frames where they come from a file.
+    /// Applies it to the settings, and reads the poses of the chosen frames where they come from a
+    /// file.
     pub fn apply(
         &self,
         settings: &mut Settings,

@@ -16,7 +16,8 @@ pub struct FixturesArgs {
 
 #[derive(Debug, clap::Subcommand)]
 enum Action {
-    /// Make a fixture of frames of a data set: pictures, calibration, masks, settings, bounds and their digests
+    /// Make a fixture of frames of a data set: pictures, calibration, masks, settings, bounds and
+    /// their digests
     New(Box<NewArgs>),
     /// Replay fixtures and compare every digest with the golden ones
     Verify {
@@ -52,7 +53,8 @@ enum Action {
         /// File to write
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
-        /// Write its bounds and settings as Rust constants, CAPACITY and CONFIG, for the firmware to include
+        /// Write its bounds and settings as Rust constants, CAPACITY and CONFIG, for the firmware
+        /// to include
         #[arg(long, value_name = "FILE")]
         rust: Option<PathBuf>,
     },
@@ -106,7 +108,11 @@ impl NewArgs {
     fn as_run(&self) -> Vec<String> {
         let mut line = ["dynvox", &self.from, "--quiet", "--frames"].map(str::to_owned).to_vec();
         line.push(self.frames.to_string());
-        let memory = if self.profile.is_none() { Some(self.memory.clone().unwrap_or_else(|| DEFAULT_MEMORY.to_owned())) } else { None };
+        let memory = if self.profile.is_none() {
+            Some(self.memory.clone().unwrap_or_else(|| DEFAULT_MEMORY.to_owned()))
+        } else {
+            None
+        };
         let single = [
             ("--start", &self.start),
             ("--scale", &self.scale),
@@ -116,9 +122,16 @@ impl NewArgs {
             ("--instances", &self.instances),
             ("--config", &self.config),
         ];
-        line.extend(single.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value.clone()?])).flatten());
+        line.extend(
+            single
+                .into_iter()
+                .filter_map(|(name, value)| Some([name.to_owned(), value.clone()?]))
+                .flatten(),
+        );
         let repeated = [("--calibration", &self.calibration), ("--set", &self.set)];
-        let each = repeated.into_iter().flat_map(|(name, values)| values.iter().map(move |value| [name.to_owned(), value.clone()]));
+        let each = repeated.into_iter().flat_map(|(name, values)| {
+            values.iter().map(move |value| [name.to_owned(), value.clone()])
+        });
         line.extend(each.flatten());
         line
     }
@@ -131,11 +144,16 @@ fn new(args: &NewArgs) -> anyhow::Result<()> {
     let plan = super::run::plan_of(&args.as_run())?;
     let frames = fixtures::create(&args.folder, &plan, &Serial)?;
     if args.json {
-        outln!("{:#}", json!({ "fixture": args.folder, "frames": frames, "bytes": plan.capacity.bytes() }));
+        outln!(
+            "{:#}",
+            json!({ "fixture": args.folder, "frames": frames, "bytes": plan.capacity.bytes() })
+        );
         return Ok(());
     }
     let (shown, mib) = (args.folder.display(), plan.capacity.bytes() as f64 / f64::from(1 << 20));
-    outln!("{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: dynvox fixtures verify {shown}");
+    outln!(
+        "{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: dynvox fixtures verify {shown}"
+    );
     Ok(())
 }
 
@@ -150,13 +168,19 @@ fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
         verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
     }
     if verdicts.iter().any(|verdict| !verdict.differences.is_empty()) {
-        bail!("digests have changed. If that is meant: dynvox fixtures bless {} --reason \"why\"", path.display());
+        bail!(
+            "digests have changed. If that is meant: dynvox fixtures bless {} --reason \"why\"",
+            path.display()
+        );
     }
     Ok(())
 }
 
 fn verdicts(path: &Path) -> anyhow::Result<Vec<Verdict>> {
-    Ok(fixtures::all(path)?.iter().map(|fixture| fixtures::verify(fixture, &Serial)).collect::<Result<_, _>>()?)
+    Ok(fixtures::all(path)?
+        .iter()
+        .map(|fixture| fixtures::verify(fixture, &Serial))
+        .collect::<Result<_, _>>()?)
 }
 
 fn bless(path: &Path, reason: &str, json: bool) -> anyhow::Result<()> {
@@ -186,7 +210,9 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
                 verdicts.iter().for_each(|verdict| outln!("{}", sentence(verdict)));
             }
         }
-        Action::Bless { path, reason, json, .. } => bless(path, reason.as_deref().unwrap_or_default(), *json)?,
+        Action::Bless { path, reason, json, .. } => {
+            bless(path, reason.as_deref().unwrap_or_default(), *json)?
+        }
         Action::Pack { fixture, out, rust } => {
             let bytes = fixtures::pack(fixture)?;
             if let Some(rust) = rust {
@@ -205,9 +231,12 @@ const NAMED: usize = 3;
 
 fn sentence(verdict: &Verdict) -> String {
     let name = verdict.fixture.display();
-    let Some(first) = verdict.differences.first() else { return format!("{name}: {} frames, all digests equal", verdict.frames) };
+    let Some(first) = verdict.differences.first() else {
+        return format!("{name}: {} frames, all digests equal", verdict.frames);
+    };
     let columns = first.columns.join(", ");
-    let others: Vec<String> = verdict.differences.iter().skip(1).take(NAMED).map(|one| one.frame.to_string()).collect();
+    let others: Vec<String> =
+        verdict.differences.iter().skip(1).take(NAMED).map(|one| one.frame.to_string()).collect();
     let more = verdict.differences.len().saturating_sub(1 + NAMED);
     let more = match (others.is_empty(), more) {
         (true, _) => String::new(),

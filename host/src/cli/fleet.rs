@@ -29,11 +29,13 @@ enum Action {
     Run {
         /// Folder of the jobs
         folder: PathBuf,
-        /// The share: every n-th job from the i-th on, from 0; by default that of Slurm's or Kubernetes' variables, else all
+        /// The share: every n-th job from the i-th on, from 0; by default that of Slurm's or
+        /// Kubernetes' variables, else all
         #[arg(long, value_name = "I/N")]
         shard: Option<Shard>,
     },
-    /// Register the maps of jobs that are all done with one another, and correct where they lie in the world
+    /// Register the maps of jobs that are all done with one another, and correct where they lie in
+    /// the world
     Align {
         /// Folder of the jobs
         folder: PathBuf,
@@ -44,7 +46,8 @@ enum Action {
         #[arg(long, default_value_t = 1.5, value_name = "DEGREES")]
         uncertainty_deg: f64,
     },
-    /// Carry a share of the maps into the world, as aligned or as given: sums in the world's lattice
+    /// Carry a share of the maps into the world, as aligned or as given: sums in the world's
+    /// lattice
     Resample {
         /// Folder of the jobs
         folder: PathBuf,
@@ -83,7 +86,8 @@ enum Action {
         #[arg(long, value_enum, default_value_t)]
         axes: Axes,
     },
-    /// Write what recordings saw, where they went and what has changed between epochs: report.json, changes.csv, map.png
+    /// Write what recordings saw, where they went and what has changed between epochs: report.json,
+    /// changes.csv, map.png
     Report {
         /// Folder of the jobs
         folder: PathBuf,
@@ -109,8 +113,11 @@ impl std::str::FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
-        let shard = parts.map(|(index, of)| Self { index, of }).filter(|shard| shard.index < shard.of);
+        let parts = text
+            .split_once('/')
+            .and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        let shard =
+            parts.map(|(index, of)| Self { index, of }).filter(|shard| shard.index < shard.of);
         shard.ok_or_else(|| format!("`{text}` is no share: write 0/4 to 3/4"))
     }
 }
@@ -119,10 +126,14 @@ impl Shard {
     /// The share that a scheduler gives to this process.
     fn of_scheduler(variable: impl Fn(&str) -> Option<usize>) -> Self {
         let slurm = || {
-            Some((variable("SLURM_ARRAY_TASK_ID")?.checked_sub(variable("SLURM_ARRAY_TASK_MIN")?)?, variable("SLURM_ARRAY_TASK_COUNT")?))
+            Some((
+                variable("SLURM_ARRAY_TASK_ID")?.checked_sub(variable("SLURM_ARRAY_TASK_MIN")?)?,
+                variable("SLURM_ARRAY_TASK_COUNT")?,
+            ))
         };
         let kubernetes = || Some((variable("JOB_COMPLETION_INDEX")?, variable("DYNVOX_SHARDS")?));
-        let (index, of) = slurm().or_else(kubernetes).filter(|(index, of)| index < of).unwrap_or((0, 1));
+        let (index, of) =
+            slurm().or_else(kubernetes).filter(|(index, of)| index < of).unwrap_or((0, 1));
         Self { index, of }
     }
 }
@@ -135,18 +146,22 @@ pub fn run(args: &FleetArgs) -> anyhow::Result<()> {
     match &args.action {
         Action::Plan { recordings, out } => jobs::plan(recordings, out),
         Action::Run { folder, shard } => jobs::run(folder, share(*shard)),
-        Action::Align { folder, uncertainty_m, uncertainty_deg } => {
-            world::align(folder, &Uncertainty { position_m: *uncertainty_m, rotation_rad: uncertainty_deg.to_radians() })
-        }
+        Action::Align { folder, uncertainty_m, uncertainty_deg } => world::align(
+            folder,
+            &Uncertainty { position_m: *uncertainty_m, rotation_rad: uncertainty_deg.to_radians() },
+        ),
         Action::Resample { folder, shard } => world::resample(folder, share(*shard)),
         Action::Status { folder, json } => jobs::status(folder, *json),
         Action::Merge { maps, out } => world::merge(maps, out),
         Action::Mesh { map, out, min_weight, axes } => world::mesh(map, out, *min_weight, *axes),
-        Action::Report { folder, map, out, least_change_m3 } => world::report((folder, map), out, *least_change_m3),
+        Action::Report { folder, map, out, least_change_m3 } => {
+            world::report((folder, map), out, *least_change_m3)
+        }
     }
 }
 
-/// Does something with each job of a share. What fails is named, and the others go on; `are` says what has become of them.
+/// Does something with each job of a share. What fails is named, and the others go on; `are` says
+/// what has become of them.
 fn each<'j, T>(
     jobs: impl Iterator<Item = (&'j Job, T)>,
     are: &str,
@@ -174,12 +189,21 @@ mod tests {
         assert_eq!("2/3".parse(), Ok(Shard { index: 2, of: 3 }));
         assert!(["3/3", "1", "/", "-1/2", "0/0"].iter().all(|text| text.parse::<Shard>().is_err()));
         let of = |variables: &[(&str, usize)]| {
-            let found = |name: &str| variables.iter().find(|(key, _)| *key == name).map(|(_, value)| *value);
+            let found = |name: &str| {
+                variables.iter().find(|(key, _)| *key == name).map(|(_, value)| *value)
+            };
             Shard::of_scheduler(found)
         };
-        let slurm = [("SLURM_ARRAY_TASK_ID", 6), ("SLURM_ARRAY_TASK_MIN", 4), ("SLURM_ARRAY_TASK_COUNT", 5)];
+        let slurm = [
+            ("SLURM_ARRAY_TASK_ID", 6),
+            ("SLURM_ARRAY_TASK_MIN", 4),
+            ("SLURM_ARRAY_TASK_COUNT", 5),
+        ];
         assert_eq!(of(&slurm), Shard { index: 2, of: 5 });
-        assert_eq!(of(&[("JOB_COMPLETION_INDEX", 1), ("DYNVOX_SHARDS", 2)]), Shard { index: 1, of: 2 });
+        assert_eq!(
+            of(&[("JOB_COMPLETION_INDEX", 1), ("DYNVOX_SHARDS", 2)]),
+            Shard { index: 1, of: 2 }
+        );
         assert_eq!(of(&[("JOB_COMPLETION_INDEX", 1)]), Shard { index: 0, of: 1 });
     }
 }

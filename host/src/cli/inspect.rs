@@ -29,7 +29,13 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         survey => survey?,
     };
     if !args.json {
-        outln!("{}: {} ({} sequence{})", args.path.display(), layout.name(), found.len(), if found.len() == 1 { "" } else { "s" });
+        outln!(
+            "{}: {} ({} sequence{})",
+            args.path.display(),
+            layout.name(),
+            found.len(),
+            if found.len() == 1 { "" } else { "s" }
+        );
         outln!("  {}", layout.describe(&args.path));
     }
     let mut sequences = Vec::new();
@@ -55,12 +61,16 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     }
     if found.iter().all(|one| one.opened.is_err()) {
         let stand = if args.json { "under `error`" } else { "above" };
-        anyhow::bail!("nothing at {} can be mapped. The reasons stand {stand}", args.path.display());
+        anyhow::bail!(
+            "nothing at {} can be mapped. The reasons stand {stand}",
+            args.path.display()
+        );
     }
     Ok(())
 }
 
-/// Describes a folder that is not a data set: a run's results, a stereo benchmark; `None` for neither.
+/// Describes a folder that is not a data set: a run's results, a stereo benchmark; `None` for
+/// neither.
 fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
     let (path, shown) = (&args.path, args.path.display());
     if path.join(SUMMARY_FILE).is_file() {
@@ -81,10 +91,16 @@ fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
         Ok(set) => {
             let (pairs, evaluate) = (set.pairs.len(), format!("dynvox evaluate stereo {shown}"));
             if args.json {
-                outln!("{:#}", json!({ "path": path, "layout": set.name, "pairs": pairs, "commands": [evaluate] }));
+                outln!(
+                    "{:#}",
+                    json!({ "path": path, "layout": set.name, "pairs": pairs, "commands": [evaluate] })
+                );
                 return Some(Ok(()));
             }
-            outln!("{shown}: {}, {pairs} pairs with true disparity: single pairs, nothing to map", set.name);
+            outln!(
+                "{shown}: {}, {pairs} pairs with true disparity: single pairs, nothing to map",
+                set.name
+            );
             outln!("  evaluate the matcher: {evaluate}");
             Some(Ok(()))
         }
@@ -94,7 +110,11 @@ fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
 }
 
 fn command(path: &Path, found: &Found) -> String {
-    let sequence = found.sequence.as_ref().map(|sequence| format!(" --sequence {sequence}")).unwrap_or_default();
+    let sequence = found
+        .sequence
+        .as_ref()
+        .map(|sequence| format!(" --sequence {sequence}"))
+        .unwrap_or_default();
     format!("dynvox run {}{sequence}", path.display())
 }
 
@@ -169,17 +189,23 @@ impl Description {
     fn of(dataset: &dyn FrameSource, command: &str) -> Self {
         let (width, height) = dataset.size();
         let first = dataset.frame(0);
-        let mut unreadable: Vec<String> =
-            first.as_ref().err().map(|error| format!("the first frame cannot be read: {error}")).into_iter().collect();
-        let scans: Vec<usize> = (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
+        let mut unreadable: Vec<String> = first
+            .as_ref()
+            .err()
+            .map(|error| format!("the first frame cannot be read: {error}"))
+            .into_iter()
+            .collect();
+        let scans: Vec<usize> =
+            (0..dataset.len()).filter(|&index| dataset.has_lidar(index)).collect();
         let scan = scans.first().map(|&index| dataset.lidar(index));
         if let Some(Err(error)) = &scan {
             unreadable.push(format!("the first LiDAR scan cannot be read: {error}"));
         }
-        let findings = diagnosis::examine(dataset, &(0..dataset.len()).collect::<Vec<_>>()).unwrap_or_else(|error| {
-            unreadable.push(format!("the images cannot be examined: {error}"));
-            Vec::new()
-        });
+        let findings = diagnosis::examine(dataset, &(0..dataset.len()).collect::<Vec<_>>())
+            .unwrap_or_else(|error| {
+                unreadable.push(format!("the images cannot be examined: {error}"));
+                Vec::new()
+            });
         let least = least_memory(width, height);
         let (masks, frames_with_masks, mask_sentence) = masks(dataset);
         let evaluate = if matches!(scan, Some(Ok(_))) { " --evaluate lidar" } else { "" };
@@ -195,12 +221,20 @@ impl Description {
             masks,
             frames_with_masks,
             frames_with_lidar: scans.len(),
-            findings: findings.into_iter().map(|finding| Doubt { refused: finding.refused, message: finding.message }).collect(),
+            findings: findings
+                .into_iter()
+                .map(|finding| Doubt { refused: finding.refused, message: finding.message })
+                .collect(),
             unreadable,
             notes: dataset.notes().to_vec(),
             memory_sentence: match &least {
-                Ok(least) => format!("memory: 256 MiB by default; at least --memory {}MiB", least.div_ceil(1 << 20)),
-                Err(error) => format!("cannot be mapped at this size: {error}. Shrink the images with --scale"),
+                Ok(least) => format!(
+                    "memory: 256 MiB by default; at least --memory {}MiB",
+                    least.div_ceil(1 << 20)
+                ),
+                Err(error) => format!(
+                    "cannot be mapped at this size: {error}. Shrink the images with --scale"
+                ),
             },
             least_bytes: least.ok(),
             command: format!("{command}{evaluate}"),
@@ -209,9 +243,17 @@ impl Description {
     }
 
     fn print(&self) {
-        outln!("  {} stereo pairs of {} x {} px, {:.1} s", self.pairs, self.width, self.height, self.seconds);
+        outln!(
+            "  {} stereo pairs of {} x {} px, {:.1} s",
+            self.pairs,
+            self.width,
+            self.height,
+            self.seconds
+        );
         let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
-        outln!("  focal length {focal_px:.2} px, principal point ({center_u_px:.2}, {center_v_px:.2}) px, baseline {baseline_m:.4} m");
+        outln!(
+            "  focal length {focal_px:.2} px, principal point ({center_u_px:.2}, {center_v_px:.2}) px, baseline {baseline_m:.4} m"
+        );
         match self.colour {
             Some(true) => outln!("  colour images: the map has colours"),
             Some(false) => outln!("  grey images: the map is grey"),
@@ -225,7 +267,9 @@ impl Description {
         outln!("  {}", self.mask_sentence);
         match self.frames_with_lidar {
             0 => outln!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown"),
-            frames => outln!("  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and completeness"),
+            frames => outln!(
+                "  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and completeness"
+            ),
         }
         self.unreadable.iter().for_each(|what| outln!("  {what}"));
         for Doubt { refused, message } in &self.findings {
@@ -250,11 +294,21 @@ fn least_memory(width: usize, height: usize) -> Result<usize, BudgetError> {
 fn masks(dataset: &dyn FrameSource) -> (&'static str, usize, String) {
     match dataset.masks() {
         AvailableMasks::Folder(folder) => {
-            let has = |index: &usize| dataset.stem(*index).is_some_and(|stem| folder.join(format!("{stem}.png")).is_file());
+            let has = |index: &usize| {
+                dataset
+                    .stem(*index)
+                    .is_some_and(|stem| folder.join(format!("{stem}.png")).is_file())
+            };
             let there = (0..dataset.len()).filter(has).count();
             let sentence = match there {
-                0 => format!("{} has no mask of any frame's name: objects are found only while they move", folder.display()),
-                there if there == dataset.len() => format!("masks in {}: objects are separate from the static map", folder.display()),
+                0 => format!(
+                    "{} has no mask of any frame's name: objects are found only while they move",
+                    folder.display()
+                ),
+                there if there == dataset.len() => format!(
+                    "masks in {}: objects are separate from the static map",
+                    folder.display()
+                ),
                 there => format!(
                     "masks in {} for {there} of {} frames: in the others objects are found only while they move",
                     folder.display(),
@@ -263,7 +317,14 @@ fn masks(dataset: &dyn FrameSource) -> (&'static str, usize, String) {
             };
             ("files", there, sentence)
         }
-        AvailableMasks::Exact => ("exact", dataset.len(), "exact masks, by --instances exact".to_owned()),
-        AvailableMasks::Absent => ("none", 0, "no masks: objects are found only while they move, unless --instances names some".to_owned()),
+        AvailableMasks::Exact => {
+            ("exact", dataset.len(), "exact masks, by --instances exact".to_owned())
+        }
+        AvailableMasks::Absent => (
+            "none",
+            0,
+            "no masks: objects are found only while they move, unless --instances names some"
+                .to_owned(),
+        ),
     }
 }

@@ -12,7 +12,8 @@ pub struct CompletionsArgs {
 
 #[derive(Debug, clap::Args)]
 pub struct ManArgs {
-    /// Folder for a page of dynvox and one of each command; without it the page of dynvox goes to standard output
+    /// Folder for a page of dynvox and one of each command; without it the page of dynvox goes to
+    /// standard output
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -32,6 +33,7 @@ pub fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
         out!("{}", String::from_utf8_lossy(&page));
         return Ok(());
     };
-    let written = std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(command, folder));
+    let written =
+        std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(command, folder));
     written.with_context(|| format!("{} cannot be written. Give another --out", folder.display()))
 }

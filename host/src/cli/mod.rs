@@ -70,7 +70,8 @@ A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and r
 Exit codes: 0 done; 1 failed; 2 wrong command line; 3 images refused; 4 the run ended early or lacks a file: what was mapped is in its folder,
 and summary.json says why under `incomplete`.";
 
-/// Dense stereo mapping of dynamic scenes, within a fixed byte budget and bit-exact on every machine.
+/// Dense stereo mapping of dynamic scenes, within a fixed byte budget and bit-exact on every
+/// machine.
 #[derive(Debug, Parser)]
 #[command(name = "dynvox", version, after_help = EXAMPLES)]
 struct Cli {
@@ -90,7 +91,8 @@ enum Command {
     Budget(budget::BudgetArgs),
     /// Evaluate files against ground truth: trajectories, disparities, masks
     Evaluate(evaluate::EvaluateArgs),
-    /// Run many times with one setting varied, and compare the results with the original's numbers on one page
+    /// Run many times with one setting varied, and compare the results with the original's numbers
+    /// on one page
     Sweep(Box<sweep::SweepArgs>),
     /// Write the synthetic street in KITTI's layout, with its ground truth
     Synth(synth::SynthArgs),
@@ -104,7 +106,8 @@ enum Command {
     Fixtures(fixtures::FixturesArgs),
     /// Map many recordings, and add their maps in any order
     Fleet(fleet::FleetArgs),
-    /// Write completions for a shell: dynvox completions bash > ~/.local/share/bash-completion/completions/dynvox
+    /// Write completions for a shell: dynvox completions bash >
+    /// ~/.local/share/bash-completion/completions/dynvox
     Completions(manual::CompletionsArgs),
     /// Write the manual: dynvox man | man -l -
     Man(manual::ManArgs),
@@ -142,7 +145,9 @@ pub fn main() -> ExitCode {
         Err(error) => {
             eprintln!("error: {}", sentence(&error));
             match () {
-                () if error.is::<crate::input::diagnosis::RefusedInput>() => ExitCode::from(REFUSED_INPUT),
+                () if error.is::<crate::input::diagnosis::RefusedInput>() => {
+                    ExitCode::from(REFUSED_INPUT)
+                }
                 () if error.is::<run::IncompleteRun>() => ExitCode::from(INCOMPLETE),
                 () => ExitCode::FAILURE,
             }
@@ -150,17 +155,16 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An error with its causes. A cause that is a part of the text already is not repeated, nor is how a command is used.
+/// An error with its causes. A cause that is a part of the text already is not repeated, nor is how
+/// a command is used.
 pub fn sentence(error: &anyhow::Error) -> String {
     if let Some(refused) = error.downcast_ref::<clap::Error>() {
         let text = refused.to_string();
         return text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
     }
-    error
-        .chain()
-        .skip(1)
-        .map(ToString::to_string)
-        .fold(error.to_string(), |text, cause| if text.contains(&cause) { text } else { format!("{text}: {cause}") })
+    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
+        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
+    })
 }
 
 /// The profile of that name, in any case, and its name.
@@ -169,7 +173,9 @@ fn profile(name: &str) -> anyhow::Result<(String, dynvox_core::Capacity)> {
     let found = known.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
     found.map(|(name, capacity)| ((*name).to_owned(), *capacity)).ok_or_else(|| {
         let names = known.map(|(name, _)| name).join(", ");
-        anyhow::anyhow!("there is no profile {name}. Choose one of {names}; `dynvox budget` shows them")
+        anyhow::anyhow!(
+            "there is no profile {name}. Choose one of {names}; `dynvox budget` shows them"
+        )
     })
 }
 
@@ -180,7 +186,10 @@ mod tests {
     #[test]
     fn a_cause_is_printed_once() {
         let cause = || std::io::Error::other("no space");
-        let error = anyhow::Error::new(crate::run::FolderError::Write { path: "x".into(), source: cause() });
+        let error = anyhow::Error::new(crate::run::FolderError::Write {
+            path: "x".into(),
+            source: cause(),
+        });
         assert_eq!(sentence(&error).matches("no space").count(), 1);
         let error = anyhow::Error::new(cause()).context("the map cannot be written");
         assert_eq!(sentence(&error), "the map cannot be written: no space");

@@ -1,4 +1,5 @@
-//! Standard output. A reader that goes away, or a full device, ends the printing, and the command fails once its work is done.
+//! Standard output. A reader that goes away, or a full device, ends the printing, and the command
+//! fails once its work is done.
 
 use std::fmt::Arguments;
 use std::io::{Error, Write, stdout};
@@ -23,6 +24,11 @@ pub fn print(text: Arguments<'_>) {
 /// What stopped the printing.
 pub fn finish() -> anyhow::Result<()> {
     let flushed = stdout().lock().flush();
-    let failure = FAILURE.get().map(ToString::to_string).or_else(|| flushed.err().map(|error| error.to_string()));
-    failure.map_or(Ok(()), |failure| Err(anyhow::anyhow!("standard output cannot be written: {failure}")))
+    let failure = FAILURE
+        .get()
+        .map(ToString::to_string)
+        .or_else(|| flushed.err().map(|error| error.to_string()));
+    failure.map_or(Ok(()), |failure| {
+        Err(anyhow::anyhow!("standard output cannot be written: {failure}"))
+    })
 }

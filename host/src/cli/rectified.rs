@@ -5,10 +5,12 @@ use crate::formats::calibration::RectifiedSize;
 
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct RectifiedArgs {
-    /// Size raw pairs are rectified to [default: the calibration's own, else all that both cameras see, at most 1920x1088]
+    /// Size raw pairs are rectified to
+    /// [default: the calibration's own, else all that both cameras see, at most 1920x1088]
     #[arg(long, value_name = "WxH")]
     rectified: Option<ImageSize>,
-    /// Focal length raw pairs are rectified to, px [default: the least that leaves no pixel without image]
+    /// Focal length raw pairs are rectified to, px
+    /// [default: the least that leaves no pixel without image]
     #[arg(long, value_name = "PX", requires = "rectified")]
     rectified_focal: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are errors that name the key.
+//! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are
+//! errors that name the key.
 
 use crate::formats::calibration::RectifiedSize;
 use crate::synth::StreetConfig;
@@ -20,7 +21,8 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Everything that can be configured, in the sections of the file. The rig's calibration is not among it: it comes with the data set.
+/// Everything that can be configured, in the sections of the file. The rig's calibration is not
+/// among it: it comes with the data set.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
@@ -49,9 +51,13 @@ impl Settings {
         let mut layers = Layers { table: Table::try_from(&defaults)?, settings: defaults };
         if let Some(path) = file {
             let shown = path.display();
-            let text = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read. Check the path of --config"))?;
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("{shown} cannot be read. Check the path of --config"))?;
             let table: Table = text.parse().map_err(|error: toml::de::Error| {
-                anyhow::anyhow!("{shown} is not TOML: {}. Correct it, or begin with the config.toml of a run", one_line(&error))
+                anyhow::anyhow!(
+                    "{shown} is not TOML: {}. Correct it, or begin with the config.toml of a run",
+                    one_line(&error)
+                )
             })?;
             for (key, value) in leaves("", &table) {
                 layers.set(&key, value).with_context(|| format!("{shown} cannot be used"))?;
@@ -59,9 +65,13 @@ impl Settings {
         }
         for set in sets {
             let Some((key, text)) = set.split_once('=') else {
-                bail!("--set {set} has no value. Write --set key=value, as in --set volume.voxel_size_m=0.1");
+                bail!(
+                    "--set {set} has no value. Write --set key=value, as in --set volume.voxel_size_m=0.1"
+                );
             };
-            layers.set(key.trim(), value_of(text.trim())).with_context(|| format!("--set {set} cannot be used"))?;
+            layers
+                .set(key.trim(), value_of(text.trim()))
+                .with_context(|| format!("--set {set} cannot be used"))?;
         }
         Ok(layers.settings)
     }
@@ -107,11 +117,13 @@ impl Settings {
         }
     }
 
-    /// Shortens the pruning window to what the profile remembers, unless another than the default was asked for.
+    /// Shortens the pruning window to what the profile remembers, unless another than the default
+    /// was asked for.
     pub fn fit(&mut self, capacity: &Capacity) {
         let default = VolumeConfig::default().prune_lag;
         if self.volume.prune_lag == default {
-            self.volume.prune_lag = u32::try_from(capacity.history_frames).map_or(default, |frames| frames.min(default));
+            self.volume.prune_lag = u32::try_from(capacity.history_frames)
+                .map_or(default, |frames| frames.min(default));
         }
     }
 
@@ -183,20 +195,25 @@ struct Layers {
 }
 
 impl Layers {
-    /// Sets one key and checks at once that it is known and its value of the right kind, so that the error can name it.
+    /// Sets one key and checks at once that it is known and its value of the right kind, so that
+    /// the error can name it.
     fn set(&mut self, key: &str, value: Value) -> anyhow::Result<()> {
         let known = self.table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         match key.split_once('.') {
-            None => bail!("`{key}` is not a key. Keys are section.name with one of the sections {known}"),
+            None => bail!(
+                "`{key}` is not a key. Keys are section.name with one of the sections {known}"
+            ),
             Some((section, _)) if !self.table.contains_key(section) => {
                 bail!("`{key}` is not a key: there is no section {section}. Sections are {known}")
             }
             Some(_) => insert(&mut self.table, key, value),
         }
-        self.settings =
-            self.table.clone().try_into().map_err(|error| {
-                anyhow::anyhow!("`{key}`: {}. The config.toml of a run lists all keys with their values", one_line(&error))
-            })?;
+        self.settings = self.table.clone().try_into().map_err(|error| {
+            anyhow::anyhow!(
+                "`{key}`: {}. The config.toml of a run lists all keys with their values",
+                one_line(&error)
+            )
+        })?;
         Ok(())
     }
 }
@@ -231,7 +248,8 @@ fn insert(table: &mut Table, key: &str, value: Value) {
 
 /// The value as TOML; what is not TOML is a word.
 fn value_of(text: &str) -> Value {
-    let parsed = format!("value = {text}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
+    let parsed =
+        format!("value = {text}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
     parsed.unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
@@ -265,8 +283,15 @@ mod tests {
     fn the_resolved_file_gives_the_same_settings_again() {
         let folder = tempfile::TempDir::new().unwrap();
         let file = folder.path().join("c.toml");
-        let text = sets(&["volume.voxel_size_m=0.1", "volume.observation_weight=depth"]).unwrap().to_toml(true).unwrap();
-        assert!(text.contains("voxel_size_m = 0.1\n") && text.contains("observation_weight = \"depth\""), "{text}");
+        let text = sets(&["volume.voxel_size_m=0.1", "volume.observation_weight=depth"])
+            .unwrap()
+            .to_toml(true)
+            .unwrap();
+        assert!(
+            text.contains("voxel_size_m = 0.1\n")
+                && text.contains("observation_weight = \"depth\""),
+            "{text}"
+        );
         std::fs::write(&file, &text).unwrap();
         assert_eq!(Settings::resolve(Some(&file), &[]).unwrap().to_toml(true).unwrap(), text);
     }
@@ -289,7 +314,11 @@ mod tests {
         let mut config = dynvox_core::Config::for_rig(any_rig());
         for (key, value) in leaves("", &table) {
             let text = value.to_string();
-            assert_eq!(config.set(&key, text.trim_matches(['"', '[', ']'])), Ok(()), "{key} = {text}");
+            assert_eq!(
+                config.set(&key, text.trim_matches(['"', '[', ']'])),
+                Ok(()),
+                "{key} = {text}"
+            );
         }
         assert_eq!(config, given.config(any_rig(), None));
     }
@@ -298,9 +327,15 @@ mod tests {
     fn unknown_keys_and_wrong_kinds_are_named() {
         let refusal = |set: &str| format!("{:#}", sets(&[set]).unwrap_err());
         let message = refusal("volume.voxel_sise_m=0.1");
-        assert!(message.contains("`volume.voxel_sise_m`") && message.contains("voxel_size_m"), "{message}");
+        assert!(
+            message.contains("`volume.voxel_sise_m`") && message.contains("voxel_size_m"),
+            "{message}"
+        );
         assert!(refusal("volumes.far_m=1").contains("no section volumes"));
-        assert!(refusal("rig.focal_px=1").contains("`rig.focal_px`"), "the calibration comes with the data");
+        assert!(
+            refusal("rig.focal_px=1").contains("`rig.focal_px`"),
+            "the calibration comes with the data"
+        );
         assert!(refusal("far_m=1").contains("`far_m` is not a key"));
         assert!(refusal("volume.far_m").contains("has no value"));
         assert!(refusal("volume.far_m=wide").contains("`volume.far_m`"));
@@ -311,6 +346,9 @@ mod tests {
         let message = format!("{:#}", Settings::resolve(Some(&file), &[]).unwrap_err());
         assert!(message.contains("c.toml") && message.contains("`volume.nonsense`"), "{message}");
         std::fs::write(&file, "[volume\n").unwrap();
-        assert!(format!("{:#}", Settings::resolve(Some(&file), &[]).unwrap_err()).contains("is not TOML"));
+        assert!(
+            format!("{:#}", Settings::resolve(Some(&file), &[]).unwrap_err())
+                .contains("is not TOML")
+        );
     }
 }

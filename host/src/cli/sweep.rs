@@ -46,7 +46,8 @@ pub struct SweepArgs {
     /// One setting of every run; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Run nothing: make jobs in --out, each with its bytes of memory, which dynvox fleet run does in shares; --merge draws the page
+    /// Run nothing: make jobs in --out, each with its bytes of memory, which dynvox fleet run does
+    /// in shares; --merge draws the page
     #[arg(long)]
     plan: bool,
     /// Merge the folders of several machines into --out, without a run; --out may be one of them
@@ -69,13 +70,24 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         let page = folder.draw(&plan, &results)?;
         return print_result(args, &plan, &results, &page);
     }
-    let data = if args.data.is_empty() { vec![Data { path: None, sequence: None }] } else { args.data.clone() };
+    let data = if args.data.is_empty() {
+        vec![Data { path: None, sequence: None }]
+    } else {
+        args.data.clone()
+    };
     let labels: Vec<String> = data.iter().map(Data::label).collect();
-    if let Some(twice) = labels.iter().enumerate().find_map(|(at, label)| labels[..at].contains(label).then_some(label)) {
+    if let Some(twice) = labels
+        .iter()
+        .enumerate()
+        .find_map(|(at, label)| labels[..at].contains(label).then_some(label))
+    {
         bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
     let plan = Plan::new(&SweepRequest {
-        data: data.iter().map(|one| Ok((one.clone(), reference(one)?))).collect::<anyhow::Result<_>>()?,
+        data: data
+            .iter()
+            .map(|one| Ok((one.clone(), reference(one)?)))
+            .collect::<anyhow::Result<_>>()?,
         kinds: args.sweeps.clone(),
         weights: args.weights.clone(),
         rates: args.rates.clone(),
@@ -86,10 +98,16 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     });
     let folder = SweepFolder::open(&args.out, &plan)?;
     let keys = plan.keys();
-    let line = |key: &str| Some(args.line(data.get(data_of(&plan, key, &labels)?)?, plan.runs.get(key)?));
+    let line =
+        |key: &str| Some(args.line(data.get(data_of(&plan, key, &labels)?)?, plan.runs.get(key)?));
     if args.plan {
-        let job = |key: &&str| jobs::of_figures(key, line(key).unwrap_or_default(), SweepFolder::result_below(key));
-        return jobs::write(&Manifest::of(keys.iter().map(job).collect::<anyhow::Result<_>>()?), &args.out);
+        let job = |key: &&str| {
+            jobs::of_figures(key, line(key).unwrap_or_default(), SweepFolder::result_below(key))
+        };
+        return jobs::write(
+            &Manifest::of(keys.iter().map(job).collect::<anyhow::Result<_>>()?),
+            &args.out,
+        );
     }
     for (at, key) in keys.iter().enumerate() {
         let Some(line) = line(key).filter(|_| !folder.result(key).is_file()) else { continue };
@@ -119,8 +137,10 @@ impl SweepArgs {
     /// Arguments of `dynvox run` for one run.
     fn line(&self, data: &Data, arguments: &[String]) -> Vec<String> {
         let path = data.path.iter().map(|path| path.display().to_string());
-        let sequence = data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]);
-        let threads = self.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]);
+        let sequence =
+            data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]);
+        let threads =
+            self.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]);
         path.chain(sequence).chain(threads).chain(arguments.iter().cloned()).collect()
     }
 }
@@ -128,7 +148,10 @@ impl SweepArgs {
 /// The reference that a data set has.
 fn reference(data: &Data) -> anyhow::Result<Option<&'static str>> {
     let Some(path) = &data.path else { return Ok(Some("exact")) };
-    let dataset = input::open(path, &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() })?;
+    let dataset = input::open(
+        path,
+        &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() },
+    )?;
     Ok((0..dataset.len()).any(|index| dataset.has_lidar(index)).then_some("lidar"))
 }
 
@@ -139,9 +162,15 @@ fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
 }
 
 /// Runs once, with these arguments. Only the result remains.
-fn figures(folder: &SweepFolder, plan: &Plan, key: &str, line: &[String]) -> anyhow::Result<RunResult> {
+fn figures(
+    folder: &SweepFolder,
+    plan: &Plan,
+    key: &str,
+    line: &[String],
+) -> anyhow::Result<RunResult> {
     let result = || -> anyhow::Result<RunResult> {
-        let record = run::record(&RunArgs::parse(&jobs::quiet_line(line))?, &folder.scratch_dir(key))?;
+        let record =
+            run::record(&RunArgs::parse(&jobs::quiet_line(line))?, &folder.scratch_dir(key))?;
         Ok(RunResult::of(plan.runs.get(key).context("it is of no point of the sweep")?, &record)?)
     };
     result().with_context(|| format!("run {key} ended"))
@@ -153,13 +182,19 @@ pub fn figures_of(folder: &Path, job: &Job) -> anyhow::Result<RunResult> {
     figures(&folder, &folder.plan()?, &job.name, &job.arguments)
 }
 
-fn print_result(args: &SweepArgs, plan: &Plan, results: &Results, page: &Path) -> anyhow::Result<()> {
+fn print_result(
+    args: &SweepArgs,
+    plan: &Plan,
+    results: &Results,
+    page: &Path,
+) -> anyhow::Result<()> {
     if args.json {
         let points = plan.points.iter().map(|point| {
             let result = results.get(&point.run);
             let mut value = serde_json::to_value(point)?;
             value["arguments"] = plan.runs.get(&point.run).cloned().unwrap_or_default().into();
-            value["summary"] = result.map_or(serde_json::Value::Null, |result| result.summary.clone());
+            value["summary"] =
+                result.map_or(serde_json::Value::Null, |result| result.summary.clone());
             Ok(value)
         });
         let points = points.collect::<anyhow::Result<Vec<_>>>()?;

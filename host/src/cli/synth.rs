@@ -29,12 +29,16 @@ pub fn street(settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
 pub fn run(args: &SynthArgs) -> anyhow::Result<()> {
     let mut config = Settings::resolve(args.config.as_deref(), &args.set)?.street();
     config.frames = args.frames.unwrap_or(config.frames);
-    let street = Street::new(config).map_err(|error| InputError::Street { reason: error.to_string() })?;
+    let street =
+        Street::new(config).map_err(|error| InputError::Street { reason: error.to_string() })?;
     let bar = indicatif::ProgressBar::new(u64::from(street.config().frames));
     let written = write_kitti(&street, &args.out, |done, _| bar.set_position(u64::from(done)));
     bar.finish_and_clear();
     written?;
     let folder = args.out.display();
-    outln!("{} frames with their truth in {folder}\nmap it: dynvox run {folder} --images colour", street.config().frames);
+    outln!(
+        "{} frames with their truth in {folder}\nmap it: dynvox run {folder} --images colour",
+        street.config().frames
+    );
     Ok(())
 }

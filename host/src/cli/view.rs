@@ -34,7 +34,8 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
             folder.display()
         );
     };
-    let summary: serde_json::Value = serde_json::from_str(&summary).context("summary.json is damaged")?;
+    let summary: serde_json::Value =
+        serde_json::from_str(&summary).context("summary.json is damaged")?;
     let name = summary.get("dataset").and_then(serde_json::Value::as_str).unwrap_or("run");
     let viewer = viewer::fragment(folder, name, &Scene::read(folder, args.triangles)?)?;
     let page = page(&format!("dynvox: {name}"), &html! { h1 { (name) } (viewer) }).into_string();
@@ -42,8 +43,9 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
     write_whole(&out, |file| std::io::Write::write_all(file, page.as_bytes()))?;
     outln!("{}", out.display());
     if !args.no_open {
-        open::that_detached(&out)
-            .with_context(|| format!("no browser can be started: open {} yourself, or give --no-open", out.display()))?;
+        open::that_detached(&out).with_context(|| {
+            format!("no browser can be started: open {} yourself, or give --no-open", out.display())
+        })?;
     }
     Ok(())
 }

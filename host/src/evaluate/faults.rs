@@ -1,5 +1,5 @@
-//! What a run with a fault in its images makes of it: how wrong poses are that nothing warns of, what is fused from them, and when all is
-//! well again.
+//! What a run with a fault in its images makes of it: how wrong poses are that nothing warns of,
+//! what is fused from them, and when all is well again.
 
 use dynvox_core::geometry::Transform;
 use dynvox_core::{PoseOrigin, Severity};
@@ -42,13 +42,15 @@ pub struct FaultOutcome {
     pub held: usize,
     /// Frames reported to affect the map.
     pub map_affected: usize,
-    /// Frames from the first with the fault until all that follow are right and nothing is reported of them; `None` where the last is not.
+    /// Frames from the first with the fault until all that follow are right and nothing is reported
+    /// of them; `None` where the last is not.
     pub recovered_after: Option<usize>,
 }
 
 impl FaultOutcome {
-    /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the frame before it on, so that
-    /// drift until then does not count, and within a segment of the map from its first frame on.
+    /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the
+    /// frame before it on, so that drift until then does not count, and within a segment of the map
+    /// from its first frame on.
     pub fn of(frames: &[EvaluatedFrame], first: usize) -> Self {
         let Some(mut before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
         let mut outcome = Self { recovered_after: Some(0), ..Self::default() };
@@ -60,7 +62,10 @@ impl FaultOutcome {
             let truly = before.true_t_world_camera.inverse() * frame.true_t_world_camera;
             let error = truly.inverse() * moved;
             let (distance_m, angle_deg) = (error.distance_m(), error.angle_rad().to_degrees());
-            let (wrong, reported) = (distance_m > WRONG_M || angle_deg > WRONG_DEG, frame.severity >= Severity::MapAffected);
+            let (wrong, reported) = (
+                distance_m > WRONG_M || angle_deg > WRONG_DEG,
+                frame.severity >= Severity::MapAffected,
+            );
             if !reported {
                 outcome.unreported_m = outcome.unreported_m.max(distance_m);
                 outcome.unreported_deg = outcome.unreported_deg.max(angle_deg);
@@ -99,17 +104,33 @@ mod tests {
     #[test]
     fn a_wrong_pose_counts_as_unreported_only_where_nothing_is_said() {
         let (info, affected) = (Severity::Info, Severity::MapAffected);
-        let outcome = FaultOutcome::of(&run_with(&[(0.0, info), (0.1, info), (2.0, affected), (1.0, info), (0.2, info)]), 1);
+        let outcome = FaultOutcome::of(
+            &run_with(&[(0.0, info), (0.1, info), (2.0, affected), (1.0, info), (0.2, info)]),
+            1,
+        );
         assert!((outcome.unreported_m - 1.0).abs() < 1e-9, "{outcome:?}");
-        assert_eq!((outcome.unreported_frames, outcome.wrong_fused, outcome.map_affected), (1, 2, 1));
+        assert_eq!(
+            (outcome.unreported_frames, outcome.wrong_fused, outcome.map_affected),
+            (1, 2, 1)
+        );
         assert_eq!(outcome.recovered_after, Some(3));
-        assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after, Some(0));
-        assert_eq!(FaultOutcome::of(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after, None);
+        assert_eq!(
+            FaultOutcome::of(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after,
+            Some(0)
+        );
+        assert_eq!(
+            FaultOutcome::of(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after,
+            None
+        );
     }
 
     #[test]
     fn a_segment_is_compared_with_its_first_pose() {
-        let mut frames = run_with(&[(0.0, Severity::Info), (100.0, Severity::MapAffected), (100.1, Severity::MapAffected)]);
+        let mut frames = run_with(&[
+            (0.0, Severity::Info),
+            (100.0, Severity::MapAffected),
+            (100.1, Severity::MapAffected),
+        ]);
         assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 2);
         frames[1..].iter_mut().for_each(|frame| frame.segment = 1);
         assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 0);
@@ -119,7 +140,8 @@ mod tests {
 
     #[test]
     fn drift_before_the_fault_does_not_count() {
-        let outcome = FaultOutcome::of(&run_with(&[(5.0, Severity::Info), (5.0, Severity::Info)]), 1);
+        let outcome =
+            FaultOutcome::of(&run_with(&[(5.0, Severity::Info), (5.0, Severity::Info)]), 1);
         assert_eq!((outcome.unreported_m, outcome.unreported_frames), (0.0, 0));
     }
 }

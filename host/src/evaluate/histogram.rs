@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 /// Bits of a float's fraction that a bin does not tell apart: 512 bins to each power of two.
 const DROPPED_BITS: u32 = 14;
 
-/// Counts of values from 0 on. Memory: a counter for each bin that has a value, 512 for each power of two they span. A quantile is the
-/// middle of its bin, within 0.1 % of the value.
+/// Counts of values from 0 on. Memory: a counter for each bin that has a value, 512 for each power
+/// of two they span. A quantile is the middle of its bin, within 0.1 % of the value.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Histogram {
     counts: BTreeMap<u32, u64>,
@@ -37,7 +37,13 @@ impl Histogram {
             below += **count;
             below > rank
         });
-        bin.map(|(&bin, _)| if bin == 0 { 0.0 } else { f64::from(f32::from_bits(bin << DROPPED_BITS | 1 << (DROPPED_BITS - 1))) })
+        bin.map(|(&bin, _)| {
+            if bin == 0 {
+                0.0
+            } else {
+                f64::from(f32::from_bits(bin << DROPPED_BITS | 1 << (DROPPED_BITS - 1)))
+            }
+        })
     }
 }
 
@@ -48,13 +54,16 @@ mod tests {
 
     #[test]
     fn quantiles_are_within_a_thousandth_of_those_of_the_values() {
-        let values: Vec<f64> = (0..5_000u32).map(|at| f64::from(at.wrapping_mul(2_654_435_761) >> 12) * 1e-4).collect();
+        let values: Vec<f64> = (0..5_000u32)
+            .map(|at| f64::from(at.wrapping_mul(2_654_435_761) >> 12) * 1e-4)
+            .collect();
         let mut histogram = Histogram::default();
         values.iter().for_each(|value| histogram.add(*value));
         histogram.add(f64::NAN);
         let sorted = ascending(values.into_iter());
         for share in [0.0, 0.01, 0.5, 0.99, 1.0] {
-            let (ours, exact) = (histogram.quantile(share).unwrap(), quantile(&sorted, share).unwrap());
+            let (ours, exact) =
+                (histogram.quantile(share).unwrap(), quantile(&sorted, share).unwrap());
             assert!((ours - exact).abs() <= 0.001 * exact, "{share}: {ours} for {exact}");
         }
         assert_eq!((histogram.values(), Histogram::default().quantile(0.5)), (5_000, None));

@@ -1,5 +1,6 @@
-//! The one definition of a quantile: of `n` sorted values the one at position `share * n`, rounded down. The median of an even number is
-//! the higher of the two in the middle. A quantile is always a value that occurred, so infinite ones need no special case.
+//! The one definition of a quantile: of `n` sorted values the one at position `share * n`, rounded
+//! down. The median of an even number is the higher of the two in the middle. A quantile is always
+//! a value that occurred, so infinite ones need no special case.
 
 /// The value at `share`, 0 to 1, of ascending values; `None` without values.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
@@ -29,10 +30,12 @@ pub fn quantile_bin(counts: &[u64], share: f64) -> Option<usize> {
     })
 }
 
-/// Five numbers for a box plot: whiskers end at the last value within one and a half times the box's height (Tukey).
+/// Five numbers for a box plot: whiskers end at the last value within one and a half times the
+/// box's height (Tukey).
 pub fn five_numbers(values: &[f64]) -> Option<[f64; 5]> {
     let sorted = ascending(values.iter().copied().filter(|value| value.is_finite()));
-    let [low, middle, high] = [quantile(&sorted, 0.25)?, quantile(&sorted, 0.5)?, quantile(&sorted, 0.75)?];
+    let [low, middle, high] =
+        [quantile(&sorted, 0.25)?, quantile(&sorted, 0.5)?, quantile(&sorted, 0.75)?];
     let reach = 1.5 * (high - low);
     let first = sorted.iter().copied().find(|value| *value >= low - reach)?;
     let last = sorted.iter().rev().copied().find(|value| *value <= high + reach)?;
@@ -50,7 +53,10 @@ mod tests {
     #[test]
     fn quantiles_are_values_that_occurred() {
         let sorted: Vec<f64> = (1..=200).map(f64::from).collect();
-        assert_eq!([0.0, 0.5, 0.99, 1.0].map(|share| quantile(&sorted, share)), [1.0, 101.0, 199.0, 200.0].map(Some));
+        assert_eq!(
+            [0.0, 0.5, 0.99, 1.0].map(|share| quantile(&sorted, share)),
+            [1.0, 101.0, 199.0, 200.0].map(Some)
+        );
         assert_eq!(quantile(&[], 0.5), None);
         assert_eq!(median([3.0, f64::NAN, 1.0, f64::INFINITY].into_iter()), Some(3.0));
     }
@@ -60,7 +66,11 @@ mod tests {
         let counts = [2, 0, 3, 5];
         let values: Vec<f64> = [0.0, 0.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0].to_vec();
         for share in [0.0, 0.19, 0.2, 0.5, 0.99, 1.0] {
-            assert_eq!(quantile_bin(&counts, share).map(|bin| bin as f64), quantile(&values, share), "{share}");
+            assert_eq!(
+                quantile_bin(&counts, share).map(|bin| bin as f64),
+                quantile(&values, share),
+                "{share}"
+            );
         }
         assert_eq!(quantile_bin(&[0, 0], 0.5), None);
     }

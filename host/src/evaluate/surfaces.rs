@@ -1,10 +1,11 @@
-//! Objects' meshes against the surfaces the renderer drew: how far the mesh lies from what is really there, and how much it has of what was
-//! seen.
+//! Objects' meshes against the surfaces the renderer drew: how far the mesh lies from what is
+//! really there, and how much it has of what was seen.
 //!
-//! Every pixel of exact depth that lies on a true object while its object is fused is a point of its true surface, in the true object's own frame; those
-//! of one cell of `CELL_M` are one sample, their mean. So the seen side is known, and hidden parts do not count. The mesh is carried into the
-//! true object's frame by where the object was in the frame in which the true object was nearest, and most of it is made: drift of the object's pose
-//! shows as distance.
+//! Every pixel of exact depth that lies on a true object while its object is fused is a point of
+//! its true surface, in the true object's own frame; those of one cell of `CELL_M` are one sample,
+//! their mean. So the seen side is known, and hidden parts do not count. The mesh is carried into
+//! the true object's frame by where the object was in the frame in which the true object was
+//! nearest, and most of it is made: drift of the object's pose shows as distance.
 
 use crate::input::TrueObject;
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -49,7 +50,8 @@ pub struct SeenSide {
 /// A mesh against the true surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceFigures {
-    /// Median distance of the mesh's triangles to what was seen of the true surface, m; `None` where the most lie beyond the reach.
+    /// Median distance of the mesh's triangles to what was seen of the true surface, m; `None`
+    /// where the most lie beyond the reach.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub median_m: Option<f64>,
     /// Share of the triangles within [`REACH_VOXELS`] of it.
@@ -65,12 +67,16 @@ pub struct SurfaceFigures {
 }
 
 impl SeenSide {
-    /// Adds what a frame shows of a true object. `t_truth_object` carries the object's own frame into the true object's.
+    /// Adds what a frame shows of a true object. `t_truth_object` carries the object's own frame
+    /// into the true object's.
     pub fn add(&mut self, view: &TrueView<'_>, truth: &TrueObject, t_truth_object: &Transform) {
         let t_truth_camera = truth.t_world_object.inverse() * view.t_world_camera;
         let [width, height, length] = truth.dimensions_m;
         let inside = |p: &Point3<f64>| {
-            p.x.abs() <= 0.5 * width + MARGIN_M && p.z.abs() <= 0.5 * length + MARGIN_M && p.y >= -height - MARGIN_M && p.y <= -FOOT_M
+            p.x.abs() <= 0.5 * width + MARGIN_M
+                && p.z.abs() <= 0.5 * length + MARGIN_M
+                && p.y >= -height - MARGIN_M
+                && p.y <= -FOOT_M
         };
         let pixels = truth.pixels;
         let mut seen = false;
@@ -81,12 +87,18 @@ impl SeenSide {
                     continue;
                 }
                 let per_px = depth_m / view.rig.focal_px;
-                let camera =
-                    Point3::new((f64::from(u) - view.rig.center_u_px) * per_px, (f64::from(v) - view.rig.center_v_px) * per_px, depth_m);
+                let camera = Point3::new(
+                    (f64::from(u) - view.rig.center_u_px) * per_px,
+                    (f64::from(v) - view.rig.center_v_px) * per_px,
+                    depth_m,
+                );
                 let point = t_truth_camera.transform_point(camera);
                 if inside(&point) {
                     let cell = self.cells.entry(cell(&point, CELL_M)).or_default();
-                    [point.x, point.y, point.z, 1.0].iter().zip(cell).for_each(|(value, sum)| *sum += value);
+                    [point.x, point.y, point.z, 1.0]
+                        .iter()
+                        .zip(cell)
+                        .for_each(|(value, sum)| *sum += value);
                     seen = true;
                 }
             }
@@ -100,15 +112,21 @@ impl SeenSide {
         }
     }
 
-    /// Compares a mesh, in the object's own frame, with it; `None` where nothing was seen or there is no mesh.
+    /// Compares a mesh, in the object's own frame, with it; `None` where nothing was seen or there
+    /// is no mesh.
     pub fn compare(&self, triangles: &[Triangle], voxel_size_m: f64) -> Option<SurfaceFigures> {
         let (nearest_m, t_truth_object) = self.nearest?;
         let reach_m = REACH_VOXELS * voxel_size_m;
-        let mut samples: Vec<([i32; 3], Point3<f64>)> =
-            self.cells.iter().map(|(cell, [x, y, z, count])| (*cell, Point3::new(x / count, y / count, z / count))).collect();
+        let mut samples: Vec<([i32; 3], Point3<f64>)> = self
+            .cells
+            .iter()
+            .map(|(cell, [x, y, z, count])| (*cell, Point3::new(x / count, y / count, z / count)))
+            .collect();
         samples.sort_by_key(|(cell, _)| *cell);
         let samples: Vec<Point3<f64>> = samples.into_iter().map(|(_, point)| point).collect();
-        let of = |position_m: [f32; 3]| t_truth_object.transform_point(Point3::from(position_m.map(f64::from)));
+        let of = |position_m: [f32; 3]| {
+            t_truth_object.transform_point(Point3::from(position_m.map(f64::from)))
+        };
         let middles: Vec<Point3<f64>> = triangles
             .iter()
             .map(|triangle| {
@@ -120,13 +138,18 @@ impl SeenSide {
             return None;
         }
         let truth = PointGrid::of(&samples, reach_m);
-        let mut distances: Vec<f64> = middles.iter().map(|middle| truth.distance_m(middle)).collect();
+        let mut distances: Vec<f64> =
+            middles.iter().map(|middle| truth.distance_m(middle)).collect();
         distances.sort_by(f64::total_cmp);
         let mesh = PointGrid::of(&middles, reach_m);
         let there = samples.iter().filter(|sample| mesh.distance_m(sample).is_finite()).count();
         Some(SurfaceFigures {
-            median_m: distances.get(distances.len() / 2).copied().filter(|distance| distance.is_finite()),
-            accuracy: distances.iter().filter(|distance| distance.is_finite()).count() as f64 / distances.len() as f64,
+            median_m: distances
+                .get(distances.len() / 2)
+                .copied()
+                .filter(|distance| distance.is_finite()),
+            accuracy: distances.iter().filter(|distance| distance.is_finite()).count() as f64
+                / distances.len() as f64,
             completeness: there as f64 / samples.len() as f64,
             samples: samples.len(),
             frames: self.frames,
@@ -156,7 +179,10 @@ impl<'p> PointGrid<'p> {
     fn distance_m(&self, from: &Point3<f64>) -> f64 {
         let [x, y, z] = cell(from, self.reach_m);
         let around = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-        let near = around.filter_map(|cell| self.cells.get(&cell)).flatten().map(|point| (from - **point).norm());
+        let near = around
+            .filter_map(|cell| self.cells.get(&cell))
+            .flatten()
+            .map(|point| (from - **point).norm());
         near.filter(|distance| *distance <= self.reach_m).fold(f64::INFINITY, f64::min)
     }
 }
@@ -167,10 +193,12 @@ mod tests {
     use dynvox_core::masks::PixelBox;
     use dynvox_core::view::Vertex;
 
-    const RIG: StereoRig = StereoRig { focal_px: 200.0, center_u_px: 50.0, center_v_px: 40.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 200.0, center_u_px: 50.0, center_v_px: 40.0, baseline_m: 0.5 };
     const SIZE: (usize, usize) = (100, 80);
 
-    /// A wall of a box 2 m wide, 1.5 m high and 4 m long whose back is 8 m away: what a camera 1 m above the road sees of it.
+    /// A wall of a box 2 m wide, 1.5 m high and 4 m long whose back is 8 m away: what a camera 1 m
+    /// above the road sees of it.
     fn side() -> SeenSide {
         let truth = TrueObject {
             id: 1,
@@ -196,9 +224,13 @@ mod tests {
 
     /// A square patch of small triangles at a depth, from `left` to `right`.
     fn patch(depth_m: f32, left: f32, right: f32) -> Vec<Triangle> {
-        let steps = |from: f32, to: f32| (0..((to - from) / 0.04) as usize).map(move |n| from + 0.04 * n as f32);
+        let steps = |from: f32, to: f32| {
+            (0..((to - from) / 0.04) as usize).map(move |n| from + 0.04 * n as f32)
+        };
         let corner = |x: f32, y: f32| Vertex { position_m: [x, y, depth_m], ..Vertex::default() };
-        let at = |x: f32, y: f32| Triangle { vertices: [corner(x, y), corner(x + 0.04, y), corner(x, y + 0.04)] };
+        let at = |x: f32, y: f32| Triangle {
+            vertices: [corner(x, y), corner(x + 0.04, y), corner(x, y + 0.04)],
+        };
         steps(left, right).flat_map(|x| steps(-0.5, 0.95).map(move |y| at(x, y))).collect()
     }
 
@@ -206,14 +238,20 @@ mod tests {
     fn a_mesh_where_the_surface_is_has_all_of_it_and_one_beside_it_the_distance_it_is_off() {
         let side = side();
         let good = side.compare(&patch(8.0, -1.0, 1.0), 0.05).unwrap();
-        assert!(good.median_m.unwrap() < 0.025 && good.accuracy > 0.99 && good.completeness > 0.98, "{good:?}");
+        assert!(
+            good.median_m.unwrap() < 0.025 && good.accuracy > 0.99 && good.completeness > 0.98,
+            "{good:?}"
+        );
         let off = side.compare(&patch(8.06, -1.0, 1.0), 0.05).unwrap();
         assert!((off.median_m.unwrap() - 0.061).abs() < 0.006, "{off:?}");
         let half = side.compare(&patch(8.0, -1.0, 0.0), 0.05).unwrap();
         assert!((half.completeness - 0.53).abs() < 0.03 && half.accuracy > 0.99, "{half:?}");
         let far = side.compare(&patch(8.5, -1.0, 1.0), 0.05).unwrap();
         assert_eq!((far.median_m, far.accuracy, far.completeness), (None, 0.0, 0.0));
-        assert!(side.compare(&[], 0.05).is_none() && SeenSide::default().compare(&patch(8.0, -1.0, 1.0), 0.05).is_none());
+        assert!(
+            side.compare(&[], 0.05).is_none()
+                && SeenSide::default().compare(&patch(8.0, -1.0, 1.0), 0.05).is_none()
+        );
     }
 
     #[test]
@@ -221,6 +259,8 @@ mod tests {
         let side = side();
         let xs: Vec<f64> = side.cells.values().map(|[x, _, _, count]| x / count).collect();
         assert!(xs.iter().all(|x| x.abs() <= 1.03) && xs.iter().any(|x| *x < -0.95));
-        assert!(side.cells.values().all(|[_, y, _, count]| y / count <= -FOOT_M && y / count >= -1.53));
+        assert!(
+            side.cells.values().all(|[_, y, _, count]| y / count <= -FOOT_M && y / count >= -1.53)
+        );
     }
 }

@@ -1,6 +1,8 @@
-//! The static map against moving objects: triangles of `map.ply` inside the boxes moving objects filled while they were seen.
+//! The static map against moving objects: triangles of `map.ply` inside the boxes moving objects
+//! filled while they were seen.
 //!
-//! A box is taken smaller than the true object: the ground below it and what it touches belong to the map.
+//! A box is taken smaller than the true object: the ground below it and what it touches belong to
+//! the map.
 
 use crate::formats::{PlyMesh, PlyVertex};
 use crate::input::TrueObject;
@@ -29,8 +31,12 @@ struct SweptBox {
 
 impl SweptBox {
     fn contains(&self, point: &Point3<f64>) -> bool {
-        let ([width, height, length], at) = (self.dimensions_m, self.t_object_map.transform_point(*point));
-        at.x.abs() < 0.5 * width - SIDE_M && at.z.abs() < 0.5 * length - SIDE_M && at.y < -FOOT_M && at.y > -height
+        let ([width, height, length], at) =
+            (self.dimensions_m, self.t_object_map.transform_point(*point));
+        at.x.abs() < 0.5 * width - SIDE_M
+            && at.z.abs() < 0.5 * length - SIDE_M
+            && at.y < -FOOT_M
+            && at.y > -height
     }
 }
 
@@ -48,16 +54,22 @@ fn square(x_m: f64, z_m: f64) -> [i64; 2] {
 }
 
 impl Swept {
-    /// Adds a true object if it moves in this frame; `t_map_world` carries the truth's world into the map's.
+    /// Adds a true object if it moves in this frame; `t_map_world` carries the truth's world into
+    /// the map's.
     pub fn add(&mut self, object: &TrueObject, t_map_world: &Transform) {
         if object.moving {
             let t_map_object = t_map_world * object.t_world_object;
-            let ([width, height, length], foot) = (object.dimensions_m, Point3::from(t_map_object.translation_m));
+            let ([width, height, length], foot) =
+                (object.dimensions_m, Point3::from(t_map_object.translation_m));
             // The box may lean: no corner is farther away than this.
             let reach = (0.25 * (width * width + length * length) + height * height).sqrt();
             let number = self.boxes.len() as u32;
-            self.boxes.push(SweptBox { t_object_map: t_map_object.inverse(), dimensions_m: object.dimensions_m });
-            let ([left, near], [right, far]) = (square(foot.x - reach, foot.z - reach), square(foot.x + reach, foot.z + reach));
+            self.boxes.push(SweptBox {
+                t_object_map: t_map_object.inverse(),
+                dimensions_m: object.dimensions_m,
+            });
+            let ([left, near], [right, far]) =
+                (square(foot.x - reach, foot.z - reach), square(foot.x + reach, foot.z + reach));
             for x in left..=right {
                 (near..=far).for_each(|z| self.squares.entry([x, z]).or_default().push(number));
             }
@@ -75,9 +87,14 @@ impl Swept {
     /// # Errors
     /// The file is no mesh of this program.
     pub fn triangles(&self, ply: &Path) -> io::Result<u64> {
-        let inside = |corner: &PlyVertex| corner.object == 0 && self.contains(&Point3::from(corner.vertex.position_m.map(f64::from)));
+        let inside = |corner: &PlyVertex| {
+            corner.object == 0
+                && self.contains(&Point3::from(corner.vertex.position_m.map(f64::from)))
+        };
         let mut count = 0;
-        PlyMesh::open(ply).map_err(io::Error::other)?.triangles(|triangle| count += u64::from(triangle.iter().all(inside)))?;
+        PlyMesh::open(ply)
+            .map_err(io::Error::other)?
+            .triangles(|triangle| count += u64::from(triangle.iter().all(inside)))?;
         Ok(count)
     }
 }
@@ -101,17 +118,32 @@ mod tests {
             speed_m_s: 10.0,
         };
         let mut swept = Swept::default();
-        (0..5).for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::IDENTITY));
+        (0..5)
+            .for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::IDENTITY));
         swept.add(&car(30.0, false), &Transform::IDENTITY);
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin(&path).unwrap();
         let mut patch = |x: f32, y: f32, z: f32| {
-            ply.triangle([0.0, 0.05, 0.1].map(|d| Vertex { position_m: [x + d, y, z + d * d], ..Vertex::default() }))
+            ply.triangle(
+                [0.0, 0.05, 0.1]
+                    .map(|d| Vertex { position_m: [x + d, y, z + d * d], ..Vertex::default() }),
+            )
         };
-        let patches = [(3.0, 1.0, 9.0), (3.0, 1.0, 15.5), (3.0, 1.6, 12.0), (5.0, 1.0, 12.0), (3.0, 1.0, 30.0), (3.0, -0.5, 12.0)];
+        let patches = [
+            (3.0, 1.0, 9.0),
+            (3.0, 1.0, 15.5),
+            (3.0, 1.6, 12.0),
+            (5.0, 1.0, 12.0),
+            (3.0, 1.0, 30.0),
+            (3.0, -0.5, 12.0),
+        ];
         patches.iter().for_each(|&(x, y, z)| patch(x, y, z));
         ply.finish().unwrap();
-        assert_eq!(swept.triangles(&path).unwrap(), 2, "two of the patches: the others are road, beside, above, or where a car is parked");
+        assert_eq!(
+            swept.triangles(&path).unwrap(),
+            2,
+            "two of the patches: the others are road, beside, above, or where a car is parked"
+        );
     }
 }

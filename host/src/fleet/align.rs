@@ -1,6 +1,8 @@
-//! Where recordings lie in the world: maps that overlap are registered with one another, and a pose graph gives each map its place.
+//! Where recordings lie in the world: maps that overlap are registered with one another, and a pose
+//! graph gives each map its place.
 //!
-//! **Memory.** The distances of two maps, and 200,000 surface points of each recording, 48 bytes each.
+//! **Memory.** The distances of two maps, and 200,000 surface points of each recording, 48 bytes
+//! each.
 
 use super::distance_field::{DistanceField, SurfacePoint};
 use super::georeference::{Prior, prior};
@@ -21,8 +23,9 @@ pub const ALIGNMENT_FILE: &str = "alignment.json";
 const POINTS_MAX: usize = 200_000;
 /// Weight of a voxel that takes part.
 const MIN_WEIGHT: u8 = 3;
-/// How much surer the first recording is than the others: its given pose is the world's, so that what is known of the world, a map or a plan, goes on
-/// to fit. Were it as unsure as the others, all would move by the mean of their errors.
+/// How much surer the first recording is than the others: its given pose is the world's, so that
+/// what is known of the world, a map or a plan, goes on to fit. Were it as unsure as the others,
+/// all would move by the mean of their errors.
 const FIRST_SHARE: f64 = 1e-4;
 /// Registrations of all pairs, each from the poses that the last one gave.
 const ROUNDS: usize = 3;
@@ -75,9 +78,18 @@ impl Alignment {
     ///
     /// # Errors
     /// A map is damaged or missing.
-    pub fn find(manifest: &Manifest, folder: &Path, uncertainty: &Uncertainty) -> Result<Self, FleetError> {
-        let priors = manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
-        let sampled = manifest.jobs.iter().map(|job| Sampled::of(job, folder)).collect::<Result<Vec<_>, _>>()?;
+    pub fn find(
+        manifest: &Manifest,
+        folder: &Path,
+        uncertainty: &Uncertainty,
+    ) -> Result<Self, FleetError> {
+        let priors =
+            manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
+        let sampled = manifest
+            .jobs
+            .iter()
+            .map(|job| Sampled::of(job, folder))
+            .collect::<Result<Vec<_>, _>>()?;
         let node = |(at, (prior, of)): (usize, (&Prior, &Sampled))| {
             let share = if at == 0 { FIRST_SHARE } else { 1.0 };
             Node {
@@ -87,17 +99,29 @@ impl Alignment {
             }
         };
         let nodes: Vec<Node> = priors.iter().zip(&sampled).enumerate().map(node).collect();
-        let allowed: Vec<Uncertainty> = priors.iter().map(|prior| prior.uncertainty.unwrap_or(*uncertainty)).collect();
+        let allowed: Vec<Uncertainty> =
+            priors.iter().map(|prior| prior.uncertainty.unwrap_or(*uncertainty)).collect();
         let mut poses: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
         for _ in 0..ROUNDS {
             let found = register_all(manifest, folder, (&sampled, &nodes, &poses, &allowed))?;
-            let edges: Vec<Edge> =
-                found.iter().filter(|(_, of)| of.fit.refused.is_none()).map(|(nodes, of)| edge(*nodes, of, &sampled)).collect();
+            let edges: Vec<Edge> = found
+                .iter()
+                .filter(|(_, of)| of.fit.refused.is_none())
+                .map(|(nodes, of)| edge(*nodes, of, &sampled))
+                .collect();
             poses = solve(&nodes, &edges, &poses);
-            pairs = found.iter().map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs))).collect();
+            pairs = found
+                .iter()
+                .map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs)))
+                .collect();
         }
-        let recordings = manifest.jobs.iter().zip(&poses).zip(&nodes).map(|((job, pose), node)| recording(job, pose, node));
+        let recordings = manifest
+            .jobs
+            .iter()
+            .zip(&poses)
+            .zip(&nodes)
+            .map(|((job, pose), node)| recording(job, pose, node));
         Ok(Self {
             recordings: recordings.collect(),
             pairs: pairs.into_iter().map(|(_, pair)| pair).collect(),
@@ -111,41 +135,63 @@ impl Alignment {
     pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
         let path = folder.join(ALIGNMENT_FILE);
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&path, error.to_string()))
+        write_whole(&path, |file| file.write_all(text.as_bytes()))
+            .map_err(|error| FleetError::content(&path, error.to_string()))
     }
 }
 
-/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned. With fixes that is known of a map that is there.
+/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned. With
+/// fixes that is known of a map that is there.
 ///
 /// # Errors
 /// The alignment is not of these jobs.
-pub fn poses(manifest: &Manifest, folder: &Path) -> Result<Vec<Result<Transform, FleetError>>, FleetError> {
+pub fn poses(
+    manifest: &Manifest,
+    folder: &Path,
+) -> Result<Vec<Result<Transform, FleetError>>, FleetError> {
     let path = folder.join(ALIGNMENT_FILE);
-    let given: Vec<_> = manifest.jobs.iter().map(|job| Ok(prior(job, folder)?.t_world_map)).collect();
+    let given: Vec<_> =
+        manifest.jobs.iter().map(|job| Ok(prior(job, folder)?.t_world_map)).collect();
     if !path.is_file() {
         return Ok(given);
     }
     let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
-    let other = || FleetError::content(&path, "is not of these jobs. Align again with `dynvox fleet align`, or remove it");
+    let other = || {
+        FleetError::content(
+            &path,
+            "is not of these jobs. Align again with `dynvox fleet align`, or remove it",
+        )
+    };
     let alignment: Alignment = serde_json::from_str(&text).map_err(|_| other())?;
     // Numbers read from JSON may differ in their last bit.
     let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs());
-    let is_same = |((job, given), of): ((&Job, &Result<Transform, FleetError>), &AlignedRecording)| {
-        job.id == of.id && given.as_ref().is_ok_and(|given| rows_of(given).iter().zip(&of.given).all(is_near))
-    };
+    let is_same =
+        |((job, given), of): ((&Job, &Result<Transform, FleetError>), &AlignedRecording)| {
+            job.id == of.id
+                && given
+                    .as_ref()
+                    .is_ok_and(|given| rows_of(given).iter().zip(&of.given).all(is_near))
+        };
     let jobs = manifest.jobs.iter().zip(&given);
     if alignment.recordings.len() != jobs.len() || !jobs.zip(&alignment.recordings).all(is_same) {
         return Err(other());
     }
-    Ok(alignment.recordings.iter().map(|of| transform(&of.t_world_camera).ok_or_else(other)).collect())
+    Ok(alignment
+        .recordings
+        .iter()
+        .map(|of| transform(&of.t_world_camera).ok_or_else(other))
+        .collect())
 }
 
 impl Sampled {
     fn of(job: &Job, folder: &Path) -> Result<Self, FleetError> {
         let points = field(job, folder)?.surface(POINTS_MAX);
         let mut centre_m = [0.0; 3];
-        points.iter().for_each(|point| (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64));
-        let radius_m = points.iter().map(|point| distance_m(&point.at_m, &centre_m)).fold(0.0, f64::max);
+        points.iter().for_each(|point| {
+            (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64)
+        });
+        let radius_m =
+            points.iter().map(|point| distance_m(&point.at_m, &centre_m)).fold(0.0, f64::max);
         Ok(Self { points, centre_m, radius_m })
     }
 }
@@ -165,7 +211,10 @@ fn register_all(
     (sampled, nodes, poses, uncertainties): Known<'_>,
 ) -> Result<Vec<([usize; 2], Registration)>, FleetError> {
     let load = |at: usize| -> Result<RegisteredMap, FleetError> {
-        Ok(RegisteredMap { field: field(&manifest.jobs[at], folder)?, points: sampled[at].points.clone() })
+        Ok(RegisteredMap {
+            field: field(&manifest.jobs[at], folder)?,
+            points: sampled[at].points.clone(),
+        })
     };
     let mut found = Vec::new();
     for b in 0..sampled.len() {
@@ -181,17 +230,23 @@ fn register_all(
             }
             let Some(map_b) = &map_b else { continue };
             let given = nodes[b].given.inverse() * nodes[a].given;
-            let registration = register((&load(a)?, map_b), (&given, &t_b_a), &uncertainties[a].and(&uncertainties[b]));
+            let registration = register(
+                (&load(a)?, map_b),
+                (&given, &t_b_a),
+                &uncertainties[a].and(&uncertainties[b]),
+            );
             found.extend(registration.map(|registration| ([a, b], registration)));
         }
     }
     Ok(found)
 }
 
-/// A registration: where maps overlap, it says how they lie; how their centres lie follows as far as the maps have no drift from there.
+/// A registration: where maps overlap, it says how they lie; how their centres lie follows as far
+/// as the maps have no drift from there.
 fn edge([a, b]: [usize; 2], of: &Registration, sampled: &[Sampled]) -> Edge {
     let in_a_m = of.t_b_a.inverse().transform_point(of.centre_m);
-    let way_m = distance_m(&of.centre_m, &sampled[b].centre_m).hypot(distance_m(&in_a_m, &sampled[a].centre_m));
+    let way_m = distance_m(&of.centre_m, &sampled[b].centre_m)
+        .hypot(distance_m(&in_a_m, &sampled[a].centre_m));
     Edge {
         nodes: [a, b],
         t_b_a: of.t_b_a,
@@ -200,7 +255,12 @@ fn edge([a, b]: [usize; 2], of: &Registration, sampled: &[Sampled]) -> Edge {
     }
 }
 
-fn pair(manifest: &Manifest, [a, b]: [usize; 2], of: &Registration, before: &[([usize; 2], AlignedPair)]) -> AlignedPair {
+fn pair(
+    manifest: &Manifest,
+    [a, b]: [usize; 2],
+    of: &Registration,
+    before: &[([usize; 2], AlignedPair)],
+) -> AlignedPair {
     let first = before.iter().find(|(nodes, _)| *nodes == [a, b]);
     let rms_before_m = first.map_or(of.fit.rms_before_m, |(_, pair)| pair.fit.rms_before_m);
     AlignedPair {
@@ -211,7 +271,8 @@ fn pair(manifest: &Manifest, [a, b]: [usize; 2], of: &Registration, before: &[([
 
 fn recording(job: &Job, pose: &Transform, node: &Node) -> AlignedRecording {
     let motion = *pose * node.given.inverse();
-    let (from, to) = (node.given.transform_point(node.centre_m), pose.transform_point(node.centre_m));
+    let (from, to) =
+        (node.given.transform_point(node.centre_m), pose.transform_point(node.centre_m));
     AlignedRecording {
         name: job.name.clone(),
         id: job.id.clone(),
@@ -234,7 +295,8 @@ mod tests {
     const LATTICE: Lattice = Lattice { voxel_size_m: 0.2, truncation_m: 0.8, colour: false };
     const UNCERTAINTY: Uncertainty = Uncertainty { position_m: 0.3, rotation_rad: 0.026 };
 
-    /// Distance from a street: ground below, walls to both sides, and pillars of several sizes before them.
+    /// Distance from a street: ground below, walls to both sides, and pillars of several sizes
+    /// before them.
     fn street([x, y, z]: [f64; 3]) -> f64 {
         let pillar = |nth: i32| {
             let (side, along) = (if nth % 2 == 0 { 4.5 } else { -4.0 }, 3.7 * f64::from(nth));
@@ -248,13 +310,16 @@ mod tests {
     /// What a recording at a pose sees 20 m ahead of it.
     fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
         let path = folder.join(format!("{}.blocks", job.id));
-        let (mut store, _) = BlockFile::open(&path, LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
+        let (mut store, _) =
+            BlockFile::open(&path, LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
         for block in 0..10 * 4 * 16 {
             let coord = BlockCoord { x: block % 10 - 5, y: block / 10 % 4 - 2, z: block / 40 - 2 };
             let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
             for voxel in 0..BLOCK_VOXELS {
                 let offset = [voxel % 8, voxel / 8 % 8, voxel / 64].map(|side| side as f64);
-                let at = std::array::from_fn(|axis| (f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis]) * 0.2);
+                let at = std::array::from_fn(|axis| {
+                    (f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis]) * 0.2
+                });
                 let share = street(t_world_camera.transform_point(at)) / 0.8;
                 if share > -1.0 {
                     (sdf[voxel], weight[voxel]) = ((share.min(1.0) * 32_767.0) as i16, 9);
@@ -262,8 +327,15 @@ mod tests {
             }
             assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: None }));
         }
-        let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
-        keep(&mut store, &LATTICE, &Camera { rig, size: (100, 40), poses: Vec::new() }, &job.submap(folder)).unwrap();
+        let rig =
+            StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
+        keep(
+            &mut store,
+            &LATTICE,
+            &Camera { rig, size: (100, 40), poses: Vec::new() },
+            &job.submap(folder),
+        )
+        .unwrap();
     }
 
     fn job(nth: usize, given: &Transform) -> Job {
@@ -289,7 +361,8 @@ mod tests {
         ];
         let off = |at: usize, turn: [f64; 3], shift: [f64; 3]| {
             let moved = std::array::from_fn(|axis| truth[at].translation_m[axis] + shift[axis]);
-            let turned = Transform::new(turn, [0.0; 3]) * Transform { translation_m: [0.0; 3], ..truth[at] };
+            let turned =
+                Transform::new(turn, [0.0; 3]) * Transform { translation_m: [0.0; 3], ..truth[at] };
             Transform { translation_m: moved, ..turned }
         };
         let degree = 1f64.to_radians();
@@ -306,19 +379,32 @@ mod tests {
         manifest.jobs.iter().zip(&truth).for_each(|(job, truth)| record(job, root.path(), truth));
         let alignment = Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap();
         alignment.write(root.path()).unwrap();
-        let found: Vec<Transform> = poses(&manifest, root.path()).unwrap().into_iter().map(Result::unwrap).collect();
+        let found: Vec<Transform> =
+            poses(&manifest, root.path()).unwrap().into_iter().map(Result::unwrap).collect();
         for at in 0..3 {
             let error = truth[at].inverse() * found[at];
             assert!(error.distance_m() < 0.03, "{at}: {} m, {alignment:?}", error.distance_m());
-            assert!(error.angle_rad().to_degrees() < 0.1, "{at}: {} degrees", error.angle_rad().to_degrees());
+            assert!(
+                error.angle_rad().to_degrees() < 0.1,
+                "{at}: {} degrees",
+                error.angle_rad().to_degrees()
+            );
         }
         assert!((found[3].inverse() * given[3]).distance_m() < 1e-9, "without overlap it stays");
-        assert!(alignment.pairs.iter().all(|pair| pair.fit.refused.is_none() && pair.fit.rms_m < pair.fit.rms_before_m), "{alignment:?}");
+        assert!(
+            alignment
+                .pairs
+                .iter()
+                .all(|pair| pair.fit.refused.is_none() && pair.fit.rms_m < pair.fit.rms_before_m),
+            "{alignment:?}"
+        );
         assert_eq!(alignment, Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap());
         let mut others = manifest;
         let moved = Transform::from_translation([0.1, 0.0, 0.0]) * given[1];
         others.jobs[1].given = Given::TWorldCamera(rows_of(&moved));
-        assert!(poses(&others, root.path()).unwrap_err().to_string().contains("is not of these jobs"));
+        assert!(
+            poses(&others, root.path()).unwrap_err().to_string().contains("is not of these jobs")
+        );
     }
 
     #[test]

@@ -47,7 +47,11 @@ impl Averages {
                 weight: &average.weight,
                 colour: average.colour.as_deref(),
             };
-            if !resolved.has_surface || store.store(block) { Ok(()) } else { Err(not_stored(&store, &path)) }
+            if !resolved.has_surface || store.store(block) {
+                Ok(())
+            } else {
+                Err(not_stored(&store, &path))
+            }
         })?;
         Ok(Self {
             store,

@@ -2,13 +2,14 @@
 
 use dynvox_core::volume::BLOCK_VOXELS;
 
-/// Largest sum of weights of a voxel whose sum of weight times distance certainly fits 32 bits: 65,538 times 32,767 does.
+/// Largest sum of weights of a voxel whose sum of weight times distance certainly fits 32 bits:
+/// 65,538 times 32,767 does.
 pub const WEIGHT_MAX: u32 = 65_535;
 
 type Voxels<T> = [T; BLOCK_VOXELS];
 
-/// Sums of one block's voxels. Additions wrap around, so that they can be done in any order; a voxel with more than [`WEIGHT_MAX`] is counted and
-/// left out where its average is taken.
+/// Sums of one block's voxels. Additions wrap around, so that they can be done in any order; a
+/// voxel with more than [`WEIGHT_MAX`] is counted and left out where its average is taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BlockSums {
     /// Weight times signed distance, in units of truncation / 32,767.
@@ -49,17 +50,26 @@ impl BlockSums {
     /// Adds an observation of a voxel.
     pub fn observe(&mut self, voxel: usize, sdf: i16, weight: u8, colour: [u8; 3]) {
         let of = u32::from(weight);
-        self.distance[voxel] = self.distance[voxel].wrapping_add(i32::from(sdf) * i32::from(weight));
+        self.distance[voxel] =
+            self.distance[voxel].wrapping_add(i32::from(sdf) * i32::from(weight));
         self.weight[voxel] = self.weight[voxel].wrapping_add(of);
         if let Some(planes) = &mut self.colour {
-            planes.iter_mut().zip(colour).for_each(|(plane, value)| plane[voxel] = plane[voxel].wrapping_add(of * u32::from(value)));
+            planes.iter_mut().zip(colour).for_each(|(plane, value)| {
+                plane[voxel] = plane[voxel].wrapping_add(of * u32::from(value))
+            });
         }
     }
 
     /// Adds the sums of another map. Both have colour, or neither.
     pub fn add(&mut self, other: &Self) {
-        self.distance.iter_mut().zip(&*other.distance).for_each(|(sum, value)| *sum = sum.wrapping_add(*value));
-        self.weight.iter_mut().zip(&*other.weight).for_each(|(sum, value)| *sum = sum.wrapping_add(*value));
+        self.distance
+            .iter_mut()
+            .zip(&*other.distance)
+            .for_each(|(sum, value)| *sum = sum.wrapping_add(*value));
+        self.weight
+            .iter_mut()
+            .zip(&*other.weight)
+            .for_each(|(sum, value)| *sum = sum.wrapping_add(*value));
         if let (Some(sums), Some(values)) = (&mut self.colour, &other.colour) {
             let pairs = sums.as_flattened_mut().iter_mut().zip(values.as_flattened());
             pairs.for_each(|(sum, value)| *sum = sum.wrapping_add(*value));
@@ -82,19 +92,25 @@ impl BlockSums {
             average.sdf[voxel] = nearest(i64::from(self.distance[voxel]), weight) as i16;
             average.weight[voxel] = weight.min(255) as u8;
             if let (Some(planes), Some(sums)) = (&mut average.colour, &self.colour) {
-                planes.iter_mut().zip(&**sums).for_each(|(plane, sums)| plane[voxel] = nearest(i64::from(sums[voxel]), weight) as u8);
+                planes.iter_mut().zip(&**sums).for_each(|(plane, sums)| {
+                    plane[voxel] = nearest(i64::from(sums[voxel]), weight) as u8
+                });
             }
         }
         average
     }
 
-    /// The sums as bytes: for each array all lowest bytes, then the next ones, so that they compress.
+    /// The sums as bytes: for each array all lowest bytes, then the next ones, so that they
+    /// compress.
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         let weights = self.weight.iter().copied();
         bytes.clear();
         planes(bytes, self.distance.iter().map(|value| value.cast_unsigned()));
         planes(bytes, weights);
-        self.colour.iter().flat_map(|colour| colour.iter()).for_each(|plane| planes(bytes, plane.iter().copied()));
+        self.colour
+            .iter()
+            .flat_map(|colour| colour.iter())
+            .for_each(|plane| planes(bytes, plane.iter().copied()));
     }
 
     /// Sums from their bytes; `None` of another number of bytes.
@@ -145,7 +161,12 @@ mod tests {
         let mut sums = BlockSums::zero(true);
         for voxel in 0..BLOCK_VOXELS {
             let mixed = (voxel as u32 ^ seed).wrapping_mul(2_654_435_761);
-            sums.observe(voxel, (mixed >> 16) as i16, (mixed >> 4) as u8, [mixed as u8, (mixed >> 8) as u8, 7]);
+            sums.observe(
+                voxel,
+                (mixed >> 16) as i16,
+                (mixed >> 4) as u8,
+                [mixed as u8, (mixed >> 8) as u8, 7],
+            );
         }
         sums
     }
@@ -154,7 +175,10 @@ mod tests {
     fn sums_come_back_from_their_bytes() {
         let (sums, mut bytes) = (sums(5), Vec::new());
         sums.write(&mut bytes);
-        assert_eq!((bytes.len(), BlockSums::read(&bytes, true)), (BlockSums::bytes(true), Some(sums)));
+        assert_eq!(
+            (bytes.len(), BlockSums::read(&bytes, true)),
+            (BlockSums::bytes(true), Some(sums))
+        );
         assert_eq!(BlockSums::read(&bytes, false), None);
     }
 
@@ -185,7 +209,13 @@ mod tests {
         sums.observe(3, 5, 255, [0; 3]);
         sums.weight[3] += WEIGHT_MAX;
         let average = sums.average();
-        assert_eq!((average.sdf[0], average.weight[0], average.sdf[1], average.weight[1]), (-4, 2, 50, 3));
-        assert_eq!((average.sdf[2], average.weight[2], average.weight[3], average.overflowed), (i16::MIN, 255, 0, 1));
+        assert_eq!(
+            (average.sdf[0], average.weight[0], average.sdf[1], average.weight[1]),
+            (-4, 2, 50, 3)
+        );
+        assert_eq!(
+            (average.sdf[2], average.weight[2], average.weight[3], average.overflowed),
+            (i16::MIN, 255, 0, 1)
+        );
     }
 }

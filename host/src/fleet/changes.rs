@@ -1,7 +1,8 @@
 //! What has changed between epochs: blocks that changed alike and touch one another are one change.
 //!
-//! Of a surface that only lies elsewhere, for depth or pose were off, the epoch with free space has one as well, half a truncation away or more.
-//! Where an object came or went, that epoch has none near, at least about what stands out by more than the truncation. So a change is listed when
+//! Of a surface that only lies elsewhere, for depth or pose were off, the epoch with free space has
+//! one as well, half a truncation away or more. Where an object came or went, that epoch has none
+//! near, at least about what stands out by more than the truncation. So a change is listed when
 //! that is said of [`CLEAR_MIN`] of its voxels.
 
 use super::resolve::BlockChange;
@@ -66,7 +67,9 @@ pub fn changes(blocks: &[BlockChange], lattice: &Lattice, least_m3: f64) -> Vec<
     for (kind, mut left) in kinds {
         while let Some((_, first)) = left.pop_first() {
             let blocks = connected(first, &mut left);
-            let total = |of: fn(&BlockChange) -> u32| blocks.iter().map(|block| f64::from(of(block))).sum::<f64>();
+            let total = |of: fn(&BlockChange) -> u32| {
+                blocks.iter().map(|block| f64::from(of(block))).sum::<f64>()
+            };
             let is_clear = total(|block| block.clear) >= CLEAR_MIN * total(|block| block.voxels);
             let change = summed(kind, &blocks, lattice);
             changes.extend((is_clear && change.volume_m3 >= least_m3).then_some(change));
@@ -83,7 +86,11 @@ fn connected(first: BlockChange, left: &mut BTreeMap<BlockCoord, BlockChange>) -
         at += 1;
         for neighbour in 0..27 {
             let side = |c: i16, by: i32| i32::from(c) + by - 1;
-            let coord = BlockCoord::new(side(coord.x, neighbour % 3), side(coord.y, neighbour / 3 % 3), side(coord.z, neighbour / 9));
+            let coord = BlockCoord::new(
+                side(coord.x, neighbour % 3),
+                side(coord.y, neighbour / 3 % 3),
+                side(coord.z, neighbour / 9),
+            );
             found.extend(coord.and_then(|coord| left.remove(&coord)));
         }
     }
@@ -128,7 +135,8 @@ mod tests {
 
     const LATTICE: Lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
 
-    /// Distance, in voxels, from the ground below y = 2, and from a box on it that is 8 x 8 x 12 voxels about (8, 6, 10), where it is there.
+    /// Distance, in voxels, from the ground below y = 2, and from a box on it that is 8 x 8 x 12
+    /// voxels about (8, 6, 10), where it is there.
     fn distance(at: [i32; 3], has_box: bool) -> f64 {
         let [x, y, z] = at.map(f64::from);
         let ground = y - 2.0;
@@ -154,7 +162,9 @@ mod tests {
             let mut sums = BlockSums::zero(false);
             for voxel in 0..BLOCK_VOXELS {
                 let offset = [voxel % 8, voxel / 8 % 8, voxel / 64];
-                let at = std::array::from_fn(|axis| i32::from([coord.x, coord.y, coord.z][axis]) * 8 + offset[axis] as i32);
+                let at = std::array::from_fn(|axis| {
+                    i32::from([coord.x, coord.y, coord.z][axis]) * 8 + offset[axis] as i32
+                });
                 let units = (distance(at) / 5.0).clamp(-1.0, 1.0) * 32_767.0;
                 sums.observe(voxel, units as i16, weight, [0; 3]);
             }
@@ -177,7 +187,8 @@ mod tests {
 
     /// Whether the map has a surface in the middle of the box's top.
     fn shows_box(blocks: &[ResolvedBlock]) -> bool {
-        let block = blocks.iter().find(|block| block.coord == BlockCoord { x: 1, y: 1, z: 1 }).unwrap();
+        let block =
+            blocks.iter().find(|block| block.coord == BlockCoord { x: 1, y: 1, z: 1 }).unwrap();
         // (8, 9, 10): a voxel below the top.
         block.average.sdf[8 * (1 + 8 * 2)] <= 0
     }
@@ -190,13 +201,17 @@ mod tests {
         let (blocks, changes) = resolved(root.path());
         assert!(!shows_box(&blocks));
         let [change] = &changes[..] else { panic!("{changes:?}") };
-        assert_eq!((change.kind, change.from_epoch, change.to_epoch, change.believed_epoch), (ChangeKind::Gone, 3, 5, 5));
+        assert_eq!(
+            (change.kind, change.from_epoch, change.to_epoch, change.believed_epoch),
+            (ChangeKind::Gone, 3, 5, 5)
+        );
         let near = |a: f64, b: f64| (a - b).abs() < 0.25;
         assert!(near(change.centre_m[0], 0.8) && near(change.centre_m[2], 1.0), "{change:?}");
         // The box without its ground, and without its inside that lies deeper than two voxels.
         assert!(change.volume_m3 > 0.3 && change.volume_m3 < 0.768, "{change:?}");
         // What agrees is averaged over both.
-        let ground = blocks.iter().find(|block| block.coord == BlockCoord { x: 3, y: 0, z: 0 }).unwrap();
+        let ground =
+            blocks.iter().find(|block| block.coord == BlockCoord { x: 3, y: 0, z: 0 }).unwrap();
         assert!(ground.average.weight.iter().all(|&weight| weight == 26));
     }
 
@@ -207,21 +222,30 @@ mod tests {
         write(root.path(), 1, true, 6);
         let (blocks, changes) = resolved(root.path());
         assert!(shows_box(&blocks));
-        assert_eq!((changes.len(), changes[0].kind, changes[0].believed_epoch), (1, ChangeKind::Appeared, 1));
+        assert_eq!(
+            (changes.len(), changes[0].kind, changes[0].believed_epoch),
+            (1, ChangeKind::Appeared, 1)
+        );
         write(root.path(), 1, true, 3);
         let (blocks, changes) = resolved(root.path());
         assert!(!shows_box(&blocks));
-        assert_eq!((changes.len(), changes[0].kind, changes[0].believed_epoch), (1, ChangeKind::Appeared, 0));
+        assert_eq!(
+            (changes.len(), changes[0].kind, changes[0].believed_epoch),
+            (1, ChangeKind::Appeared, 0)
+        );
     }
 
     #[test]
     fn a_surface_that_lies_elsewhere_is_no_change() {
         let root = tempfile::TempDir::new().unwrap();
-        let map = |epoch: u32, shift: i32| write_of(root.path(), epoch, 6, |[x, y, z]| distance([x, y - shift, z], true));
+        let map = |epoch: u32, shift: i32| {
+            write_of(root.path(), epoch, 6, |[x, y, z]| distance([x, y - shift, z], true))
+        };
         map(1, 0);
         map(2, 4);
         let found = resolve(root.path(), |_| Ok(())).unwrap();
-        let volume_m3 = found.changes.iter().map(|block| f64::from(block.voxels) * 1e-3).sum::<f64>();
+        let volume_m3 =
+            found.changes.iter().map(|block| f64::from(block.voxels) * 1e-3).sum::<f64>();
         assert!(volume_m3 > 0.5, "ground and box are .4 m higher: {volume_m3}");
         assert_eq!(changes(&found.changes, &LATTICE, 0.05), []);
     }

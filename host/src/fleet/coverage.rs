@@ -45,8 +45,15 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
     files.sort();
     let (mut coverage, mut lattice) = (Coverage::default(), None);
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
-        let mut heads = of_tile.iter().map(|(_, _, path)| Head::open(path, &mut lattice)).collect::<Result<Vec<_>, _>>()?;
-        let mut tile = TileCoverage { sides: of_tile[0].0.sides, recordings: 0, blocks_by_recordings: Vec::new() };
+        let mut heads = of_tile
+            .iter()
+            .map(|(_, _, path)| Head::open(path, &mut lattice))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut tile = TileCoverage {
+            sides: of_tile[0].0.sides,
+            recordings: 0,
+            blocks_by_recordings: Vec::new(),
+        };
         let mut saw = vec![false; heads.len()];
         while let Some(coord) = least(&heads) {
             let mut count = 0;
@@ -71,6 +78,8 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
 
 /// Whether a voxel lies nearer to a surface than the truncation.
 fn has_surface(sums: &BlockSums) -> bool {
-    let is_near = |(distance, weight): (&i32, &u32)| *weight > 0 && i64::from(*distance) < i64::from(*weight) * 32_767;
+    let is_near = |(distance, weight): (&i32, &u32)| {
+        *weight > 0 && i64::from(*distance) < i64::from(*weight) * 32_767
+    };
     sums.distance.iter().zip(&*sums.weight).any(is_near)
 }

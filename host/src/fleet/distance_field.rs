@@ -45,7 +45,11 @@ impl DistanceField {
         for &coord in &field.order {
             if let Some(source) = Source::load(store, coord, lattice.colour) {
                 let mut sdf = Box::new([UNSEEN; BLOCK_VOXELS]);
-                let seen = source.sdf.iter().zip(&source.weight).map(|(sdf, weight)| if *weight >= min_weight { *sdf } else { UNSEEN });
+                let seen = source
+                    .sdf
+                    .iter()
+                    .zip(&source.weight)
+                    .map(|(sdf, weight)| if *weight >= min_weight { *sdf } else { UNSEEN });
                 sdf.iter_mut().zip(seen).for_each(|(to, value)| *to = value);
                 field.blocks.insert(coord, sdf);
             }
@@ -73,8 +77,13 @@ impl DistanceField {
         let (mut distance, mut gradient) = (0.0, [0.0; 3]);
         for corner in 0..8usize {
             let ahead: [bool; 3] = std::array::from_fn(|axis| corner >> axis & 1 == 1);
-            let value = f64::from(self.voxel(std::array::from_fn(|axis| first[axis] + i32::from(ahead[axis])))?);
-            let factor: [f64; 3] = std::array::from_fn(|axis| if ahead[axis] { share[axis] } else { 1.0 - share[axis] });
+            let value = f64::from(
+                self.voxel(std::array::from_fn(|axis| first[axis] + i32::from(ahead[axis])))?,
+            );
+            let factor: [f64; 3] =
+                std::array::from_fn(
+                    |axis| if ahead[axis] { share[axis] } else { 1.0 - share[axis] },
+                );
             distance += value * factor[0] * factor[1] * factor[2];
             for axis in 0..3 {
                 let others = factor[(axis + 1) % 3] * factor[(axis + 2) % 3];
@@ -85,7 +94,8 @@ impl DistanceField {
         Some((distance * unit_m, gradient.map(|part| part * unit_m / self.voxel_size_m)))
     }
 
-    /// Points where the distance changes its sign between two neighbouring voxels, at most `most`: of more, every second, fourth, ... is kept.
+    /// Points where the distance changes its sign between two neighbouring voxels, at most `most`:
+    /// of more, every second, fourth, ... is kept.
     pub fn surface(&self, most: usize) -> Vec<SurfacePoint> {
         let (mut points, mut stride, mut count) = (Vec::new(), 1usize, 0usize);
         for &coord in &self.order {
@@ -112,12 +122,14 @@ impl DistanceField {
         points
     }
 
-    /// Where the distance changes its sign between a lattice point and the next along an axis, in voxels.
+    /// Where the distance changes its sign between a lattice point and the next along an axis, in
+    /// voxels.
     fn crossing(&self, at: [i32; 3], axis: usize) -> Option<[f64; 3]> {
         let mut next = at;
         next[axis] += 1;
         let (here, there) = (f64::from(self.voxel(at)?), f64::from(self.voxel(next)?));
-        // Of neighbours whose distances differ by more than two voxels at least one is no distance from this surface.
+        // Of neighbours whose distances differ by more than two voxels at least one is no distance
+        // from this surface.
         let most = 2.0 * self.voxel_size_m / self.truncation_m * 32_767.0;
         if (here > 0.0) == (there > 0.0) || (here - there).abs() > most {
             return None;

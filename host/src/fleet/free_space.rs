@@ -1,10 +1,13 @@
 //! Blocks that a run saw to be free of any surface.
 //!
-//! A map has blocks about surfaces alone, so where a parked car has left, the map of the day after has nothing that could say so. A view of the
-//! map from the poses of its camera has: a block wholly in the picture, all of whose pixels show a surface behind it, was free. Such blocks are
-//! added to the run's blocks with the truncation as distance and the number of these views as weight.
+//! A map has blocks about surfaces alone, so where a parked car has left, the map of the day after
+//! has nothing that could say so. A view of the map from the poses of its camera has: a block
+//! wholly in the picture, all of whose pixels show a surface behind it, was free. Such blocks are
+//! added to the run's blocks with the truncation as distance and the number of these views as
+//! weight.
 //!
-//! Views are taken wherever the camera has moved by [`APART_M`], a pixel in [`PIXELS`] on each axis, within [`FAR_M`].
+//! Views are taken wherever the camera has moved by [`APART_M`], a pixel in [`PIXELS`] on each
+//! axis, within [`FAR_M`].
 //!
 //! **Memory.** 1 KiB a block of the map, and 8 bytes a free block.
 
@@ -71,7 +74,10 @@ pub fn free_blocks(field: &DistanceField, camera: &Camera) -> BTreeMap<BlockCoor
         for x in -reach..=reach {
             for y in -reach..=reach {
                 for z in -reach..=reach {
-                    let Some(coord) = BlockCoord::new(centre[0] + x, centre[1] + y, centre[2] + z) else { continue };
+                    let Some(coord) = BlockCoord::new(centre[0] + x, centre[1] + y, centre[2] + z)
+                    else {
+                        continue;
+                    };
                     if depths.show_free(camera, &to_camera, coord, (block_m, field.truncation_m)) {
                         let count = views.entry(coord).or_default();
                         *count = count.saturating_add(1);
@@ -90,8 +96,13 @@ impl Depths {
         let mut depth_m = Vec::with_capacity(width * height);
         for row in 0..height {
             for column in 0..width {
-                let across = |px: usize, centre_px: f64| ((px * PIXELS) as f64 - centre_px) / rig.focal_px;
-                let ray = pose.rotate([across(column, rig.center_u_px), across(row, rig.center_v_px), 1.0]);
+                let across =
+                    |px: usize, centre_px: f64| ((px * PIXELS) as f64 - centre_px) / rig.focal_px;
+                let ray = pose.rotate([
+                    across(column, rig.center_u_px),
+                    across(row, rig.center_v_px),
+                    1.0,
+                ]);
                 depth_m.push(first_surface(field, pose.translation_m, ray).unwrap_or(0.0));
             }
         }
@@ -108,31 +119,45 @@ impl Depths {
     ) -> bool {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for corner in 0..8usize {
-            let side = |axis: usize, at: i16| (f64::from(at) + f64::from((corner >> axis & 1) as u8)) * block_m;
-            let [x, y, z] = to_camera.transform_point([side(0, coord.x), side(1, coord.y), side(2, coord.z)]);
+            let side = |axis: usize, at: i16| {
+                (f64::from(at) + f64::from((corner >> axis & 1) as u8)) * block_m
+            };
+            let [x, y, z] =
+                to_camera.transform_point([side(0, coord.x), side(1, coord.y), side(2, coord.z)]);
             if !(NEAR_M..FAR_M).contains(&z) {
                 return false;
             }
             let pixels = PIXELS as f64;
-            let at = [(rig.focal_px * x / z + rig.center_u_px) / pixels, (rig.focal_px * y / z + rig.center_v_px) / pixels, z];
-            (0..3).for_each(|axis| (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis])));
+            let at = [
+                (rig.focal_px * x / z + rig.center_u_px) / pixels,
+                (rig.focal_px * y / z + rig.center_v_px) / pixels,
+                z,
+            ];
+            (0..3).for_each(|axis| {
+                (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]))
+            });
         }
-        let [left, top, right, bottom] = [low[0].floor(), low[1].floor(), high[0].ceil(), high[1].ceil()];
+        let [left, top, right, bottom] =
+            [low[0].floor(), low[1].floor(), high[0].ceil(), high[1].ceil()];
         if left < 0.0 || top < 0.0 || right >= self.width as f64 || bottom >= self.height as f64 {
             return false;
         }
         let behind_m = high[2] + truncation_m;
-        let mut pixels = (top as usize..=bottom as usize).flat_map(|v| (left as usize..=right as usize).map(move |u| (u, v)));
+        let mut pixels = (top as usize..=bottom as usize)
+            .flat_map(|v| (left as usize..=right as usize).map(move |u| (u, v)));
         pixels.all(|(u, v)| self.depth_m[v * self.width + u] >= behind_m)
     }
 }
 
-/// Depth of the first surface along a ray of depth 1. A ray that comes upon the back of a surface shows none.
+/// Depth of the first surface along a ray of depth 1. A ray that comes upon the back of a surface
+/// shows none.
 fn first_surface(field: &DistanceField, from_m: [f64; 3], ray: [f64; 3]) -> Option<f64> {
     let step_m = 1.5 * field.voxel_size_m;
     let (mut depth_m, mut before) = (0.5, None);
     while depth_m < HIT_MAX_M {
-        let point = std::array::from_fn(|axis| ((from_m[axis] + ray[axis] * depth_m) / field.voxel_size_m).round() as i32);
+        let point = std::array::from_fn(|axis| {
+            ((from_m[axis] + ray[axis] * depth_m) / field.voxel_size_m).round() as i32
+        });
         let here = field.voxel(point).map(|sdf| f64::from(sdf) / 32_767.0 * field.truncation_m);
         match (here, before) {
             (Some(here), Some(before)) if here <= 0.0 && before > 0.0 => return Some(depth_m),

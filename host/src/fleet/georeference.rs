@@ -1,8 +1,11 @@
-//! Where a recording lies in the world, from fixes of a receiver of satellites along its path: a rigid motion by least squares.
+//! Where a recording lies in the world, from fixes of a receiver of satellites along its path: a
+//! rigid motion by least squares.
 //!
-//! Umeyama's closed form without scale (*Least-squares estimation of transformation parameters between two point patterns*, PAMI 1991), repeated with
-//! Cauchy's weights, whose scale is that of the median residual, so that fixes reflected by houses do not count. Where roll, pitch and yaw come with
-//! the fixes, their mean rotation is one more observation in the same form: a straight path says nothing about the turn about itself.
+//! Umeyama's closed form without scale (*Least-squares estimation of transformation parameters
+//! between two point patterns*, PAMI 1991), repeated with Cauchy's weights, whose scale is that of
+//! the median residual, so that fixes reflected by houses do not count. Where roll, pitch and yaw
+//! come with the fixes, their mean rotation is one more observation in the same form: a straight
+//! path says nothing about the turn about itself.
 //!
 //! The world is the plane through the origin of the fixes: x east, y down, z north.
 
@@ -19,7 +22,8 @@ use std::path::Path;
 const FIXES_MIN: usize = 10;
 /// Largest standard deviation of the turn about any axis, rad: a registration does not find more.
 const TURN_MAX_RAD: f64 = 0.052;
-/// How well the axes of the inertial system are those of the camera, and how well it measures them, rad.
+/// How well the axes of the inertial system are those of the camera, and how well it measures them,
+/// rad.
 const ANGLES_SIGMA_RAD: f64 = 0.0175;
 /// Angles may contradict positions by no more, rad.
 const CONTRADICTION_MAX_RAD: f64 = 0.175;
@@ -67,13 +71,17 @@ struct Observation {
 pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
     let (gnss, antenna_m, origin) = match &job.given {
         Given::TWorldCamera(rows) => {
-            let t_world_map =
-                transform(rows).ok_or_else(|| FleetError::content(folder, format!("has no rigid motion for {}", job.name)))?;
+            let t_world_map = transform(rows).ok_or_else(|| {
+                FleetError::content(folder, format!("has no rigid motion for {}", job.name))
+            })?;
             return Ok(Prior { t_world_map, uncertainty: None });
         }
         Given::Gnss { file, antenna_m, origin } => (file, antenna_m, origin),
         Given::Figures(_) => {
-            return Err(FleetError::content(folder, "has the jobs of a sweep, which keep no maps. Draw them with `dynvox sweep --merge`"));
+            return Err(FleetError::content(
+                folder,
+                "has the jobs of a sweep, which keep no maps. Draw them with `dynvox sweep --merge`",
+            ));
         }
     };
     let fixes = read_gnss(gnss)?;
@@ -84,7 +92,9 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
         Some(Observation::of(&camera.t_map_camera, &fix, &plane))
     });
     let found = georeference(&seen.collect::<Vec<_>>(), *antenna_m);
-    found.map_err(|reason| FleetError::content(gnss, format!("does not say where {} lies: {reason}", job.name)))
+    found.map_err(|reason| {
+        FleetError::content(gnss, format!("does not say where {} lies: {reason}", job.name))
+    })
 }
 
 impl Observation {
@@ -98,11 +108,15 @@ impl Observation {
     }
 }
 
-/// The camera's axes (x right, y down, z ahead) in the world, of a vehicle with x ahead, y left, z up.
+/// The camera's axes (x right, y down, z ahead) in the world, of a vehicle with x ahead, y left, z
+/// up.
 fn camera_axes([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    let about =
-        |axis: [f64; 3], angle: f64| Matrix3::from(Transform::new(axis.map(|side| side * angle), [0.0; 3]).rotation_matrix()).transpose();
-    let enu_vehicle = about([0.0, 0.0, 1.0], yaw) * about([0.0, 1.0, 0.0], pitch) * about([1.0, 0.0, 0.0], roll);
+    let about = |axis: [f64; 3], angle: f64| {
+        Matrix3::from(Transform::new(axis.map(|side| side * angle), [0.0; 3]).rotation_matrix())
+            .transpose()
+    };
+    let enu_vehicle =
+        about([0.0, 0.0, 1.0], yaw) * about([0.0, 1.0, 0.0], pitch) * about([1.0, 0.0, 0.0], roll);
     let world_enu = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
     let vehicle_camera = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     world_enu * enu_vehicle * vehicle_camera
@@ -136,7 +150,9 @@ impl Estimate {
         let mut estimate = start.next(points, axes)?;
         for _ in 1..ROUNDS_MAX {
             let next = estimate.next(points, axes)?;
-            let change = (next.rotation - estimate.rotation).amax().max((next.shift_m - estimate.shift_m).amax());
+            let change = (next.rotation - estimate.rotation)
+                .amax()
+                .max((next.shift_m - estimate.shift_m).amax());
             estimate = next;
             if change < STEP_MIN {
                 break;
@@ -148,30 +164,46 @@ impl Estimate {
     /// The motion that fits best with some weights, and the weights that follow from it.
     fn next(&self, points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
         let centres = centres(points, &self.weights);
-        let mut sum = axes.copied().unwrap_or_else(Matrix3::zeros) / (2.0 * ANGLES_SIGMA_RAD.powi(2));
+        let mut sum =
+            axes.copied().unwrap_or_else(Matrix3::zeros) / (2.0 * ANGLES_SIGMA_RAD.powi(2));
         for ((from, to), weight) in points.iter().zip(&self.weights) {
-            sum += (weight / information_of(self.sigma_m)) * (to - centres.1) * (from - centres.0).transpose();
+            sum += (weight / information_of(self.sigma_m))
+                * (to - centres.1)
+                * (from - centres.0).transpose();
         }
         let rotation = nearest_rotation(&sum)?;
         let shift_m = centres.1 - rotation * centres.0;
-        let residuals_m: Vec<f64> = points.iter().map(|(from, to)| (to - rotation * from - shift_m).norm()).collect();
+        let residuals_m: Vec<f64> =
+            points.iter().map(|(from, to)| (to - rotation * from - shift_m).norm()).collect();
         let mut sorted = residuals_m.clone();
         sorted.sort_by(f64::total_cmp);
         let sigma_m = (sorted.get(sorted.len() / 2)? / MEDIAN_LENGTH).max(SIGMA_MIN_M);
-        let weights = residuals_m.iter().map(|residual_m| 1.0 / (1.0 + (residual_m / (LIMIT * sigma_m)).powi(2))).collect();
+        let weights = residuals_m
+            .iter()
+            .map(|residual_m| 1.0 / (1.0 + (residual_m / (LIMIT * sigma_m)).powi(2)))
+            .collect();
         Some(Self { rotation, shift_m, sigma_m, weights })
     }
 
     /// Standard deviation of the turn about the axis that is known least, rad.
     fn turn_sigma_rad(&self, points: &[PointPair], with_angles: bool) -> f64 {
         let (centre, _) = centres(points, &self.weights);
-        let mut information = if with_angles { Matrix3::identity() / ANGLES_SIGMA_RAD.powi(2) } else { Matrix3::zeros() };
+        let mut information = if with_angles {
+            Matrix3::identity() / ANGLES_SIGMA_RAD.powi(2)
+        } else {
+            Matrix3::zeros()
+        };
         for ((from, _), weight) in points.iter().zip(&self.weights) {
             let arm = from - centre;
-            information += (weight / information_of(self.sigma_m)) * (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose());
+            information += (weight / information_of(self.sigma_m))
+                * (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose());
         }
         let least = SymmetricEigen::new(information).eigenvalues.min();
-        if least > 0.0 { least.sqrt().recip().min(std::f64::consts::PI) } else { std::f64::consts::PI }
+        if least > 0.0 {
+            least.sqrt().recip().min(std::f64::consts::PI)
+        } else {
+            std::f64::consts::PI
+        }
     }
 }
 
@@ -187,7 +219,11 @@ fn transform_of(rotation: &Matrix3<f64>, shift_m: &Vector3<f64>) -> Transform {
 fn centres(points: &[PointPair], weights: &[f64]) -> PointPair {
     let total: f64 = weights.iter().sum();
     let sum = |of: fn(&PointPair) -> Vector3<f64>| {
-        points.iter().zip(weights).fold(Vector3::zeros(), |sum, (point, weight)| sum + of(point) * *weight) / total
+        points
+            .iter()
+            .zip(weights)
+            .fold(Vector3::zeros(), |sum, (point, weight)| sum + of(point) * *weight)
+            / total
     };
     (sum(|point| point.0), sum(|point| point.1))
 }
@@ -197,20 +233,29 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     if frames.len() < FIXES_MIN {
         return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
     }
-    let points: Vec<_> = frames.iter().map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m)).collect();
-    let turned = frames.iter().filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
+    let points: Vec<_> = frames
+        .iter()
+        .map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m))
+        .collect();
+    let turned = frames
+        .iter()
+        .filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
     let axes = turned.clone().next().and_then(|_| nearest_rotation(&turned.sum()));
     let unclear = || "its positions are not finite".to_owned();
     let by_positions = Estimate::of(&points, None).ok_or_else(unclear)?;
     let estimate = Estimate::of(&points, axes.as_ref()).ok_or_else(unclear)?;
-    let off_rad = axes.map_or(0.0, |axes| transform_of(&(axes.transpose() * by_positions.rotation), &Vector3::zeros()).angle_rad());
-    if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD {
+    let off_rad = axes.map_or(0.0, |axes| {
+        transform_of(&(axes.transpose() * by_positions.rotation), &Vector3::zeros()).angle_rad()
+    });
+    if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD
+    {
         return Err(format!(
             "its angles contradict its positions by {:.0} degrees. The camera must look along the vehicle",
             off_rad.to_degrees()
         ));
     }
-    let (position_m, rotation_rad) = (estimate.sigma_m, estimate.turn_sigma_rad(&points, axes.is_some()));
+    let (position_m, rotation_rad) =
+        (estimate.sigma_m, estimate.turn_sigma_rad(&points, axes.is_some()));
     if position_m > SIGMA_MAX_M {
         return Err(format!(
             "its fixes are {position_m:.0} m off its path (one standard deviation; at most {SIGMA_MAX_M}). Give those of this recording"
@@ -225,7 +270,8 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     }
     Ok(Prior {
         t_world_map: transform_of(&estimate.rotation, &estimate.shift_m),
-        // The error of a receiver lasts longer than a recording: its mean over the path is no surer than one fix.
+        // The error of a receiver lasts longer than a recording: its mean over the path is no surer
+        // than one fix.
         uncertainty: Some(Uncertainty { position_m, rotation_rad }),
     })
 }
@@ -239,7 +285,10 @@ mod tests {
 
     impl Noise {
         fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (self.0 >> 33) as f64 / f64::from(1u32 << 30) - 1.0
         }
 
@@ -255,17 +304,26 @@ mod tests {
         Transform::new([0.02, 2.1, -0.03], [310.0, -4.0, -95.0])
     }
 
-    /// 300 frames along a path of 240 m whose direction swings by some degrees; every eighth fix is reflected by a house.
-    fn observed(bend_rad: f64, step_m: f64, sigma_m: f64, angles_off_rad: Option<f64>) -> Vec<Observation> {
+    /// 300 frames along a path of 240 m whose direction swings by some degrees; every eighth fix is
+    /// reflected by a house.
+    fn observed(
+        bend_rad: f64,
+        step_m: f64,
+        sigma_m: f64,
+        angles_off_rad: Option<f64>,
+    ) -> Vec<Observation> {
         let (mut noise, mut at_m) = (Noise(7), [0.0; 3]);
         let frame = |nth: usize| {
             let (sine, cosine) = (f64::from(nth as u32) * 0.03).sin_cos();
-            let t_map_camera = Transform::new([0.3 * bend_rad * cosine, bend_rad * sine, 0.0], at_m);
+            let t_map_camera =
+                Transform::new([0.3 * bend_rad * cosine, bend_rad * sine, 0.0], at_m);
             let ahead = t_map_camera.rotate([0.0, 0.0, step_m]);
             (0..3).for_each(|axis| at_m[axis] += ahead[axis]);
             let t_world_camera = world() * t_map_camera;
             let reflected = if nth % 8 == 3 { noise.vector(25.0) } else { Vector3::zeros() };
-            let at_m = Vector3::from(t_world_camera.transform_point(ANTENNA_M)) + noise.vector(sigma_m) + reflected;
+            let at_m = Vector3::from(t_world_camera.transform_point(ANTENNA_M))
+                + noise.vector(sigma_m)
+                + reflected;
             let off = |by: f64| Transform::new([0.0, by, 0.0], [0.0; 3]) * t_world_camera;
             Observation {
                 t_map_camera,
@@ -277,7 +335,8 @@ mod tests {
     }
 
     fn error(found: &Prior, at_m: [f64; 3]) -> (f64, f64) {
-        let apart = Vector3::from(found.t_world_map.transform_point(at_m)) - Vector3::from(world().transform_point(at_m));
+        let apart = Vector3::from(found.t_world_map.transform_point(at_m))
+            - Vector3::from(world().transform_point(at_m));
         (apart.norm(), (found.t_world_map.inverse() * world()).angle_rad())
     }
 
@@ -288,25 +347,41 @@ mod tests {
         let stated = found.uncertainty.unwrap();
         let (off_m, turned_rad) = error(&found, frames[150].t_map_camera.translation_m);
         assert!((0.3..0.5).contains(&stated.position_m), "{stated:?}");
-        assert!(off_m < stated.position_m && turned_rad < 2.0 * stated.rotation_rad, "{off_m} m, {turned_rad} rad, {stated:?}");
+        assert!(
+            off_m < stated.position_m && turned_rad < 2.0 * stated.rotation_rad,
+            "{off_m} m, {turned_rad} rad, {stated:?}"
+        );
         let exact = georeference(&observed(0.6, 0.8, 0.0, None), ANTENNA_M).unwrap();
         let (off_m, turned_rad) = error(&exact, [0.0; 3]);
-        assert!(off_m < 0.01 && turned_rad < 1e-4, "reflected fixes alone: {off_m} m, {turned_rad} rad");
-        assert!(error(&georeference(&frames, [0.0; 3]).unwrap(), [0.0; 3]).0 > 0.5, "the antenna counts");
+        assert!(
+            off_m < 0.01 && turned_rad < 1e-4,
+            "reflected fixes alone: {off_m} m, {turned_rad} rad"
+        );
+        assert!(
+            error(&georeference(&frames, [0.0; 3]).unwrap(), [0.0; 3]).0 > 0.5,
+            "the antenna counts"
+        );
     }
 
     #[test]
     fn a_straight_or_short_path_is_refused_unless_angles_are_given() {
         for (bend_rad, step_m) in [(0.0, 0.8), (0.6, 0.002)] {
-            let refused = georeference(&observed(bend_rad, step_m, 0.4, None), ANTENNA_M).unwrap_err();
-            assert!(refused.contains("degrees only") && refused.contains("Give roll, pitch and yaw"), "{refused}");
-            let found = georeference(&observed(bend_rad, step_m, 0.4, Some(0.01)), ANTENNA_M).unwrap();
+            let refused =
+                georeference(&observed(bend_rad, step_m, 0.4, None), ANTENNA_M).unwrap_err();
+            assert!(
+                refused.contains("degrees only") && refused.contains("Give roll, pitch and yaw"),
+                "{refused}"
+            );
+            let found =
+                georeference(&observed(bend_rad, step_m, 0.4, Some(0.01)), ANTENNA_M).unwrap();
             let (off_m, turned_rad) = error(&found, [0.0; 3]);
             assert!(off_m < 0.5 && turned_rad < 0.02, "{off_m} m, {turned_rad} rad");
         }
         let few = georeference(&observed(0.6, 0.8, 0.4, None)[..9], ANTENNA_M).unwrap_err();
         assert!(few.contains("9 frames with a fix are less than 10"), "{few}");
-        let turned = |bend_rad: f64| georeference(&observed(bend_rad, 0.8, 0.4, Some(1.5)), ANTENNA_M).unwrap_err();
+        let turned = |bend_rad: f64| {
+            georeference(&observed(bend_rad, 0.8, 0.4, Some(1.5)), ANTENNA_M).unwrap_err()
+        };
         assert!(turned(0.6).contains("contradict its positions by 8"), "{}", turned(0.6));
         assert!(turned(0.0).contains("m off its path"), "{}", turned(0.0));
     }
@@ -316,8 +391,14 @@ mod tests {
         let north = camera_axes([0.0, 0.0, std::f64::consts::FRAC_PI_2]);
         assert!((north - Matrix3::identity()).norm() < 1e-12, "{north}");
         let nose_down = camera_axes([0.0, 0.1, std::f64::consts::FRAC_PI_2]) * Vector3::z();
-        assert!((nose_down - Vector3::new(0.0, 0.1f64.sin(), 0.1f64.cos())).norm() < 1e-12, "positive with the nose down: {nose_down}");
+        assert!(
+            (nose_down - Vector3::new(0.0, 0.1f64.sin(), 0.1f64.cos())).norm() < 1e-12,
+            "positive with the nose down: {nose_down}"
+        );
         let left_up = camera_axes([0.1, 0.0, std::f64::consts::FRAC_PI_2]) * Vector3::x();
-        assert!((left_up - Vector3::new(0.1f64.cos(), 0.1f64.sin(), 0.0)).norm() < 1e-12, "positive with the left side up: {left_up}");
+        assert!(
+            (left_up - Vector3::new(0.1f64.cos(), 0.1f64.sin(), 0.0)).norm() < 1e-12,
+            "positive with the left side up: {left_up}"
+        );
     }
 }

@@ -1,5 +1,6 @@
-//! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory and a name that is a hash of all that
-//! decides its result, so that what is done is known by its folder.
+//! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory
+//! and a name that is a hash of all that decides its result, so that what is done is known by its
+//! folder.
 
 use super::{FleetError, Recording, Recordings, submap, tile_file};
 use crate::run::{self, write_whole};
@@ -44,7 +45,8 @@ pub enum Given {
         /// Latitude and longitude, degrees, and altitude, m, of the world's origin.
         origin: [f64; 3],
     },
-    /// Nowhere: the run's figures are wanted, as this file below the folder of the jobs, and no map.
+    /// Nowhere: the run's figures are wanted, as this file below the folder of the jobs, and no
+    /// map.
     Figures(PathBuf),
 }
 
@@ -73,7 +75,8 @@ pub struct Identity {
 /// All jobs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// The program that planned them, and its formats: another one may map otherwise, and does not take over what this one did.
+    /// The program that planned them, and its formats: another one may map otherwise, and does not
+    /// take over what this one did.
     pub program: String,
     /// In the order of the recordings.
     pub jobs: Vec<Job>,
@@ -98,12 +101,19 @@ impl Manifest {
         let origin = recordings.origin()?;
         for recording in &recordings.recordings {
             let Recording { name, arguments, epoch, .. } = recording;
-            let arguments: Vec<String> = arguments.iter().chain(&recordings.arguments).cloned().collect();
+            let arguments: Vec<String> =
+                arguments.iter().chain(&recordings.arguments).cloned().collect();
             let identity = identify(&arguments)?;
-            let given = recording.given(origin, identity.first_pose.as_ref()).map_err(|reason| FleetError::content(path, reason))?;
+            let given = recording
+                .given(origin, identity.first_pose.as_ref())
+                .map_err(|reason| FleetError::content(path, reason))?;
             let job = Job { epoch: *epoch, ..Job::new(name, arguments, &identity, given) };
             if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
-                return Err(FleetError::content(path, format!("has one recording twice: {} is {name}. Remove one", same.name)).into());
+                return Err(FleetError::content(
+                    path,
+                    format!("has one recording twice: {} is {name}. Remove one", same.name),
+                )
+                .into());
             }
             jobs.push(job);
         }
@@ -123,11 +133,18 @@ impl Manifest {
         let path = folder.join(MANIFEST_FILE);
         let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
         let again = "Make it with `dynvox fleet plan`";
-        let manifest: Self = serde_json::from_str(&text)
-            .map_err(|error| FleetError::content(&path, format!("is no list of jobs of this version: {error}. {again}")))?;
+        let manifest: Self = serde_json::from_str(&text).map_err(|error| {
+            FleetError::content(
+                &path,
+                format!("is no list of jobs of this version: {error}. {again}"),
+            )
+        })?;
         if manifest.program != program() {
             let [planned, own] = [&manifest.program, &program()];
-            return Err(FleetError::content(&path, format!("was planned by {planned}; this is {own}, which maps anew. {again}")));
+            return Err(FleetError::content(
+                &path,
+                format!("was planned by {planned}; this is {own}, which maps anew. {again}"),
+            ));
         }
         Ok(manifest)
     }
@@ -139,8 +156,10 @@ impl Manifest {
     pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
         std::fs::create_dir_all(folder).map_err(FleetError::io(folder))?;
         let path = folder.join(MANIFEST_FILE);
-        let text = serde_json::to_string_pretty(self).map_err(|error| FleetError::content(&path, error.to_string()))?;
-        write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&path, error.to_string()))
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| FleetError::content(&path, error.to_string()))?;
+        write_whole(&path, |file| file.write_all(text.as_bytes()))
+            .map_err(|error| FleetError::content(&path, error.to_string()))
     }
 
     /// The jobs of one of `shards` workers.
@@ -239,8 +258,10 @@ mod tests {
     use crate::fleet::RECORDINGS_EXAMPLE;
 
     fn identify(arguments: &[String]) -> Result<Identity, FleetError> {
-        let first_pose =
-            arguments.iter().any(|argument| argument.contains("file:")).then(|| Transform::from_translation([0.0, 1.0, 700.0]));
+        let first_pose = arguments
+            .iter()
+            .any(|argument| argument.contains("file:"))
+            .then(|| Transform::from_translation([0.0, 1.0, 700.0]));
         Ok(Identity { digest: arguments.len() as u64, bytes: 7, first_pose })
     }
 
@@ -253,8 +274,14 @@ mod tests {
         manifest.write(root.path()).unwrap();
         assert_eq!(Manifest::read(root.path()).unwrap(), manifest);
         let [monday, tuesday] = &manifest.jobs[..] else { panic!("{manifest:?}") };
-        assert_eq!(monday.arguments, ["recordings/monday", "--instances", "none", "--memory", "256MiB"]);
-        assert_eq!(tuesday.given, Given::TWorldCamera([1.0, 0.0, 0.0, 5.2, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -3.1]));
+        assert_eq!(
+            monday.arguments,
+            ["recordings/monday", "--instances", "none", "--memory", "256MiB"]
+        );
+        assert_eq!(
+            tuesday.given,
+            Given::TWorldCamera([1.0, 0.0, 0.0, 5.2, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -3.1])
+        );
         assert!(monday.is_of(5) && !monday.is_of(4) && monday.id != tuesday.id);
         assert_eq!(manifest.shard(1, 2).collect::<Vec<_>>(), [tuesday]);
         assert_eq!(tuesday.state(root.path()), JobState::Open);
@@ -271,6 +298,10 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("sums 1", "sums 0")).unwrap();
         let refused = Manifest::read(root.path()).unwrap_err().to_string();
-        assert!(refused.contains("sums 0; this is dynvox ") && refused.contains("Make it with `dynvox fleet plan`"), "{refused}");
+        assert!(
+            refused.contains("sums 0; this is dynvox ")
+                && refused.contains("Make it with `dynvox fleet plan`"),
+            "{refused}"
+        );
     }
 }

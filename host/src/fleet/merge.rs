@@ -21,11 +21,13 @@ pub struct Merged {
     pub lattice: Option<Lattice>,
 }
 
-/// Adds the maps in the folders `inputs` into a new folder, each epoch by itself. The result does not depend on the order of the inputs, nor on how they were merged
-/// before. In memory at once is one block of each input.
+/// Adds the maps in the folders `inputs` into a new folder, each epoch by itself. The result does
+/// not depend on the order of the inputs, nor on how they were merged before. In memory at once is
+/// one block of each input.
 ///
 /// # Errors
-/// A tile is damaged or of other voxels, the folder exists, or the disk refuses. Nothing half-written stays behind.
+/// A tile is damaged or of other voxels, the folder exists, or the disk refuses. Nothing
+/// half-written stays behind.
 pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
     if out.exists() {
         return Err(FleetError::Exists { path: out.to_path_buf() });
@@ -37,9 +39,14 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
     let mut merged = Merged { tiles: 0, blocks: 0, lattice: None };
     for tile in all {
         let paths = folders.iter().filter_map(|folder| folder.get(&tile));
-        let mut heads = paths.map(|path| Head::open(path, &mut merged.lattice)).collect::<Result<Vec<_>, _>>()?;
+        let mut heads = paths
+            .map(|path| Head::open(path, &mut merged.lattice))
+            .collect::<Result<Vec<_>, _>>()?;
         let Some(lattice) = merged.lattice else { continue };
-        merged.blocks += u64::from(tile_file::write(&draft.path().join(tile.file_name()), &lattice, || next(&mut heads))?);
+        merged.blocks +=
+            u64::from(tile_file::write(&draft.path().join(tile.file_name()), &lattice, || {
+                next(&mut heads)
+            })?);
         merged.tiles += 1;
     }
     draft.rename(out).map_err(FleetError::io(out))?;
@@ -128,19 +135,32 @@ mod tests {
             let mut sums = BlockSums::zero(lattice.colour);
             for _ in 0..50 {
                 let mixed = random.next_u32();
-                sums.observe((mixed % 512) as usize, (mixed >> 16) as i16, (mixed >> 8) as u8, [1, 2, mixed as u8]);
+                sums.observe(
+                    (mixed % 512) as usize,
+                    (mixed >> 16) as i16,
+                    (mixed >> 8) as u8,
+                    [1, 2, mixed as u8],
+                );
             }
             blocks.insert((WorldTile::of(coord, lattice, (coord.x & 1) as u32), coord), sums);
         }
         std::fs::create_dir_all(folder).unwrap();
         for tile in blocks.keys().map(|(tile, _)| *tile).collect::<BTreeSet<_>>() {
-            let mut own = blocks.iter().filter(|((of, _), _)| *of == tile).map(|((_, coord), sums)| (*coord, sums.clone()));
+            let mut own = blocks
+                .iter()
+                .filter(|((of, _), _)| *of == tile)
+                .map(|((_, coord), sums)| (*coord, sums.clone()));
             tile_file::write(&folder.join(tile.file_name()), lattice, || Ok(own.next())).unwrap();
         }
     }
 
     /// Merges maps in a random tree, up to `workers` sums at once; the folder of the last one.
-    fn merged_by(workers: usize, mut maps: Vec<PathBuf>, scratch: &Path, random: &mut Random) -> PathBuf {
+    fn merged_by(
+        workers: usize,
+        mut maps: Vec<PathBuf>,
+        scratch: &Path,
+        random: &mut Random,
+    ) -> PathBuf {
         let mut step = 0;
         while maps.len() > 1 {
             let mut groups = Vec::new();
@@ -148,8 +168,9 @@ mod tests {
                 // Some of those that are left, at random, become one.
                 let most = (maps.len() as u32 - 1).min(8);
                 let count = 2 + random.below(most) as usize;
-                let chosen: Vec<_> =
-                    (0..count.min(maps.len())).map(|_| maps.swap_remove(random.below(maps.len() as u32) as usize)).collect();
+                let chosen: Vec<_> = (0..count.min(maps.len()))
+                    .map(|_| maps.swap_remove(random.below(maps.len() as u32) as usize))
+                    .collect();
                 groups.push((chosen, scratch.join(format!("merged-{step}"))));
                 step += 1;
                 if maps.len() < 2 {
@@ -157,7 +178,9 @@ mod tests {
                 }
             }
             std::thread::scope(|scope| {
-                groups.iter().for_each(|(chosen, out)| drop(scope.spawn(|| merge(chosen, out).unwrap())));
+                groups
+                    .iter()
+                    .for_each(|(chosen, out)| drop(scope.spawn(|| merge(chosen, out).unwrap())));
             });
             maps.extend(groups.into_iter().map(|(_, out)| out));
         }
@@ -177,7 +200,12 @@ mod tests {
             let mut expected = None;
             for trial in 0..100 {
                 let scratch = tempfile::TempDir::new_in(root.path()).unwrap();
-                let merged = merged_by(1 + trial % 4, (0..count).map(path).collect(), scratch.path(), &mut random);
+                let merged = merged_by(
+                    1 + trial % 4,
+                    (0..count).map(path).collect(),
+                    scratch.path(),
+                    &mut random,
+                );
                 let found = digest(&merged).unwrap();
                 assert_eq!(*expected.get_or_insert(found), found, "{count} maps, trial {trial}");
             }
@@ -200,8 +228,14 @@ mod tests {
         std::fs::write(&tile, &bytes[..bytes.len() - 1]).unwrap();
         assert!(merge(&both[..1], &path("out")).unwrap_err().to_string().contains("is damaged"));
         std::fs::write(path("a").join("notes.txt"), "").unwrap();
-        assert!(merge(&both[..1], &path("out")).unwrap_err().to_string().contains("notes.txt is no tile"));
-        let mut names: Vec<_> = root.path().read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert!(
+            merge(&both[..1], &path("out"))
+                .unwrap_err()
+                .to_string()
+                .contains("notes.txt is no tile")
+        );
+        let mut names: Vec<_> =
+            root.path().read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
         assert_eq!(names, ["a", "b"], "nothing half-written");
     }

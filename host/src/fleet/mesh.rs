@@ -14,7 +14,12 @@ use std::path::Path;
 ///
 /// # Errors
 /// The disk refuses. Nothing half-written stays behind.
-pub fn write_mesh(map: &mut Averages, out: &Path, min_weight: u8, axes: Axes) -> Result<Mesh, FleetError> {
+pub fn write_mesh(
+    map: &mut Averages,
+    out: &Path,
+    min_weight: u8,
+    axes: Axes,
+) -> Result<Mesh, FleetError> {
     let volume = VolumeConfig {
         voxel_size_m: map.lattice.voxel_size_m,
         truncation_m: map.lattice.truncation_m,

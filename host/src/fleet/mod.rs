@@ -1,13 +1,16 @@
 //! Many maps as one: sums of voxels in tiles of the world, which can be added in any order.
 //!
-//! A voxel's running average cannot be added to another's without its rounding. Its sums can: weight times distance, and weight, as integers.
-//! Integer addition is associative and commutative, so maps of many recordings, merged by any number of workers in any order, give the same
-//! bits. Data flows: a run's blocks -> [`keep`] (its map in its own lattice) -> [`Alignment`] (where it lies in the world) -> [`resample`] (sums
-//! in the world's lattice) -> [`merge`] -> [`Averages`] (one map of all epochs) -> [`write_mesh`]. [`Manifest`] says which runs there are to do,
-//! and no more than two folders each is what they leave.
+//! A voxel's running average cannot be added to another's without its rounding. Its sums can:
+//! weight times distance, and weight, as integers. Integer addition is associative and commutative,
+//! so maps of many recordings, merged by any number of workers in any order, give the same bits.
+//! Data flows: a run's blocks -> [`keep`] (its map in its own lattice) -> [`Alignment`] (where it
+//! lies in the world) -> [`resample`] (sums in the world's lattice) -> [`merge`] -> [`Averages`]
+//! (one map of all epochs) -> [`write_mesh`]. [`Manifest`] says which runs there are to do, and no
+//! more than two folders each is what they leave.
 //!
-//! **Memory.** A merge holds one block of each input; resampling a cache of blocks and a list of block coordinates; alignment the distances of two
-//! maps; averages one block of each epoch; a mesh a cube of blocks.
+//! **Memory.** A merge holds one block of each input; resampling a cache of blocks and a list of
+//! block coordinates; alignment the distances of two maps; averages one block of each epoch; a mesh
+//! a cube of blocks.
 
 mod align;
 mod averages;

@@ -1,8 +1,11 @@
-//! Poses of recordings from what was given and how their maps lie to one another: weighted least squares.
+//! Poses of recordings from what was given and how their maps lie to one another: weighted least
+//! squares.
 //!
-//! Each recording's map is rigid. Given poses are weak observations, registrations strong ones. A recording without a registration stays where it
-//! was given. A map's drift stays in it, so a registration at its end is as sure about its centre as the way between the two is short: without that
-//! ([`with_drift`]) the drift of all maps of a chain adds up, and given poses count for nothing.
+//! Each recording's map is rigid. Given poses are weak observations, registrations strong ones. A
+//! recording without a registration stays where it was given. A map's drift stays in it, so a
+//! registration at its end is as sure about its centre as the way between the two is short: without
+//! that ([`with_drift`]) the drift of all maps of a chain adds up, and given poses count for
+//! nothing.
 //!
 //! **Memory.** A matrix of 36 x 36 numbers for each two recordings.
 
@@ -60,7 +63,11 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
             let to_centre = about(&centre_m);
             let information = to_centre.transpose() * prior(&node.uncertainty);
             add(&mut matrix, at, at, &(information * to_centre));
-            add_vector(&mut vector, at, &(information * step_about(&centre_m, &(node.given * poses[at].inverse()))));
+            add_vector(
+                &mut vector,
+                at,
+                &(information * step_about(&centre_m, &(node.given * poses[at].inverse()))),
+            );
         }
         for edge in edges {
             let [a, b] = edge.nodes;
@@ -68,7 +75,10 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
             let to_centre = about(&centre_m);
             let wanted = poses[b] * edge.t_b_a;
             let weighted = to_centre.transpose() * turned(&edge.information, &poses[b]);
-            let (own, shared) = (weighted * to_centre, weighted * step_about(&centre_m, &(wanted * poses[a].inverse())));
+            let (own, shared) = (
+                weighted * to_centre,
+                weighted * step_about(&centre_m, &(wanted * poses[a].inverse())),
+            );
             [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)]
                 .into_iter()
                 .for_each(|(i, j, sign)| add(&mut matrix, i, j, &(sign * own)));
@@ -99,7 +109,8 @@ fn add_vector(vector: &mut DVector<f64>, row: usize, part: &Vector6<f64>) {
     view += part;
 }
 
-/// Takes a step about the world's origin to one about a centre: the translation is that of the centre.
+/// Takes a step about the world's origin to one about a centre: the translation is that of the
+/// centre.
 fn about(centre_m: &Vector3<f64>) -> Matrix6<f64> {
     let mut matrix = Matrix6::identity();
     matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&-centre_m.cross_matrix());
@@ -141,11 +152,16 @@ mod tests {
         let centre_m = [3.0, 0.0, 14.0];
         let off = |pose: &Transform, at: f64| {
             let centre = Vector3::from(pose.transform_point(centre_m));
-            motion_about(&centre, &Vector6::new(0.0, 0.017 * at, 0.0, 0.15, -0.05 * at, 0.1)) * *pose
+            motion_about(&centre, &Vector6::new(0.0, 0.017 * at, 0.0, 0.15, -0.05 * at, 0.1))
+                * *pose
         };
         let given = [truth[0], off(&truth[1], 1.0), off(&truth[2], -1.0), off(&truth[3], 1.0)];
         let uncertainty = |at: usize| UNCERTAINTY.times(if at == 0 { 1e-4 } else { 1.0 });
-        let node = |(at, &given): (usize, &Transform)| Node { given, uncertainty: uncertainty(at), centre_m };
+        let node = |(at, &given): (usize, &Transform)| Node {
+            given,
+            uncertainty: uncertainty(at),
+            centre_m,
+        };
         let nodes: Vec<Node> = given.iter().enumerate().map(node).collect();
         let edge = |a: usize, b: usize| Edge {
             nodes: [a, b],
@@ -155,7 +171,11 @@ mod tests {
         };
         let solved = solve(&nodes, &[edge(0, 1), edge(1, 2)], &given);
         for at in 0..3 {
-            assert!(apart(&solved[at], &truth[at], centre_m) < 1e-3, "{at}: {}", apart(&solved[at], &truth[at], centre_m));
+            assert!(
+                apart(&solved[at], &truth[at], centre_m) < 1e-3,
+                "{at}: {}",
+                apart(&solved[at], &truth[at], centre_m)
+            );
             assert!((solved[at].inverse() * truth[at]).angle_rad() < 1e-4);
         }
         assert!(apart(&solved[3], &given[3], centre_m) < 1e-9);
@@ -164,11 +184,19 @@ mod tests {
 
     #[test]
     fn the_drift_of_a_chain_of_maps_does_not_add_up() {
-        // Each map is 30 m long and .1 m too short, and every other one was given .2 m beside its place.
-        let truth: Vec<Transform> = (0..24).map(|nth| Transform::from_translation([0.0, 0.0, 30.0 * f64::from(nth)])).collect();
-        let beside = |at: usize| Transform::from_translation([if at.is_multiple_of(2) { 0.0 } else { 0.2 }, 0.0, 0.0]);
-        let node =
-            |(at, pose): (usize, &Transform)| Node { given: beside(at) * *pose, uncertainty: UNCERTAINTY, centre_m: [0.0, 0.0, 15.0] };
+        // Each map is 30 m long and .1 m too short, and every other one was given .2 m beside its
+        // place.
+        let truth: Vec<Transform> = (0..24)
+            .map(|nth| Transform::from_translation([0.0, 0.0, 30.0 * f64::from(nth)]))
+            .collect();
+        let beside = |at: usize| {
+            Transform::from_translation([if at.is_multiple_of(2) { 0.0 } else { 0.2 }, 0.0, 0.0])
+        };
+        let node = |(at, pose): (usize, &Transform)| Node {
+            given: beside(at) * *pose,
+            uncertainty: UNCERTAINTY,
+            centre_m: [0.0, 0.0, 15.0],
+        };
         let nodes: Vec<Node> = truth.iter().enumerate().map(node).collect();
         let given: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
         let errors = |way_m: f64| -> Vec<f64> {
@@ -179,11 +207,20 @@ mod tests {
                 centre_m: [0.0, 0.0, 30.0],
             };
             let solved = solve(&nodes, &(1..24).map(edge).collect::<Vec<_>>(), &given);
-            solved.iter().zip(&truth).map(|(found, truth)| apart(found, truth, [0.0, 0.0, 15.0])).collect()
+            solved
+                .iter()
+                .zip(&truth)
+                .map(|(found, truth)| apart(found, truth, [0.0, 0.0, 15.0]))
+                .collect()
         };
         let (rigid, drifting) = (errors(0.0), errors(20.0));
         let worst = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
-        assert!(worst(&rigid) > 1.0 && worst(&drifting) < 0.35, "{} m, {} m", worst(&rigid), worst(&drifting));
+        assert!(
+            worst(&rigid) > 1.0 && worst(&drifting) < 0.35,
+            "{} m, {} m",
+            worst(&rigid),
+            worst(&drifting)
+        );
     }
 
     #[test]

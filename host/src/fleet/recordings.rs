@@ -30,7 +30,8 @@ pub struct Recordings {
     /// Arguments of `dynvox run` for all of them.
     #[serde(default)]
     pub arguments: Vec<String>,
-    /// Latitude and longitude, degrees, and altitude, m, of the world's origin; by default the first fix of the first recording with `gnss`.
+    /// Latitude and longitude, degrees, and altitude, m, of the world's origin; by default the
+    /// first fix of the first recording with `gnss`.
     #[serde(default)]
     pub origin: Option<[f64; 3]>,
     /// One by one.
@@ -49,16 +50,20 @@ pub struct Recording {
     /// Its first camera in the world, camera to world; the world's origin where it is absent.
     #[serde(default)]
     pub t_world_camera: Option<[f64; 12]>,
-    /// Its poses, `--egomotion file:POSES`, are in the world: its first camera is the first of them.
+    /// Its poses, `--egomotion file:POSES`, are in the world: its first camera is the first of
+    /// them.
     #[serde(default)]
     pub poses_in_world: bool,
-    /// Fixes of a receiver of satellites: a file with a line a frame of the data set, or a recording of KITTI raw.
+    /// Fixes of a receiver of satellites: a file with a line a frame of the data set, or a
+    /// recording of KITTI raw.
     #[serde(default)]
     pub gnss: Option<PathBuf>,
-    /// The receiver's antenna, or the inertial system that gives the fixes, in the camera's axes, m: x right, y down, z ahead.
+    /// The receiver's antenna, or the inertial system that gives the fixes, in the camera's axes,
+    /// m: x right, y down, z ahead.
     #[serde(default)]
     pub antenna_m: [f64; 3],
-    /// The epoch it belongs to, such as 20261122: maps of different epochs are not averaged where they contradict one another.
+    /// The epoch it belongs to, such as 20261122: maps of different epochs are not averaged where
+    /// they contradict one another.
     #[serde(default)]
     pub epoch: u32,
 }
@@ -72,24 +77,41 @@ impl Recordings {
         let text = std::fs::read_to_string(path).map_err(FleetError::io(path))?;
         toml::from_str(&text).map_err(|error| {
             let why = error.message().replace('\n', " ");
-            FleetError::content(path, format!("is no list of recordings: {why}. An example:\n\n{RECORDINGS_EXAMPLE}"))
+            FleetError::content(
+                path,
+                format!("is no list of recordings: {why}. An example:\n\n{RECORDINGS_EXAMPLE}"),
+            )
         })
     }
 
     /// The world's origin, where a recording has fixes.
     pub(super) fn origin(&self) -> Result<Option<[f64; 3]>, FleetError> {
-        let Some(gnss) = self.recordings.iter().find_map(|of| of.gnss.as_ref()).filter(|_| self.origin.is_none()) else {
+        let Some(gnss) = self
+            .recordings
+            .iter()
+            .find_map(|of| of.gnss.as_ref())
+            .filter(|_| self.origin.is_none())
+        else {
             return Ok(self.origin);
         };
         let fixes = read_gnss(gnss).map_err(FleetError::Format)?;
-        let first = fixes.iter().flatten().next().ok_or_else(|| FleetError::content(gnss, "has no fix. Give a file that has"))?;
+        let first = fixes
+            .iter()
+            .flatten()
+            .next()
+            .ok_or_else(|| FleetError::content(gnss, "has no fix. Give a file that has"))?;
         Ok(Some(first.geodetic))
     }
 }
 
 impl Recording {
-    /// Where it lies; `first_pose` is that of its file of poses. In the error's place why that is not said.
-    pub(super) fn given(&self, origin: Option<[f64; 3]>, first_pose: Option<&Transform>) -> Result<Given, String> {
+    /// Where it lies; `first_pose` is that of its file of poses. In the error's place why that is
+    /// not said.
+    pub(super) fn given(
+        &self,
+        origin: Option<[f64; 3]>,
+        first_pose: Option<&Transform>,
+    ) -> Result<Given, String> {
         let Self { name, t_world_camera, poses_in_world, gnss, antenna_m, .. } = self;
         match (t_world_camera, poses_in_world, gnss, origin) {
             (None, false, Some(file), Some(origin)) => Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin }),
@@ -120,11 +142,16 @@ mod tests {
     #[test]
     fn wrong_lists_and_motions_are_refused() {
         assert!(example("[[drives]]\n").unwrap_err().to_string().contains("[[recording]]"));
-        let given = |list: &str| example(list).unwrap().recordings[0].given(Some([49.0, 8.0, 0.0]), None);
+        let given =
+            |list: &str| example(list).unwrap().recordings[0].given(Some([49.0, 8.0, 0.0]), None);
         let recording = "[[recording]]\nname = \"tuesday\"\narguments = []\n";
         let turned = "t_world_camera = [2, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]\n";
-        assert_eq!(given(&format!("{recording}{turned}")).unwrap_err(), "has no rigid motion as t_world_camera of tuesday");
-        let twice = given(&format!("{recording}poses_in_world = true\ngnss = \"here.txt\"\n")).unwrap_err();
+        assert_eq!(
+            given(&format!("{recording}{turned}")).unwrap_err(),
+            "has no rigid motion as t_world_camera of tuesday"
+        );
+        let twice =
+            given(&format!("{recording}poses_in_world = true\ngnss = \"here.txt\"\n")).unwrap_err();
         assert!(twice.contains("more than once where tuesday lies"), "{twice}");
         let without = given(&format!("{recording}poses_in_world = true\n")).unwrap_err();
         assert!(without.contains("Give `--egomotion`"), "{without}");
@@ -134,12 +161,18 @@ mod tests {
     fn a_recording_lies_where_its_first_pose_or_its_fixes_say() {
         let pose = Transform::new([0.0, 0.3, 0.0], [80.0, 0.0, -7.0]);
         let given = |lines: &str| {
-            let list = example(&format!("[[recording]]\nname = \"tuesday\"\narguments = []\n{lines}\n")).unwrap();
+            let list =
+                example(&format!("[[recording]]\nname = \"tuesday\"\narguments = []\n{lines}\n"))
+                    .unwrap();
             list.recordings[0].given(Some([49.0, 8.0, 110.0]), Some(&pose)).unwrap()
         };
         assert_eq!(given("poses_in_world = true"), Given::TWorldCamera(rows_of(&pose)));
         assert_eq!(given(""), Given::TWorldCamera(rows_of(&Transform::IDENTITY)));
-        let gnss = Given::Gnss { file: "fixes".into(), antenna_m: [0.0, -1.0, 0.5], origin: [49.0, 8.0, 110.0] };
+        let gnss = Given::Gnss {
+            file: "fixes".into(),
+            antenna_m: [0.0, -1.0, 0.5],
+            origin: [49.0, 8.0, 110.0],
+        };
         assert_eq!(given("gnss = \"fixes\"\nantenna_m = [0, -1, 0.5]"), gnss);
     }
 
@@ -148,10 +181,16 @@ mod tests {
         let root = tempfile::TempDir::new().unwrap();
         let fixes = root.path().join("fixes.txt");
         std::fs::write(&fixes, "-\n49 8 110\n48 8 110\n").unwrap();
-        let recording = format!("[[recording]]\nname = \"tuesday\"\narguments = []\ngnss = {fixes:?}\n");
+        let recording =
+            format!("[[recording]]\nname = \"tuesday\"\narguments = []\ngnss = {fixes:?}\n");
         assert_eq!(example(&recording).unwrap().origin().unwrap(), Some([49.0, 8.0, 110.0]));
-        assert_eq!(example(&format!("origin = [1, 2, 3]\n{recording}")).unwrap().origin().unwrap(), Some([1.0, 2.0, 3.0]));
+        assert_eq!(
+            example(&format!("origin = [1, 2, 3]\n{recording}")).unwrap().origin().unwrap(),
+            Some([1.0, 2.0, 3.0])
+        );
         std::fs::write(&fixes, "-\n").unwrap();
-        assert!(example(&recording).unwrap().origin().unwrap_err().to_string().contains("has no fix"));
+        assert!(
+            example(&recording).unwrap().origin().unwrap_err().to_string().contains("has no fix")
+        );
     }
 }

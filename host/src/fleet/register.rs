@@ -1,10 +1,13 @@
-//! Registration of two maps: points on the surface of each against the signed distance of the other.
+//! Registration of two maps: points on the surface of each against the signed distance of the
+//! other.
 //!
-//! Gauss-Newton over rigid motions (point to implicit surface: Canelhas, Stoyanov, Lilienthal, *SDF Tracker*, IROS 2013), with Tukey's weights
-//! whose limit shrinks from the truncation to two voxels. Sums run over the points in their order, so the result is the same every time.
+//! Gauss-Newton over rigid motions (point to implicit surface: Canelhas, Stoyanov, Lilienthal, *SDF
+//! Tracker*, IROS 2013), with Tukey's weights whose limit shrinks from the truncation to two
+//! voxels. Sums run over the points in their order, so the result is the same every time.
 //!
-//! A registration is believed when enough points take part, most of them lie near, they constrain all six degrees of freedom, and the motion is
-//! not larger than the given poses allow; otherwise it is refused by name.
+//! A registration is believed when enough points take part, most of them lie near, they constrain
+//! all six degrees of freedom, and the motion is not larger than the given poses allow; otherwise
+//! it is refused by name.
 
 use super::distance_field::{DistanceField, SurfacePoint};
 use dynvox_core::geometry::Transform;
@@ -130,12 +133,14 @@ pub fn motion_about(centre_m: &Vector3<f64>, step: &Vector6<f64>) -> Transform {
 pub fn step_about(centre_m: &Vector3<f64>, motion: &Transform) -> Vector6<f64> {
     let [x, y, z, w] = motion.rotation;
     let turn = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z)).scaled_axis();
-    let moved = Vector3::from(motion.transform_point([centre_m.x, centre_m.y, centre_m.z])) - centre_m;
+    let moved =
+        Vector3::from(motion.transform_point([centre_m.x, centre_m.y, centre_m.z])) - centre_m;
     Vector6::new(turn.x, turn.y, turn.z, moved.x, moved.y, moved.z)
 }
 
-/// Registers a map with another: `given` is the first map in the second by the poses that were given, which may be off by `uncertainty`, `guess` by
-/// what is known now. `None` where too few points could meet.
+/// Registers a map with another: `given` is the first map in the second by the poses that were
+/// given, which may be off by `uncertainty`, `guess` by what is known now. `None` where too few
+/// points could meet.
 pub fn register(
     (a, b): (&RegisteredMap, &RegisteredMap),
     (given, guess): (&Transform, &Transform),
@@ -144,8 +149,12 @@ pub fn register(
     let pair = Pair::new(a, b, guess)?;
     let field = &b.field;
     let near_m = NEAR_VOXELS * field.voxel_size_m;
-    let limits_m: Vec<f64> =
-        LIMITS.iter().map(|share| share * field.truncation_m).filter(|limit_m| *limit_m > near_m).chain([near_m]).collect();
+    let limits_m: Vec<f64> = LIMITS
+        .iter()
+        .map(|share| share * field.truncation_m)
+        .filter(|limit_m| *limit_m > near_m)
+        .chain([near_m])
+        .collect();
     let rms_before_m = pair.equations(guess, limits_m[0]).rms_m();
     let mut t_b_a = *guess;
     for &limit_m in &limits_m {
@@ -154,7 +163,9 @@ pub fn register(
             let Some(solver) = equations.matrix.cholesky() else { break };
             let step = solver.solve(&-equations.vector);
             t_b_a = (motion_about(&pair.centre_m, &step) * t_b_a).normalized();
-            if step.fixed_rows::<3>(3).norm() + step.fixed_rows::<3>(0).norm() * pair.radius_m() < STEP_MIN_M {
+            if step.fixed_rows::<3>(3).norm() + step.fixed_rows::<3>(0).norm() * pair.radius_m()
+                < STEP_MIN_M
+            {
                 break;
             }
         }
@@ -175,7 +186,11 @@ pub fn register(
     Some(Registration { t_b_a, information, centre_m: pair.centre_m.into(), fit })
 }
 
-fn refusal(of: &Fit, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty)) -> Option<String> {
+fn refusal(
+    of: &Fit,
+    moved: &Vector6<f64>,
+    (voxel_size_m, pair, uncertainty): (f64, &Pair<'_>, &Uncertainty),
+) -> Option<String> {
     // Two standard deviations; a turn also moves what is far from the map's origin.
     let turn_rad = 2.0 * uncertainty.rotation_rad;
     let move_m = 2.0 * uncertainty.position_m + turn_rad * pair.centre_m.norm();
@@ -183,13 +198,23 @@ fn refusal(of: &Fit, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f
     if of.points < POINTS_MIN {
         Some(format!("{} points are less than {POINTS_MIN}", of.points))
     } else if of.inlier_share < INLIERS_MIN {
-        Some(format!("{:.0} % of the points are near, less than {:.0}", 100.0 * of.inlier_share, 100.0 * INLIERS_MIN))
+        Some(format!(
+            "{:.0} % of the points are near, less than {:.0}",
+            100.0 * of.inlier_share,
+            100.0 * INLIERS_MIN
+        ))
     } else if of.rms_m > RMS_MAX_VOXELS * voxel_size_m {
         Some(format!("the points are {:.3} m off, more than {RMS_MAX_VOXELS} voxel", of.rms_m))
     } else if of.min_eigen_share < EIGEN_SHARE_MIN {
-        Some(format!("the surfaces slide along one another: {:.5} is less than {EIGEN_SHARE_MIN}", of.min_eigen_share))
+        Some(format!(
+            "the surfaces slide along one another: {:.5} is less than {EIGEN_SHARE_MIN}",
+            of.min_eigen_share
+        ))
     } else if moved_m > move_m || turned_rad > turn_rad {
-        Some(format!("{moved_m:.2} m and {:.2} degrees are more than the given poses may be off", turned_rad.to_degrees()))
+        Some(format!(
+            "{moved_m:.2} m and {:.2} degrees are more than the given poses may be off",
+            turned_rad.to_degrees()
+        ))
     } else {
         None
     }
@@ -197,9 +222,18 @@ fn refusal(of: &Fit, moved: &Vector6<f64>, (voxel_size_m, pair, uncertainty): (f
 
 /// The least eigenvalue over the greatest, with rotations counted by how far they move the points.
 fn min_eigen_share(matrix: &Matrix6<f64>, radius_m: f64) -> f64 {
-    let scale = Matrix6::from_diagonal(&Vector6::new(1.0 / radius_m, 1.0 / radius_m, 1.0 / radius_m, 1.0, 1.0, 1.0));
+    let scale = Matrix6::from_diagonal(&Vector6::new(
+        1.0 / radius_m,
+        1.0 / radius_m,
+        1.0 / radius_m,
+        1.0,
+        1.0,
+        1.0,
+    ));
     let values = SymmetricEigen::new(scale * matrix * scale).eigenvalues;
-    let (least, most) = values.iter().fold((f64::INFINITY, 0.0f64), |(least, most), &value| (least.min(value), most.max(value)));
+    let (least, most) = values
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(least, most), &value| (least.min(value), most.max(value)));
     if most > 0.0 { least.max(0.0) / most } else { 0.0 }
 }
 
@@ -207,19 +241,29 @@ impl<'p> Pair<'p> {
     /// The points of each map that lie where the other was seen, evenly chosen.
     fn new(a: &'p RegisteredMap, b: &'p RegisteredMap, t_b_a: &Transform) -> Option<Self> {
         let back = t_b_a.inverse();
-        let of_a = chosen(&a.points, |point| b.field.at(t_b_a.transform_point(point.at_m)).is_some());
-        let of_b = chosen(&b.points, |point| a.field.at(back.transform_point(point.at_m)).is_some());
+        let of_a =
+            chosen(&a.points, |point| b.field.at(t_b_a.transform_point(point.at_m)).is_some());
+        let of_b =
+            chosen(&b.points, |point| a.field.at(back.transform_point(point.at_m)).is_some());
         if of_a.len() + of_b.len() < POINTS_MIN {
             return None;
         }
-        let in_b = of_a.iter().map(|point| t_b_a.transform_point(point.at_m)).chain(of_b.iter().map(|point| point.at_m));
-        let (sum, count) = in_b.fold((Vector3::zeros(), 0.0), |(sum, count), at| (sum + Vector3::from(at), count + 1.0));
+        let in_b = of_a
+            .iter()
+            .map(|point| t_b_a.transform_point(point.at_m))
+            .chain(of_b.iter().map(|point| point.at_m));
+        let (sum, count) = in_b.fold((Vector3::zeros(), 0.0), |(sum, count), at| {
+            (sum + Vector3::from(at), count + 1.0)
+        });
         Some(Self { a, b, of_a, of_b, centre_m: sum / count })
     }
 
     /// Root mean square of the points' distances from their centre, m.
     fn radius_m(&self) -> f64 {
-        let squares = self.of_b.iter().map(|point| (Vector3::from(point.at_m) - self.centre_m).norm_squared());
+        let squares = self
+            .of_b
+            .iter()
+            .map(|point| (Vector3::from(point.at_m) - self.centre_m).norm_squared());
         (squares.sum::<f64>() / self.of_b.len().max(1) as f64).sqrt().max(1.0)
     }
 
@@ -235,13 +279,24 @@ impl<'p> Pair<'p> {
         for point in &self.of_a {
             let (at_m, normal) = (t_b_a.transform_point(point.at_m), t_b_a.rotate(point.normal));
             if let Some((distance_m, gradient)) = self.b.field.at(at_m) {
-                equations.add((distance_m, gradient, normal), &(Vector3::from(at_m) - self.centre_m), 1.0, limit_m);
+                equations.add(
+                    (distance_m, gradient, normal),
+                    &(Vector3::from(at_m) - self.centre_m),
+                    1.0,
+                    limit_m,
+                );
             }
         }
         for point in &self.of_b {
-            if let Some((distance_m, gradient)) = self.a.field.at(back.transform_point(point.at_m)) {
+            if let Some((distance_m, gradient)) = self.a.field.at(back.transform_point(point.at_m))
+            {
                 let gradient = t_b_a.rotate(gradient);
-                equations.add((distance_m, gradient, point.normal), &(Vector3::from(point.at_m) - self.centre_m), -1.0, limit_m);
+                equations.add(
+                    (distance_m, gradient, point.normal),
+                    &(Vector3::from(point.at_m) - self.centre_m),
+                    -1.0,
+                    limit_m,
+                );
             }
         }
         equations
@@ -250,7 +305,13 @@ impl<'p> Pair<'p> {
 
 impl Equations {
     /// Adds a point's distance; `sign` says which of the maps a step moves towards it.
-    fn add(&mut self, (distance_m, gradient, normal): (f64, [f64; 3], [f64; 3]), arm_m: &Vector3<f64>, sign: f64, limit_m: f64) {
+    fn add(
+        &mut self,
+        (distance_m, gradient, normal): (f64, [f64; 3], [f64; 3]),
+        arm_m: &Vector3<f64>,
+        sign: f64,
+        limit_m: f64,
+    ) {
         let (gradient, normal) = (Vector3::from(gradient), Vector3::from(normal));
         // A surface seen from its other side is another surface.
         if gradient.dot(&normal) < 0.5 * gradient.norm() {

@@ -1,4 +1,5 @@
-//! What recordings saw, where they went and what has changed: figures, a table of changes and a picture from above.
+//! What recordings saw, where they went and what has changed: figures, a table of changes and a
+//! picture from above.
 
 use super::coverage::{Coverage, coverage};
 use super::resolve::{ResolvedMap, resolve};
@@ -19,8 +20,14 @@ const BACKGROUND: Rgb<u8> = Rgb([255, 255, 255]);
 const COVERED: [Rgb<u8>; 3] = [Rgb([205, 205, 205]), Rgb([150, 195, 150]), Rgb([120, 160, 215])];
 const CHANGED: Rgb<u8> = Rgb([220, 20, 20]);
 /// Of paths, in turn.
-const PATHS: [Rgb<u8>; 6] =
-    [Rgb([0, 0, 0]), Rgb([215, 95, 0]), Rgb([0, 105, 170]), Rgb([130, 60, 150]), Rgb([0, 120, 60]), Rgb([150, 110, 0])];
+const PATHS: [Rgb<u8>; 6] = [
+    Rgb([0, 0, 0]),
+    Rgb([215, 95, 0]),
+    Rgb([0, 105, 170]),
+    Rgb([130, 60, 150]),
+    Rgb([0, 120, 60]),
+    Rgb([150, 110, 0]),
+];
 
 /// What a merged map is made of.
 #[derive(Clone, Debug, Serialize)]
@@ -57,17 +64,23 @@ pub struct RecordingPath {
 }
 
 impl Report {
-    /// Of jobs that are all in the world and their merged map; changes below `least_change_m3` are left out.
+    /// Of jobs that are all in the world and their merged map; changes below `least_change_m3` are
+    /// left out.
     ///
     /// # Errors
     /// A file is damaged or missing.
-    pub fn of((folder, manifest): (&Path, &Manifest), map: &Path, least_change_m3: f64) -> Result<Self, FleetError> {
+    pub fn of(
+        (folder, manifest): (&Path, &Manifest),
+        map: &Path,
+        least_change_m3: f64,
+    ) -> Result<Self, FleetError> {
         let (mut sums, mut recordings) = (Vec::new(), Vec::new());
         for (job, t_world_map) in manifest.jobs.iter().zip(poses(manifest, folder)?) {
             let t_world_map = t_world_map?;
             sums.push(job.sums(folder, &t_world_map));
             let cameras = Submap::cameras(&job.submap(folder))?;
-            let cameras_m: Vec<_> = cameras.iter().map(|of| (t_world_map * of.t_map_camera).translation_m).collect();
+            let cameras_m: Vec<_> =
+                cameras.iter().map(|of| (t_world_map * of.t_map_camera).translation_m).collect();
             recordings.push(RecordingPath {
                 name: job.name.clone(),
                 epoch: job.epoch,
@@ -76,7 +89,8 @@ impl Report {
                 cameras_m,
             });
         }
-        let ResolvedMap { lattice, blocks, free_blocks, overflowed, changes: changed } = resolve(map, |_| Ok(()))?;
+        let ResolvedMap { lattice, blocks, free_blocks, overflowed, changes: changed } =
+            resolve(map, |_| Ok(()))?;
         Ok(Self {
             recordings,
             blocks,
@@ -100,12 +114,15 @@ impl Report {
         std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
         let file = |name: &str, text: String| {
             let path: PathBuf = draft.path().join(name);
-            write_whole(&path, |file| file.write_all(text.as_bytes())).map_err(|error| FleetError::content(&path, error.to_string()))
+            write_whole(&path, |file| file.write_all(text.as_bytes()))
+                .map_err(|error| FleetError::content(&path, error.to_string()))
         };
         file("report.json", serde_json::to_string_pretty(self).unwrap_or_default() + "\n")?;
         file("changes.csv", self.table())?;
         let path = draft.path().join("map.png");
-        self.picture().save(&path).map_err(|error| FleetError::content(&path, error.to_string()))?;
+        self.picture()
+            .save(&path)
+            .map_err(|error| FleetError::content(&path, error.to_string()))?;
         draft.rename(out).map_err(FleetError::io(out))
     }
 
@@ -122,45 +139,79 @@ impl Report {
                 volume_m3,
             } = change;
             let kind = kind.name();
-            table += &format!("{kind},{from_epoch},{to_epoch},{believed_epoch},{x:.2},{y:.2},{z:.2},{a:.1},{b:.1},{c:.1},{volume_m3:.3}\n");
+            table += &format!(
+                "{kind},{from_epoch},{to_epoch},{believed_epoch},{x:.2},{y:.2},{z:.2},{a:.1},{b:.1},{c:.1},{volume_m3:.3}\n"
+            );
         }
         table
     }
 
-    /// From above: x to the right, z upwards. Columns that recordings saw, their paths, and a ring about what has changed.
+    /// From above: x to the right, z upwards. Columns that recordings saw, their paths, and a ring
+    /// about what has changed.
     fn picture(&self) -> RgbImage {
         let columns = &self.coverage.columns;
         let path = |at: &[f64; 3]| [at[0], at[2]].map(|side| (side / self.block_m).floor() as i32);
         let paths = self.recordings.iter().flat_map(|of| of.cameras_m.iter().map(path));
         let all = columns.keys().map(|at| at.map(i32::from)).chain(paths);
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        all.for_each(|at| (0..2).for_each(|axis| (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]))));
+        all.for_each(|at| {
+            (0..2).for_each(|axis| {
+                (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]))
+            })
+        });
         if low[0] > high[0] {
             return RgbImage::from_pixel(1, 1, BACKGROUND);
         }
         let longer = (high[0] - low[0]).max(high[1] - low[1]) + 1;
         // Some columns make a pixel, or some pixels a column.
-        let scale = if longer > PICTURE_PX { f64::from(PICTURE_PX) / f64::from(longer) } else { f64::from((PICTURE_PX / longer).min(8)) };
-        let size = |axis: usize| ((f64::from(high[axis] - low[axis] + 1) * scale).ceil() as u32).max(1);
+        let scale = if longer > PICTURE_PX {
+            f64::from(PICTURE_PX) / f64::from(longer)
+        } else {
+            f64::from((PICTURE_PX / longer).min(8))
+        };
+        let size =
+            |axis: usize| ((f64::from(high[axis] - low[axis] + 1) * scale).ceil() as u32).max(1);
         let mut picture = RgbImage::from_pixel(size(0), size(1), BACKGROUND);
-        let pixel =
-            |x: f64, z: f64| [((x - f64::from(low[0])) * scale) as i32, size(1) as i32 - 1 - ((z - f64::from(low[1])) * scale) as i32];
+        let pixel = |x: f64, z: f64| {
+            [
+                ((x - f64::from(low[0])) * scale) as i32,
+                size(1) as i32 - 1 - ((z - f64::from(low[1])) * scale) as i32,
+            ]
+        };
         for ([x, z], count) in columns {
             let [left, bottom] = pixel(f64::from(*x), f64::from(*z));
             let side = scale.ceil() as i32;
-            (0..side * side)
-                .for_each(|at| set(&mut picture, [left + at % side, bottom - at / side], COVERED[usize::from(*count).clamp(1, 3) - 1]));
+            (0..side * side).for_each(|at| {
+                set(
+                    &mut picture,
+                    [left + at % side, bottom - at / side],
+                    COVERED[usize::from(*count).clamp(1, 3) - 1],
+                )
+            });
         }
         for (of, colour) in self.recordings.iter().zip(PATHS.iter().cycle()) {
-            let points: Vec<_> = of.cameras_m.iter().map(|at| pixel(at[0] / self.block_m, at[2] / self.block_m)).collect();
+            let points: Vec<_> = of
+                .cameras_m
+                .iter()
+                .map(|at| pixel(at[0] / self.block_m, at[2] / self.block_m))
+                .collect();
             points.windows(2).for_each(|ends| line(&mut picture, ends[0], ends[1], *colour));
         }
         for change in &self.changes {
-            let centre = pixel(change.centre_m[0] / self.block_m, change.centre_m[2] / self.block_m);
-            let radius_px = (0.5 * change.extent_m[0].max(change.extent_m[2]) / self.block_m * scale).max(4.0);
+            let centre =
+                pixel(change.centre_m[0] / self.block_m, change.centre_m[2] / self.block_m);
+            let radius_px =
+                (0.5 * change.extent_m[0].max(change.extent_m[2]) / self.block_m * scale).max(4.0);
             for degree in 0..720 {
                 let (sine, cosine) = (0.5 * f64::from(degree)).to_radians().sin_cos();
-                set(&mut picture, [centre[0] + (radius_px * cosine) as i32, centre[1] + (radius_px * sine) as i32], CHANGED);
+                set(
+                    &mut picture,
+                    [
+                        centre[0] + (radius_px * cosine) as i32,
+                        centre[1] + (radius_px * sine) as i32,
+                    ],
+                    CHANGED,
+                );
             }
         }
         picture
@@ -179,7 +230,8 @@ fn set(picture: &mut RgbImage, [x, y]: [i32; 2], colour: Rgb<u8>) {
 fn line(picture: &mut RgbImage, from: [i32; 2], to: [i32; 2], colour: Rgb<u8>) {
     let steps = (to[0] - from[0]).abs().max((to[1] - from[1]).abs()).max(1);
     for step in 0..=steps {
-        let at: [i32; 2] = std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * step / steps);
+        let at: [i32; 2] =
+            std::array::from_fn(|axis| from[axis] + (to[axis] - from[axis]) * step / steps);
         (0..4).for_each(|by| set(picture, [at[0] + by % 2, at[1] + by / 2], colour));
     }
 }

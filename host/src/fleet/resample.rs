@@ -1,9 +1,10 @@
 //! A run's map as sums in the world's lattice.
 //!
-//! Each lattice point of the world is carried into the run's map, where distance, weight and colour are interpolated between the eight lattice
-//! points around it. Corners that count for at least half must have been seen; for the distance at the others the plane through those that were
-//! stands in. Where the lattices coincide the values are taken over as they are; elsewhere a surface moves by less than a twentieth of a voxel
-//! (tests).
+//! Each lattice point of the world is carried into the run's map, where distance, weight and colour
+//! are interpolated between the eight lattice points around it. Corners that count for at least
+//! half must have been seen; for the distance at the others the plane through those that were
+//! stands in. Where the lattices coincide the values are taken over as they are; elsewhere a
+//! surface moves by less than a twentieth of a voxel (tests).
 
 use super::FleetError;
 use super::block_sums::BlockSums;
@@ -36,11 +37,18 @@ pub struct Resampled {
     pub beyond: u64,
 }
 
-/// Writes a map as sums of an epoch in the world's lattice into a new folder; `t_world_map` carries the map into the world.
+/// Writes a map as sums of an epoch in the world's lattice into a new folder; `t_world_map` carries
+/// the map into the world.
 ///
 /// # Errors
-/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays behind.
-pub fn resample(map: &mut Submap, epoch: u32, t_world_map: &Transform, out: &Path) -> Result<Resampled, FleetError> {
+/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays
+/// behind.
+pub fn resample(
+    map: &mut Submap,
+    epoch: u32,
+    t_world_map: &Transform,
+    out: &Path,
+) -> Result<Resampled, FleetError> {
     if out.exists() {
         return Err(FleetError::Exists { path: out.to_path_buf() });
     }
@@ -54,8 +62,9 @@ pub fn resample(map: &mut Submap, epoch: u32, t_world_map: &Transform, out: &Pat
     for of_tile in targets.chunk_by(|a, b| a.0 == b.0) {
         let path = draft.path().join(of_tile[0].0.file_name());
         let mut coords = of_tile.iter().map(|(_, coord)| *coord);
-        let blocks =
-            tile_file::write(&path, lattice, || Ok(coords.next().map(|coord| (coord, source.sums_at(coord, &way, lattice.colour)))))?;
+        let blocks = tile_file::write(&path, lattice, || {
+            Ok(coords.next().map(|coord| (coord, source.sums_at(coord, &way, lattice.colour))))
+        })?;
         if blocks == 0 {
             std::fs::remove_file(&path).map_err(FleetError::io(&path))?;
             continue;
@@ -68,7 +77,10 @@ pub fn resample(map: &mut Submap, epoch: u32, t_world_map: &Transform, out: &Pat
     }
     let unreadable = source.store.unreadable();
     if unreadable > 0 {
-        return Err(FleetError::content(out, format!("is not made: {unreadable} blocks of the run cannot be read")));
+        return Err(FleetError::content(
+            out,
+            format!("is not made: {unreadable} blocks of the run cannot be read"),
+        ));
     }
     draft.rename(out).map_err(FleetError::io(out))?;
     Ok(resampled)
@@ -112,8 +124,14 @@ impl LatticeWay {
     }
 }
 
-/// The blocks of the world that blocks of the run reach into, by tile; and how many lie beyond the world's coordinates.
-fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice, epoch: u32) -> (Vec<(WorldTile, BlockCoord)>, u64) {
+/// The blocks of the world that blocks of the run reach into, by tile; and how many lie beyond the
+/// world's coordinates.
+fn targets(
+    store: &mut BlockFile<File>,
+    way: &LatticeWay,
+    lattice: &Lattice,
+    epoch: u32,
+) -> (Vec<(WorldTile, BlockCoord)>, u64) {
     let (mut targets, mut beyond) = (Vec::new(), 0);
     for tile in store.tiles() {
         for source in store.blocks_of(tile) {
@@ -122,7 +140,9 @@ fn targets(store: &mut BlockFile<File>, way: &LatticeWay, lattice: &Lattice, epo
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
                         match BlockCoord::new(x, y, z) {
-                            Some(coord) => targets.push((WorldTile::of(coord, lattice, epoch), coord)),
+                            Some(coord) => {
+                                targets.push((WorldTile::of(coord, lattice, epoch), coord))
+                            }
                             None => beyond += 1,
                         }
                     }
@@ -143,14 +163,19 @@ fn reach(source: BlockCoord, way: &LatticeWay) -> [[i32; 3]; 2] {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in 0..8usize {
         // Lattice points between this block and its neighbours are interpolated with both.
-        let point = std::array::from_fn(|axis| origin[axis] + if corner >> axis & 1 == 1 { side } else { -1.0 });
+        let point = std::array::from_fn(|axis| {
+            origin[axis] + if corner >> axis & 1 == 1 { side } else { -1.0 }
+        });
         for (axis, value) in way.to_world.apply(point).into_iter().enumerate() {
             (low[axis], high[axis]) = (low[axis].min(value), high[axis].max(value));
         }
     }
     // Lattice points strictly within.
     let block = |lattice: f64| (lattice / side).floor() as i32;
-    [low.map(|value| block((value + ROUNDING).ceil())), high.map(|value| block((value - ROUNDING).floor()))]
+    [
+        low.map(|value| block((value + ROUNDING).ceil())),
+        high.map(|value| block((value - ROUNDING).floor())),
+    ]
 }
 
 /// The run's blocks, the last ones read in memory.
@@ -184,7 +209,10 @@ impl<'s> SourceMap<'s> {
     fn voxel(&mut self, point: [i32; 3]) -> Option<(i16, u8, [u8; 3])> {
         let block = self.block(BlockCoord::of_lattice(point)?)?;
         let at = voxel_of(point);
-        let colour = block.colour.as_ref().map_or([0; 3], |planes| [planes[0][at], planes[1][at], planes[2][at]]);
+        let colour = block
+            .colour
+            .as_ref()
+            .map_or([0; 3], |planes| [planes[0][at], planes[1][at], planes[2][at]]);
         (block.weight[at] > 0).then_some((block.sdf[at], block.weight[at], colour))
     }
 
@@ -204,8 +232,9 @@ impl<'s> SourceMap<'s> {
     fn interpolated(&mut self, point: [f64; 3]) -> Option<(i16, u8, [u8; 3])> {
         let near = point.map(f64::round);
         // A point that rounding moved off a lattice point is on it.
-        let point: [f64; 3] =
-            std::array::from_fn(|axis| if (point[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { point[axis] });
+        let point: [f64; 3] = std::array::from_fn(|axis| {
+            if (point[axis] - near[axis]).abs() < ROUNDING { near[axis] } else { point[axis] }
+        });
         let low = point.map(f64::floor);
         let share: [f64; 3] = std::array::from_fn(|axis| point[axis] - low[axis]);
         let (mut sums, mut seen, mut distances) = ([0.0; 5], 0.0, [None; 8]);
@@ -218,7 +247,8 @@ impl<'s> SourceMap<'s> {
             let point = std::array::from_fn(|axis| low[axis] as i32 + (corner >> axis & 1) as i32);
             let Some((sdf, weight, [red, green, blue])) = self.voxel(point) else { continue };
             *distance = Some(f64::from(sdf));
-            let values = [0.0, f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
+            let values =
+                [0.0, f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
             seen += factor;
         }
@@ -235,14 +265,19 @@ impl<'s> SourceMap<'s> {
 
 /// What a corner of a cell counts.
 fn factor(share: &[f64; 3], corner: usize) -> f64 {
-    (0..3).fold(1.0, |product, axis| product * if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] })
+    (0..3).fold(1.0, |product, axis| {
+        product * if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] }
+    })
 }
 
-/// Distance between the corners of a cell. For a corner that was not seen the plane through the others stands in; `None` where they give none.
+/// Distance between the corners of a cell. For a corner that was not seen the plane through the
+/// others stands in; `None` where they give none.
 fn distance(corners: &[Option<f64>; 8], share: &[f64; 3]) -> Option<f64> {
     let counts = |corner: &usize| factor(share, *corner) > 0.0;
     let steps: [Option<f64>; 3] = std::array::from_fn(|axis| {
-        let pairs = (0..8usize).filter(|corner| corner >> axis & 1 == 0).filter_map(|low| Some(corners[low | 1 << axis]? - corners[low]?));
+        let pairs = (0..8usize)
+            .filter(|corner| corner >> axis & 1 == 0)
+            .filter_map(|low| Some(corners[low | 1 << axis]? - corners[low]?));
         let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0));
         (count > 0.0).then(|| sum / count)
     });
@@ -252,7 +287,9 @@ fn distance(corners: &[Option<f64>; 8], share: &[f64; 3]) -> Option<f64> {
             Some(if corner >> axis & 1 == 1 { from + steps[axis]? } else { from - steps[axis]? })
         };
         let stand_in = || {
-            let (sum, count) = (0..3).filter_map(beside).fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            let (sum, count) = (0..3)
+                .filter_map(beside)
+                .fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
             (count > 0.0).then(|| sum / count)
         };
         Some(sum + factor(share, corner) * corners[corner].or_else(stand_in)?)
@@ -277,18 +314,27 @@ mod tests {
 
     /// A map of the plane in six by six blocks, seen within four voxels.
     fn map(folder: &Path) -> Submap {
-        let (mut store, _) = BlockFile::open(&folder.join("map.blocks"), LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
+        let (mut store, _) =
+            BlockFile::open(&folder.join("map.blocks"), LATTICE.voxel_size_m, LATTICE.truncation_m)
+                .unwrap();
         for block in 0..216 {
             let coord = BlockCoord { x: block % 6 - 3, y: block / 6 % 6 - 3, z: block / 36 - 3 };
             let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
             for at in 0..BLOCK_VOXELS {
                 let offset = [at % 8, at / 8 % 8, at / 64];
-                let point = std::array::from_fn(|axis| f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64);
+                let point = std::array::from_fn(|axis| {
+                    f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64
+                });
                 if plane(point).abs() < 4.0 {
                     (sdf[at], weight[at]) = ((plane(point) * UNITS).round() as i16, 9);
                 }
             }
-            assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: Some(&[[50; BLOCK_VOXELS]; 3]) }));
+            assert!(store.store(EvictedBlock {
+                coord,
+                sdf: &sdf,
+                weight: &weight,
+                colour: Some(&[[50; BLOCK_VOXELS]; 3])
+            }));
         }
         Submap { lattice: LATTICE, store }
     }
@@ -308,24 +354,48 @@ mod tests {
     fn lattices_that_coincide_keep_every_value() {
         let root = tempfile::TempDir::new().unwrap();
         let mut map = map(root.path());
-        let shifted = Transform::from_translation([1.6 * f64::from(0.1f32) / 0.1, 0.0, -0.8 * f64::from(0.1f32) / 0.1]);
-        for (name, t_world_map, blocks) in [("same", Transform::IDENTITY, [0, 0, 0]), ("shifted", shifted, [2, 0, -1])] {
+        let shifted = Transform::from_translation([
+            1.6 * f64::from(0.1f32) / 0.1,
+            0.0,
+            -0.8 * f64::from(0.1f32) / 0.1,
+        ]);
+        for (name, t_world_map, blocks) in
+            [("same", Transform::IDENTITY, [0, 0, 0]), ("shifted", shifted, [2, 0, -1])]
+        {
             let out = root.path().join(name);
             resample(&mut map, 0, &t_world_map, &out).unwrap();
             let all = all_sums(&out);
             assert!(all.len() > 60, "{}", all.len());
             for (coord, sums) in &all {
-                let source = BlockCoord { x: coord.x - blocks[0], y: coord.y - blocks[1], z: coord.z - blocks[2] };
-                let (mut sdf, mut weight, mut colour) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS], [[0; BLOCK_VOXELS]; 3]);
-                assert!(map.store.load(LoadedBlock { coord: source, sdf: &mut sdf, weight: &mut weight, colour: Some(&mut colour) }));
+                let source = BlockCoord {
+                    x: coord.x - blocks[0],
+                    y: coord.y - blocks[1],
+                    z: coord.z - blocks[2],
+                };
+                let (mut sdf, mut weight, mut colour) =
+                    ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS], [[0; BLOCK_VOXELS]; 3]);
+                assert!(map.store.load(LoadedBlock {
+                    coord: source,
+                    sdf: &mut sdf,
+                    weight: &mut weight,
+                    colour: Some(&mut colour)
+                }));
                 let average = sums.average();
                 assert!(
-                    *average.weight == weight && weight.iter().zip(&*average.sdf).zip(&sdf).all(|((w, a), b)| *w == 0 || a == b),
+                    *average.weight == weight
+                        && weight
+                            .iter()
+                            .zip(&*average.sdf)
+                            .zip(&sdf)
+                            .all(|((w, a), b)| *w == 0 || a == b),
                     "{coord:?}"
                 );
             }
         }
-        assert!(matches!(resample(&mut map, 0, &shifted, root.path()), Err(FleetError::Exists { .. })));
+        assert!(matches!(
+            resample(&mut map, 0, &shifted, root.path()),
+            Err(FleetError::Exists { .. })
+        ));
     }
 
     #[test]
@@ -341,8 +411,11 @@ mod tests {
             let average = sums.average();
             for at in (0..BLOCK_VOXELS).filter(|at| average.weight[*at] > 0) {
                 let offset = [at % 8, at / 8 % 8, at / 64];
-                let point = std::array::from_fn(|axis| f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64);
-                worst = worst.max((f64::from(average.sdf[at]) / UNITS - plane(to_map.apply(point))).abs());
+                let point = std::array::from_fn(|axis| {
+                    f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis] as f64
+                });
+                worst = worst
+                    .max((f64::from(average.sdf[at]) / UNITS - plane(to_map.apply(point))).abs());
                 (seen, _) = (seen + 1, assert_eq!(average.weight[at], 9));
             }
         }

@@ -1,9 +1,12 @@
-//! One map of several epochs: what agrees is averaged, and where epochs contradict one another a rule decides.
+//! One map of several epochs: what agrees is averaged, and where epochs contradict one another a
+//! rule decides.
 //!
-//! Sums alone would blur a parked car that has left with the empty road of the day after. So each epoch's sums are kept apart until here. In a
-//! voxel one epoch has a *surface* and another *free space* when the first is at most 0.4 truncations behind its surface and the second at least
-//! half a truncation in front of its own: a thin wall seen from both sides is no contradiction. A block with at least [`CONTRADICTIONS_MIN`] such
-//! voxels has changed. Of the epochs that contradict one another there, the latest that saw those voxels with a mean weight of at least
+//! Sums alone would blur a parked car that has left with the empty road of the day after. So each
+//! epoch's sums are kept apart until here. In a voxel one epoch has a *surface* and another *free
+//! space* when the first is at most 0.4 truncations behind its surface and the second at least half
+//! a truncation in front of its own: a thin wall seen from both sides is no contradiction. A block
+//! with at least [`CONTRADICTIONS_MIN`] such voxels has changed. Of the epochs that contradict one
+//! another there, the latest that saw those voxels with a mean weight of at least
 //! [`SEEN_OFTEN`] is believed, else the one with the largest weight; the others lose the voxels in which they contradict it.
 //!
 //! **Memory.** One block of each epoch, and what has changed.
@@ -24,7 +27,8 @@ pub const SEEN_OFTEN: u64 = 4;
 const BEHIND_MAX: f64 = 0.4;
 /// Nearest in front of a surface that is free space.
 const FREE_MIN: f64 = 0.5;
-/// From here on there is no surface within the truncation: less than 1, for values are averages and interpolated.
+/// From here on there is no surface within the truncation: less than 1, for values are averages and
+/// interpolated.
 const CLEAR_MIN: f64 = 0.95;
 /// The value of a truncation.
 const TRUNCATION: f64 = 32_767.0;
@@ -83,12 +87,18 @@ pub struct ResolvedMap {
 ///
 /// # Errors
 /// The folder has no tile, a tile is damaged or of other voxels, or an error of `sink`.
-pub fn resolve(folder: &Path, mut sink: impl FnMut(ResolvedBlock) -> Result<(), FleetError>) -> Result<ResolvedMap, FleetError> {
+pub fn resolve(
+    folder: &Path,
+    mut sink: impl FnMut(ResolvedBlock) -> Result<(), FleetError>,
+) -> Result<ResolvedMap, FleetError> {
     let files: Vec<(WorldTile, PathBuf)> = tiles(folder)?.into_iter().collect();
     let (mut lattice, mut changes) = (None, Vec::new());
     let (mut with_surface, mut free_blocks, mut overflowed) = (0, 0, 0);
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
-        let mut heads = of_tile.iter().map(|(_, path)| Head::open(path, &mut lattice)).collect::<Result<Vec<_>, _>>()?;
+        let mut heads = of_tile
+            .iter()
+            .map(|(_, path)| Head::open(path, &mut lattice))
+            .collect::<Result<Vec<_>, _>>()?;
         while let Some(coord) = least(&heads) {
             let mut blocks = Vec::new();
             for ((tile, _), head) in of_tile.iter().zip(&mut heads) {
@@ -101,12 +111,16 @@ pub fn resolve(folder: &Path, mut sink: impl FnMut(ResolvedBlock) -> Result<(), 
             sink(block)?;
         }
     }
-    let lattice = lattice.ok_or_else(|| FleetError::content(folder, "has no tile: nothing was mapped"))?;
+    let lattice =
+        lattice.ok_or_else(|| FleetError::content(folder, "has no tile: nothing was mapped"))?;
     Ok(ResolvedMap { lattice, blocks: with_surface, free_blocks, overflowed, changes })
 }
 
 /// One block of some epochs, ascending.
-fn resolve_block(coord: BlockCoord, mut blocks: Vec<(u32, BlockSums)>) -> (ResolvedBlock, Vec<BlockChange>) {
+fn resolve_block(
+    coord: BlockCoord,
+    mut blocks: Vec<(u32, BlockSums)>,
+) -> (ResolvedBlock, Vec<BlockChange>) {
     let changes = if blocks.len() > 1 { decide(coord, &mut blocks) } else { Vec::new() };
     let mut blocks = blocks.into_iter().map(|(_, sums)| sums);
     let mut sum = blocks.next().unwrap_or_else(|| BlockSums::zero(false));
@@ -119,22 +133,32 @@ fn resolve_block(coord: BlockCoord, mut blocks: Vec<(u32, BlockSums)>) -> (Resol
 
 /// Takes from the epochs what contradicts those that are believed.
 fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange> {
-    let statements: Vec<Vec<Statement>> =
-        blocks.iter().map(|(_, sums)| (0..BLOCK_VOXELS).map(|voxel| statement(sums, voxel)).collect()).collect();
+    let statements: Vec<Vec<Statement>> = blocks
+        .iter()
+        .map(|(_, sums)| (0..BLOCK_VOXELS).map(|voxel| statement(sums, voxel)).collect())
+        .collect();
     let mut changes = Vec::new();
     // The latest pair first: what is taken from an epoch there contradicts nothing any more.
     for later in (1..blocks.len()).rev() {
         for earlier in (0..later).rev() {
             for (surface, free) in [(earlier, later), (later, earlier)] {
-                let differs =
-                    |voxel: &usize| statements[surface][*voxel] == Statement::Surface && statements[free][*voxel] == Statement::Free;
+                let differs = |voxel: &usize| {
+                    statements[surface][*voxel] == Statement::Surface
+                        && statements[free][*voxel] == Statement::Free
+                };
                 let seen = |of: usize, voxel: usize| blocks[of].1.weight[voxel] > 0;
-                let voxels: Vec<usize> = (0..BLOCK_VOXELS).filter(differs).filter(|&v| seen(surface, v) && seen(free, v)).collect();
+                let voxels: Vec<usize> = (0..BLOCK_VOXELS)
+                    .filter(differs)
+                    .filter(|&v| seen(surface, v) && seen(free, v))
+                    .collect();
                 if (voxels.len() as u32) < CONTRADICTIONS_MIN {
                     continue;
                 }
-                let weight = |of: usize| voxels.iter().map(|&voxel| u64::from(blocks[of].1.weight[voxel])).sum::<u64>();
-                let is_later = weight(later) >= SEEN_OFTEN * voxels.len() as u64 || weight(later) >= weight(earlier);
+                let weight = |of: usize| {
+                    voxels.iter().map(|&voxel| u64::from(blocks[of].1.weight[voxel])).sum::<u64>()
+                };
+                let is_later = weight(later) >= SEEN_OFTEN * voxels.len() as u64
+                    || weight(later) >= weight(earlier);
                 let (believed, other) = if is_later { (later, earlier) } else { (earlier, later) };
                 let change = BlockChange {
                     coord,
@@ -142,7 +166,10 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                     free: blocks[free].0,
                     believed: blocks[believed].0,
                     voxels: voxels.len() as u32,
-                    clear: voxels.iter().filter(|&&voxel| share(&blocks[free].1, voxel) >= CLEAR_MIN).count() as u32,
+                    clear: voxels
+                        .iter()
+                        .filter(|&&voxel| share(&blocks[free].1, voxel) >= CLEAR_MIN)
+                        .count() as u32,
                 };
                 (0..BLOCK_VOXELS)
                     .filter(|&v| contradicts(statements[other][v], statements[believed][v]))
@@ -175,7 +202,8 @@ fn share(sums: &BlockSums, voxel: usize) -> f64 {
 fn contradicts(one: Statement, other: Statement) -> bool {
     matches!(
         (one, other),
-        (Statement::Free, Statement::Surface | Statement::Behind) | (Statement::Surface | Statement::Behind, Statement::Free)
+        (Statement::Free, Statement::Surface | Statement::Behind)
+            | (Statement::Surface | Statement::Behind, Statement::Free)
     )
 }
 

@@ -40,11 +40,16 @@ pub struct Lattice {
 impl fmt::Display for Lattice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { voxel_size_m, truncation_m, colour } = self;
-        write!(f, "voxels of {voxel_size_m} m with {truncation_m} m truncation and {}", if *colour { "colour" } else { "no colour" })
+        write!(
+            f,
+            "voxels of {voxel_size_m} m with {truncation_m} m truncation and {}",
+            if *colour { "colour" } else { "no colour" }
+        )
     }
 }
 
-/// Writes the sums of ascending blocks; empty ones are left out. Returns how many blocks there are. Nothing half-written stays behind.
+/// Writes the sums of ascending blocks; empty ones are left out. Returns how many blocks there are.
+/// Nothing half-written stays behind.
 ///
 /// # Errors
 /// The disk refuses, or the source of the blocks fails.
@@ -101,10 +106,16 @@ struct Record {
 }
 
 impl Record {
-    fn write(&mut self, file: &mut BufWriter<File>, coord: BlockCoord, sums: &BlockSums) -> std::io::Result<()> {
+    fn write(
+        &mut self,
+        file: &mut BufWriter<File>,
+        coord: BlockCoord,
+        sums: &BlockSums,
+    ) -> std::io::Result<()> {
         sums.write(&mut self.plain);
         self.packed.resize(lz4_flex::block::get_maximum_output_size(self.plain.len()), 0);
-        let len = lz4_flex::block::compress_into(&self.plain, &mut self.packed).map_err(std::io::Error::other)?;
+        let len = lz4_flex::block::compress_into(&self.plain, &mut self.packed)
+            .map_err(std::io::Error::other)?;
         let packed = &self.packed[..len];
         let mut head = [0; BLOCK_HEAD];
         for (at, value) in [coord.x, coord.y, coord.z].into_iter().enumerate() {
@@ -142,9 +153,13 @@ impl TileReader {
     pub fn open(path: &Path) -> Result<Self, FleetError> {
         let mut file = BufReader::new(File::open(path).map_err(FleetError::io(path))?);
         let mut head = [0; HEAD];
-        let is_whole = file.read_exact(&mut head).is_ok() && head[HEAD_CHECKED..] == crc32fast::hash(&head[..HEAD_CHECKED]).to_le_bytes();
+        let is_whole = file.read_exact(&mut head).is_ok()
+            && head[HEAD_CHECKED..] == crc32fast::hash(&head[..HEAD_CHECKED]).to_le_bytes();
         if !is_whole || head[..8] != MAGIC {
-            return Err(FleetError::content(path, "is not a tile of this version. Remove the folder and make it again"));
+            return Err(FleetError::content(
+                path,
+                "is not a tile of this version. Remove the folder and make it again",
+            ));
         }
         let word = |at: usize| [head[at], head[at + 1], head[at + 2], head[at + 3]];
         let lattice = Lattice {
@@ -171,7 +186,8 @@ impl TileReader {
     /// # Errors
     /// A byte of it has changed, or the file ends early.
     pub fn next(&mut self) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
-        let damaged = || FleetError::content(&self.path, "is damaged. Remove the folder and make it again");
+        let damaged =
+            || FleetError::content(&self.path, "is damaged. Remove the folder and make it again");
         if self.left == 0 {
             let ends = self.file.read(&mut [0]).is_ok_and(|read| read == 0);
             return if ends { Ok(None) } else { Err(damaged()) };
@@ -179,7 +195,8 @@ impl TileReader {
         let mut head = [0; BLOCK_HEAD];
         self.file.read_exact(&mut head).map_err(|_| damaged())?;
         let half = |at: usize| i16::from_le_bytes([head[at], head[at + 1]]);
-        let word = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let word =
+            |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
         let plain_len = BlockSums::bytes(self.lattice.colour);
         let len = word(8) as usize;
         if len > lz4_flex::block::get_maximum_output_size(plain_len) {
@@ -250,7 +267,8 @@ mod tests {
     fn a_source_that_fails_leaves_no_file() {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("0_0_0.sums");
-        let failing = write(&path, &LATTICE, || Err(FleetError::Exists { path: PathBuf::from("x") }));
+        let failing =
+            write(&path, &LATTICE, || Err(FleetError::Exists { path: PathBuf::from("x") }));
         assert!(matches!(failing, Err(FleetError::Exists { .. })));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }

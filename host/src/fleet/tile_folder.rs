@@ -23,7 +23,9 @@ pub struct WorldTile {
 impl WorldTile {
     /// The tile that a block of an epoch lies in.
     pub fn of(coord: BlockCoord, lattice: &Lattice, epoch: u32) -> Self {
-        let blocks = (TILE_M / (f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64)).round().clamp(1.0, 32_767.0) as i16;
+        let blocks = (TILE_M / (f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64))
+            .round()
+            .clamp(1.0, 32_767.0) as i16;
         Self { sides: [coord.x, coord.y, coord.z].map(|side| side.div_euclid(blocks)), epoch }
     }
 
@@ -34,7 +36,8 @@ impl WorldTile {
     }
 
     fn parse(name: &str) -> Option<Self> {
-        let mut sides = name.strip_suffix(EXTENSION)?.strip_suffix('.')?.split('_').map(str::parse::<i64>);
+        let mut sides =
+            name.strip_suffix(EXTENSION)?.strip_suffix('.')?.split('_').map(str::parse::<i64>);
         let mut side = || i16::try_from(sides.next()?.ok()?).ok();
         let coordinates = [side()?, side()?, side()?];
         let tile = Self { sides: coordinates, epoch: u32::try_from(sides.next()?.ok()?).ok()? };
@@ -51,8 +54,9 @@ pub fn tiles(folder: &Path) -> Result<BTreeMap<WorldTile, PathBuf>, FleetError> 
     for entry in folder.read_dir().map_err(FleetError::io(folder))? {
         let path = entry.map_err(FleetError::io(folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let tile =
-            WorldTile::parse(&name).ok_or_else(|| FleetError::content(&path, "is no tile. Give folders that `dynvox fleet` wrote"))?;
+        let tile = WorldTile::parse(&name).ok_or_else(|| {
+            FleetError::content(&path, "is no tile. Give folders that `dynvox fleet` wrote")
+        })?;
         tiles.insert(tile, path);
     }
     Ok(tiles)
@@ -68,11 +72,21 @@ mod tests {
         let of = |x: i16| WorldTile::of(BlockCoord { x, y: 0, z: 0 }, &lattice, 7).sides[0];
         assert_eq!([-161, -160, -1, 0, 159, 160, i16::MAX].map(of), [-2, -1, -1, 0, 0, 1, 204]);
         let tile = WorldTile { sides: [-3, 0, 12], epoch: 20_261_122 };
-        assert_eq!((tile.file_name().as_str(), WorldTile::parse("-3_0_12_20261122.sums")), ("-3_0_12_20261122.sums", Some(tile)));
+        assert_eq!(
+            (tile.file_name().as_str(), WorldTile::parse("-3_0_12_20261122.sums")),
+            ("-3_0_12_20261122.sums", Some(tile))
+        );
         assert!(
-            ["3_0_1.sums", "1_2_3_4_5.sums", "+1_2_3_0.sums", "1_2_3_0", "a_b_c_d.sums", "1_2_3_-1.sums"]
-                .iter()
-                .all(|name| WorldTile::parse(name).is_none())
+            [
+                "3_0_1.sums",
+                "1_2_3_4_5.sums",
+                "+1_2_3_0.sums",
+                "1_2_3_0",
+                "a_b_c_d.sums",
+                "1_2_3_-1.sums"
+            ]
+            .iter()
+            .all(|name| WorldTile::parse(name).is_none())
         );
     }
 }

@@ -11,7 +11,8 @@ const WINDOW_BYTES: usize = 16 << 10;
 /// # Errors
 /// The file cannot be read.
 pub fn checksum_of(file: &File, bytes: u64) -> io::Result<Option<u32>> {
-    let (mut checksum, mut left, mut window) = (crc32fast::Hasher::new(), bytes, vec![0; WINDOW_BYTES]);
+    let (mut checksum, mut left, mut window) =
+        (crc32fast::Hasher::new(), bytes, vec![0; WINDOW_BYTES]);
     let mut rest = file.take(bytes);
     loop {
         match rest.read(&mut window)? {

@@ -34,7 +34,10 @@ impl FormatError {
 
     /// An image that has not the size of those it belongs to.
     pub fn other_size(path: &Path, found: (usize, usize), expected: (usize, usize)) -> Self {
-        let reason = format!("it is {} x {} px, but the images are {} x {} px", found.0, found.1, expected.0, expected.1);
+        let reason = format!(
+            "it is {} x {} px, but the images are {} x {} px",
+            found.0, found.1, expected.0, expected.1
+        );
         Self::content(path, reason, "All must have one size: scale or crop them alike")
     }
 

@@ -1,8 +1,10 @@
-//! Where a receiver of satellites was, frame by frame: rows of latitude, longitude, altitude, and angles where an inertial system gives them.
+//! Where a receiver of satellites was, frame by frame: rows of latitude, longitude, altitude, and
+//! angles where an inertial system gives them.
 //!
-//! Read are a text file with a line a frame, or a folder with a file a frame (`oxts/data` of a recording of KITTI raw). A row has 3 numbers
-//! (degrees, degrees, m above the ellipsoid), 6 (with roll, pitch, yaw, rad, as KITTI's oxts: yaw 0 is east, counterclockwise) or KITTI's 30:
-//! the first six are read. A line `-` is a frame without a fix.
+//! Read are a text file with a line a frame, or a folder with a file a frame (`oxts/data` of a
+//! recording of KITTI raw). A row has 3 numbers (degrees, degrees, m above the ellipsoid), 6 (with
+//! roll, pitch, yaw, rad, as KITTI's oxts: yaw 0 is east, counterclockwise) or KITTI's 30: the
+//! first six are read. A line `-` is a frame without a fix.
 
 use super::rows::{lines_of, numbers_of};
 use super::{FormatError, read_text};
@@ -24,8 +26,8 @@ pub struct Fix {
     pub angles_rad: Option<[f64; 3]>,
 }
 
-/// East, north and up at a point: a plane that touches the ellipsoid there, so that nothing is stretched. The ground falls away from it by 8 cm at
-/// a distance of 1 km.
+/// East, north and up at a point: a plane that touches the ellipsoid there, so that nothing is
+/// stretched. The ground falls away from it by 8 cm at a distance of 1 km.
 #[derive(Clone, Copy, Debug)]
 pub struct LocalPlane {
     origin_m: [f64; 3],
@@ -50,7 +52,8 @@ impl LocalPlane {
     /// East, north and up of a point, m.
     pub fn east_north_up_m(&self, geodetic: [f64; 3]) -> [f64; 3] {
         let at_m = earth_centred_m(geodetic);
-        self.axes.map(|axis| (0..3).map(|side| axis[side] * (at_m[side] - self.origin_m[side])).sum())
+        self.axes
+            .map(|axis| (0..3).map(|side| axis[side] * (at_m[side] - self.origin_m[side])).sum())
     }
 }
 
@@ -59,10 +62,15 @@ fn earth_centred_m([latitude_deg, longitude_deg, altitude_m]: [f64; 3]) -> [f64;
     let (sin_lon, cos_lon) = longitude_deg.to_radians().sin_cos();
     let normal_m = RADIUS_M / (1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat).sqrt();
     let across_m = (normal_m + altitude_m) * cos_lat;
-    [across_m * cos_lon, across_m * sin_lon, (normal_m * (1.0 - ECCENTRICITY_SQUARED) + altitude_m) * sin_lat]
+    [
+        across_m * cos_lon,
+        across_m * sin_lon,
+        (normal_m * (1.0 - ECCENTRICITY_SQUARED) + altitude_m) * sin_lat,
+    ]
 }
 
-/// Reads the fixes of a recording, by the number of its frames from 0: a file with a line a frame, or a folder with a file a frame.
+/// Reads the fixes of a recording, by the number of its frames from 0: a file with a line a frame,
+/// or a folder with a file a frame.
 ///
 /// # Errors
 /// It cannot be read, a row is no fix, or the folder has none.
@@ -71,9 +79,17 @@ pub fn read_gnss(path: &Path) -> Result<Vec<Option<Fix>>, FormatError> {
         let text = read_text(path)?;
         return lines_of(&text).map(|(line, row)| row_of(path, line, row)).collect();
     }
-    let files = FOLDERS.iter().map(|folder| text_files(&path.join(folder))).find(|files| !files.is_empty()).unwrap_or_default();
+    let files = FOLDERS
+        .iter()
+        .map(|folder| text_files(&path.join(folder)))
+        .find(|files| !files.is_empty())
+        .unwrap_or_default();
     if files.is_empty() {
-        return Err(FormatError::content(path, "it has no fixes", "Give a file, or a recording of KITTI raw with `oxts/data`"));
+        return Err(FormatError::content(
+            path,
+            "it has no fixes",
+            "Give a file, or a recording of KITTI raw with `oxts/data`",
+        ));
     }
     let first = |file: &PathBuf| {
         let text = read_text(file)?;
@@ -88,7 +104,9 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
         return Ok(None);
     }
     let fix = numbers_of(row).and_then(|numbers| {
-        let &[latitude_deg, longitude_deg, altitude_m, ref more @ ..] = &numbers[..] else { return None };
+        let &[latitude_deg, longitude_deg, altitude_m, ref more @ ..] = &numbers[..] else {
+            return None;
+        };
         let angles_rad = match more {
             [] => None,
             &[roll, pitch, yaw] => Some([roll, pitch, yaw]),
@@ -96,18 +114,25 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
             _ => return None,
         };
         let is_on_earth = latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 360.0;
-        is_on_earth.then_some(Fix { geodetic: [latitude_deg, longitude_deg, altitude_m], angles_rad })
+        is_on_earth
+            .then_some(Fix { geodetic: [latitude_deg, longitude_deg, altitude_m], angles_rad })
     });
-    let action =
-        "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw (6), KITTI's 30, or - where there was no fix";
-    fix.map(Some).ok_or_else(|| FormatError::content(path, format!("line {line} is no fix"), action))
+    let action = "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw (6), KITTI's 30, or - where there was no fix";
+    fix.map(Some)
+        .ok_or_else(|| FormatError::content(path, format!("line {line} is no fix"), action))
 }
 
 /// The text files of a folder whose names are numbers, by name.
 fn text_files(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_number = |path: &PathBuf| path.file_stem().is_some_and(|stem| stem.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()));
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "txt") && is_number(path)).collect();
+    let entries =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_number = |path: &PathBuf| {
+        path.file_stem()
+            .is_some_and(|stem| stem.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    let mut files: Vec<PathBuf> = entries
+        .filter(|path| path.extension().is_some_and(|end| end == "txt") && is_number(path))
+        .collect();
     files.sort();
     files
 }
@@ -121,10 +146,14 @@ mod tests {
         let plane = LocalPlane::at([49.0, 8.4, 110.0]);
         let near = |geodetic: [f64; 3], expected: [f64; 3]| {
             let found = plane.east_north_up_m(geodetic);
-            assert!((0..3).all(|axis| (found[axis] - expected[axis]).abs() < 0.02), "{geodetic:?}: {found:?}");
+            assert!(
+                (0..3).all(|axis| (found[axis] - expected[axis]).abs() < 0.02),
+                "{geodetic:?}: {found:?}"
+            );
         };
         near([49.0, 8.4, 113.5], [0.0, 0.0, 3.5]);
-        // Radii of curvature at this latitude and altitude: 6,371,959 m along the meridian, 6,390,442 m across it.
+        // Radii of curvature at this latitude and altitude: 6,371,959 m along the meridian,
+        // 6,390,442 m across it.
         near([49.0 + 0.001, 8.4, 110.0], [0.0, 111.212, 0.0]);
         near([49.0, 8.4 + 0.001, 110.0], [73.173, 0.0, 0.0]);
         let far = plane.east_north_up_m([49.0 + 0.009, 8.4, 110.0]);
@@ -138,17 +167,32 @@ mod tests {
         std::fs::write(&file, "# a comment\n49 8.4 110\n-\n49 8.5 110 0.1 0.2 0.3\n").unwrap();
         let fixes = read_gnss(&file).unwrap();
         assert_eq!(fixes[0], Some(Fix { geodetic: [49.0, 8.4, 110.0], angles_rad: None }));
-        assert_eq!((fixes[1], fixes[2].unwrap().angles_rad, fixes.len()), (None, Some([0.1, 0.2, 0.3]), 3));
+        assert_eq!(
+            (fixes[1], fixes[2].unwrap().angles_rad, fixes.len()),
+            (None, Some([0.1, 0.2, 0.3]), 3)
+        );
         let folder = root.path().join("2011_09_26_drive_0001_sync");
         std::fs::create_dir_all(folder.join("oxts/data")).unwrap();
         let rest = " 0".repeat(24);
         for frame in [1, 0] {
-            std::fs::write(folder.join(format!("oxts/data/{frame:010}.txt")), format!("49 8.{frame} 112 .01 .02 -1.5{rest}\n")).unwrap();
+            std::fs::write(
+                folder.join(format!("oxts/data/{frame:010}.txt")),
+                format!("49 8.{frame} 112 .01 .02 -1.5{rest}\n"),
+            )
+            .unwrap();
         }
         let fixes = read_gnss(&folder).unwrap();
-        assert_eq!(fixes[1].unwrap(), Fix { geodetic: [49.0, 8.1, 112.0], angles_rad: Some([0.01, 0.02, -1.5]) });
+        assert_eq!(
+            fixes[1].unwrap(),
+            Fix { geodetic: [49.0, 8.1, 112.0], angles_rad: Some([0.01, 0.02, -1.5]) }
+        );
         std::fs::write(&file, "49 8.4\n").unwrap();
-        assert!(read_gnss(&file).unwrap_err().to_string().contains("line 1 is no fix. A line holds latitude"));
+        assert!(
+            read_gnss(&file)
+                .unwrap_err()
+                .to_string()
+                .contains("line 1 is no fix. A line holds latitude")
+        );
         assert!(read_gnss(root.path()).unwrap_err().to_string().contains("it has no fixes"));
     }
 }

@@ -13,7 +13,11 @@ pub struct Image<T> {
 impl<T> Image<T> {
     /// Takes over `pixels`; `None` unless there are `width` x `height` of them and at least one.
     pub fn new(width: usize, height: usize, pixels: Vec<T>) -> Option<Self> {
-        (width > 0 && height > 0 && width.checked_mul(height)? == pixels.len()).then_some(Self { width, height, pixels })
+        (width > 0 && height > 0 && width.checked_mul(height)? == pixels.len()).then_some(Self {
+            width,
+            height,
+            pixels,
+        })
     }
 
     /// Width, px.

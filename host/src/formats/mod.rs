@@ -1,8 +1,9 @@
-//! Files as they are defined elsewhere, read and written. Nothing here knows of frames, runs or the map; of a run's files only names are here, for
-//! who reads them need not know runs.
+//! Files as they are defined elsewhere, read and written. Nothing here knows of frames, runs or the
+//! map; of a run's files only names are here, for who reads them need not know runs.
 //!
-//! A reader takes a path and gives numbers, images or poses; what it cannot use is a [`FormatError`] that says what is wrong and what to do.
-//! Readers of images are told the size that is expected where a header could ask for any amount of memory.
+//! A reader takes a path and gives numbers, images or poses; what it cannot use is a
+//! [`FormatError`] that says what is wrong and what to do. Readers of images are told the size that
+//! is expected where a header could ask for any amount of memory.
 
 pub mod calibration;
 mod capacity;
@@ -32,13 +33,14 @@ pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;
 pub use pfm::read_pfm;
 pub use picture::{
-    Decoded, ENDINGS as PICTURE_ENDINGS, Picture, SAMPLE_BITS, decode_picture, picture_size, read_picture, significant_bits,
+    Decoded, ENDINGS as PICTURE_ENDINGS, Picture, SAMPLE_BITS, decode_picture, picture_size,
+    read_picture, significant_bits,
 };
 pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
 pub use rows::{parse_seconds, read_stamped_names, read_times};
 pub use run_files::{
-    BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, SETTINGS_FILE, SUMMARY_FILE, TIMED_TRAJECTORY_FILE, TRACKS_FILE, TRAJECTORY_FILE,
-    TRUE_TRAJECTORY_FILE,
+    BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, SETTINGS_FILE, SUMMARY_FILE, TIMED_TRAJECTORY_FILE,
+    TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
 };

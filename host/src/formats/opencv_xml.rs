@@ -1,4 +1,5 @@
-//! OpenCV's XML: a matrix `depth-frame` of signed 16-bit millimetres, as the original's ELAS tool wrote it.
+//! OpenCV's XML: a matrix `depth-frame` of signed 16-bit millimetres, as the original's ELAS tool
+//! wrote it.
 
 use super::{FormatError, Image, read_text};
 use std::path::Path;
@@ -17,22 +18,39 @@ const ACTION: &str = "Write it anew with OpenCV's FileStorage, of the images' si
 pub fn read_opencv_depth(path: &Path, size: (usize, usize)) -> Result<Image<f32>, FormatError> {
     let text = read_text(path)?;
     let refuse = |reason: String| FormatError::content(path, reason, ACTION);
-    let document = roxmltree::Document::parse(&text).map_err(|error| refuse(format!("it is not XML: {error}")))?;
+    let document = roxmltree::Document::parse(&text)
+        .map_err(|error| refuse(format!("it is not XML: {error}")))?;
     let matrix = document.root_element().children().find(|node| node.has_tag_name(MATRIX));
     let matrix = matrix.ok_or_else(|| refuse(format!("it holds no matrix {MATRIX}")))?;
-    let part = |name: &str| matrix.children().find(|node| node.has_tag_name(name)).and_then(|node| node.text()).unwrap_or_default().trim();
-    let (Ok(height), Ok(width)) = (part("rows").parse::<usize>(), part("cols").parse::<usize>()) else {
+    let part = |name: &str| {
+        matrix
+            .children()
+            .find(|node| node.has_tag_name(name))
+            .and_then(|node| node.text())
+            .unwrap_or_default()
+            .trim()
+    };
+    let (Ok(height), Ok(width)) = (part("rows").parse::<usize>(), part("cols").parse::<usize>())
+    else {
         return Err(refuse(format!("{MATRIX} lacks its rows or cols")));
     };
     if (width, height) != size {
         return Err(FormatError::other_size(path, (width, height), size));
     }
     if part("dt") != "s" {
-        return Err(refuse(format!("{MATRIX} has the type {:?}; signed 16-bit millimetres (s) are read", part("dt"))));
+        return Err(refuse(format!(
+            "{MATRIX} has the type {:?}; signed 16-bit millimetres (s) are read",
+            part("dt")
+        )));
     }
-    let depth_m: Result<Vec<f32>, _> =
-        part("data").split_ascii_whitespace().map(|word| word.parse::<i16>().map(|mm| f32::from(mm) * MM)).collect();
-    let depth_m = depth_m.map_err(|error| refuse(format!("{MATRIX} holds a value that is not a 16-bit number: {error}")))?;
+    let depth_m: Result<Vec<f32>, _> = part("data")
+        .split_ascii_whitespace()
+        .map(|word| word.parse::<i16>().map(|mm| f32::from(mm) * MM))
+        .collect();
+    let depth_m = depth_m.map_err(|error| {
+        refuse(format!("{MATRIX} holds a value that is not a 16-bit number: {error}"))
+    })?;
     let found = depth_m.len();
-    Image::new(width, height, depth_m).ok_or_else(|| refuse(format!("{MATRIX} holds {found} values, not {}", width * height)))
+    Image::new(width, height, depth_m)
+        .ok_or_else(|| refuse(format!("{MATRIX} holds {found} values, not {}", width * height)))
 }

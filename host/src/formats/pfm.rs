@@ -1,4 +1,5 @@
-//! Portable float maps: `Pf`, width, height, a scale whose sign tells the byte order, then floats, the lowest row first.
+//! Portable float maps: `Pf`, width, height, a scale whose sign tells the byte order, then floats,
+//! the lowest row first.
 
 use super::{FormatError, Image};
 use std::path::Path;
@@ -6,17 +7,21 @@ use std::path::Path;
 /// What to do about a file that is not one.
 const ACTION: &str = "Write it anew, as a grey PFM of the images' size";
 
-/// Reads a grey PFM of `size`. The scale's magnitude says nothing of the values and is left aside, as other programs do.
+/// Reads a grey PFM of `size`. The scale's magnitude says nothing of the values and is left aside,
+/// as other programs do.
 ///
 /// # Errors
 /// The file cannot be read, has no header of a grey PFM, or another size.
 pub fn read_pfm(path: &Path, size: (usize, usize)) -> Result<Image<f32>, FormatError> {
     let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
     let refuse = |reason: &str| FormatError::content(path, reason, ACTION);
-    let (header, body) = header(&bytes).ok_or_else(|| refuse("it does not have the header of a PFM: Pf, width, height, scale"))?;
+    let (header, body) = header(&bytes)
+        .ok_or_else(|| refuse("it does not have the header of a PFM: Pf, width, height, scale"))?;
     match header[0] {
         "Pf" => {}
-        "PF" => return Err(refuse("it is a PFM in colour; disparity or depth is one value a pixel")),
+        "PF" => {
+            return Err(refuse("it is a PFM in colour; disparity or depth is one value a pixel"));
+        }
         _ => return Err(refuse("it does not begin with Pf")),
     }
     let (Ok(width), Ok(height)) = (header[1].parse::<usize>(), header[2].parse::<usize>()) else {
@@ -32,9 +37,15 @@ pub fn read_pfm(path: &Path, size: (usize, usize)) -> Result<Image<f32>, FormatE
         .ok_or_else(|| refuse("its scale is not a number"))?;
     let (words, rest) = body.as_chunks::<4>();
     if words.len() != width * height || !rest.is_empty() {
-        return Err(refuse(&format!("it holds {} bytes of pixels, not {}", body.len(), 4 * width * height)));
+        return Err(refuse(&format!(
+            "it holds {} bytes of pixels, not {}",
+            body.len(),
+            4 * width * height
+        )));
     }
-    let value = |word: &[u8; 4]| if scale < 0.0 { f32::from_le_bytes(*word) } else { f32::from_be_bytes(*word) };
+    let value = |word: &[u8; 4]| {
+        if scale < 0.0 { f32::from_le_bytes(*word) } else { f32::from_be_bytes(*word) }
+    };
     let pixels = words.chunks_exact(width).rev().flatten().map(value).collect();
     Image::new(width, height, pixels).ok_or_else(|| refuse("it has no pixels"))
 }

@@ -1,10 +1,14 @@
-//! Pictures of cameras: PNG, JPEG, PGM, PPM, TIFF and BMP, of 8 or 16 bit, grey or colour. The content tells the format, not the file's name.
+//! Pictures of cameras: PNG, JPEG, PGM, PPM, TIFF and BMP, of 8 or 16 bit, grey or colour. The
+//! content tells the format, not the file's name.
 //!
-//! The mapper takes 8 bit. Of 16-bit samples `b` bits are significant and the upper 8 of them are taken: `min(value >> (b - 8), 255)`. How
-//! many are significant is given, or told by [`significant_bits`] from the largest value of some pictures and kept for all of them: a choice
-//! made anew in each picture would change the brightness from frame to frame, which the matchers follow.
+//! The mapper takes 8 bit. Of 16-bit samples `b` bits are significant and the upper 8 of them are
+//! taken: `min(value >> (b - 8), 255)`. How many are significant is given, or told by
+//! [`significant_bits`] from the largest value of some pictures and kept for all of them: a choice
+//! made anew in each picture would change the brightness from frame to frame, which the matchers
+//! follow.
 //!
-//! Memory: the file's samples once, and the 8-bit images made of them. A header may ask for 512 MiB at most.
+//! Memory: the file's samples once, and the 8-bit images made of them. A header may ask for 512 MiB
+//! at most.
 
 use super::{FormatError, Image, luma};
 use image::{DynamicImage, ImageReader};
@@ -60,14 +64,17 @@ impl Picture {
         }
     }
 
-    /// The 8-bit picture. `bits` are the significant bits of 16-bit samples, 8 to 16; where they are not said, this picture's own range tells.
+    /// The 8-bit picture. `bits` are the significant bits of 16-bit samples, 8 to 16; where they
+    /// are not said, this picture's own range tells.
     pub fn to_8_bit(self, bits: Option<u32>) -> Decoded {
         let bits = bits.or_else(|| self.largest_sample().map(significant_bits)).unwrap_or(16);
         let narrow = |value: u16| (value >> bits.clamp(8, 16).saturating_sub(8)).min(255) as u8;
         match self {
             Self::Grey(grey) => Decoded { grey, colour: None },
             Self::Colour(colour) => of_colour(colour),
-            Self::DeepGrey(image) => Decoded { grey: image.map(|&value| narrow(value)), colour: None },
+            Self::DeepGrey(image) => {
+                Decoded { grey: image.map(|&value| narrow(value)), colour: None }
+            }
             Self::DeepColour(image) => of_colour(image.map(|&rgb| rgb.map(narrow))),
         }
     }
@@ -97,7 +104,9 @@ pub fn read_picture(path: &Path) -> Result<Picture, FormatError> {
 /// # Errors
 /// What is wrong, as the rest of a sentence.
 pub fn decode_picture(bytes: &[u8]) -> Result<Picture, String> {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    let reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
     picture_of(limited(reader).decode().map_err(|error| plain(&error))?)
 }
 
@@ -106,12 +115,16 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Picture, String> {
 /// # Errors
 /// The file cannot be read, or has no header of a picture.
 pub fn picture_size(path: &Path) -> Result<(usize, usize), FormatError> {
-    let size = open(path)?.into_dimensions().map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))?;
+    let size = open(path)?
+        .into_dimensions()
+        .map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))?;
     Ok((size.0 as usize, size.1 as usize))
 }
 
 fn open(path: &Path) -> Result<ImageReader<impl BufRead + Seek>, FormatError> {
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(FormatError::read(path))?;
+    let reader = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(FormatError::read(path))?;
     Ok(limited(reader))
 }
 
@@ -126,17 +139,28 @@ fn picture_of(decoded: DynamicImage) -> Result<Picture, String> {
         Image::new(width, height, pixels).ok_or_else(|| "it has no pixels".to_owned())
     }
     Ok(match decoded {
-        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => Picture::Grey(owned(width, height, decoded.into_luma8().into_raw())?),
-        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
-            Picture::Colour(owned(width, height, decoded.into_rgb8().into_raw().as_chunks().0.to_vec())?)
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+            Picture::Grey(owned(width, height, decoded.into_luma8().into_raw())?)
         }
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => Picture::Colour(owned(
+            width,
+            height,
+            decoded.into_rgb8().into_raw().as_chunks().0.to_vec(),
+        )?),
         DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
             Picture::DeepGrey(owned(width, height, decoded.into_luma16().into_raw())?)
         }
-        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
-            Picture::DeepColour(owned(width, height, decoded.into_rgb16().into_raw().as_chunks().0.to_vec())?)
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => Picture::DeepColour(owned(
+            width,
+            height,
+            decoded.into_rgb16().into_raw().as_chunks().0.to_vec(),
+        )?),
+        other => {
+            return Err(format!(
+                "its pixels are {:?}; integers of 8 or 16 bit are read, grey or colour",
+                other.color()
+            ));
         }
-        other => return Err(format!("its pixels are {:?}; integers of 8 or 16 bit are read, grey or colour", other.color())),
     })
 }
 
@@ -148,7 +172,9 @@ pub(super) fn plain(error: &image::ImageError) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgb, RgbImage, RgbaImage};
+    use ::image::{
+        DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgb, RgbImage, RgbaImage,
+    };
     use tempfile::TempDir;
 
     #[test]
@@ -162,7 +188,11 @@ mod tests {
             let read = read_picture(&path).unwrap().to_8_bit(None);
             assert_eq!(read.grey.pixels(), grey.as_raw().as_slice(), "{ending}");
             assert_eq!(picture_size(&path).unwrap(), (40, 33));
-            assert_eq!(decode_picture(&std::fs::read(&path).unwrap()).unwrap().to_8_bit(None), read, "{ending}");
+            assert_eq!(
+                decode_picture(&std::fs::read(&path).unwrap()).unwrap().to_8_bit(None),
+                read,
+                "{ending}"
+            );
         }
         for ending in ["png", "ppm", "tif", "bmp"] {
             let path = folder.path().join(format!("colour.{ending}"));
@@ -179,14 +209,20 @@ mod tests {
         let path = folder.path().join("a.png");
         let grey = GrayImage::from_fn(64, 48, |u, v| Luma([(u + v) as u8]));
         let file = &mut std::fs::File::create(&path).unwrap();
-        DynamicImage::from(grey.clone()).write_to(&mut std::io::BufWriter::new(file), ImageFormat::Jpeg).unwrap();
+        DynamicImage::from(grey.clone())
+            .write_to(&mut std::io::BufWriter::new(file), ImageFormat::Jpeg)
+            .unwrap();
         let read = read_picture(&path).unwrap().to_8_bit(None).grey;
         let apart = read.pixels().iter().zip(grey.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(apart.unwrap() < 8, "{apart:?}");
         std::fs::write(&path, [0xFF, 0xD8, 0xFF, 0xE0, 0, 0]).unwrap();
         assert!(read_picture(&path).unwrap_err().to_string().contains("a.png cannot be used"));
         RgbaImage::from_pixel(4, 3, ::image::Rgba([9, 8, 7, 0])).save(&path).unwrap();
-        assert_eq!(read_picture(&path).unwrap().to_8_bit(None).colour.unwrap().get(3, 2), Some([9, 8, 7]), "alpha is dropped");
+        assert_eq!(
+            read_picture(&path).unwrap().to_8_bit(None).colour.unwrap().get(3, 2),
+            Some([9, 8, 7]),
+            "alpha is dropped"
+        );
     }
 
     #[test]
@@ -200,13 +236,24 @@ mod tests {
             let picture = read_picture(&path).unwrap();
             assert_eq!(picture.largest_sample(), Some(3_753), "{ending}");
             let read = picture.clone().to_8_bit(None).grey;
-            assert_eq!((read.get(15, 0), read.get(8, 0)), (Some(234), Some(125)), "12 bits: 3,750 / 16 and 2,000 / 16");
+            assert_eq!(
+                (read.get(15, 0), read.get(8, 0)),
+                (Some(234), Some(125)),
+                "12 bits: 3,750 / 16 and 2,000 / 16"
+            );
             assert_eq!(picture.clone().to_8_bit(Some(16)).grey.get(15, 0), Some(14));
-            assert_eq!(picture.to_8_bit(Some(10)).grey.get(15, 0), Some(255), "beyond the range is white, never black");
+            assert_eq!(
+                picture.to_8_bit(Some(10)).grey.get(15, 0),
+                Some(255),
+                "beyond the range is white, never black"
+            );
         }
         let colour = ImageBuffer::from_pixel(3, 2, Rgb([4_000u16, 160, 0]));
         let path = folder.path().join("deep_colour.png");
         DynamicImage::ImageRgb16(colour).save(&path).unwrap();
-        assert_eq!(read_picture(&path).unwrap().to_8_bit(None).colour.unwrap().get(1, 1), Some([250, 10, 0]));
+        assert_eq!(
+            read_picture(&path).unwrap().to_8_bit(None).colour.unwrap().get(1, 1),
+            Some([250, 10, 0])
+        );
     }
 }

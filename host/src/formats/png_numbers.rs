@@ -18,22 +18,34 @@ pub fn read_png_u16(path: &Path) -> Result<Image<u16>, FormatError> {
     let pixels = match decoded {
         DynamicImage::ImageLuma8(image) => image.into_raw().into_iter().map(u16::from).collect(),
         DynamicImage::ImageLuma16(image) => image.into_raw(),
-        _ => return Err(FormatError::content(path, "it is a colour image", "Numbers of instances are grey, 8 or 16 bit")),
+        _ => {
+            return Err(FormatError::content(
+                path,
+                "it is a colour image",
+                "Numbers of instances are grey, 8 or 16 bit",
+            ));
+        }
     };
     owned(path, width, height, pixels)
 }
 
-/// Reads a grey PNG of 16 bit as numbers; one of 8 bit, such as a picture of a depth image, is refused.
+/// Reads a grey PNG of 16 bit as numbers; one of 8 bit, such as a picture of a depth image, is
+/// refused.
 ///
 /// # Errors
 /// The file cannot be read or decoded, or is not of one channel of 16 bit.
 pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
     match decode(path)? {
-        DynamicImage::ImageLuma16(image) => owned(path, image.width() as usize, image.height() as usize, image.into_raw()),
+        DynamicImage::ImageLuma16(image) => {
+            owned(path, image.width() as usize, image.height() as usize, image.into_raw())
+        }
         other => {
             let color = other.color();
             let bits = 8 * color.bytes_per_pixel() / color.channel_count().max(1);
-            let reason = format!("it is of {} channel(s) of {bits} bit, not of one of 16", color.channel_count());
+            let reason = format!(
+                "it is of {} channel(s) of {bits} bit, not of one of 16",
+                color.channel_count()
+            );
             Err(FormatError::content(path, reason, FETCH_ANEW))
         }
     }
@@ -45,8 +57,16 @@ pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
 /// The file cannot be written.
 pub fn write_png_deep(path: &Path, image: &Image<u16>) -> Result<(), FormatError> {
     let bytes: Vec<u8> = image.pixels().iter().copied().flat_map(u16::to_ne_bytes).collect();
-    image::save_buffer(path, &bytes, image.width() as u32, image.height() as u32, ExtendedColorType::L16)
-        .map_err(|error| FormatError::content(path, plain(&error), "Check the folder, and whether the disk is full"))
+    image::save_buffer(
+        path,
+        &bytes,
+        image.width() as u32,
+        image.height() as u32,
+        ExtendedColorType::L16,
+    )
+    .map_err(|error| {
+        FormatError::content(path, plain(&error), "Check the folder, and whether the disk is full")
+    })
 }
 
 fn decode(path: &Path) -> Result<DynamicImage, FormatError> {
@@ -55,6 +75,12 @@ fn decode(path: &Path) -> Result<DynamicImage, FormatError> {
     reader.decode().map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))
 }
 
-fn owned(path: &Path, width: usize, height: usize, pixels: Vec<u16>) -> Result<Image<u16>, FormatError> {
-    Image::new(width, height, pixels).ok_or_else(|| FormatError::content(path, "it has no pixels", FETCH_ANEW))
+fn owned(
+    path: &Path,
+    width: usize,
+    height: usize,
+    pixels: Vec<u16>,
+) -> Result<Image<u16>, FormatError> {
+    Image::new(width, height, pixels)
+        .ok_or_else(|| FormatError::content(path, "it has no pixels", FETCH_ANEW))
 }

@@ -1,4 +1,5 @@
-//! Camera trajectories in text files, read and written: KITTI's rows of twelve numbers, TUM's rows of time, position and quaternion.
+//! Camera trajectories in text files, read and written: KITTI's rows of twelve numbers, TUM's rows
+//! of time, position and quaternion.
 //!
 //! Numbers are written so that reading them gives the same bits.
 
@@ -32,7 +33,9 @@ pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
                 "A line holds 12 numbers (KITTI: the rows of t_world_camera) or 8 (TUM: time x y z qx qy qz qw), the same in every line",
             )
         };
-        let (time_s, pose) = numbers_of(row).and_then(|numbers| pose_of(&numbers)).ok_or_else(|| refuse("is not a pose"))?;
+        let (time_s, pose) = numbers_of(row)
+            .and_then(|numbers| pose_of(&numbers))
+            .ok_or_else(|| refuse("is not a pose"))?;
         if !poses.is_empty() && time_s.is_some() == times_s.is_empty() {
             return Err(refuse("is of another format than the first"));
         }
@@ -53,7 +56,13 @@ pub fn read_numbered(path: &Path) -> Result<Vec<(usize, Transform)>, FormatError
         let (frame, numbers) = numbers.split_first()?;
         Some((*frame as usize, pose_of(numbers)?.1))
     };
-    let refuse = |line| FormatError::content(path, format!("line {line} is not a frame and its pose"), "A line holds 13 numbers");
+    let refuse = |line| {
+        FormatError::content(
+            path,
+            format!("line {line} is not a frame and its pose"),
+            "A line holds 13 numbers",
+        )
+    };
     lines_of(&text).map(|(line, row)| pose(row).ok_or_else(|| refuse(line))).collect()
 }
 
@@ -82,9 +91,14 @@ fn kitti_row(pose: &Transform) -> String {
     joined(pose.matrix_3x4().as_flattened().iter().copied())
 }
 
-/// TUM: `t x y z qx qy qz qw`, one line a frame. The time is in ns and written as seconds to the last digit.
+/// TUM: `t x y z qx qy qz qw`, one line a frame. The time is in ns and written as seconds to the
+/// last digit.
 pub fn tum_line(time_ns: u64, pose: &Transform) -> String {
-    format!("{} {}\n", seconds_text(time_ns), joined(pose.translation_m.into_iter().chain(pose.rotation)))
+    format!(
+        "{} {}\n",
+        seconds_text(time_ns),
+        joined(pose.translation_m.into_iter().chain(pose.rotation))
+    )
 }
 
 fn joined(numbers: impl Iterator<Item = f64>) -> String {

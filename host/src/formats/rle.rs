@@ -1,8 +1,10 @@
-//! Run lengths as COCO writes them: counts of alternating pixels, 0 first, down the columns, each count in characters of 5 bits, the
-//! lowest first, bit 5 saying that more follow, the last one's bit 4 being the sign; from the fourth count on the difference to the last but
-//! one is written. (Format: the COCO data set's mask interface.)
+//! Run lengths as COCO writes them: counts of alternating pixels, 0 first, down the columns, each
+//! count in characters of 5 bits, the lowest first, bit 5 saying that more follow, the last one's
+//! bit 4 being the sign; from the fourth count on the difference to the last but one is written.
+//! (Format: the COCO data set's mask interface.)
 
-/// The runs of 1: first pixel and length, counted down the columns. The counts must fill the image exactly.
+/// The runs of 1: first pixel and length, counted down the columns. The counts must fill the image
+/// exactly.
 ///
 /// # Errors
 /// What is wrong, as the rest of a sentence.
@@ -14,20 +16,31 @@ pub fn runs(text: &str, width: usize, height: usize) -> Result<Vec<(usize, usize
 ///
 /// # Errors
 /// What is wrong, as the rest of a sentence.
-pub fn runs_of_counts(counts: &[i64], width: usize, height: usize) -> Result<Vec<(usize, usize)>, String> {
+pub fn runs_of_counts(
+    counts: &[i64],
+    width: usize,
+    height: usize,
+) -> Result<Vec<(usize, usize)>, String> {
     let pixels = width * height;
     let (mut runs, mut at) = (Vec::new(), 0usize);
     for (number, &count) in counts.iter().enumerate() {
-        let count = usize::try_from(count).map_err(|_| format!("run {} has a length below 0", number + 1))?;
+        let count = usize::try_from(count)
+            .map_err(|_| format!("run {} has a length below 0", number + 1))?;
         if count > pixels - at {
-            return Err(format!("its runs hold more than the {pixels} pixels of {width} x {height}"));
+            return Err(format!(
+                "its runs hold more than the {pixels} pixels of {width} x {height}"
+            ));
         }
         if number % 2 == 1 && count > 0 {
             runs.push((at, count));
         }
         at += count;
     }
-    if at == pixels { Ok(runs) } else { Err(format!("its runs hold {at} of the {pixels} pixels of {width} x {height}")) }
+    if at == pixels {
+        Ok(runs)
+    } else {
+        Err(format!("its runs hold {at} of the {pixels} pixels of {width} x {height}"))
+    }
 }
 
 fn counts(text: &str) -> Result<Vec<i64>, String> {
@@ -36,7 +49,10 @@ fn counts(text: &str) -> Result<Vec<i64>, String> {
     while let Some(first) = bytes.next() {
         let (mut value, mut shift, mut byte) = (0i64, 0u32, first);
         loop {
-            let bits = byte.checked_sub(48).filter(|bits| *bits < 64).ok_or_else(|| format!("`{}` is no run length", char::from(byte)))?;
+            let bits = byte
+                .checked_sub(48)
+                .filter(|bits| *bits < 64)
+                .ok_or_else(|| format!("`{}` is no run length", char::from(byte)))?;
             if shift > 30 {
                 return Err("a run length has more than 35 bits".to_owned());
             }

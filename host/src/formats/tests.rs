@@ -31,9 +31,19 @@ fn kitti_trajectories_are_read_back_as_they_were() {
 
 #[test]
 fn tum_trajectories_keep_every_digit_of_time_and_pose() {
-    let times_ns = [0, 103_730_000, 1_317_354_879_123_456_000, 1_317_354_879_123_457_001, 2_000_000_000_000_000_000];
-    let text: String = times_ns.iter().zip(poses()).map(|(time_ns, pose)| tum_line(*time_ns, &pose)).collect();
-    let rows: Vec<Vec<f64>> = text.lines().map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect()).collect();
+    let times_ns = [
+        0,
+        103_730_000,
+        1_317_354_879_123_456_000,
+        1_317_354_879_123_457_001,
+        2_000_000_000_000_000_000,
+    ];
+    let text: String =
+        times_ns.iter().zip(poses()).map(|(time_ns, pose)| tum_line(*time_ns, &pose)).collect();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .map(|line| line.split(' ').map(|word| word.parse().unwrap()).collect())
+        .collect();
     for ((row, time_ns), pose) in rows.iter().zip(times_ns).zip(poses()) {
         let ([x, y, z], [i, j, k, w]) = (pose.translation_m, pose.rotation);
         assert_eq!(*row, [time_ns as f64 / 1e9, x, y, z, i, j, k, w]);
@@ -45,23 +55,42 @@ fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("map.ply");
     let mut ply = PlyWriter::begin(&path).unwrap();
-    let corner = |x: f32, y: f32| Vertex { position_m: [x, y, 2.0], colour: [10, 20, 30], weight: 40 + x as u8 };
+    let corner = |x: f32, y: f32| Vertex {
+        position_m: [x, y, 2.0],
+        colour: [10, 20, 30],
+        weight: 40 + x as u8,
+    };
     ply.triangle([corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)]);
     ply.triangle([corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
     assert_eq!(ply.finish().unwrap(), Mesh { vertices: 4, triangles: 2, object_triangles: 0 });
     let bytes = fs::read(&path).unwrap();
     let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     let header = std::str::from_utf8(&bytes[..end]).unwrap();
-    assert!(header.contains("element vertex 0000000004\n") && header.contains("element face 0000000002\n"), "{header}");
+    assert!(
+        header.contains("element vertex 0000000004\n")
+            && header.contains("element face 0000000002\n"),
+        "{header}"
+    );
     let body = &bytes[end..];
     assert_eq!(body.len(), 4 * 32 + 2 * 13);
     let face = |at: usize| {
         let face = &body[4 * 32 + 13 * at..][..13];
-        (face[0], [1, 5, 9].map(|from| u32::from_le_bytes(face[from..from + 4].try_into().unwrap())))
+        (
+            face[0],
+            [1, 5, 9].map(|from| u32::from_le_bytes(face[from..from + 4].try_into().unwrap())),
+        )
     };
     assert_eq!((face(0), face(1)), ((3, [0, 1, 2]), (3, [1, 3, 2])));
     let number = |at: usize| f32::from_le_bytes(body[at..at + 4].try_into().unwrap());
-    assert_eq!([32, 12, 16, 20].map(number), [1.0, 0.0, 0.0, 1.0], "the second vertex and the first one's normal");
-    assert_eq!((&body[24..28], &body[56..60]), (&[10, 20, 30, 40][..], &[10, 20, 30, 41][..]), "colours and weights");
+    assert_eq!(
+        [32, 12, 16, 20].map(number),
+        [1.0, 0.0, 0.0, 1.0],
+        "the second vertex and the first one's normal"
+    );
+    assert_eq!(
+        (&body[24..28], &body[56..60]),
+        (&[10, 20, 30, 40][..], &[10, 20, 30, 41][..]),
+        "colours and weights"
+    );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the file of faces is gone");
 }

@@ -1,4 +1,5 @@
-//! Where frames come from: data sets on disk, the synthetic street, and the depth and masks that other programs made of them.
+//! Where frames come from: data sets on disk, the synthetic street, and the depth and masks that
+//! other programs made of them.
 //!
 //! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else here. [`layouts`] reads recordings, [`bags`] those of ROS, [`stream`] what comes
 //! through a pipe or from an iterator,
@@ -14,8 +15,12 @@ pub mod masks;
 pub mod source;
 pub mod stream;
 
-pub use layouts::{CameraPair, Found, Layout, OpenOptions, Sequence, Stacking, StreetFrames, open, sequences_at, survey};
+pub use layouts::{
+    CameraPair, Found, Layout, OpenOptions, Sequence, Stacking, StreetFrames, open, sequences_at,
+    survey,
+};
 pub use source::{
-    AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError, InstanceMask, LidarScan, MaskRefusals,
-    ObjectsTruth, Scaled, StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
+    AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError,
+    InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, StereoImages, StopRequest,
+    StreamState, TrueObject, read_given_poses,
 };

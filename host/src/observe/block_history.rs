@@ -1,6 +1,8 @@
-//! When each block of the static map was last visible, and which of them pruning took: `blocks.csv`.
+//! When each block of the static map was last visible, and which of them pruning took:
+//! `blocks.csv`.
 //!
-//! Memory: 12 bytes a slot of the pool. A row is written when a block leaves the pool, and for those that are left at the end.
+//! Memory: 12 bytes a slot of the pool. A row is written when a block leaves the pool, and for
+//! those that are left at the end.
 
 use super::tables::{BlockFate, block_rows};
 use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
@@ -33,7 +35,11 @@ impl Observer for BlockHistoryObserver {
         vec![&mut self.file]
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let volume = frame.view.mapper().background();
         let mut left = self.note_visible(volume, frame.row.frame as u32);
         let report = &frame.row.report;
@@ -41,7 +47,13 @@ impl Observer for BlockHistoryObserver {
         if report.prune.blocks_freed + eviction.kept + eviction.lost + eviction.empty > 0 {
             left.extend(self.take_absent(volume));
         }
-        let fate = |coord: &[i16; 3]| if frame.evicted.contains(&key_of(*coord)) { BlockFate::Evicted } else { BlockFate::Pruned };
+        let fate = |coord: &[i16; 3]| {
+            if frame.evicted.contains(&key_of(*coord)) {
+                BlockFate::Evicted
+            } else {
+                BlockFate::Pruned
+            }
+        };
         self.write(setup, left.into_iter().map(|(coord, last)| (coord, last, fate(&coord))))
     }
 
@@ -85,8 +97,15 @@ impl BlockHistoryObserver {
         left
     }
 
-    fn write(&mut self, setup: &Setup<'_>, rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>) -> Result<(), ObserveError> {
-        let failed = |source: io::Error| ObserveError::Write { path: setup.folder.join(BLOCKS_TABLE_FILE), source };
+    fn write(
+        &mut self,
+        setup: &Setup<'_>,
+        rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>,
+    ) -> Result<(), ObserveError> {
+        let failed = |source: io::Error| ObserveError::Write {
+            path: setup.folder.join(BLOCKS_TABLE_FILE),
+            source,
+        };
         self.file.append(&block_rows(rows, self.file.is_empty()).map_err(failed)?);
         Ok(())
     }

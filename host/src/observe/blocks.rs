@@ -77,7 +77,11 @@ impl BlocksSection {
 
     /// Bytes of the slab in use by the map's regions (`volume.*`).
     pub fn map_bytes(&self) -> u64 {
-        self.regions.iter().filter(|region| region.name.starts_with("volume.")).map(|region| region.used as u64).sum()
+        self.regions
+            .iter()
+            .filter(|region| region.name.starts_with("volume."))
+            .map(|region| region.used as u64)
+            .sum()
     }
 }
 
@@ -90,7 +94,11 @@ pub struct BlocksObserver {
 impl Observer for BlocksObserver {
     type Section = BlocksSection;
 
-    fn frame(&mut self, _: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        _: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let (totals, row) = (&mut self.totals, frame.row);
         let (allocation, prune) = (&row.report.allocation, &row.report.prune);
         totals.peak = row.report.blocks.peak;

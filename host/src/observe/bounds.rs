@@ -1,4 +1,5 @@
-//! How much of each bound of [`Capacity`] a run needed, and the least capacity that would have been enough for it.
+//! How much of each bound of [`Capacity`] a run needed, and the least capacity that would have been
+//! enough for it.
 
 use super::{Finished, FrameContext, FrameRow, ObserveError, Observer, Setup};
 use dynvox_core::scene_flow::FlowReport;
@@ -8,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// What a run needed of a bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BoundUse {
-    /// The most needed at once. Where something was refused it is what was in use and what was refused in that frame: with so much, more may
-    /// be needed.
+    /// The most needed at once. Where something was refused it is what was in use and what was
+    /// refused in that frame: with so much, more may be needed.
     pub needed: usize,
     /// What was refused, evicted or shortened because of the bound, over the run.
     pub refused: u64,
@@ -57,19 +58,40 @@ impl BoundUses {
         self.add_flow(&report.scene_flow);
         let (blocks, allocation) = (&report.blocks, &report.allocation);
         let refused = allocation.refused + allocation.eviction.lost;
-        self.blocks.add(blocks.peak as usize + lost_blocks as usize + allocation.refused as usize, refused);
-        self.visible_blocks.add((blocks.visible + allocation.unlisted) as usize, allocation.unlisted);
+        self.blocks.add(
+            blocks.peak as usize + lost_blocks as usize + allocation.refused as usize,
+            refused,
+        );
+        self.visible_blocks
+            .add((blocks.visible + allocation.unlisted) as usize, allocation.unlisted);
         self.history_frames.add(row.history_frames, report.prune.early);
         let instances = &report.instances;
         let found = &instances.detections;
-        let detections = found.accepted + found.tracked_only + found.covered + found.bad_mask + instances.segmentation.instances;
-        self.detections.add((detections + found.over_capacity + found.mask_store_full) as usize, found.over_capacity);
-        self.mask_words.add(instances.mask_words as usize, found.mask_store_full + instances.tracks.masks_lost);
+        let detections = found.accepted
+            + found.tracked_only
+            + found.covered
+            + found.bad_mask
+            + instances.segmentation.instances;
+        self.detections.add(
+            (detections + found.over_capacity + found.mask_store_full) as usize,
+            found.over_capacity,
+        );
+        self.mask_words.add(
+            instances.mask_words as usize,
+            found.mask_store_full + instances.tracks.masks_lost,
+        );
         let tracks = &instances.tracks;
-        self.tracks.add((tracks.tracks + tracks.evicted + tracks.refused) as usize, tracks.evicted + tracks.refused);
+        self.tracks.add(
+            (tracks.tracks + tracks.evicted + tracks.refused) as usize,
+            tracks.evicted + tracks.refused,
+        );
         let objects = &instances.objects;
         self.objects.add((objects.objects + objects.refused) as usize, objects.refused);
-        let most = mapper.objects().map(|(_, object)| object.volume().pool().peak()).max().unwrap_or_default();
+        let most = mapper
+            .objects()
+            .map(|(_, object)| object.volume().pool().peak())
+            .max()
+            .unwrap_or_default();
         self.object_blocks.add(most + objects.blocks_refused as usize, objects.blocks_refused);
         self.crop_pixels.add(objects.crop_pixels as usize, objects.crops_dropped);
     }
@@ -131,8 +153,8 @@ impl BoundUses {
 pub struct BoundsSection {
     /// Bound by bound.
     pub uses: BoundUses,
-    /// The least capacity with which nothing that was not refused would be. Where something was refused it is larger there than that of the
-    /// run, and may still be too small.
+    /// The least capacity with which nothing that was not refused would be. Where something was
+    /// refused it is larger there than that of the run, and may still be too small.
     pub least: Capacity,
 }
 
@@ -146,7 +168,11 @@ pub struct BoundsObserver {
 impl Observer for BoundsObserver {
     type Section = BoundsSection;
 
-    fn frame(&mut self, _: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        _: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         self.lost_blocks += u64::from(frame.row.report.allocation.eviction.lost);
         self.uses.add(frame.row, frame.view.mapper(), self.lost_blocks);
         Ok(())
@@ -155,11 +181,18 @@ impl Observer for BoundsObserver {
     fn finish(mut self, setup: &Setup<'_>, _: &Finished) -> Result<BoundsSection, ObserveError> {
         let volume = &setup.config.volume;
         if volume.prunes() {
-            // A shorter window would be another setting, even where the run ended before the window was full.
+            // A shorter window would be another setting, even where the run ended before the window
+            // was full.
             let asked = volume.prune_lag as usize;
-            self.uses.history_frames.needed =
-                if self.uses.history_frames.refused > 0 { asked } else { asked.min(setup.capacity.history_frames) };
+            self.uses.history_frames.needed = if self.uses.history_frames.refused > 0 {
+                asked
+            } else {
+                asked.min(setup.capacity.history_frames)
+            };
         }
-        Ok(BoundsSection { uses: self.uses, least: self.uses.least(setup.capacity, setup.dataset.size()) })
+        Ok(BoundsSection {
+            uses: self.uses,
+            least: self.uses.least(setup.capacity, setup.dataset.size()),
+        })
     }
 }

@@ -1,4 +1,5 @@
-//! What the report's charts show of each frame, thinned so that a long run has no more points than a short one.
+//! What the report's charts show of each frame, thinned so that a long run has no more points than
+//! a short one.
 
 use super::{FrameRow, STAGES};
 use dynvox_core::Stage;
@@ -87,11 +88,15 @@ impl Point {
 
     /// The larger of each value.
     fn merge(&mut self, next: &Self) {
-        self.values.iter_mut().zip(&next.values).for_each(|(value, next)| *value = value.max(*next));
+        self.values
+            .iter_mut()
+            .zip(&next.values)
+            .for_each(|(value, next)| *value = value.max(*next));
     }
 }
 
-/// The charted values of a run, in at most `MOST_POINTS` points of equally many frames; the last one may have fewer.
+/// The charted values of a run, in at most `MOST_POINTS` points of equally many frames; the last
+/// one may have fewer.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ChartValues {
     points: Vec<Point>,
@@ -150,18 +155,26 @@ mod tests {
 
     fn run(frames: usize) -> ChartValues {
         let mut values = ChartValues::default();
-        (0..frames).for_each(|at| values.add(&FrameRow { frame: 10 + at, step_ms: at as f64, ..FrameRow::default() }));
+        (0..frames).for_each(|at| {
+            values.add(&FrameRow { frame: 10 + at, step_ms: at as f64, ..FrameRow::default() })
+        });
         values
     }
 
     #[test]
     fn a_long_run_has_no_more_points_than_a_short_one_and_keeps_its_peaks() {
         let short = run(MOST_POINTS);
-        assert_eq!((short.frames_per_point(), short.frames()[1], short.series(Charted::Step)[1]), (1, 11, 1.0));
+        assert_eq!(
+            (short.frames_per_point(), short.frames()[1], short.series(Charted::Step)[1]),
+            (1, 11, 1.0)
+        );
         let long = run(5_000);
         assert_eq!((long.frames_per_point(), long.frames().len()), (8, 625));
         assert_eq!(long.frames()[1], 18);
         assert_eq!([0, 1, 624].map(|at| long.series(Charted::Step)[at]), [7.0, 15.0, 4_999.0]);
-        assert!(long.series(Charted::Resident).iter().all(|value| value.is_nan()), "unknown stays unknown");
+        assert!(
+            long.series(Charted::Resident).iter().all(|value| value.is_nan()),
+            "unknown stays unknown"
+        );
     }
 }

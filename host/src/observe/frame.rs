@@ -94,17 +94,19 @@ impl FrameRow {
         self.report.pose == PoseOrigin::Held
     }
 
-    /// Matches the estimate was made of, inliers among them, and their root mean square error in px; for the depth tracker the
-    /// matches that were checked, and those that agree.
+    /// Matches the estimate was made of, inliers among them, and their root mean square error in
+    /// px; for the depth tracker the matches that were checked, and those that agree.
     pub fn matches(&self) -> (u32, u32, f64) {
         if let Some(icp) = &self.report.icp {
             return (icp.matches[1], icp.matches[0], 0.0);
         }
-        self.report.egomotion.map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
+        self.report
+            .egomotion
+            .map_or((0, 0, 0.0), |motion| (motion.matches, motion.inliers, motion.residual_rms_px))
     }
 
-    /// The worst event of the frame: what the core reports, and what the sources of masks and depth refused. Objects of a frame
-    /// without masks go into the static map.
+    /// The worst event of the frame: what the core reports, and what the sources of masks and depth
+    /// refused. Objects of a frame without masks go into the static map.
     pub fn severity(&self) -> Severity {
         let masks = &self.mask_refusals;
         let of_sources = if masks.missing + masks.beyond > 0 {
@@ -119,11 +121,18 @@ impl FrameRow {
 
     /// What affected the map in this frame, in words.
     pub fn cause(&self) -> String {
-        let (allocation, motion, masks) = (&self.report.allocation, self.motion(), &self.mask_refusals);
+        let (allocation, motion, masks) =
+            (&self.report.allocation, self.motion(), &self.mask_refusals);
         let instances = &self.report.instances;
-        let lost = (self.report.segment > 0)
-            .then(|| format!("segment {} of the map, apart from the others: the camera was lost before", self.report.segment));
-        let guessed = self.held().then(|| format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " ")));
+        let lost = (self.report.segment > 0).then(|| {
+            format!(
+                "segment {} of the map, apart from the others: the camera was lost before",
+                self.report.segment
+            )
+        });
+        let guessed = self.held().then(|| {
+            format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " "))
+        });
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
             (allocation.beyond, "points beyond the map's coordinates"),
@@ -138,13 +147,20 @@ impl FrameRow {
             (instances.objects.blocks_refused, "blocks of objects refused"),
             (instances.objects.crops_dropped, "crops of objects dropped"),
             (self.report.internal_faults, "internal faults: please report them"),
-            (u32::from(self.report.self_calibration.is_uncorrected()), "disparity offset that is known and not corrected"),
+            (
+                u32::from(self.report.self_calibration.is_uncorrected()),
+                "disparity offset that is known and not corrected",
+            ),
         ];
-        let counted = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+        let counted = counts
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, what)| format!("{count} {what}"));
         guessed.into_iter().chain(lost).chain(counted).collect::<Vec<_>>().join("; ")
     }
 
-    /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the list of visible ones.
+    /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the
+    /// list of visible ones.
     pub fn blocks_refused(&self) -> u32 {
         let allocation = &self.report.allocation;
         allocation.refused + allocation.beyond + allocation.unlisted

@@ -1,4 +1,5 @@
-//! The frames of a run: their rows go to `frames.csv`; what the end of the run needs of them is kept in a form that does not grow.
+//! The frames of a run: their rows go to `frames.csv`; what the end of the run needs of them is
+//! kept in a form that does not grow.
 
 use super::tables::frame_row;
 use super::{ChartValues, FrameRow, GrowingFile, STAGES, StageTime};
@@ -77,7 +78,9 @@ impl FrameLog {
         self.file.append(&frame_row(&row, self.frames == 0)?);
         self.frames += 1;
         self.step.add(StageTime { wall_ms: row.step_ms, cpu_ms: row.times.cpu_ms });
-        for (times, time) in self.stages.iter_mut().zip(row.times.stages).filter(|(_, time)| time.wall_ms > 0.0) {
+        for (times, time) in
+            self.stages.iter_mut().zip(row.times.stages).filter(|(_, time)| time.wall_ms > 0.0)
+        {
             times.add(time);
         }
         self.charts.add(&row);
@@ -112,8 +115,12 @@ impl FrameLog {
 
     /// Statistics of `step` and every stage that ran, in pipeline order.
     pub fn stage_statistics(&self) -> Vec<(&'static str, StageStatistics)> {
-        let stages = Stage::ALL.iter().zip(&self.stages).map(|(stage, times)| (stage.name(), times));
-        std::iter::once(("step", &self.step)).chain(stages).filter_map(|(name, times)| Some((name, times.statistics()?))).collect()
+        let stages =
+            Stage::ALL.iter().zip(&self.stages).map(|(stage, times)| (stage.name(), times));
+        std::iter::once(("step", &self.step))
+            .chain(stages)
+            .filter_map(|(name, times)| Some((name, times.statistics()?)))
+            .collect()
     }
 }
 
@@ -127,14 +134,20 @@ mod tests {
         for ms in (1..=200).rev().map(f64::from) {
             let mut row = FrameRow { step_ms: 1.0, ..FrameRow::default() };
             if ms > 100.0 {
-                row.times.stages[Stage::Fuse as usize] = StageTime { wall_ms: ms, cpu_ms: 2.0 * ms };
+                row.times.stages[Stage::Fuse as usize] =
+                    StageTime { wall_ms: ms, cpu_ms: 2.0 * ms };
             }
             log.add(row).unwrap();
         }
         let statistics = log.stage_statistics();
-        assert_eq!(statistics.iter().map(|(name, of)| (*name, of.frames)).collect::<Vec<_>>(), [("step", 200), (Stage::Fuse.name(), 100)]);
+        assert_eq!(
+            statistics.iter().map(|(name, of)| (*name, of.frames)).collect::<Vec<_>>(),
+            [("step", 200), (Stage::Fuse.name(), 100)]
+        );
         let fuse = statistics[1].1;
-        for (value, exact) in [(fuse.median_ms, 151.0), (fuse.p99_ms, 200.0), (fuse.cpu_median_ms, 302.0)] {
+        for (value, exact) in
+            [(fuse.median_ms, 151.0), (fuse.p99_ms, 200.0), (fuse.cpu_median_ms, 302.0)]
+        {
             assert!((value / exact - 1.0).abs() < 1e-3, "{value} for {exact}");
         }
         assert_eq!((log.len(), log.charts().frames().len()), (200, 200));

@@ -26,7 +26,9 @@ impl FrameContext<'_, '_> {
     pub(super) fn jpeg(&mut self, shown: Shown) -> Vec<u8> {
         let at = shown as usize;
         let made = self.pictures.0[at].take();
-        let made = made.unwrap_or_else(|| self.picture(shown).as_ref().map(pictures::jpeg).unwrap_or_default());
+        let made = made.unwrap_or_else(|| {
+            self.picture(shown).as_ref().map(pictures::jpeg).unwrap_or_default()
+        });
         self.pictures.0[at].insert(made).clone()
     }
 

@@ -1,6 +1,10 @@
-//! Pictures of some frames and of the finished map as files, for the viewer: a fixed number, however long the run.
+//! Pictures of some frames and of the finished map as files, for the viewer: a fixed number,
+//! however long the run.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown, pictures, spread};
+use super::{
+    EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown,
+    pictures, spread,
+};
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -35,7 +39,11 @@ impl Observer for GalleryObserver {
         if !folder.is_dir() {
             return Ok(());
         }
-        let known: Vec<String> = self.taken.iter().flat_map(|(_, frame)| PictureKind::ALL.map(|kind| kind.file(*frame))).collect();
+        let known: Vec<String> = self
+            .taken
+            .iter()
+            .flat_map(|(_, frame)| PictureKind::ALL.map(|kind| kind.file(*frame)))
+            .collect();
         for entry in folder.read_dir().map_err(failed)? {
             let entry = entry.map_err(failed)?;
             if !known.iter().any(|name| entry.file_name() == name.as_str()) {
@@ -45,9 +53,16 @@ impl Observer for GalleryObserver {
         if self.taken.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let position = frame.position;
-        let chosen = setup.frames.map_or_else(|| position.is_multiple_of(self.every), |frames| spread(frames, FRAMES)(position));
+        let chosen = setup.frames.map_or_else(
+            || position.is_multiple_of(self.every),
+            |frames| spread(frames, FRAMES)(position),
+        );
         if chosen && self.failure.is_none() {
             self.taken.push((position, frame.row.frame));
             self.failure = write_frame(&folder(setup), frame).err().map(|error| error.to_string());
@@ -61,11 +76,22 @@ impl Observer for GalleryObserver {
             return Ok(());
         }
         let (width, height) = setup.dataset.size();
-        let index = PictureIndex { width, height, frames: self.taken.iter().map(|(_, frame)| *frame).collect() };
+        let index = PictureIndex {
+            width,
+            height,
+            frames: self.taken.iter().map(|(_, frame)| *frame).collect(),
+        };
         let overview = &end.overview_jpeg;
-        let written = if overview.is_empty() { Ok(()) } else { write(&folder(setup).join(OVERVIEW), overview) };
+        let written = if overview.is_empty() {
+            Ok(())
+        } else {
+            write(&folder(setup).join(OVERVIEW), overview)
+        };
         let index = serde_json::to_vec(&index).unwrap_or_default();
-        self.failure = written.and_then(|()| write(&folder(setup).join(PICTURES_INDEX), &index)).err().map(|error| error.to_string());
+        self.failure = written
+            .and_then(|()| write(&folder(setup).join(PICTURES_INDEX), &index))
+            .err()
+            .map(|error| error.to_string());
         Ok(())
     }
 
@@ -91,7 +117,9 @@ impl GalleryObserver {
             let stays = position.is_multiple_of(every);
             if !stays {
                 // One that stays behind is not in the list of pictures.
-                PictureKind::ALL.iter().for_each(|kind| drop(std::fs::remove_file(folder.join(kind.file(frame)))));
+                PictureKind::ALL
+                    .iter()
+                    .for_each(|kind| drop(std::fs::remove_file(folder.join(kind.file(frame)))));
             }
             stays
         });
@@ -104,7 +132,8 @@ fn folder(setup: &Setup<'_>) -> PathBuf {
 
 /// Writes the pictures of a frame. One that cannot be made leaves no file.
 fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-    std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
     let disparity_q8 = frame.view.mapper().disparity_q8();
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
     let composed = frame.jpeg(Shown::Composed);
@@ -120,5 +149,6 @@ fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), Ob
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), ObserveError> {
-    std::fs::write(path, bytes).map_err(|source| ObserveError::Write { path: path.to_path_buf(), source })
+    std::fs::write(path, bytes)
+        .map_err(|source| ObserveError::Write { path: path.to_path_buf(), source })
 }

@@ -1,5 +1,6 @@
-//! Files of the run folder that grow frame by frame, so that a long run keeps no rows in memory. A checkpoint has the length and the checksum
-//! of each; a resumed run truncates what was written after it.
+//! Files of the run folder that grow frame by frame, so that a long run keeps no rows in memory. A
+//! checkpoint has the length and the checksum of each; a resumed run truncates what was written
+//! after it.
 
 use super::ObserveError;
 use crate::formats::checksum_of;
@@ -11,7 +12,8 @@ use std::path::{Path, PathBuf};
 /// Bytes that are written at once.
 const WRITE_BYTES: usize = 16 << 10;
 
-/// A file that grows with the run. What the disk refuses stays in memory and is tried again with the next write.
+/// A file that grows with the run. What the disk refuses stays in memory and is tried again with
+/// the next write.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct GrowingFile {
     name: String,
@@ -65,7 +67,10 @@ impl GrowingFile {
     pub fn sync(&mut self, folder: &Path) -> Result<(), ObserveError> {
         self.write(folder)?;
         let path = self.path(folder);
-        self.file.as_ref().map_or(Ok(()), File::sync_data).map_err(|source| ObserveError::Write { path, source })
+        self.file
+            .as_ref()
+            .map_or(Ok(()), File::sync_data)
+            .map_err(|source| ObserveError::Write { path, source })
     }
 
     /// Brings the file back to its state at the checkpoint.
@@ -78,11 +83,16 @@ impl GrowingFile {
         let changed = |reason: String| ObserveError::Changed { path: path.clone(), reason };
         let file = match File::options().read(true).append(true).open(&path) {
             Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Err(changed("it is missing".to_owned())),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(changed("it is missing".to_owned()));
+            }
             Err(source) => return Err(failed(source)),
         };
         if checksum_of(&file, self.bytes).map_err(failed)? != Some(self.checksum) {
-            return Err(changed(format!("its first {} bytes are truncated or changed", self.bytes)));
+            return Err(changed(format!(
+                "its first {} bytes are truncated or changed",
+                self.bytes
+            )));
         }
         file.set_len(self.bytes).map_err(failed)?;
         self.file = Some(file);
@@ -141,12 +151,22 @@ mod tests {
         again.append(b"b\n");
         again.sync(folder.path()).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"a\nb\n");
-        for (bytes, reason) in [(&b"A\nb\n"[..], "truncated or changed"), (b"a", "truncated or changed")] {
+        for (bytes, reason) in
+            [(&b"A\nb\n"[..], "truncated or changed"), (b"a", "truncated or changed")]
+        {
             std::fs::write(&path, bytes).unwrap();
-            assert!(saved(&checkpoint).resume(folder.path()).unwrap_err().to_string().contains(reason));
+            assert!(
+                saved(&checkpoint).resume(folder.path()).unwrap_err().to_string().contains(reason)
+            );
         }
         std::fs::remove_file(&path).unwrap();
-        assert!(saved(&checkpoint).resume(folder.path()).unwrap_err().to_string().contains("it is missing"));
+        assert!(
+            saved(&checkpoint)
+                .resume(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("it is missing")
+        );
     }
 
     #[test]

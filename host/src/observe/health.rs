@@ -34,7 +34,11 @@ pub struct HealthObserver {
 impl Observer for HealthObserver {
     type Section = HealthSection;
 
-    fn frame(&mut self, _: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        _: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let (sums, row) = (&mut self.sums, frame.row);
         let instances = &row.report.instances;
         sums.matches_dropped += u64::from(row.report.dropped_features());
@@ -49,7 +53,11 @@ impl Observer for HealthObserver {
 
     fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<HealthSection, ObserveError> {
         let store = &finished.store;
-        let end = if u64::from(store.end.lost) + store.unreadable > 0 { Severity::MapAffected } else { Severity::Info };
+        let end = if u64::from(store.end.lost) + store.unreadable > 0 {
+            Severity::MapAffected
+        } else {
+            Severity::Info
+        };
         Ok(HealthSection { worst: self.sums.worst.max(end), ..self.sums })
     }
 }

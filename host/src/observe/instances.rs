@@ -20,12 +20,19 @@ pub struct InstancesObserver {}
 impl Observer for InstancesObserver {
     type Section = ();
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let Some(folder) = setup.save_instances else { return Ok(()) };
         let motion_folder = folder.join(MOTION_FOLDER);
-        std::fs::create_dir_all(&motion_folder).map_err(|source| ObserveError::Write { path: motion_folder.clone(), source })?;
+        std::fs::create_dir_all(&motion_folder)
+            .map_err(|source| ObserveError::Write { path: motion_folder.clone(), source })?;
         let (stem, size) = (stem(setup.dataset, frame.row.frame), setup.dataset.size());
-        let save = |folder: &Path, masks: &[InstanceMask]| Ok::<(), ObserveError>(save_masks(folder, &stem, size, masks)?);
+        let save = |folder: &Path, masks: &[InstanceMask]| {
+            Ok::<(), ObserveError>(save_masks(folder, &stem, size, masks)?)
+        };
         save(folder, &frame.images.masks.instances)?;
         save(&motion_folder, &found_by_motion(frame.view.mapper(), size))
     }
@@ -43,7 +50,9 @@ pub(super) fn stem(dataset: &dyn FrameSource, index: usize) -> String {
 /// The masks of this frame's moving objects that no source of masks gave.
 fn found_by_motion(mapper: &Mapper<'_>, (width, height): (usize, usize)) -> Vec<InstanceMask> {
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
-    let track_at = |u: i32, v: i32| mapper.instance_at(u, v).filter(|at| at.class == Class::MovingObject).map(|at| at.track);
+    let track_at = |u: i32, v: i32| {
+        mapper.instance_at(u, v).filter(|at| at.class == Class::MovingObject).map(|at| at.track)
+    };
     let mut labels = vec![0u16; width * height];
     let mut tracks = BTreeMap::new();
     for (at, label) in labels.iter_mut().enumerate() {
@@ -52,9 +61,13 @@ fn found_by_motion(mapper: &Mapper<'_>, (width, height): (usize, usize)) -> Vec<
         *label = *tracks.entry(track).or_insert(next);
     }
     let label_at = |u: i32, v: i32| labels.get(v as usize * width + u as usize).copied();
-    let score = |track: Option<u32>| mapper.tracks().find(|known| Some(known.id) == track).map_or(1.0, |track| track.score);
+    let score = |track: Option<u32>| {
+        mapper.tracks().find(|known| Some(known.id) == track).map_or(1.0, |track| track.score)
+    };
     let mask = |(track, label): (Option<u32>, u16)| {
-        InstanceMask::from_predicate(Class::MovingObject, score(track), image, |u, v| label_at(u, v) == Some(label))
+        InstanceMask::from_predicate(Class::MovingObject, score(track), image, |u, v| {
+            label_at(u, v) == Some(label)
+        })
     };
     tracks.into_iter().filter_map(mask).collect()
 }

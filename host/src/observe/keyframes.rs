@@ -1,6 +1,9 @@
 //! Pictures of some frames, and of the finished map.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown, spread};
+use super::{
+    EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown,
+    spread,
+};
 use serde::{Deserialize, Serialize};
 
 /// Frames shown in the report.
@@ -26,7 +29,8 @@ pub struct Keyframe {
 pub struct KeyframesSection {
     /// Pictures of some frames.
     pub keyframes: Vec<Keyframe>,
-    /// The finished map from behind and above the last camera, as a JPEG file; empty without frames.
+    /// The finished map from behind and above the last camera, as a JPEG file; empty without
+    /// frames.
     pub overview_jpeg: Vec<u8>,
 }
 
@@ -41,10 +45,17 @@ pub struct KeyframesObserver {
 impl Observer for KeyframesObserver {
     type Section = KeyframesSection;
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let position = frame.position;
         // Of a stream the first frame, and others ever further apart.
-        let chosen = setup.frames.map_or_else(|| position == 0 || position.is_power_of_two(), |frames| spread(frames, KEYFRAMES)(position));
+        let chosen = setup.frames.map_or_else(
+            || position == 0 || position.is_power_of_two(),
+            |frames| spread(frames, KEYFRAMES)(position),
+        );
         if chosen {
             if self.keyframes.len() == KEYFRAMES {
                 self.keyframes.remove(0);
@@ -65,7 +76,8 @@ impl Observer for KeyframesObserver {
 }
 
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
-    let (input_jpeg, disparity_jpeg, raycast_jpeg) = (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity), frame.jpeg(Shown::Map));
+    let (input_jpeg, disparity_jpeg, raycast_jpeg) =
+        (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity), frame.jpeg(Shown::Map));
     if input_jpeg.is_empty() || raycast_jpeg.is_empty() {
         return None;
     }

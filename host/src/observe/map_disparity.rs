@@ -1,4 +1,5 @@
-//! Saves what the finished map shows at every frame's pose, as disparities, to be compared with a matcher that was never fused.
+//! Saves what the finished map shows at every frame's pose, as disparities, to be compared with a
+//! matcher that was never fused.
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, instances::stem};
 use crate::formats::{Image, write_png_deep};
@@ -21,22 +22,31 @@ pub struct MapDisparityObserver {
 impl Observer for MapDisparityObserver {
     type Section = ();
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         if setup.save_map_disparity.is_some() {
-            self.frames.push((stem(setup.dataset, frame.row.frame), frame.row.report.t_world_camera));
+            self.frames
+                .push((stem(setup.dataset, frame.row.frame), frame.row.report.t_world_camera));
         }
         Ok(())
     }
 
     fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
         let Some(folder) = setup.save_map_disparity else { return Ok(()) };
-        let calibration = end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
+        let calibration =
+            end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
         let correction = calibration.and_then(|report| report.found()).unwrap_or_default();
         for (name, t_world_camera) in self.frames.drain(..) {
-            let seen =
-                end.view.raycast((&t_world_camera).into()).and_then(|seen| disparities(&setup.config.rig, &correction, seen.depth_m()?));
+            let seen = end
+                .view
+                .raycast((&t_world_camera).into())
+                .and_then(|seen| disparities(&setup.config.rig, &correction, seen.depth_m()?));
             if let Some(disparity) = seen {
-                write_png_deep(&folder.join(format!("{name}.png")), &disparity).map_err(InputError::from)?;
+                write_png_deep(&folder.join(format!("{name}.png")), &disparity)
+                    .map_err(InputError::from)?;
             }
         }
         Ok(())
@@ -47,8 +57,13 @@ impl Observer for MapDisparityObserver {
     }
 }
 
-/// Depths as the disparities that the images themselves have there, without what `correction` adds, in units of 1/256 px; 0 stays none.
-fn disparities(rig: &StereoRig, correction: &DisparityCorrection, depth_m: View<'_, f32>) -> Option<Image<u16>> {
+/// Depths as the disparities that the images themselves have there, without what `correction` adds,
+/// in units of 1/256 px; 0 stays none.
+fn disparities(
+    rig: &StereoRig,
+    correction: &DisparityCorrection,
+    depth_m: View<'_, f32>,
+) -> Option<Image<u16>> {
     let of_1_m = (rig.focal_px * rig.baseline_m) as f32;
     let width = depth_m.width();
     let disparity = |(at, &depth_m): (usize, &f32)| {
@@ -59,7 +74,11 @@ fn disparities(rig: &StereoRig, correction: &DisparityCorrection, depth_m: View<
         let right_px = [(at % width) as f32 - corrected_px, (at / width) as f32];
         ((corrected_px - correction.added_px(rig, right_px)) * UNITS_PER_PX).round().max(1.0) as u16
     };
-    Image::new(width, depth_m.height(), depth_m.pixels().iter().enumerate().map(disparity).collect())
+    Image::new(
+        width,
+        depth_m.height(),
+        depth_m.pixels().iter().enumerate().map(disparity).collect(),
+    )
 }
 
 #[cfg(test)]
@@ -68,7 +87,8 @@ mod tests {
 
     #[test]
     fn depths_become_the_disparities_of_the_rig() {
-        let rig = StereoRig { focal_px: 500.0, center_u_px: 1.0, center_v_px: 1.0, baseline_m: 0.5 };
+        let rig =
+            StereoRig { focal_px: 500.0, center_u_px: 1.0, center_v_px: 1.0, baseline_m: 0.5 };
         let depth_m = [0.0, 10.0, 100.0, 1e-3, 1e9, 250.0];
         let none = DisparityCorrection::default();
         let image = disparities(&rig, &none, View::new(&depth_m, 3, 2).unwrap()).unwrap();
@@ -78,8 +98,13 @@ mod tests {
 
     #[test]
     fn what_self_calibration_added_is_taken_off_again() {
-        let rig = StereoRig { focal_px: 500.0, center_u_px: 100.0, center_v_px: 1.0, baseline_m: 0.5 };
-        let correction = DisparityCorrection { offset_px: 0.5, row_quadratic_px: -1.0, ..DisparityCorrection::default() };
+        let rig =
+            StereoRig { focal_px: 500.0, center_u_px: 100.0, center_v_px: 1.0, baseline_m: 0.5 };
+        let correction = DisparityCorrection {
+            offset_px: 0.5,
+            row_quadratic_px: -1.0,
+            ..DisparityCorrection::default()
+        };
         let image = disparities(&rig, &correction, View::new(&[10.0; 3], 1, 3).unwrap()).unwrap();
         assert_eq!(image.pixels(), [6477, 6221, 6477]);
     }

@@ -1,5 +1,5 @@
-//! What is measured during a run. Each observer sees every frame after its step, keeps plain data that goes into checkpoints, and returns
-//! a section of the run's record in the end.
+//! What is measured during a run. Each observer sees every frame after its step, keeps plain data
+//! that goes into checkpoints, and returns a section of the run's record in the end.
 
 mod block_history;
 mod blocks;
@@ -48,7 +48,9 @@ pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
-pub use trajectory::{ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first};
+pub use trajectory::{
+    ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first,
+};
 pub use volume_copy::VolumeCopy;
 pub use written_file::WrittenFile;
 
@@ -161,7 +163,8 @@ pub struct EndContext<'a, 's> {
     pub last: Option<&'a FrameRow>,
     /// Objects that left the mapper at the end.
     pub retired: &'a [RetiredVolume],
-    /// The finished map from behind and above the last camera, as a JPEG file; empty without frames.
+    /// The finished map from behind and above the last camera, as a JPEG file; empty without
+    /// frames.
     pub overview_jpeg: Vec<u8>,
     /// The map.
     pub view: &'a mut dyn MapView<'s>,
@@ -193,7 +196,8 @@ pub trait Observer {
         Vec::new()
     }
 
-    /// A checkpoint is about to be written: waits until files written since the last one are on the disk.
+    /// A checkpoint is about to be written: waits until files written since the last one are on the
+    /// disk.
     ///
     /// # Errors
     /// The disk refuses.
@@ -201,7 +205,8 @@ pub trait Observer {
         Ok(())
     }
 
-    /// The run is resumed from a checkpoint: checks files written before it, and removes those written after it.
+    /// The run is resumed from a checkpoint: checks files written before it, and removes those
+    /// written after it.
     ///
     /// # Errors
     /// A file is missing or differs, or cannot be removed.
@@ -213,13 +218,21 @@ pub trait Observer {
     ///
     /// # Errors
     /// The data set or the disk refuses.
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError>;
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError>;
 
     /// Takes in the end.
     ///
     /// # Errors
     /// The disk refuses.
-    fn end(&mut self, _setup: &Setup<'_>, _end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        _setup: &Setup<'_>,
+        _end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         Ok(())
     }
 
@@ -285,7 +298,12 @@ impl Observer for Observers {
     type Section = Sections;
 
     fn files(&mut self) -> Vec<&mut GrowingFile> {
-        self.trajectory.files().into_iter().chain(self.tracks.files()).chain(self.block_history.files()).collect()
+        self.trajectory
+            .files()
+            .into_iter()
+            .chain(self.tracks.files())
+            .chain(self.block_history.files())
+            .collect()
     }
 
     fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
@@ -297,7 +315,11 @@ impl Observer for Observers {
         self.objects.resume(setup)
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         self.trajectory.frame(setup, frame)?;
         self.keyframes.frame(setup, frame)?;
         self.gallery.frame(setup, frame)?;

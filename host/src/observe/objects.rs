@@ -1,8 +1,11 @@
-//! Reconstructed objects: meshes of those that leave the mapper, and their poses. An object leaves within a step, which must not wait for
-//! its mesh: its blocks are copied there, and meshed here, after the step.
+//! Reconstructed objects: meshes of those that leave the mapper, and their poses. An object leaves
+//! within a step, which must not wait for its mesh: its blocks are copied there, and meshed here,
+//! after the step.
 
 use super::thumbnail::thumbnail;
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup, WrittenFile};
+use super::{
+    EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup, WrittenFile,
+};
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
@@ -51,7 +54,8 @@ pub struct ObjectsSection {
     pub objects: Vec<ReconstructedObject>,
     /// Names of objects whose files could not be written.
     pub unwritten: Vec<String>,
-    /// Triangles of the static map in the volume that moving objects swept; known where the truth is exact.
+    /// Triangles of the static map in the volume that moving objects swept; known where the truth
+    /// is exact.
     pub swept_triangles: Option<u64>,
 }
 
@@ -68,7 +72,8 @@ struct PosedAt {
 /// Collects objects.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct ObjectsObserver {
-    /// Poses of each object that is still in the mapper, in the frames it was fused in: by track and segment.
+    /// Poses of each object that is still in the mapper, in the frames it was fused in: by track
+    /// and segment.
     paths: BTreeMap<(u32, u32), Vec<PosedAt>>,
     /// The true surface seen of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
@@ -104,7 +109,9 @@ impl Observer for ObjectsObserver {
         }
         for entry in folder.read_dir().map_err(failed)? {
             let entry = entry.map_err(failed)?;
-            let known = |one: &ReconstructedObject| files(&one.name).iter().any(|file| entry.file_name() == file.as_str());
+            let known = |one: &ReconstructedObject| {
+                files(&one.name).iter().any(|file| entry.file_name() == file.as_str())
+            };
             if !self.retired.iter().any(known) {
                 std::fs::remove_file(entry.path()).map_err(failed)?;
             }
@@ -113,7 +120,11 @@ impl Observer for ObjectsObserver {
         if self.retired.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         self.write_all(setup, frame.retired);
         for object in fused(frame) {
             self.paths.entry((object.id, object.segment_id)).or_default().push(PosedAt {
@@ -133,7 +144,12 @@ impl Observer for ObjectsObserver {
 
     fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<ObjectsSection, ObserveError> {
         let mesh = finished.mesh_path.is_file();
-        let swept = self.swept.as_ref().filter(|_| mesh).map(|swept| swept.triangles(&finished.mesh_path)).transpose();
+        let swept = self
+            .swept
+            .as_ref()
+            .filter(|_| mesh)
+            .map(|swept| swept.triangles(&finished.mesh_path))
+            .transpose();
         let failed = |source| ObserveError::Write { path: finished.mesh_path.clone(), source };
         Ok(ObjectsSection {
             objects: self.retired,
@@ -150,9 +166,12 @@ fn fused(frame: &FrameContext<'_, '_>) -> Vec<ObjectSummary> {
 }
 
 impl ObjectsObserver {
-    /// Notes what is really there, where the truth is exact: the volume moving objects sweep, and the surfaces that are seen.
+    /// Notes what is really there, where the truth is exact: the volume moving objects sweep, and
+    /// the surfaces that are seen.
     fn note_truth(&mut self, setup: &Setup<'_>, frame: &FrameContext<'_, '_>) {
-        let (Some(truth), Some(exact)) = (&frame.images.objects, &frame.images.exact) else { return };
+        let (Some(truth), Some(exact)) = (&frame.images.objects, &frame.images.exact) else {
+            return;
+        };
         let t_map_world = frame.row.report.t_world_camera * truth.t_world_camera.inverse();
         let swept = self.swept.get_or_insert_default();
         truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
@@ -163,12 +182,18 @@ impl ObjectsObserver {
             t_world_camera: truth.t_world_camera,
             far_m: f64::from(setup.config.objects.far_m),
         };
-        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
+        let tracks: Vec<TrackReport> =
+            frame.view.mapper().tracks().filter(|track| track.detected).collect();
         for object in fused(frame) {
             let track = tracks.iter().find(|track| track.id == object.id);
             if let Some(truth) = track.and_then(|track| true_object(&track.pixels, truth)) {
-                let t_truth_object = truth.t_world_object.inverse() * t_map_world.inverse() * object.t_world_object;
-                self.sides.entry((object.id, object.segment_id)).or_default().add(&view, truth, &t_truth_object);
+                let t_truth_object =
+                    truth.t_world_object.inverse() * t_map_world.inverse() * object.t_world_object;
+                self.sides.entry((object.id, object.segment_id)).or_default().add(
+                    &view,
+                    truth,
+                    &t_truth_object,
+                );
             }
         }
     }
@@ -183,7 +208,9 @@ impl ObjectsObserver {
         for one in retired {
             let name = self.name_of(one);
             if let Err(error) = self.write(setup, one, &name) {
-                files(&name).iter().for_each(|file| drop(std::fs::remove_file(setup.folder.join(OBJECTS_FOLDER).join(file))));
+                files(&name).iter().for_each(|file| {
+                    drop(std::fs::remove_file(setup.folder.join(OBJECTS_FOLDER).join(file)))
+                });
                 self.unwritten.push(name);
                 self.failure.get_or_insert_with(|| error.to_string());
             }
@@ -197,12 +224,18 @@ impl ObjectsObserver {
     }
 
     /// Writes an object's mesh and poses. One without triangles leaves no file.
-    fn write(&mut self, setup: &Setup<'_>, RetiredVolume { summary, volume }: &RetiredVolume, name: &str) -> Result<(), ObserveError> {
+    fn write(
+        &mut self,
+        setup: &Setup<'_>,
+        RetiredVolume { summary, volume }: &RetiredVolume,
+        name: &str,
+    ) -> Result<(), ObserveError> {
         let poses = self.paths.remove(&(summary.id, summary.segment_id)).unwrap_or_default();
         let side = self.sides.remove(&(summary.id, summary.segment_id));
         let folder = setup.folder.join(OBJECTS_FOLDER);
         let mut triangles = Vec::new();
-        let meshed = volume.triangles(&setup.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
+        let meshed = volume
+            .triangles(&setup.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
         if triangles.is_empty() {
             return Ok(());
@@ -218,7 +251,8 @@ impl ObjectsObserver {
             frames: summary.frames,
             blocks: volume.blocks(),
             triangles: triangles.len() as u64,
-            surface: side.and_then(|side| side.compare(&triangles, f64::from(volume.config().voxel_size_m))),
+            surface: side
+                .and_then(|side| side.compare(&triangles, f64::from(volume.config().voxel_size_m))),
             thumbnail_jpeg: thumbnail(&triangles),
         });
         self.limit_thumbnails();
@@ -227,7 +261,8 @@ impl ObjectsObserver {
 
     /// Drops the thumbnail of the object fused least often when there are too many.
     fn limit_thumbnails(&mut self) {
-        let mut shown: Vec<_> = self.retired.iter_mut().filter(|one| !one.thumbnail_jpeg.is_empty()).collect();
+        let mut shown: Vec<_> =
+            self.retired.iter_mut().filter(|one| !one.thumbnail_jpeg.is_empty()).collect();
         if shown.len() > THUMBNAILS
             && let Some(least) = shown.iter_mut().min_by_key(|one| one.frames)
         {
@@ -236,9 +271,15 @@ impl ObjectsObserver {
     }
 }
 
-/// The files of an object: its mesh in its own frame and where it was last seen, its poses by frame and by time.
+/// The files of an object: its mesh in its own frame and where it was last seen, its poses by frame
+/// and by time.
 fn files(name: &str) -> [String; 4] {
-    [format!("{name}.ply"), format!("{name}_world.ply"), format!("{name}_kitti.txt"), format!("{name}_tum.txt")]
+    [
+        format!("{name}.ply"),
+        format!("{name}_world.ply"),
+        format!("{name}_kitti.txt"),
+        format!("{name}_tum.txt"),
+    ]
 }
 
 /// Writes an object's files.
@@ -256,22 +297,37 @@ fn write_files(
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     let last = poses.last().map(|pose| pose.t_world_object).unwrap_or_default();
     let own_frame = "the object's own frame: the camera's when it was first seen";
-    write_mesh(&mesh, id, (own_frame, Axes::Camera), triangles, &Transform::IDENTITY).map_err(failed(&mesh))?;
-    write_mesh(&world_mesh, id, ("the first camera", axes), triangles, &last).map_err(failed(&world_mesh))?;
+    write_mesh(&mesh, id, (own_frame, Axes::Camera), triangles, &Transform::IDENTITY)
+        .map_err(failed(&mesh))?;
+    write_mesh(&world_mesh, id, ("the first camera", axes), triangles, &last)
+        .map_err(failed(&world_mesh))?;
     let mut by_frame = Vec::new();
     let numbered: Vec<_> = poses.iter().map(|pose| (pose.frame, pose.t_world_object)).collect();
-    write_numbered(&mut by_frame, &numbered).and_then(|()| std::fs::write(&kitti, by_frame)).map_err(failed(&kitti))?;
-    let by_time: String = poses.iter().map(|pose| tum_line(pose.time_ns, &pose.t_world_object)).collect();
+    write_numbered(&mut by_frame, &numbered)
+        .and_then(|()| std::fs::write(&kitti, by_frame))
+        .map_err(failed(&kitti))?;
+    let by_time: String =
+        poses.iter().map(|pose| tum_line(pose.time_ns, &pose.t_world_object)).collect();
     std::fs::write(&tum, by_time).map_err(failed(&tum))
 }
 
 /// Writes a mesh that a pose carries to the frame of reference of that name.
-fn write_mesh(path: &Path, id: u32, (frame, axes): (&str, Axes), triangles: &[Triangle], pose: &Transform) -> std::io::Result<Mesh> {
-    let moved = |position_m: [f32; 3]| pose.transform_point(position_m.map(f64::from)).map(|metres| metres as f32);
+fn write_mesh(
+    path: &Path,
+    id: u32,
+    (frame, axes): (&str, Axes),
+    triangles: &[Triangle],
+    pose: &Transform,
+) -> std::io::Result<Mesh> {
+    let moved = |position_m: [f32; 3]| {
+        pose.transform_point(position_m.map(f64::from)).map(|metres| metres as f32)
+    };
     let mut ply = PlyWriter::begin_in(path, frame, axes)?;
     ply.begin_object(id);
     for Triangle { vertices } in triangles {
-        ply.triangle(vertices.map(|vertex| Vertex { position_m: moved(vertex.position_m), ..vertex }));
+        ply.triangle(
+            vertices.map(|vertex| Vertex { position_m: moved(vertex.position_m), ..vertex }),
+        );
     }
     ply.finish()
 }

@@ -1,4 +1,5 @@
-//! Pictures for the report: input, disparity in colours, the map from the camera's pose, errors against a reference.
+//! Pictures for the report: input, disparity in colours, the map from the camera's pose, errors
+//! against a reference.
 
 use super::MapView;
 use crate::evaluate::reference::{Region, Rule, Sample};
@@ -26,7 +27,8 @@ const STATIC: [u8; 3] = [40, 130, 255];
 const UNCERTAIN: [u8; 3] = [190, 190, 190];
 /// Share of a tint in what is tinted.
 const TINT: f32 = 0.45;
-/// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the camera's left shoulder.
+/// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the
+/// camera's left shoulder.
 const TO_LIGHT: [f32; 3] = [-0.36, -0.60, -0.714];
 
 /// Quality of JPEG files, of 100.
@@ -36,12 +38,23 @@ const MASK_ALPHA: u8 = 120;
 
 /// A picture as a PNG file.
 pub fn png(picture: &RgbImage) -> Vec<u8> {
-    file(|out| PngEncoder::new(out).write_image(picture, picture.width(), picture.height(), ExtendedColorType::Rgb8))
+    file(|out| {
+        PngEncoder::new(out).write_image(
+            picture,
+            picture.width(),
+            picture.height(),
+            ExtendedColorType::Rgb8,
+        )
+    })
 }
 
-/// A picture as a JPEG file: without planes of colour where it has none, which show the same pixels.
+/// A picture as a JPEG file: without planes of colour where it has none, which show the same
+/// pixels.
 pub fn jpeg(picture: &RgbImage) -> Vec<u8> {
-    let grey: Option<Vec<u8>> = picture.pixels().map(|&Rgb([red, green, blue])| (red == green && green == blue).then_some(red)).collect();
+    let grey: Option<Vec<u8>> = picture
+        .pixels()
+        .map(|&Rgb([red, green, blue])| (red == green && green == blue).then_some(red))
+        .collect();
     let (width, height) = picture.dimensions();
     file(|out| {
         let encoder = JpegEncoder::new_with_quality(out, JPEG_QUALITY);
@@ -73,7 +86,12 @@ fn thinned(widest_px: usize, width: usize, height: usize) -> (usize, u32, u32) {
 }
 
 /// A picture of the sampled pixels.
-fn picture(widest_px: usize, width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> RgbImage {
+fn picture(
+    widest_px: usize,
+    width: usize,
+    height: usize,
+    pixel: impl Fn(usize, usize) -> [u8; 3],
+) -> RgbImage {
     let (step, columns, rows) = thinned(widest_px, width, height);
     RgbImage::from_fn(columns, rows, |u, v| Rgb(pixel(u as usize * step, v as usize * step)))
 }
@@ -87,10 +105,12 @@ pub fn state_colour(state: MotionState) -> [u8; 3] {
     }
 }
 
-/// The instances of the last frame in the colours of their motion states, transparent elsewhere, as a PNG file. Empty without instances.
+/// The instances of the last frame in the colours of their motion states, transparent elsewhere, as
+/// a PNG file. Empty without instances.
 pub fn masks(mapper: &Mapper<'_>, width: usize, height: usize) -> Vec<u8> {
     let (step, columns, rows) = thinned(SMALL_PX, width, height);
-    let instance = |u: u32, v: u32| mapper.instance_at((u as usize * step) as i32, (v as usize * step) as i32);
+    let instance =
+        |u: u32, v: u32| mapper.instance_at((u as usize * step) as i32, (v as usize * step) as i32);
     let colour = |u: u32, v: u32| instance(u, v).map(|instance| state_colour(instance.state));
     let mask = RgbaImage::from_fn(columns, rows, |u, v| match colour(u, v) {
         Some([red, green, blue]) => Rgba([red, green, blue, MASK_ALPHA]),
@@ -103,7 +123,10 @@ pub fn masks(mapper: &Mapper<'_>, width: usize, height: usize) -> Vec<u8> {
 }
 
 /// Points over the darkened image, each a spot in the colour of its error.
-pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample, f32)>) -> Vec<u8> {
+pub fn errors<'a>(
+    grey: &View<'_, u8>,
+    samples: impl Iterator<Item = (&'a Sample, f32)>,
+) -> Vec<u8> {
     let (width, height) = (grey.width(), grey.height());
     // A few steps of grey, so that the file stays small.
     let mut pixels: Vec<[u8; 3]> = grey.rows().flatten().map(|&grey| [grey / 32 * 11; 3]).collect();
@@ -120,12 +143,19 @@ pub fn errors<'a>(grey: &View<'_, u8>, samples: impl Iterator<Item = (&'a Sample
             }
         }
     }
-    RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened()).map(|picture| jpeg(&picture)).unwrap_or_default()
+    RgbImage::from_raw(width as u32, height as u32, pixels.into_flattened())
+        .map(|picture| jpeg(&picture))
+        .unwrap_or_default()
 }
 
-/// Disparities against true ones, both 1/256 px and 0 none, each pixel of truth in the colour of its error over the darkened image; what the matcher filled
-/// in is darker.
-pub fn disparity_errors(grey: &View<'_, u8>, truth: &View<'_, u16>, given: &View<'_, u16>, marked: bool) -> Vec<u8> {
+/// Disparities against true ones, both 1/256 px and 0 none, each pixel of truth in the colour of
+/// its error over the darkened image; what the matcher filled in is darker.
+pub fn disparity_errors(
+    grey: &View<'_, u8>,
+    truth: &View<'_, u16>,
+    given: &View<'_, u16>,
+    marked: bool,
+) -> Vec<u8> {
     let px = |q8: u16| f32::from(q8) / f32::from(DISPARITY_ONE_PX);
     let picture = RgbImage::from_fn(grey.width() as u32, grey.height() as u32, |u, v| {
         let at = (u as usize, v as usize);
@@ -134,7 +164,11 @@ pub fn disparity_errors(grey: &View<'_, u8>, truth: &View<'_, u16>, given: &View
             return Rgb([grey.get(at.0, at.1).unwrap_or_default() / 32 * 11; 3]);
         }
         let colour = error_colour(px(given), px(truth));
-        Rgb(if marked && given & DISPARITY_FILLED != 0 { colour.map(|channel| channel / 2) } else { colour })
+        Rgb(if marked && given & DISPARITY_FILLED != 0 {
+            colour.map(|channel| channel / 2)
+        } else {
+            colour
+        })
     });
     png(&picture)
 }
@@ -143,7 +177,8 @@ pub fn disparity_errors(grey: &View<'_, u8>, truth: &View<'_, u16>, given: &View
 pub const IGNORED: [u8; 3] = [110, 110, 110];
 /// Points without an estimate.
 pub const MISSING: [u8; 3] = [190, 60, 230];
-/// Upper bounds of errors, as multiples of what is right, and their colours: blue is right, yellow to red wrong.
+/// Upper bounds of errors, as multiples of what is right, and their colours: blue is right, yellow
+/// to red wrong.
 pub const ERRORS: [(f32, [u8; 3]); 6] = [
     (0.25, [49, 84, 200]),
     (0.5, [84, 148, 224]),
@@ -166,16 +201,21 @@ fn error_colour(seen_px: f32, true_px: f32) -> [u8; 3] {
 /// The left image, in colour where there is one.
 pub fn input(grey: &View<'_, u8>, colour: Option<&View<'_, [u8; 3]>>) -> RgbImage {
     picture(SMALL_PX, grey.width(), grey.height(), |u, v| {
-        colour.and_then(|colour| colour.get(u, v)).or_else(|| grey.get(u, v).map(|grey| [grey; 3])).unwrap_or(EMPTY)
+        colour
+            .and_then(|colour| colour.get(u, v))
+            .or_else(|| grey.get(u, v).map(|grey| [grey; 3]))
+            .unwrap_or(EMPTY)
     })
 }
 
 /// Disparity as colours from blue (far) to red (near).
 pub fn disparity(disparity_q8: &View<'_, u16>) -> RgbImage {
     let near_px = NEAR_SHARE * disparity_q8.width() as f32;
-    picture(SMALL_PX, disparity_q8.width(), disparity_q8.height(), |u, v| match disparity_q8.get(u, v) {
-        Some(q8) if q8 > 0 => turbo(f32::from(q8) / f32::from(DISPARITY_ONE_PX) / near_px),
-        _ => EMPTY,
+    picture(SMALL_PX, disparity_q8.width(), disparity_q8.height(), |u, v| {
+        match disparity_q8.get(u, v) {
+            Some(q8) if q8 > 0 => turbo(f32::from(q8) / f32::from(DISPARITY_ONE_PX) / near_px),
+            _ => EMPTY,
+        }
     })
 }
 
@@ -188,13 +228,23 @@ fn looking(widest_px: usize, view: &dyn MapView<'_>, t_world_camera: &Transform)
 }
 
 /// The static map: its colours, or clay grey where it has none, lit from behind the camera.
-pub fn map(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Option<RgbImage> {
+pub fn map(
+    widest_px: usize,
+    view: &mut dyn MapView<'_>,
+    t_world_camera: &Transform,
+) -> Option<RgbImage> {
     painted(view.raycast(looking(widest_px, view, t_world_camera))?, |_| None)
 }
 
-/// The static map with every object at its pose: dynamic ones tinted orange, static ones blue. `None` without objects.
-pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &Transform) -> Option<RgbImage> {
-    let states: Vec<MotionState> = view.mapper().posed_objects().map(|posed| posed.summary.state).collect();
+/// The static map with every object at its pose: dynamic ones tinted orange, static ones blue.
+/// `None` without objects.
+pub fn composed(
+    widest_px: usize,
+    view: &mut dyn MapView<'_>,
+    t_world_camera: &Transform,
+) -> Option<RgbImage> {
+    let states: Vec<MotionState> =
+        view.mapper().posed_objects().map(|posed| posed.summary.state).collect();
     if states.is_empty() {
         return None;
     }
@@ -205,10 +255,15 @@ pub fn composed(widest_px: usize, view: &mut dyn MapView<'_>, t_world_camera: &T
     painted(view.raycast_with_objects(looking(widest_px, view, t_world_camera))?, tint)
 }
 
-/// What a raycast shows, tinted by layer with the colours of `tint`. `None` before the first raycast.
+/// What a raycast shows, tinted by layer with the colours of `tint`. `None` before the first
+/// raycast.
 fn painted(seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option<RgbImage> {
-    let (depth_m, normal, colour, layer) = (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
-    Some(Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }.picture())
+    let (depth_m, normal, colour, layer) =
+        (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
+    Some(
+        Painting { depth_m, normal, colour, tint: |u, v| layer.get(u, v).and_then(&tint) }
+            .picture(),
+    )
 }
 
 /// What a raycast shows, and how it is painted.
@@ -226,18 +281,25 @@ struct Painting<'a, T> {
 impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
     fn picture(&self) -> RgbImage {
         let (width, height) = (self.depth_m.width() as u32, self.depth_m.height() as u32);
-        RgbImage::from_fn(width, height, |u, v| Rgb(self.pixel(u as usize, v as usize).unwrap_or(EMPTY)))
+        RgbImage::from_fn(width, height, |u, v| {
+            Rgb(self.pixel(u as usize, v as usize).unwrap_or(EMPTY))
+        })
     }
 
     fn pixel(&self, u: usize, v: usize) -> Option<[u8; 3]> {
-        let (depth, normal, colour) = (self.depth_m.get(u, v)?, self.normal.get(u, v)?, self.colour.get(u, v)?);
+        let (depth, normal, colour) =
+            (self.depth_m.get(u, v)?, self.normal.get(u, v)?, self.colour.get(u, v)?);
         if depth <= 0.0 {
             return None;
         }
-        let facing: f32 = normal.iter().zip(TO_LIGHT).map(|(n, light)| f32::from(*n) * light).sum::<f32>() / NORMAL_ONE;
+        let facing: f32 =
+            normal.iter().zip(TO_LIGHT).map(|(n, light)| f32::from(*n) * light).sum::<f32>()
+                / NORMAL_ONE;
         let lit = facing.clamp(0.0, 1.0);
-        let (base, ambient) = if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
-        let shaded = base.map(|channel| 1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit));
+        let (base, ambient) =
+            if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
+        let shaded =
+            base.map(|channel| 1.05 * f32::from(channel) * (ambient + (1.0 - ambient) * lit));
         Some(match (self.tint)(u, v) {
             // A tinted surface keeps its shading: half its brightness, half the tint's colour.
             Some(tint) => [0, 1, 2].map(|c| (0.5 * shaded[c] + TINT * f32::from(tint[c])) as u8),
@@ -265,8 +327,12 @@ mod tests {
     #[test]
     fn a_grey_picture_shows_the_same_with_and_without_planes_of_colour() {
         let grey = RgbImage::from_fn(75, 41, |u, v| Rgb([(u * u + 3 * v * v + u * v) as u8; 3]));
-        let [one_plane, three_planes] = [jpeg(&grey), file(|out| JpegEncoder::new_with_quality(out, JPEG_QUALITY).encode_image(&grey))];
-        let [one, three] = [&one_plane, &three_planes].map(|bytes| image::load_from_memory(bytes).unwrap());
+        let [one_plane, three_planes] = [
+            jpeg(&grey),
+            file(|out| JpegEncoder::new_with_quality(out, JPEG_QUALITY).encode_image(&grey)),
+        ];
+        let [one, three] =
+            [&one_plane, &three_planes].map(|bytes| image::load_from_memory(bytes).unwrap());
         assert_eq!((one.color().channel_count(), three.color().channel_count()), (1, 3));
         assert!(one.into_rgb8() == three.into_rgb8() && one_plane.len() < three_planes.len());
     }

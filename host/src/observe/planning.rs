@@ -1,4 +1,5 @@
-//! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a picture of them.
+//! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a
+//! picture of them.
 
 use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup};
 use crate::scene::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, WindowScales};
@@ -12,7 +13,8 @@ const UNKNOWN_GREY: u8 = 205;
 /// What stands for a distance of 0 in `distance.png`, whose values are centimetres.
 const DISTANCE_ZERO: f32 = 32_768.0;
 
-/// Writes the window after the last frame, with what moves in it; of a stream, whose last frame is known too late, without.
+/// Writes the window after the last frame, with what moves in it; of a stream, whose last frame is
+/// known too late, without.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct PlanningObserver {
     written: bool,
@@ -21,7 +23,8 @@ pub struct PlanningObserver {
 /// What the files' numbers mean.
 #[derive(Clone, Debug, Serialize)]
 struct Description {
-    /// Number of the frame, and its camera's place in the window's axes: m to the right, ahead, upwards.
+    /// Number of the frame, and its camera's place in the window's axes: m to the right, ahead,
+    /// upwards.
     frame: usize,
     camera_m: [f64; 3],
     /// Cells along each side.
@@ -63,7 +66,11 @@ impl From<&MovingBox> for BoxDescription {
 impl Observer for PlanningObserver {
     type Section = ();
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         if setup.frames == Some(frame.position + 1) {
             self.write(setup, frame.row.frame, frame.view)?;
         }
@@ -83,13 +90,24 @@ impl Observer for PlanningObserver {
 }
 
 impl PlanningObserver {
-    fn write(&mut self, setup: &Setup<'_>, frame: usize, view: &mut dyn super::MapView<'_>) -> Result<(), ObserveError> {
+    fn write(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: usize,
+        view: &mut dyn super::MapView<'_>,
+    ) -> Result<(), ObserveError> {
         if view.mapper().planning().is_empty() {
             return Ok(());
         }
         let report = view.plan(0.0);
         let camera = view.mapper().t_world_camera().translation_m;
-        write_folder(&setup.folder.join(PLANNING_FOLDER), frame, camera, report, view.mapper().planning())?;
+        write_folder(
+            &setup.folder.join(PLANNING_FOLDER),
+            frame,
+            camera,
+            report,
+            view.mapper().planning(),
+        )?;
         self.written = true;
         Ok(())
     }
@@ -106,7 +124,8 @@ pub fn write_folder(
     report: PlanningReport,
     planning: &Planning<'_>,
 ) -> Result<(), ObserveError> {
-    std::fs::create_dir_all(folder).map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
     let write = |name: &str, bytes: &[u8]| {
         let path: PathBuf = folder.join(name);
         std::fs::write(&path, bytes).map_err(|source| ObserveError::Write { path, source })
@@ -121,7 +140,12 @@ pub fn write_folder(
     write("window.json", &serde_json::to_vec_pretty(&description).unwrap_or_default())
 }
 
-fn describe(columns: &Columns<'_, '_>, frame: usize, camera_world: [f64; 3], report: PlanningReport) -> Description {
+fn describe(
+    columns: &Columns<'_, '_>,
+    frame: usize,
+    camera_world: [f64; 3],
+    report: PlanningReport,
+) -> Description {
     let planning = columns.planning;
     let grid = planning.grid();
     let cell_m = grid.cell_m();
@@ -195,8 +219,14 @@ impl Columns<'_, '_> {
     fn heights(&self, description: &Description) -> ImageBuffer<Luma<u16>, Vec<u16>> {
         let (width, length) = self.size();
         ImageBuffer::from_fn(width, length, |u, v| {
-            let height_m = self.planning.column(self.at(u, v)).and_then(|column| column.ground_m()).map(f64::from);
-            let value = height_m.map(|height_m| (height_m - description.scales.height_zero_m) / description.scales.height_unit_m);
+            let height_m = self
+                .planning
+                .column(self.at(u, v))
+                .and_then(|column| column.ground_m())
+                .map(f64::from);
+            let value = height_m.map(|height_m| {
+                (height_m - description.scales.height_zero_m) / description.scales.height_unit_m
+            });
             Luma([value.map_or(u16::MAX, |value| (value + 0.5).min(65_534.0) as u16)])
         })
     }
@@ -206,15 +236,24 @@ impl Columns<'_, '_> {
         let (width, length) = self.size();
         ImageBuffer::from_fn(width, length, |u, v| {
             let distance = self.planning.slice_distance(self.at(u, v));
-            Luma([distance.map_or(0, |distance| (DISTANCE_ZERO + 0.5 + 100.0 * distance.distance_m).clamp(1.0, 65_535.0) as u16)])
+            Luma([distance.map_or(0, |distance| {
+                (DISTANCE_ZERO + 0.5 + 100.0 * distance.distance_m).clamp(1.0, 65_535.0) as u16
+            })])
         })
     }
 
-    /// For people: free ground by height, steps in orange, obstacles black, moving objects red, unknown grey, the camera blue.
+    /// For people: free ground by height, steps in orange, obstacles black, moving objects red,
+    /// unknown grey, the camera blue.
     fn picture(&self, description: &Description) -> RgbImage {
         let (width, length) = self.size();
-        let [camera_x, camera_y, _] = description.camera_m.map(|c| (c / description.scales.cell_m).floor() as i32);
-        let boxes = |cell: Cell| self.planning.boxes().iter().any(|moving| covers(moving, cell, description.scales.cell_m as f32));
+        let [camera_x, camera_y, _] =
+            description.camera_m.map(|c| (c / description.scales.cell_m).floor() as i32);
+        let boxes = |cell: Cell| {
+            self.planning
+                .boxes()
+                .iter()
+                .any(|moving| covers(moving, cell, description.scales.cell_m as f32))
+        };
         RgbImage::from_fn(width, length, |u, v| {
             let cell = self.at(u, v);
             let column = self.planning.column(cell).unwrap_or_default();
@@ -230,7 +269,9 @@ impl Columns<'_, '_> {
                 CellState::Free => match column.ground_m() {
                     _ if column.step_m > 0.06 => Rgb([255, 160, 40]),
                     Some(height_m) => {
-                        let above = ((f64::from(height_m) - description.scales.height_zero_m) * 128.0).clamp(0.0, 155.0) as u8;
+                        let above = ((f64::from(height_m) - description.scales.height_zero_m)
+                            * 128.0)
+                            .clamp(0.0, 155.0) as u8;
                         Rgb([100 + above, 230, 100])
                     }
                     None => Rgb([235, 235, 235]),
@@ -242,9 +283,13 @@ impl Columns<'_, '_> {
 
 /// Whether a box stands over the middle of a column.
 fn covers(moving: &MovingBox, [x, y, _]: Cell, cell_m: f32) -> bool {
-    let [dx, dy] = [(x as f32 + 0.5) * cell_m - moving.center_m[0], (y as f32 + 0.5) * cell_m - moving.center_m[1]];
+    let [dx, dy] = [
+        (x as f32 + 0.5) * cell_m - moving.center_m[0],
+        (y as f32 + 0.5) * cell_m - moving.center_m[1],
+    ];
     let [cos, sin] = moving.heading;
-    (cos * dx + sin * dy).abs() <= moving.half_m[0] && (cos * dy - sin * dx).abs() <= moving.half_m[1]
+    (cos * dx + sin * dy).abs() <= moving.half_m[0]
+        && (cos * dy - sin * dx).abs() <= moving.half_m[1]
 }
 
 /// A picture as a PNG file.

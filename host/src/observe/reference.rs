@@ -1,9 +1,10 @@
-//! Input and map against a reference depth, LiDAR or exact: regions are fixed while a frame is there, the map is viewed when the frame is due.
+//! Input and map against a reference depth, LiDAR or exact: regions are fixed while a frame is
+//! there, the map is viewed when the frame is due.
 
 use super::{Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
 use crate::evaluate::reference::{
-    DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, PointOutcomes, ProjectedScan, ReferenceFigures, Region, Sample,
-    SurfaceErrors, project_scan, sample_exact_depth,
+    DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, PointOutcomes, ProjectedScan,
+    ReferenceFigures, Region, Sample, SurfaceErrors, project_scan, sample_exact_depth,
 };
 use crate::formats::Image;
 use crate::input::InstanceMask;
@@ -24,7 +25,8 @@ const SAMPLED_FRAMES: usize = 24;
 /// What the map is evaluated against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Reference {
-    /// LiDAR scans, of the frames that have one: `velodyne/` next to the images, or the synthetic street's.
+    /// LiDAR scans, of the frames that have one: `velodyne/` next to the images, or the synthetic
+    /// street's.
     Lidar,
     /// The synthetic street's exact depth.
     Exact,
@@ -61,23 +63,38 @@ pub struct ReferencePlan {
 }
 
 impl ReferencePlan {
-    /// All frames that have the reference, each evaluated `delay` frames later; `None` when no frame has it in time.
-    pub fn all(dataset: &dyn FrameSource, indices: &[usize], reference: Reference, delay: usize) -> Option<Self> {
+    /// All frames that have the reference, each evaluated `delay` frames later; `None` when no
+    /// frame has it in time.
+    pub fn all(
+        dataset: &dyn FrameSource,
+        indices: &[usize],
+        reference: Reference,
+        delay: usize,
+    ) -> Option<Self> {
         let in_time = indices.iter().enumerate().take(indices.len().saturating_sub(delay));
-        let positions = in_time.filter(|&(_, &index)| reference.is_there(dataset, index)).map(|(at, _)| at).collect();
+        let positions = in_time
+            .filter(|&(_, &index)| reference.is_there(dataset, index))
+            .map(|(at, _)| at)
+            .collect();
         Self::of(reference, delay, positions)
     }
 
     /// Some frames against exact depth, at once; `None` where there is no exact depth.
     pub fn sampled(dataset: &dyn FrameSource, indices: &[usize]) -> Option<Self> {
         let chosen = spread(indices.len(), SAMPLED_FRAMES);
-        let positions = if dataset.has_exact_depth() { (0..indices.len()).filter(|&at| chosen(at)).collect() } else { Vec::new() };
+        let positions = if dataset.has_exact_depth() {
+            (0..indices.len()).filter(|&at| chosen(at)).collect()
+        } else {
+            Vec::new()
+        };
         Self::of(Reference::Exact, 0, positions)
     }
 
     fn of(reference: Reference, delay: usize, positions: Vec<usize>) -> Option<Self> {
         let count = PICTURES.min(positions.len());
-        let drawn = (1..=count).filter_map(|at| positions.get(at * positions.len() / count - 1).copied()).collect();
+        let drawn = (1..=count)
+            .filter_map(|at| positions.get(at * positions.len() / count - 1).copied())
+            .collect();
         (!positions.is_empty()).then_some(Self { reference, delay, positions, drawn })
     }
 }
@@ -125,16 +142,26 @@ pub struct ReferenceObserver {
 impl Observer for ReferenceObserver {
     type Section = Option<ReferenceSection>;
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let Some(plan) = &setup.reference else { return Ok(()) };
-        let pending = if plan.positions.binary_search(&frame.position).is_ok() { pending(setup, plan, frame)? } else { None };
+        let pending = if plan.positions.binary_search(&frame.position).is_ok() {
+            pending(setup, plan, frame)?
+        } else {
+            None
+        };
         let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
         // Object poses of past frames are not kept: later the background is viewed alone.
         let seen = match plan.delay {
             0 => frame.view.raycast_with_objects((&due.t_world_camera).into()),
             _ => frame.view.raycast((&due.t_world_camera).into()),
         };
-        if let Some((depth_m, normal)) = seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?))) {
+        if let Some((depth_m, normal)) =
+            seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?)))
+        {
             self.compare(setup, &due, &depth_m, &normal);
         }
         Ok(())
@@ -142,7 +169,12 @@ impl Observer for ReferenceObserver {
 
     fn finish(self, setup: &Setup<'_>, _: &Finished) -> Result<Self::Section, ObserveError> {
         Ok(setup.reference.as_ref().map(|plan| ReferenceSection {
-            figures: ReferenceFigures::of(plan.reference.name(), plan.delay, &self.frames, self.depth_errors.figures()),
+            figures: ReferenceFigures::of(
+                plan.reference.name(),
+                plan.delay,
+                &self.frames,
+                self.depth_errors.figures(),
+            ),
             frames: self.frames,
             outcomes: self.outcomes,
             surface_errors: self.surface_errors,
@@ -153,7 +185,13 @@ impl Observer for ReferenceObserver {
 
 impl ReferenceObserver {
     /// Compares a frame that is due with a view of the map from its pose.
-    fn compare(&mut self, setup: &Setup<'_>, due: &PendingFrame, map_depth_m: &View<'_, f32>, normal: &View<'_, [i8; 3]>) {
+    fn compare(
+        &mut self,
+        setup: &Setup<'_>,
+        due: &PendingFrame,
+        map_depth_m: &View<'_, f32>,
+        normal: &View<'_, [i8; 3]>,
+    ) {
         let rig = &setup.config.rig;
         let focal_baseline_px_m = rig.focal_baseline_px_m();
         let (size, full_size) = (setup.dataset.size(), setup.dataset.full_size());
@@ -162,7 +200,9 @@ impl ReferenceObserver {
         self.frames.push(evaluated);
         self.outcomes.push(PointOutcomes::of(due, &shown_px, enlarged));
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
-        for (sample, &shown_px) in due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static) {
+        for (sample, &shown_px) in
+            due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static)
+        {
             if shown_px > 0.0 {
                 let (shown_m, true_m) = (depth_m(shown_px), depth_m(sample.point.disparity_px));
                 let (ray, along_normal) = (ray(rig, sample), along_normal(rig, normal, sample));
@@ -177,16 +217,22 @@ impl ReferenceObserver {
             let samples = || due.samples.iter();
             self.pictures.push(ErrorPictures {
                 frame: due.frame,
-                input_jpeg: pictures::errors(&picture, samples().map(|sample| (sample, sample.input_px))),
+                input_jpeg: pictures::errors(
+                    &picture,
+                    samples().map(|sample| (sample, sample.input_px)),
+                ),
                 map_jpeg: pictures::errors(&picture, samples().zip(shown_px.iter().copied())),
             });
         }
     }
 }
 
-/// Length of a sample's ray of depth 1 along the normal that the map shows there; `None` where it shows none.
+/// Length of a sample's ray of depth 1 along the normal that the map shows there; `None` where it
+/// shows none.
 fn along_normal(rig: &StereoRig, normal: &View<'_, [i8; 3]>, sample: &Sample) -> Option<f64> {
-    let [x, y, z] = normal.get(sample.point.u.into(), sample.point.v.into())?.map(|n| f64::from(n) / f64::from(NORMAL_ONE));
+    let [x, y, z] = normal
+        .get(sample.point.u.into(), sample.point.v.into())?
+        .map(|n| f64::from(n) / f64::from(NORMAL_ONE));
     let ray = ray(rig, sample);
     ([x, y, z] != [0.0; 3]).then(|| x * ray[0] + y * ray[1] + z)
 }
@@ -197,36 +243,57 @@ fn ray(rig: &StereoRig, sample: &Sample) -> [f64; 3] {
     [across(sample.point.u, rig.center_u_px), across(sample.point.v, rig.center_v_px), 1.0]
 }
 
-/// The points of a frame, with their regions and what the input measured there; `None` without a reference.
-fn pending(setup: &Setup<'_>, plan: &ReferencePlan, frame: &FrameContext<'_, '_>) -> Result<Option<PendingFrame>, ObserveError> {
+/// The points of a frame, with their regions and what the input measured there; `None` without a
+/// reference.
+fn pending(
+    setup: &Setup<'_>,
+    plan: &ReferencePlan,
+    frame: &FrameContext<'_, '_>,
+) -> Result<Option<PendingFrame>, ObserveError> {
     let (rig, images, mapper) = (&setup.config.rig, frame.images, frame.view.mapper());
     let (width, height) = setup.dataset.size();
     let (near_m, far_m) = (setup.config.volume.near_m.into(), setup.config.volume.far_m.into());
     let field = Field { width, height, near_m, far_m };
     let scan: Option<ProjectedScan> = match plan.reference {
-        Reference::Lidar => setup.dataset.lidar(frame.row.frame)?.map(|scan| project_scan(&scan, &field)),
-        Reference::Exact => images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, rig, &field)),
+        Reference::Lidar => {
+            setup.dataset.lidar(frame.row.frame)?.map(|scan| project_scan(&scan, &field))
+        }
+        Reference::Exact => {
+            images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, rig, &field))
+        }
     };
     let disparity = mapper.disparity_q8();
-    // The map's metres are those of the scaled baseline: a disparity is compared as the calibrated rig would have it at that depth.
+    // The map's metres are those of the scaled baseline: a disparity is compared as the calibrated
+    // rig would have it at that depth.
     let baseline_scale = setup.config.rig_settings.baseline_scale as f32;
     let input_px = |u: usize, v: usize| {
-        let px = f32::from(disparity.get(u, v).unwrap_or_default()) / f32::from(DISPARITY_ONE_PX) / baseline_scale;
+        let px = f32::from(disparity.get(u, v).unwrap_or_default())
+            / f32::from(DISPARITY_ONE_PX)
+            / baseline_scale;
         let depth_m = rig.focal_baseline_px_m() / f64::from(px);
         // Only what is fused is the map's input. Infinite where there is no disparity.
         if depth_m >= near_m && depth_m <= far_m { px } else { 0.0 }
     };
     let region = |u: i32, v: i32| region(setup, mapper, images, u, v);
     Ok(scan.map(|scan| {
-        let mut pending = PendingFrame::new(frame.row.frame, frame.row.report.t_world_camera, &scan, input_px, region);
+        let mut pending = PendingFrame::new(
+            frame.row.frame,
+            frame.row.report.t_world_camera,
+            &scan,
+            input_px,
+            region,
+        );
         let rectified = mapper.rectified_pair().map(|[left, _]| Image::from_view(&left));
-        pending.picture = plan.drawn.contains(&frame.position).then(|| rectified.unwrap_or_else(|| images.left.clone()));
+        pending.picture = plan
+            .drawn
+            .contains(&frame.position)
+            .then(|| rectified.unwrap_or_else(|| images.left.clone()));
         pending
     }))
 }
 
-/// The region of a pixel. Without object tracking every masked object counts as one of unknown motion, so that maps with and without it
-/// are evaluated at the same points of the background.
+/// The region of a pixel. Without object tracking every masked object counts as one of unknown
+/// motion, so that maps with and without it are evaluated at the same points of the background.
 fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32, v: i32) -> Region {
     let instances = &setup.config.tracking;
     if instances.dynamic {
@@ -241,5 +308,9 @@ fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32,
             && instances.is_reconstructable(one.pixels.intersection(&image).area(), width)
     };
     let object = images.masks.instances.iter().find(taken);
-    Region::of(object.map(|one| InstanceAt { class: one.class, track: None, state: MotionState::Uncertain }).as_ref())
+    Region::of(
+        object
+            .map(|one| InstanceAt { class: one.class, track: None, state: MotionState::Uncertain })
+            .as_ref(),
+    )
 }

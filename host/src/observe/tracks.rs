@@ -153,24 +153,41 @@ impl Observer for TracksObserver {
         vec![&mut self.file]
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-        let tracks: Vec<TrackReport> = frame.view.mapper().tracks().filter(|track| track.detected).collect();
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
+        let tracks: Vec<TrackReport> =
+            frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
             let size = setup.dataset.size();
-            let large_enough = |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
+            let large_enough =
+                |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
             self.compared_frames.push(frame.row.frame);
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
-                let large_enough = |pixels: u64| setup.config.tracking.is_trackable(pixels as i64, size.0);
-                self.masks.add(&overlaps, &truth.objects, &truth.t_world_camera, large_enough, |label| by_motion.contains(&label));
+                let large_enough =
+                    |pixels: u64| setup.config.tracking.is_trackable(pixels as i64, size.0);
+                self.masks.add(
+                    &overlaps,
+                    &truth.objects,
+                    &truth.t_world_camera,
+                    large_enough,
+                    |label| by_motion.contains(&label),
+                );
             }
         }
         let rows: Vec<TrackRow> = tracks.iter().map(TrackRow::from).collect();
         let text = track_rows(frame.row.frame, &rows, self.file.is_empty());
-        self.file.append(&text.map_err(|source| ObserveError::Write { path: self.file.path(&setup.folder), source })?);
+        self.file.append(&text.map_err(|source| ObserveError::Write {
+            path: self.file.path(&setup.folder),
+            source,
+        })?);
         for row in &rows {
-            let sums = self.tracks.entry(row.id).or_insert_with(|| TrackSums::begin(frame.row.frame));
+            let sums =
+                self.tracks.entry(row.id).or_insert_with(|| TrackSums::begin(frame.row.frame));
             sums.add(frame.row.frame, self.frames, row);
         }
         self.frames += 1;
@@ -180,7 +197,11 @@ impl Observer for TracksObserver {
     fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<TracksSection, ObserveError> {
         let errors = self.errors.tracks();
         Ok(TracksSection {
-            tracks: self.tracks.into_iter().map(|(id, sums)| sums.record(id, errors.get(&id))).collect(),
+            tracks: self
+                .tracks
+                .into_iter()
+                .map(|(id, sums)| sums.record(id, errors.get(&id)))
+                .collect(),
             figures: self.errors.figures(),
             masks: self.masks.figures(),
             comparisons: self.errors.comparisons(),
@@ -189,15 +210,18 @@ impl Observer for TracksObserver {
     }
 }
 
-/// Overlaps of this frame's instances with the exact masks, and the labels of those found by motion. Labels number the instances.
+/// Overlaps of this frame's instances with the exact masks, and the labels of those found by
+/// motion. Labels number the instances.
 fn overlaps(mapper: &Mapper<'_>, exact: &Image<u8>) -> (Overlaps, BTreeSet<u16>) {
-    let (mut labels, mut by_motion) = (BTreeMap::<(Option<u32>, Class), u16>::new(), BTreeSet::new());
+    let (mut labels, mut by_motion) =
+        (BTreeMap::<(Option<u32>, Class), u16>::new(), BTreeSet::new());
     let width = exact.width();
     let overlaps = Overlaps::of(exact.pixels().iter().enumerate().map(|(at, truth)| {
-        let found = mapper.instance_at((at % width) as i32, (at / width) as i32).map_or(0, |instance| {
-            let next = labels.len() as u16 + 1;
-            *labels.entry((instance.track, instance.class)).or_insert(next)
-        });
+        let found =
+            mapper.instance_at((at % width) as i32, (at / width) as i32).map_or(0, |instance| {
+                let next = labels.len() as u16 + 1;
+                *labels.entry((instance.track, instance.class)).or_insert(next)
+            });
         (found, u16::from(*truth))
     }));
     let moving = labels.iter().filter(|((_, class), _)| *class == Class::MovingObject);

@@ -1,5 +1,5 @@
-//! The camera's path: written to `trajectory_kitti.txt` and `trajectory_tum.txt` as it comes, and kept in memory only where it is compared with
-//! true poses, which are there as well.
+//! The camera's path: written to `trajectory_kitti.txt` and `trajectory_tum.txt` as it comes, and
+//! kept in memory only where it is compared with true poses, which are there as well.
 
 use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
@@ -61,7 +61,9 @@ impl ThinnedPath {
             }
             self.points_m.push(position_m);
         }
-        let step = self.last_m.map(|last| nalgebra::Vector3::from(position_m) - nalgebra::Vector3::from(last));
+        let step = self
+            .last_m
+            .map(|last| nalgebra::Vector3::from(position_m) - nalgebra::Vector3::from(last));
         self.length_m += step.map_or(0.0, |step| step.norm());
         self.last_m = Some(position_m);
         self.frames += 1;
@@ -115,7 +117,11 @@ impl Observer for TrajectoryObserver {
         vec![&mut self.kitti, &mut self.tum]
     }
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let (row, pose) = (frame.row, frame.row.report.t_world_camera);
         self.kitti.append(kitti_line(&pose).as_bytes());
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
@@ -126,7 +132,9 @@ impl Observer for TrajectoryObserver {
         }
         self.held_frames += usize::from(row.held());
         self.segments = row.report.segment + 1;
-        if let Some(status) = row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked) {
+        if let Some(status) =
+            row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked)
+        {
             self.lost_frames += 1;
             self.first_lost.get_or_insert((row.frame, status));
         }
@@ -143,14 +151,19 @@ impl Observer for TrajectoryObserver {
             truth,
             held_frames: self.held_frames,
             segments: self.segments,
-            failures: self.first_lost.map(|(first, status)| TrackingFailures { frames: self.lost_frames, first, cause: status.name() }),
+            failures: self.first_lost.map(|(first, status)| TrackingFailures {
+                frames: self.lost_frames,
+                first,
+                cause: status.name(),
+            }),
         })
     }
 }
 
 /// Poses of the chosen frames relative to the first of them.
 pub fn from_first(poses: &[Transform], indices: &[usize]) -> Vec<Transform> {
-    let chosen: Vec<Transform> = indices.iter().filter_map(|&index| poses.get(index).copied()).collect();
+    let chosen: Vec<Transform> =
+        indices.iter().filter_map(|&index| poses.get(index).copied()).collect();
     let Some(first) = chosen.first().map(Transform::inverse) else { return Vec::new() };
     chosen.iter().map(|pose| first * pose).collect()
 }
@@ -165,7 +178,10 @@ mod tests {
         (0..10_000).for_each(|at| path.add([0.0, 0.0, 0.5 * f64::from(at)]));
         let points: Vec<[f64; 3]> = path.points_m().collect();
         assert!(points.len() <= MOST_POINTS && path.doublings == 2, "{}", points.len());
-        assert_eq!((points[1][2], points[points.len() - 1][2], path.length_m()), (2.0, 4_999.5, 4_999.5));
+        assert_eq!(
+            (points[1][2], points[points.len() - 1][2], path.length_m()),
+            (2.0, 4_999.5, 4_999.5)
+        );
         assert_eq!(ThinnedPath::default().points_m().count(), 0);
     }
 }

@@ -4,7 +4,9 @@ use crate::slab::HostSlab;
 use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::view::{MeshConfig, MeshSink};
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig};
+use dynvox_core::volume::{
+    BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig,
+};
 use std::io::{Error, ErrorKind};
 
 /// The blocks of a volume, in its order.
@@ -26,12 +28,23 @@ impl VolumeCopy {
     /// Copies a volume.
     pub fn of(volume: &Volume<'_>) -> Self {
         let (pool, blocks) = (volume.pool(), volume.blocks());
-        let mut copy = Self { config: *volume.config(), colour: false, blocks: Vec::with_capacity(pool.len()) };
+        let mut copy = Self {
+            config: *volume.config(),
+            colour: false,
+            blocks: Vec::with_capacity(pool.len()),
+        };
         for slot in pool.live() {
             let colour = blocks.colour(slot);
             copy.colour |= colour.is_some();
-            if let (Some(coord), Some(&sdf), Some(&weight)) = (blocks.coord(slot), blocks.sdf(slot), blocks.weight(slot)) {
-                copy.blocks.push(Block { coord, sdf, weight, colour: colour.copied().unwrap_or([[0; BLOCK_VOXELS]; 3]) });
+            if let (Some(coord), Some(&sdf), Some(&weight)) =
+                (blocks.coord(slot), blocks.sdf(slot), blocks.weight(slot))
+            {
+                copy.blocks.push(Block {
+                    coord,
+                    sdf,
+                    weight,
+                    colour: colour.copied().unwrap_or([[0; BLOCK_VOXELS]; 3]),
+                });
             }
         }
         copy
@@ -62,7 +75,9 @@ impl VolumeCopy {
         };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).ok_or(ErrorKind::OutOfMemory)?;
-        let misfit = |error| Error::other(format!("an object's blocks do not fit the copy's memory: {error:?}"));
+        let misfit = |error| {
+            Error::other(format!("an object's blocks do not fit the copy's memory: {error:?}"))
+        };
         let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
         let mut volume = Volume::new_in(&capacity, &self.config, &mut carver);
         carver.check().map_err(misfit)?;
@@ -102,18 +117,23 @@ mod tests {
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
 
-    /// A volume of two walls. The first is pruned away, so that slots are free between those in use.
+    /// A volume of two walls. The first is pruned away, so that slots are free between those in
+    /// use.
     fn with_volume(colour: bool, test: impl FnOnce(&Volume<'_>)) {
         let capacity = Capacity { blocks: 500, colour, ..Capacity::TINY };
         let config = VolumeConfig { truncation_m: 0.2, ..VolumeConfig::default() };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).unwrap();
-        let mut volume = Volume::new_in(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
-        let rig = StereoRig { focal_px: 80.0, center_u_px: 48.0, center_v_px: 32.0, baseline_m: 0.5 };
-        let view = Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::IDENTITY };
+        let mut volume =
+            Volume::new_in(&capacity, &config, &mut Carver::new(slab.bytes_mut(), bytes).unwrap());
+        let rig =
+            StereoRig { focal_px: 80.0, center_u_px: 48.0, center_v_px: 32.0, baseline_m: 0.5 };
+        let view =
+            Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::IDENTITY };
         let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| 40 + (i % 200) as u8).collect();
         for walls_m in [[1.0, 2.0], [0.0, 2.0]] {
-            let depth_m: Vec<f32> = (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();
+            let depth_m: Vec<f32> =
+                (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();
             let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
             let seen = Observation {
                 depth_m,
@@ -138,8 +158,14 @@ mod tests {
                 let mesh = MeshConfig::default();
                 volume.triangles(&mesh, &mut |triangle| own.push(triangle));
                 let copy = VolumeCopy::of(volume);
-                let count = copy.triangles(&mesh, &mut |triangle: Triangle| copied.push(triangle)).unwrap();
-                assert!(own == copied && count == own.len() as u64, "{} and {}", own.len(), copied.len());
+                let count =
+                    copy.triangles(&mesh, &mut |triangle: Triangle| copied.push(triangle)).unwrap();
+                assert!(
+                    own == copied && count == own.len() as u64,
+                    "{} and {}",
+                    own.len(),
+                    copied.len()
+                );
                 assert!(own.len() > 100 && copy.blocks() == volume.pool().len());
                 // Two frames were fused, and what was seen in one of them alone is pruned.
                 assert!(own.iter().flat_map(|one| one.vertices).all(|vertex| vertex.weight == 2));

@@ -39,16 +39,21 @@ impl WrittenFile {
     /// It is missing, or a byte of it has changed.
     pub fn check(&self, folder: &Path) -> Result<(), ObserveError> {
         let path = folder.join(&self.name);
-        let changed = |reason: &str| ObserveError::Changed { path: path.clone(), reason: reason.to_owned() };
+        let changed =
+            |reason: &str| ObserveError::Changed { path: path.clone(), reason: reason.to_owned() };
         let failed = |source| ObserveError::Write { path: path.clone(), source };
         let file = match File::open(&path) {
             Ok(file) => file,
-            Err(error) if error.kind() == ErrorKind::NotFound => return Err(changed("it is missing")),
+            Err(error) if error.kind() == ErrorKind::NotFound => {
+                return Err(changed("it is missing"));
+            }
             Err(source) => return Err(failed(source)),
         };
         let as_long = file.metadata().map_err(failed)?.len() == self.bytes;
         if !as_long || checksum_of(&file, self.bytes).map_err(failed)? != Some(self.checksum) {
-            return Err(changed("it is truncated or changed. Start the run again with --overwrite"));
+            return Err(changed(
+                "it is truncated or changed. Start the run again with --overwrite",
+            ));
         }
         Ok(())
     }
@@ -68,10 +73,16 @@ mod tests {
         for bytes in [&b"ply"[..], b"plx\n", b"ply\n1"] {
             std::fs::write(&path, bytes).unwrap();
             let refused = written.check(folder.path()).unwrap_err().to_string();
-            assert!(refused.contains("7.ply is not as the run left it: it is truncated or changed"), "{refused}");
+            assert!(
+                refused.contains("7.ply is not as the run left it: it is truncated or changed"),
+                "{refused}"
+            );
         }
         std::fs::remove_file(&path).unwrap();
         assert!(written.check(folder.path()).unwrap_err().to_string().contains("it is missing"));
-        assert!(matches!(WrittenFile::synced(folder.path(), "7.ply".to_owned()), Err(ObserveError::Write { .. })));
+        assert!(matches!(
+            WrittenFile::synced(folder.path(), "7.ply".to_owned()),
+            Err(ObserveError::Write { .. })
+        ));
     }
 }

@@ -33,7 +33,9 @@ struct BoundSummary {
 pub fn summary(run: &RunRecord) -> CapacitySummary {
     let section = &run.sections.bounds;
     let rows = section.uses.rows(&run.header.capacity);
-    let bounds = rows.iter().map(|&(name, bound, of)| (name, BoundSummary { bound, needed: of.needed, refused: of.refused }));
+    let bounds = rows.iter().map(|&(name, bound, of)| {
+        (name, BoundSummary { bound, needed: of.needed, refused: of.refused })
+    });
     CapacitySummary {
         bounds: bounds.collect(),
         least: CapacityTable(section.least),
@@ -51,11 +53,15 @@ fn refusals(run: &RunRecord) -> Vec<(&'static str, u64)> {
 /// What would have been enough.
 pub fn sentence(run: &RunRecord) -> String {
     let mib = run.sections.bounds.least.bytes() as f64 / MIB;
-    let refused: Vec<String> = refusals(run).iter().map(|(name, count)| format!("{name} {count}")).collect();
+    let refused: Vec<String> =
+        refusals(run).iter().map(|(name, count)| format!("{name} {count}")).collect();
     if refused.is_empty() {
         format!("{mib:.1} MiB would have held this run without a refusal: --capacity capacity.toml")
     } else {
-        format!("refused for want of {}; --capacity capacity.toml has {mib:.1} MiB, and may still be too little", refused.join(", "))
+        format!(
+            "refused for want of {}; --capacity capacity.toml has {mib:.1} MiB, and may still be too little",
+            refused.join(", ")
+        )
     }
 }
 
@@ -65,8 +71,11 @@ pub fn sentence(run: &RunRecord) -> String {
 /// A bound is beyond TOML's integers.
 pub fn capacity_toml(run: &RunRecord) -> Result<String, toml::ser::Error> {
     let least = &run.sections.bounds.least;
-    let refused =
-        if refusals(run).is_empty() { "" } else { "# Something was refused in that run, so more may be needed than stands here.\n" };
+    let refused = if refusals(run).is_empty() {
+        ""
+    } else {
+        "# Something was refused in that run, so more may be needed than stands here.\n"
+    };
     Ok(format!(
         "# The least that a run over {} frames of {} needed: {} bytes.\n{refused}# dynvox run PATH --capacity capacity.toml\n{}",
         run.frames.len(),

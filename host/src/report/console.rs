@@ -16,19 +16,33 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.extend(ending_lines(run));
     let Sections { trajectory, reference, tracks, .. } = &run.sections;
     lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
-    lines.extend(reference.iter().filter_map(|reference| reference.figures.as_ref()).flat_map(reference_lines));
+    lines.extend(
+        reference
+            .iter()
+            .filter_map(|reference| reference.figures.as_ref())
+            .flat_map(reference_lines),
+    );
     if let Some(figures) = &tracks.figures {
         lines.push(("tracks, 20 m", states_in_time(&figures.late_near)));
-        lines.push(("tracks, 20 to 32 m", format!("{}; {} state flips", states_in_time(&figures.late_far), figures.flips)));
+        lines.push((
+            "tracks, 20 to 32 m",
+            format!("{}; {} state flips", states_in_time(&figures.late_far), figures.flips),
+        ));
         let error = |of| motion_error(of).unwrap_or_else(|| "-".to_owned());
         let [near, far] = [&figures.moving_near, &figures.moving_far].map(error);
-        lines.push(("motion error", format!("per frame of moving objects: {near} within 20 m; {far} at 20 to 32 m")));
+        lines.push((
+            "motion error",
+            format!("per frame of moving objects: {near} within 20 m; {far} at 20 to 32 m"),
+        ));
     }
     lines.extend(tracks.masks.iter().map(|masks| ("moving objects", moving_masks(masks))));
     lines.extend(block_lines(run));
     lines.push(("memory", bounds::sentence(run)));
     lines.extend(pose_lines(run));
-    lines.push((if rig::is_warning(run) { "calibration WARNING" } else { "calibration" }, rig::sentence(run)));
+    lines.push((
+        if rig::is_warning(run) { "calibration WARNING" } else { "calibration" },
+        rig::sentence(run),
+    ));
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
     lines.push(("report", folder.join("report.html").display().to_string()));
@@ -38,7 +52,9 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
 fn ending_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     if let Some(incomplete) = &run.incomplete {
-        let left = incomplete.frames_left.map_or_else(String::new, |left| format!(" ({left} frames left)"));
+        let left = incomplete
+            .frames_left
+            .map_or_else(String::new, |left| format!(" ({left} frames left)"));
         lines.push(("INCOMPLETE", format!("{}{left}", incomplete.reason)));
     }
     if run.skipped.count > 0 {
@@ -52,32 +68,61 @@ fn ending_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
 
 fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {
     let over_segments = errors.t_err_percent.zip(errors.r_err_deg_per_m);
-    let over_segments = over_segments.map(|(percent, deg_per_m)| format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments"));
-    let per_frame = format!("{:.2} cm, {:.4} deg per frame; ATE {:.3} m", 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m);
-    let without = errors.without_boresight.map(|WithoutBoresight { angle_deg, t_err_percent, rpe_t_m }| {
-        format!("{t_err_percent:.3} %, {:.2} cm without a boresight angle of {angle_deg:.2} deg", 100.0 * rpe_t_m)
-    });
+    let over_segments = over_segments
+        .map(|(percent, deg_per_m)| format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments"));
+    let per_frame = format!(
+        "{:.2} cm, {:.4} deg per frame; ATE {:.3} m",
+        100.0 * errors.rpe_t_m,
+        errors.rpe_r_deg,
+        errors.ate_m
+    );
+    let without =
+        errors.without_boresight.map(|WithoutBoresight { angle_deg, t_err_percent, rpe_t_m }| {
+            format!(
+                "{t_err_percent:.3} %, {:.2} cm without a boresight angle of {angle_deg:.2} deg",
+                100.0 * rpe_t_m
+            )
+        });
     let labels = std::iter::once("trajectory error").chain(std::iter::repeat(""));
     labels.zip(over_segments.into_iter().chain([per_frame]).chain(without)).collect()
 }
 
 fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {
-    let percent = |share: Option<f64>| share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share));
+    let percent = |share: Option<f64>| {
+        share.map_or("-".to_owned(), |share| format!("{:.1} %", 100.0 * share))
+    };
     let name = if figures.source == "exact" { "exact depth" } else { "LiDAR" };
     let line = |label: &'static str, PairFigures { input, fused, .. }: &PairFigures| {
-        let [input, map] = [input, fused].map(|of| format!("{} accurate, {} complete", percent(of.accuracy), percent(of.completeness)));
+        let [input, map] = [input, fused].map(|of| {
+            format!("{} accurate, {} complete", percent(of.accuracy), percent(of.completeness))
+        });
         (label, format!("against {name} ({}): input {input}; map {map}", figures.rule))
     };
     let mut lines = vec![line("static map", &figures.still)];
     lines.extend(figures.dynamic.iter().filter(|of| of.frames > 0).map(|of| line("objects", of)));
-    if let [Some(input), Some(map)] = [&figures.still.input, &figures.still.fused].map(|of| of.accuracy_alone) {
-        lines.push(("", format!("of all that each shows: input {:.1} %, map {:.1} % accurate", 100.0 * input, 100.0 * map)));
+    if let [Some(input), Some(map)] =
+        [&figures.still.input, &figures.still.fused].map(|of| of.accuracy_alone)
+    {
+        lines.push((
+            "",
+            format!(
+                "of all that each shows: input {:.1} %, map {:.1} % accurate",
+                100.0 * input,
+                100.0 * map
+            ),
+        ));
     }
     if let Some(depth) = figures.map_depth_error {
         let (error_cm, depth_m) = (100.0 * depth.median_error_m, depth.median_depth_m);
-        let surface =
-            depth.median_surface_m.map_or_else(String::new, |surface_m| format!("; {:.1} cm from its surface", 100.0 * surface_m));
-        lines.push(("", format!("median depth error of the static map {error_cm:.1} cm at {depth_m:.1} m{surface}")));
+        let surface = depth.median_surface_m.map_or_else(String::new, |surface_m| {
+            format!("; {:.1} cm from its surface", 100.0 * surface_m)
+        });
+        lines.push((
+            "",
+            format!(
+                "median depth error of the static map {error_cm:.1} cm at {depth_m:.1} m{surface}"
+            ),
+        ));
     }
     lines
 }
@@ -87,15 +132,27 @@ fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     let (totals, store) = (&blocks.totals, &blocks.store);
     let mut lines = vec![(
         "map",
-        format!("{} triangles, peak {} of {} blocks", blocks.mesh.static_triangles(), totals.peak, run.header.capacity.blocks),
+        format!(
+            "{} triangles, peak {} of {} blocks",
+            blocks.mesh.static_triangles(),
+            totals.peak,
+            run.header.capacity.blocks
+        ),
     )];
     if totals.refused > 0 {
         let advice = "Give more bytes with --memory, or a larger volume.voxel_size_m";
-        lines.push(("", format!("blocks refused: {}; the map has holes. {advice}", totals.refused)));
+        lines
+            .push(("", format!("blocks refused: {}; the map has holes. {advice}", totals.refused)));
     }
     if store.records > 0 {
         let mib = store.bytes as f64 / MIB;
-        lines.push(("", format!("blocks on disk: {} written, {} loaded back, {mib:.1} MiB", store.records, totals.loaded)));
+        lines.push((
+            "",
+            format!(
+                "blocks on disk: {} written, {} loaded back, {mib:.1} MiB",
+                store.records, totals.loaded
+            ),
+        ));
     }
     if blocks.lost() > 0 {
         lines.push(("", format!("blocks lost: {}; {}", blocks.lost(), lost_because(run))));

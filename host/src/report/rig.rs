@@ -18,7 +18,8 @@ pub struct RigSummary {
     disparity_slope_px: f64,
     /// Growth of that with the fourth power of the distance from the middle, px at the sides.
     disparity_quartic_px: f64,
-    /// Growth of that with the square of the distance from the middle row, px from there to the first row.
+    /// Growth of that with the square of the distance from the middle row, px from there to the
+    /// first row.
     disparity_row_quadratic_px: f64,
     /// Largest difference of the rows in which both cameras see the same, px.
     row_error_px: f64,
@@ -62,19 +63,31 @@ fn rows_apart(report: &SelfCalibrationReport) -> Option<RowCorrection> {
 /// What was found and what to do about it.
 pub fn sentence(run: &RunRecord) -> String {
     let Some(report) = found(run) else {
-        return "disparity offset unknown: the camera has to move past something within about 30 m".to_owned();
+        return "disparity offset unknown: the camera has to move past something within about 30 m"
+            .to_owned();
     };
     let rows = rows_apart(&report).map_or_else(String::new, |rows| {
         let moved = if report.corrected { ", aligned" } else { "" };
         format!("; rows up to {:.1} px apart{moved}", rows.largest_px())
     });
-    let value = format!("{:+.3} px of disparity, sigma {:.3} px{rows}", report.offset_px, report.offset_sigma_px);
-    let done = if report.corrected { "taken out" } else { "not taken out: set rig.self_calibration=\"apply\"" };
+    let value = format!(
+        "{:+.3} px of disparity, sigma {:.3} px{rows}",
+        report.offset_px, report.offset_sigma_px
+    );
+    let done = if report.corrected {
+        "taken out"
+    } else {
+        "not taken out: set rig.self_calibration=\"apply\""
+    };
     match report.state() {
         CalibrationState::Sound => format!("sound: {value}"),
-        CalibrationState::Off => format!("{value}, {done}; another run begins with it: --config calibration.toml"),
+        CalibrationState::Off => {
+            format!("{value}, {done}; another run begins with it: --config calibration.toml")
+        }
         CalibrationState::Recalibrate => {
-            format!("{value}, {done}. Recalibrate the cameras: more than 1 px is more than they should be off")
+            format!(
+                "{value}, {done}. Recalibrate the cameras: more than 1 px is more than they should be off"
+            )
         }
     }
 }
@@ -128,13 +141,34 @@ mod tests {
     fn another_run_begins_with_what_was_found() {
         let mut report = SelfCalibrationReport::default();
         assert_eq!(begin_with(&report, 9), None);
-        (report.known, report.corrected, report.offset_px, report.applied_offset_px, report.quartic_px) = (true, true, 0.25, 0.25, 1.5);
-        report.rows = RowCorrection { constant_px: 0.5, product_px: -1.25, row_px: 0.125, ..RowCorrection::default() };
+        (
+            report.known,
+            report.corrected,
+            report.offset_px,
+            report.applied_offset_px,
+            report.quartic_px,
+        ) = (true, true, 0.25, 0.25, 1.5);
+        report.rows = RowCorrection {
+            constant_px: 0.5,
+            product_px: -1.25,
+            row_px: 0.125,
+            ..RowCorrection::default()
+        };
         let SettingsFile { rig } = toml::from_str(&begin_with(&report, 9).unwrap()).unwrap();
-        assert_eq!(rig.disparity_correction, DisparityCorrection { offset_px: 0.25, quartic_px: 1.5, ..DisparityCorrection::default() });
+        assert_eq!(
+            rig.disparity_correction,
+            DisparityCorrection {
+                offset_px: 0.25,
+                quartic_px: 1.5,
+                ..DisparityCorrection::default()
+            }
+        );
         assert_eq!(rig.row_correction, report.rows);
         report.known = false;
         let text = begin_with(&report, 9).unwrap();
-        assert!(!text.contains("disparity_correction") && text.contains("row_correction"), "rows are known from pictures alone: {text}");
+        assert!(
+            !text.contains("disparity_correction") && text.contains("row_correction"),
+            "rows are known from pictures alone: {text}"
+        );
     }
 }

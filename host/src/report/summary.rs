@@ -1,4 +1,5 @@
-//! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is unknown.
+//! `summary.json`: the figures of a run under fixed keys. A key is absent where its value is
+//! unknown.
 
 use super::bounds::CapacitySummary;
 use super::rig::RigSummary;
@@ -7,7 +8,9 @@ use crate::evaluate::objects::{ObjectFigures, TrackErrors};
 use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
 use crate::evaluate::trajectory::WithoutBoresight;
-use crate::observe::{BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name};
+use crate::observe::{
+    BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name,
+};
 use crate::run::{Incomplete, RunRecord, SkippedFrames, StageStatistics};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -201,7 +204,11 @@ impl Summary {
     /// Collects the figures of a run.
     pub fn of(run: &RunRecord) -> Self {
         let sections = &run.sections;
-        let stage = |of: StageStatistics| StageSummary { median_ms: of.median_ms, p99_ms: of.p99_ms, cpu_median_ms: of.cpu_median_ms };
+        let stage = |of: StageStatistics| StageSummary {
+            median_ms: of.median_ms,
+            p99_ms: of.p99_ms,
+            cpu_median_ms: of.cpu_median_ms,
+        };
         Self {
             dataset: run.header.name.clone(),
             profile: run.header.profile.clone(),
@@ -213,11 +220,21 @@ impl Summary {
             incomplete: run.incomplete.clone(),
             slab_bytes: run.header.slab_bytes,
             rss_peak_bytes: run.rss_peak_bytes,
-            stages: run.frames.stage_statistics().into_iter().map(|(name, of)| (name, stage(of))).collect(),
+            stages: run
+                .frames
+                .stage_statistics()
+                .into_iter()
+                .map(|(name, of)| (name, stage(of)))
+                .collect(),
             egomotion: EgomotionSummary::of(&sections.trajectory),
             rig: super::rig::summary(run),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
-            objects: sections.tracks.tracks.iter().map(|track| ObjectSummary::of(track, &sections.objects.objects)).collect(),
+            objects: sections
+                .tracks
+                .tracks
+                .iter()
+                .map(|track| ObjectSummary::of(track, &sections.objects.objects))
+                .collect(),
             objects_truth: sections.tracks.figures.clone(),
             masks_truth: sections.tracks.masks.clone(),
             capacity: super::bounds::summary(run),

@@ -27,7 +27,11 @@ pub fn counted(count: usize, name: &str) -> String {
 
 /// How many tracks had the right motion state in time.
 pub fn states_in_time(of: &LateStates) -> String {
-    format!("motion state correct within {SETTLING_FRAMES} frames: {} of {} tracks", of.tracks - of.late, of.tracks)
+    format!(
+        "motion state correct within {SETTLING_FRAMES} frames: {} of {} tracks",
+        of.tracks - of.late,
+        of.tracks
+    )
 }
 
 /// Median error of a frame's motion; `None` without one.
@@ -54,8 +58,13 @@ pub fn moving_masks(masks: &MovingFigures) -> String {
 /// Why blocks are lost, and what to do.
 pub fn lost_because(run: &RunRecord) -> String {
     match &run.sections.blocks.store.failure {
-        Some(failure) => format!("map.blocks could not grow ({failure}). Free disk space, or raise --stream-mib"),
-        None if run.header.streaming.is_some() => "records of map.blocks could not be read back. Check the disk".to_owned(),
-        None => "the pool was full. Run without --no-stream, or give more bytes with --memory".to_owned(),
+        Some(failure) => {
+            format!("map.blocks could not grow ({failure}). Free disk space, or raise --stream-mib")
+        }
+        None if run.header.streaming.is_some() => {
+            "records of map.blocks could not be read back. Check the disk".to_owned()
+        }
+        None => "the pool was full. Run without --no-stream, or give more bytes with --memory"
+            .to_owned(),
     }
 }

@@ -1,4 +1,5 @@
-//! What a step costs, stage by stage: work, span, and the bound on two threads, over the frames of a plan.
+//! What a step costs, stage by stage: work, span, and the bound on two threads, over the frames of
+//! a plan.
 
 use super::error::{RunError, refused, step_reason};
 use super::spans::{Cost, Spans};
@@ -35,24 +36,28 @@ pub struct Bench {
     pub stages: Vec<StageBench>,
 }
 
-/// Steps through the frames of a plan, without results of any kind, and takes the costs. The first frame, which has none before it, is left
-/// out of the medians where there are more.
+/// Steps through the frames of a plan, without results of any kind, and takes the costs. The first
+/// frame, which has none before it, is left out of the medians where there are more.
 ///
 /// # Errors
 /// The plan cannot be run, or a frame cannot be read or mapped.
 pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
     plan.check()?;
     let slab_bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut()).map_err(|error| refused(&plan.profile, error))?;
+    let mut slab = HostSlab::map(slab_bytes)
+        .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
+    let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut())
+        .map_err(|error| refused(&plan.profile, error))?;
     let spans = Spans::new(vectors);
     let mut costs = Vec::new();
     read_ahead(plan.dataset.as_ref(), plan.frames.from_position(0), false, |read| {
         for frame in read {
             let images = frame.images?;
-            let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
+            let detections: Vec<_> =
+                images.masks.instances.iter().map(InstanceMask::detection).collect();
             let failed = |reason: String| RunError::Step { frame: frame.index, reason };
-            let stereo = stereo_frame(&images, &detections).ok_or_else(|| failed("an image is empty".to_owned()))?;
+            let stereo = stereo_frame(&images, &detections)
+                .ok_or_else(|| failed("an image is empty".to_owned()))?;
             let (report, step, mut stages) = spans.measure(|| mapper.step(&stereo, &spans));
             let pose = report.map_err(|error| failed(step_reason(error)))?.t_world_camera;
             let (_, _, raycast) = spans.measure(|| mapper.raycast(&pose, &spans).is_ok());
@@ -62,16 +67,21 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
         Ok::<(), RunError>(())
     })?;
     let counted = costs.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(&costs);
-    let of_stage = |stage: Stage| medians(stage.name(), counted.iter().map(|(_, stages)| stages[stage as usize]));
+    let of_stage = |stage: Stage| {
+        medians(stage.name(), counted.iter().map(|(_, stages)| stages[stage as usize]))
+    };
     let [before @ .., raycast] = Stage::ALL;
-    let mut stages: Vec<_> = before.into_iter().map(of_stage).filter(|stage| stage.work_ms > 0.0).collect();
+    let mut stages: Vec<_> =
+        before.into_iter().map(of_stage).filter(|stage| stage.work_ms > 0.0).collect();
     stages.push(medians("step", counted.iter().map(|(step, _)| *step)));
     stages.push(of_stage(raycast));
     Ok(Bench { frames: costs.len(), vectors: vectors.name(), stages })
 }
 
 fn medians(name: &'static str, costs: impl Iterator<Item = Cost> + Clone) -> StageBench {
-    let of = |part: fn(&Cost) -> Duration| median(costs.clone().map(|cost| part(&cost).as_secs_f64() * 1e3)).unwrap_or_default();
+    let of = |part: fn(&Cost) -> Duration| {
+        median(costs.clone().map(|cost| part(&cost).as_secs_f64() * 1e3)).unwrap_or_default()
+    };
     StageBench {
         name,
         work_ms: of(|cost| cost.work),

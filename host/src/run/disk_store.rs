@@ -54,17 +54,35 @@ impl DiskStore {
     }
 
     /// Opens the file in the run folder if blocks are to be stored.
-    pub fn begin(streaming: Option<Streaming>, folder: &RunFolder, config: &Config) -> Result<Self, StoreError> {
+    pub fn begin(
+        streaming: Option<Streaming>,
+        folder: &RunFolder,
+        config: &Config,
+    ) -> Result<Self, StoreError> {
         let Some(streaming) = streaming else { return Ok(Self::of(None)) };
-        let (mut file, _) = BlockFile::open(&folder.file(BLOCKS_FILE), config.volume.voxel_size_m, config.volume.truncation_m)?;
+        let (mut file, _) = BlockFile::open(
+            &folder.file(BLOCKS_FILE),
+            config.volume.voxel_size_m,
+            config.volume.truncation_m,
+        )?;
         file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
         Ok(Self::of(Some(file)))
     }
 
     /// Opens the file of a resumed run, as it was at the checkpoint.
-    pub fn resume(streaming: Option<Streaming>, folder: &RunFolder, config: &Config, at: Option<&Position>) -> Result<Self, StoreError> {
+    pub fn resume(
+        streaming: Option<Streaming>,
+        folder: &RunFolder,
+        config: &Config,
+        at: Option<&Position>,
+    ) -> Result<Self, StoreError> {
         let (Some(streaming), Some(at)) = (streaming, at) else { return Ok(Self::of(None)) };
-        let mut file = BlockFile::reopen(&folder.file(BLOCKS_FILE), config.volume.voxel_size_m, config.volume.truncation_m, at)?;
+        let mut file = BlockFile::reopen(
+            &folder.file(BLOCKS_FILE),
+            config.volume.voxel_size_m,
+            config.volume.truncation_m,
+            at,
+        )?;
         file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
         Ok(Self::of(Some(file)))
     }
@@ -99,8 +117,8 @@ pub struct MeshOutput {
 }
 
 impl MeshOutput {
-    /// Begins `map.ply`. Where the file of blocks is kept, the pool's blocks are evicted to it; otherwise they are meshed where they are, with those of
-    /// the file around them.
+    /// Begins `map.ply`. Where the file of blocks is kept, the pool's blocks are evicted to it;
+    /// otherwise they are meshed where they are, with those of the file around them.
     pub fn begin(
         mapper: &mut Mapper<'_>,
         (mut store, streaming): (DiskStore, Option<Streaming>),
@@ -108,10 +126,15 @@ impl MeshOutput {
         (axes, colour): (Axes, bool),
     ) -> Self {
         let mut ply = PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
-        let (mut report, mut meshed, mut failed) = (EvictionReport::default(), HashSet::new(), None);
+        let (mut report, mut meshed, mut failed) =
+            (EvictionReport::default(), HashSet::new(), None);
         let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);
         let mut file_is_due = true;
-        match store.file.as_mut().filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none()) {
+        match store
+            .file
+            .as_mut()
+            .filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none())
+        {
             None => {
                 let volume = mapper.background();
                 if let Ok(ply) = &mut ply {
@@ -130,23 +153,28 @@ impl MeshOutput {
         Self { ply, store, file_is_due, meshed, failed, report }
     }
 
-    /// Adds the stored blocks, reading them piece by piece into `slab`, and the objects, and ends the file. What cannot be written leaves no file, and the reason.
+    /// Adds the stored blocks, reading them piece by piece into `slab`, and the objects, and ends
+    /// the file. What cannot be written leaves no file, and the reason.
     pub fn finish(
         mut self,
         slab: &mut [u8],
         (capacity, config): (&Capacity, &Config),
         (folder, objects): (&RunFolder, MapObjects),
     ) -> (Result<Mesh, FolderError>, StoreStats) {
-        let mut stats = StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
+        let mut stats =
+            StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
         let mut failed = self.failed;
         if let Some(file) = self.store.file.as_mut() {
             if self.file_is_due
                 && let Ok(ply) = &mut self.ply
             {
                 let (how, memory) = ((&config.volume, &config.mesh), (slab, capacity.colour));
-                failed = store::mesh::triangles(file, how, memory, &self.meshed, ply).err().map(too_small);
+                failed = store::mesh::triangles(file, how, memory, &self.meshed, ply)
+                    .err()
+                    .map(too_small);
             }
-            (stats.records, stats.bytes, stats.unreadable) = (file.records(), file.bytes(), file.unreadable());
+            (stats.records, stats.bytes, stats.unreadable) =
+                (file.records(), file.bytes(), file.unreadable());
         }
         let written = failed.map_or(Ok(()), Err).and_then(|()| {
             let mut ply = self.ply?;
@@ -164,11 +192,19 @@ impl MeshOutput {
 }
 
 /// Adds the mesh of a mapper's pool and of the blocks that were evicted from it.
-fn pool_and_file(mapper: &Mapper<'_>, (file, colour): (&mut BlockFile<File>, bool), ply: &mut PlyWriter) -> std::io::Result<()> {
-    let mut slab = HostSlab::map(store::mesh::slab_bytes(colour)).ok_or(std::io::ErrorKind::OutOfMemory)?;
-    let (how, memory) = ((&mapper.config().volume, &mapper.config().mesh), (slab.bytes_mut(), colour));
+fn pool_and_file(
+    mapper: &Mapper<'_>,
+    (file, colour): (&mut BlockFile<File>, bool),
+    ply: &mut PlyWriter,
+) -> std::io::Result<()> {
+    let mut slab =
+        HostSlab::map(store::mesh::slab_bytes(colour)).ok_or(std::io::ErrorKind::OutOfMemory)?;
+    let (how, memory) =
+        ((&mapper.config().volume, &mapper.config().mesh), (slab.bytes_mut(), colour));
     let mut source = PoolAndFile::new(mapper.background(), file);
-    store::mesh::triangles(&mut source, how, memory, &HashSet::new(), ply).map(drop).map_err(too_small)
+    store::mesh::triangles(&mut source, how, memory, &HashSet::new(), ply)
+        .map(drop)
+        .map_err(too_small)
 }
 
 fn too_small(error: SlabError) -> std::io::Error {

@@ -43,15 +43,21 @@ impl Incomplete {
             RunError::Resident { .. } => IncompleteCause::Memory,
             RunError::Strict { .. } => IncompleteCause::Strict,
             RunError::Folder(_) | RunError::Store(_) | RunError::Reopen(_) => IncompleteCause::Disk,
-            RunError::Observe(ObserveError::Write { .. } | ObserveError::Changed { .. }) => IncompleteCause::Disk,
+            RunError::Observe(ObserveError::Write { .. } | ObserveError::Changed { .. }) => {
+                IncompleteCause::Disk
+            }
             _ => IncompleteCause::Input,
         };
         Self { cause, reason: error.to_string(), frames_left, missing: Vec::new() }
     }
 
-    /// A file that could not be written: the end of a run that had no other reason to be incomplete, or a part of it.
+    /// A file that could not be written: the end of a run that had no other reason to be
+    /// incomplete, or a part of it.
     pub fn add_missing(incomplete: &mut Option<Self>, name: &str, reason: &str) {
-        incomplete.get_or_insert_with(|| Self::of_disk(reason.to_owned())).missing.push(name.to_owned());
+        incomplete
+            .get_or_insert_with(|| Self::of_disk(reason.to_owned()))
+            .missing
+            .push(name.to_owned());
     }
 
     /// All frames are mapped, and the disk refused a part of the results.

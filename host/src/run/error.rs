@@ -35,7 +35,9 @@ pub enum RunError {
         delay: usize,
     },
     /// The images are larger than the profile's.
-    #[error("images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}")]
+    #[error(
+        "images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}"
+    )]
     ImageSize {
         /// Image width, px.
         width: usize,
@@ -64,7 +66,9 @@ pub enum RunError {
         profile: String,
     },
     /// The configuration.
-    #[error("the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file")]
+    #[error(
+        "the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file"
+    )]
     Config {
         /// All problems.
         problems: String,
@@ -80,7 +84,9 @@ pub enum RunError {
         profile: String,
     },
     /// The core refuses the slab.
-    #[error("the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please report it")]
+    #[error(
+        "the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please report it"
+    )]
     Slab {
         /// Name of the profile.
         profile: String,
@@ -88,7 +94,9 @@ pub enum RunError {
         reason: String,
     },
     /// The core refuses a frame.
-    #[error("frame {frame} was refused: {reason}. Leave such frames out with --skip-bad-frames, or end before it with --frames")]
+    #[error(
+        "frame {frame} was refused: {reason}. Leave such frames out with --skip-bad-frames, or end before it with --frames"
+    )]
     Step {
         /// Number of the frame.
         frame: usize,
@@ -105,7 +113,9 @@ pub enum RunError {
     #[error(transparent)]
     Resume(#[from] ResumeError),
     /// A frame of a strict run affected the map.
-    #[error("frame {frame}: map affected: {cause}. Without --strict the run continues and counts it")]
+    #[error(
+        "frame {frame}: map affected: {cause}. Without --strict the run continues and counts it"
+    )]
     Strict {
         /// Number of the frame.
         frame: usize,
@@ -196,10 +206,16 @@ pub fn step_reason(error: StepError) -> String {
             format!("its images are not of {width} x {height} px, the size the calibration is for")
         }
         StepError::SizeChanged => "its images have another size than those before".to_owned(),
-        StepError::PoseNotRotation => "the quaternion of its pose does not have length 1".to_owned(),
+        StepError::PoseNotRotation => {
+            "the quaternion of its pose does not have length 1".to_owned()
+        }
         StepError::PoseNotFinite => "its pose is not finite".to_owned(),
-        StepError::TooLarge { width, height } => format!("its images are larger than {width} x {height} px"),
-        StepError::TooSmall { width, height } => format!("its images are smaller than {width} x {height} px"),
+        StepError::TooLarge { width, height } => {
+            format!("its images are larger than {width} x {height} px")
+        }
+        StepError::TooSmall { width, height } => {
+            format!("its images are smaller than {width} x {height} px")
+        }
         other => other.to_string(),
     }
 }

@@ -16,15 +16,21 @@ use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use std::time::Instant;
 
-/// Maps the planned frames, or of an interrupted run those that are left, and writes the mesh into the folder. What stops the run after its first
-/// frame is in [`RunRecord::incomplete`], and the record is of what was mapped until then.
+/// Maps the planned frames, or of an interrupted run those that are left, and writes the mesh into
+/// the folder. What stops the run after its first frame is in [`RunRecord::incomplete`], and the
+/// record is of what was mapped until then.
 ///
 /// # Errors
 /// The plan cannot be run, or not even its first frame can be mapped.
-pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> Result<RunRecord, RunError> {
+pub fn run(
+    plan: &Plan,
+    folder: &RunFolder,
+    checkpoint: Option<Checkpoint>,
+) -> Result<RunRecord, RunError> {
     plan.check()?;
     let slab_bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(slab_bytes).ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
+    let mut slab = HostSlab::map(slab_bytes)
+        .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
     let Mapped { setup, mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
         map(plan, slab.bytes_mut(), folder, checkpoint)?;
     if !state.sync(folder.path()).is_empty() {
@@ -35,7 +41,11 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
         }
     }
     // The mapper is gone: its slab serves to read the map piece by piece.
-    let (written, store) = output.finish(slab.bytes_mut(), (&plan.capacity, &plan.config), (folder, plan.export.objects));
+    let (written, store) = output.finish(
+        slab.bytes_mut(),
+        (&plan.capacity, &plan.config),
+        (folder, plan.export.objects),
+    );
     let mesh = written.unwrap_or_else(|error| {
         Incomplete::add_missing(&mut incomplete, MAP_FILE, &error.to_string());
         Mesh::default()
@@ -44,9 +54,16 @@ pub fn run(plan: &Plan, folder: &RunFolder, checkpoint: Option<Checkpoint>) -> R
     let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store };
     let sections = std::mem::take(&mut state.observers).finish(&setup, &finished)?;
     for name in &sections.objects.unwritten {
-        Incomplete::add_missing(&mut incomplete, &format!("objects/{name}.ply"), "an object could not be written");
+        Incomplete::add_missing(
+            &mut incomplete,
+            &format!("objects/{name}.ply"),
+            "an object could not be written",
+        );
     }
-    for (name, failure) in [(PICTURES_FOLDER, &sections.gallery_failure), (RECORDING_FILE, &sections.recording_failure)] {
+    for (name, failure) in [
+        (PICTURES_FOLDER, &sections.gallery_failure),
+        (RECORDING_FILE, &sections.recording_failure),
+    ] {
         if let Some(failure) = failure {
             Incomplete::add_missing(&mut incomplete, name, failure);
         }
@@ -79,7 +96,12 @@ struct Mapped<'p> {
 }
 
 /// Maps the planned frames in `slab`.
-fn map<'p>(plan: &'p Plan, slab: &mut [u8], folder: &'p RunFolder, checkpoint: Option<Checkpoint>) -> Result<Mapped<'p>, RunError> {
+fn map<'p>(
+    plan: &'p Plan,
+    slab: &mut [u8],
+    folder: &'p RunFolder,
+    checkpoint: Option<Checkpoint>,
+) -> Result<Mapped<'p>, RunError> {
     let mut session = match checkpoint {
         None => Session::begin(plan, folder, slab)?,
         Some(checkpoint) => Session::resume(plan, folder, slab, checkpoint)?,
@@ -91,7 +113,12 @@ fn map<'p>(plan: &'p Plan, slab: &mut [u8], folder: &'p RunFolder, checkpoint: O
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.background().pool().len(),
         pruned,
-        output: MeshOutput::begin(&mut mapper, (store, plan.streaming), folder, (plan.export.axes, plan.capacity.colour)),
+        output: MeshOutput::begin(
+            &mut mapper,
+            (store, plan.streaming),
+            folder,
+            (plan.export.axes, plan.capacity.colour),
+        ),
         incomplete,
         setup,
         state,

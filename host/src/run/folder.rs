@@ -1,5 +1,5 @@
-//! The run folder: written under another name next to its target, and renamed when its run has ended. A snapshot in it, of a run that was
-//! killed or ended early, is what resumes the run.
+//! The run folder: written under another name next to its target, and renamed when its run has
+//! ended. A snapshot in it, of a run that was killed or ended early, is what resumes the run.
 
 #[cfg(test)]
 mod tests;
@@ -19,13 +19,17 @@ pub enum FolderError {
         path: PathBuf,
     },
     /// What is there is not a run folder.
-    #[error("{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give another --out")]
+    #[error(
+        "{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give another --out"
+    )]
     Foreign {
         /// The folder asked for.
         path: PathBuf,
     },
     /// An interrupted run has a snapshot there.
-    #[error("an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, or start again with --overwrite")]
+    #[error(
+        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, or start again with --overwrite"
+    )]
     Interrupted {
         /// The folder asked for.
         path: PathBuf,
@@ -51,7 +55,9 @@ pub enum FolderError {
         path: PathBuf,
     },
     /// The finished folder could not be renamed to it.
-    #[error("{path} cannot be replaced: {source}. Is it a mount point? Give a folder inside it as --out")]
+    #[error(
+        "{path} cannot be replaced: {source}. Is it a mount point? Give a folder inside it as --out"
+    )]
     Fixed {
         /// The folder asked for.
         path: PathBuf,
@@ -59,7 +65,9 @@ pub enum FolderError {
         source: std::io::Error,
     },
     /// The results are complete and not where they should be.
-    #[error("the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the folder yourself")]
+    #[error(
+        "the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the folder yourself"
+    )]
     NotMoved {
         /// Where the results are.
         partial: PathBuf,
@@ -69,7 +77,9 @@ pub enum FolderError {
         reason: String,
     },
     /// The system refuses.
-    #[error("{path} cannot be written: {source}. Check the disk and the permissions, or give another --out")]
+    #[error(
+        "{path} cannot be written: {source}. Check the disk and the permissions, or give another --out"
+    )]
     Write {
         /// The file or folder.
         path: PathBuf,
@@ -82,13 +92,14 @@ pub enum FolderError {
 pub const SNAPSHOT_FILE: &str = "run.snapshot";
 /// Name of the snapshot before it.
 pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
-/// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become full during the run.
+/// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become
+/// full during the run.
 const RESERVE_FILE: &str = ".reserve";
 /// Its bytes.
 const RESERVE_BYTES: usize = 2 << 20;
 
-/// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached or there is a snapshot, nothing of it
-/// remains.
+/// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached
+/// or there is a snapshot, nothing of it remains.
 #[derive(Debug)]
 pub struct RunFolder {
     target: PathBuf,
@@ -96,7 +107,8 @@ pub struct RunFolder {
     overwrite: bool,
     /// Whether the folder stays when this is dropped.
     keep: bool,
-    /// Whether it is that of a run that ended early, and goes back to its target unless there is a new end.
+    /// Whether it is that of a run that ended early, and goes back to its target unless there is a
+    /// new end.
     reopened: bool,
     /// Locked while this exists; `None` where the system cannot lock a folder.
     _lock: Option<File>,
@@ -124,7 +136,8 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// The folder of an interrupted run to `target` that left a snapshot. An incomplete snapshot next to it is removed.
+    /// The folder of an interrupted run to `target` that left a snapshot. An incomplete snapshot
+    /// next to it is removed.
     ///
     /// # Errors
     /// There is no such run, or another process resumes it.
@@ -137,13 +150,16 @@ impl RunFolder {
         if !killed && !ended_early {
             return Err(nothing(match (partial.is_dir(), target.join(SUMMARY_FILE).is_file()) {
                 (true, _) => "it was interrupted before its first snapshot. Start it again",
-                (false, true) => "it has no snapshot: it is complete, or ran without --snapshot-every",
+                (false, true) => {
+                    "it has no snapshot: it is complete, or ran without --snapshot-every"
+                }
                 (false, false) => "there is no such run. Give the --out of the interrupted run",
             }));
         }
         let lock = lock(if killed { &partial } else { &target }, &target)?;
         if ended_early {
-            std::fs::rename(&target, &partial).map_err(|source| FolderError::Fixed { path: target.clone(), source })?;
+            std::fs::rename(&target, &partial)
+                .map_err(|source| FolderError::Fixed { path: target.clone(), source })?;
         }
         let folder = Self {
             target,
@@ -155,22 +171,30 @@ impl RunFolder {
         };
         folder.reserve()?;
         match std::fs::remove_file(sibling(&folder.snapshot(), "partial")) {
-            Err(source) if source.kind() != ErrorKind::NotFound => Err(FolderError::Write { path: folder.snapshot(), source }),
+            Err(source) if source.kind() != ErrorKind::NotFound => {
+                Err(FolderError::Write { path: folder.snapshot(), source })
+            }
             _ => Ok(folder),
         }
     }
 
-    /// Whether the results of a reopened run were in place already: it was killed while it removed what it no longer needed.
+    /// Whether the results of a reopened run were in place already: it was killed while it removed
+    /// what it no longer needed.
     pub fn is_complete(&self) -> bool {
         let summary = std::fs::read(self.file(SUMMARY_FILE)).ok();
-        let summary = summary.and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
-        self.reopened && summary.is_some_and(|summary| summary.get("incomplete").is_none_or(serde_json::Value::is_null))
+        let summary =
+            summary.and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
+        self.reopened
+            && summary.is_some_and(|summary| {
+                summary.get("incomplete").is_none_or(serde_json::Value::is_null)
+            })
     }
 
     /// Takes disk space for what is written last.
     fn reserve(&self) -> Result<(), FolderError> {
         let path = self.file(RESERVE_FILE);
-        std::fs::write(&path, vec![0; RESERVE_BYTES]).map_err(|source| FolderError::Write { path, source })
+        std::fs::write(&path, vec![0; RESERVE_BYTES])
+            .map_err(|source| FolderError::Write { path, source })
     }
 
     /// Gives the disk space back that was kept for what is written last.
@@ -190,7 +214,8 @@ impl RunFolder {
             return Ok(());
         }
         let old = unused(&self.target, "replaced");
-        let there_and_back = std::fs::rename(&self.target, &old).and_then(|()| std::fs::rename(&old, &self.target));
+        let there_and_back =
+            std::fs::rename(&self.target, &old).and_then(|()| std::fs::rename(&old, &self.target));
         there_and_back.map_err(|source| FolderError::Fixed { path: self.target.clone(), source })
     }
 
@@ -222,7 +247,10 @@ impl RunFolder {
     /// The next free folder `parent/name-NNN`.
     pub fn next_name(parent: &Path, name: &str) -> PathBuf {
         let taken = |path: &PathBuf| path.exists() || sibling(path, "partial").exists();
-        (1u32..).map(|number| parent.join(format!("{name}-{number:03}"))).find(|path| !taken(path)).unwrap_or_else(|| parent.join(name))
+        (1u32..)
+            .map(|number| parent.join(format!("{name}-{number:03}")))
+            .find(|path| !taken(path))
+            .unwrap_or_else(|| parent.join(name))
     }
 
     /// Where it is while the run lasts.
@@ -235,17 +263,19 @@ impl RunFolder {
         self.partial.join(name)
     }
 
-    /// Creates a file and hands a buffered writer to `write`. What cannot be written leaves no file.
+    /// Creates a file and hands a buffered writer to `write`. What cannot be written leaves no
+    /// file.
     pub fn write(
         &self,
         name: &str,
         write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
     ) -> Result<(), FolderError> {
         let path = self.file(name);
-        let made = std::fs::File::create(&path).map(std::io::BufWriter::new).and_then(|mut file| {
-            write(&mut file)?;
-            std::io::Write::flush(&mut file)
-        });
+        let made =
+            std::fs::File::create(&path).map(std::io::BufWriter::new).and_then(|mut file| {
+                write(&mut file)?;
+                std::io::Write::flush(&mut file)
+            });
         made.map_err(|source| {
             // It may not exist.
             let _ = std::fs::remove_file(&path);
@@ -253,15 +283,20 @@ impl RunFolder {
         })
     }
 
-    /// Renames the folder to its target, which is returned. Temporary files, the snapshot among them, are removed only then, so that a run killed
-    /// in its last moment can still be resumed.
+    /// Renames the folder to its target, which is returned. Temporary files, the snapshot among
+    /// them, are removed only then, so that a run killed in its last moment can still be resumed.
     ///
     /// # Errors
-    /// It cannot be renamed, and stays where it is, complete; or a temporary file cannot be removed.
+    /// It cannot be renamed, and stays where it is, complete; or a temporary file cannot be
+    /// removed.
     pub fn commit(mut self, temporary: &[&str]) -> Result<PathBuf, FolderError> {
         self.keep = true;
         self.release_reserve();
-        let not_moved = |reason: String| FolderError::NotMoved { partial: self.partial.clone(), path: self.target.clone(), reason };
+        let not_moved = |reason: String| FolderError::NotMoved {
+            partial: self.partial.clone(),
+            path: self.target.clone(),
+            reason,
+        };
         check_target(&self.target, self.overwrite).map_err(|error| not_moved(error.to_string()))?;
         let old = unused(&self.target, "replaced");
         let replaced = self.target.exists();
@@ -276,12 +311,15 @@ impl RunFolder {
             return Err(not_moved(source.to_string()));
         }
         if replaced {
-            std::fs::remove_dir_all(&old).map_err(|source| FolderError::Write { path: old, source })?;
+            std::fs::remove_dir_all(&old)
+                .map_err(|source| FolderError::Write { path: old, source })?;
         }
         for name in temporary {
             let path = self.target.join(name);
             match std::fs::remove_file(&path) {
-                Err(source) if source.kind() != ErrorKind::NotFound => return Err(FolderError::Write { path, source }),
+                Err(source) if source.kind() != ErrorKind::NotFound => {
+                    return Err(FolderError::Write { path, source });
+                }
                 _ => {}
             }
         }
@@ -312,8 +350,14 @@ fn resolved(target: &Path) -> Result<PathBuf, FolderError> {
     let current = std::env::current_dir().map_err(failed)?;
     let named = matches!(target.components().next_back(), Some(Component::Normal(_)));
     let path = if named { target.to_path_buf() } else { target.canonicalize().map_err(failed)? };
-    let is_current = path.canonicalize().is_ok_and(|path| current.canonicalize().is_ok_and(|current| path == current));
-    if is_current || path.file_name().is_none() { Err(FolderError::Current { path: target.to_path_buf() }) } else { Ok(path) }
+    let is_current = path
+        .canonicalize()
+        .is_ok_and(|path| current.canonicalize().is_ok_and(|current| path == current));
+    if is_current || path.file_name().is_none() {
+        Err(FolderError::Current { path: target.to_path_buf() })
+    } else {
+        Ok(path)
+    }
 }
 
 /// Locks a folder; the lock ends with the process. Systems that cannot lock a folder have no lock.
@@ -335,7 +379,11 @@ fn clear(folder: &Path) -> Result<(), FolderError> {
     for entry in folder.read_dir().map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let is_dir = entry.file_type().map_err(failed)?.is_dir();
-        let removed = if is_dir { std::fs::remove_dir_all(entry.path()) } else { std::fs::remove_file(entry.path()) };
+        let removed = if is_dir {
+            std::fs::remove_dir_all(entry.path())
+        } else {
+            std::fs::remove_file(entry.path())
+        };
         removed.map_err(failed)?;
     }
     Ok(())
@@ -351,7 +399,8 @@ fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
     if !overwrite && has_snapshot(target) {
         return Err(FolderError::Interrupted { path: target.to_path_buf() });
     }
-    let empty = !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    let empty =
+        !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
     match (overwrite || empty, empty || target.join(SUMMARY_FILE).is_file()) {
         (true, true) => Ok(()),
         (true, false) => Err(FolderError::Foreign { path: target.to_path_buf() }),
@@ -369,7 +418,10 @@ fn sibling(target: &Path, suffix: &str) -> PathBuf {
 fn unused(target: &Path, suffix: &str) -> PathBuf {
     let first = sibling(target, suffix);
     let numbered = (2u32..).map(|number| sibling(target, &format!("{suffix}-{number}")));
-    std::iter::once(first.clone()).chain(numbered).find(|path| path.symlink_metadata().is_err()).unwrap_or(first)
+    std::iter::once(first.clone())
+        .chain(numbered)
+        .find(|path| path.symlink_metadata().is_err())
+        .unwrap_or(first)
 }
 
 /// Writes a file atomically: under another name first, renamed when it is synced to the disk.
@@ -378,11 +430,12 @@ pub fn write_whole(
     write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), FolderError> {
     let draft = sibling(path, "partial");
-    let written = std::fs::File::create(&draft).map(std::io::BufWriter::new).and_then(|mut file| {
-        write(&mut file)?;
-        file.into_inner()?.sync_all()?;
-        std::fs::rename(&draft, path)
-    });
+    let written =
+        std::fs::File::create(&draft).map(std::io::BufWriter::new).and_then(|mut file| {
+            write(&mut file)?;
+            file.into_inner()?.sync_all()?;
+            std::fs::rename(&draft, path)
+        });
     written.map_err(|source| {
         // The draft may not exist.
         let _ = std::fs::remove_file(&draft);

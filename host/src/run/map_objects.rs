@@ -40,15 +40,18 @@ pub(super) fn add_objects(ply: &mut PlyWriter, run: &Path, which: MapObjects) ->
         return Ok(());
     }
     for (id, name) in object_files(&folder).map_err(io::Error::other)? {
-        let poses = read_numbered(&folder.join(format!("{name}_kitti.txt"))).map_err(io::Error::other)?;
+        let poses =
+            read_numbered(&folder.join(format!("{name}_kitti.txt"))).map_err(io::Error::other)?;
         let first = if which == MapObjects::All { 0 } else { poses.len().saturating_sub(1) };
         for (_, t_world_object) in &poses[first..] {
             ply.begin_object(id);
-            let mesh = PlyMesh::open(&folder.join(format!("{name}.ply"))).map_err(io::Error::other)?;
+            let mesh =
+                PlyMesh::open(&folder.join(format!("{name}.ply"))).map_err(io::Error::other)?;
             mesh.triangles(|corners| {
-                ply.triangle(
-                    corners.map(|PlyVertex { vertex, .. }| Vertex { position_m: moved(t_world_object, vertex.position_m), ..vertex }),
-                );
+                ply.triangle(corners.map(|PlyVertex { vertex, .. }| Vertex {
+                    position_m: moved(t_world_object, vertex.position_m),
+                    ..vertex
+                }));
             })?;
         }
     }
@@ -69,20 +72,31 @@ mod tests {
         let folder = tempfile::TempDir::new().unwrap();
         let objects = folder.path().join(OBJECTS_FOLDER);
         std::fs::create_dir(&objects).unwrap();
-        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(|position_m| Vertex { position_m, ..Vertex::default() });
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+            .map(|position_m| Vertex { position_m, ..Vertex::default() });
         let mut ply = PlyWriter::begin(&objects.join("7-2.ply")).unwrap();
         ply.triangle(corners);
         ply.finish().unwrap();
         std::fs::copy(objects.join("7-2.ply"), objects.join("7-2_world.ply")).unwrap();
-        std::fs::write(objects.join("7-2_kitti.txt"), "3 1 0 0 5 0 1 0 0 0 0 1 0\n4 1 0 0 6 0 1 0 -1 0 0 1 20\n").unwrap();
+        std::fs::write(
+            objects.join("7-2_kitti.txt"),
+            "3 1 0 0 5 0 1 0 0 0 0 1 0\n4 1 0 0 6 0 1 0 -1 0 0 1 20\n",
+        )
+        .unwrap();
         let path = folder.path().join("map.ply");
         let map = |which, axes| {
             let mut ply = PlyWriter::begin_in(&path, "a test", axes).unwrap();
             ply.triangle(corners);
             add_objects(&mut ply, folder.path(), which).unwrap();
             let (mesh, mut found) = (ply.finish().unwrap(), Vec::new());
-            PlyMesh::open(&path).unwrap().triangles(|[first, ..]| found.push((first.object, first.vertex.position_m))).unwrap();
-            assert_eq!((mesh.triangles, mesh.object_triangles), (found.len() as u64, found.len() as u64 - 1));
+            PlyMesh::open(&path)
+                .unwrap()
+                .triangles(|[first, ..]| found.push((first.object, first.vertex.position_m)))
+                .unwrap();
+            assert_eq!(
+                (mesh.triangles, mesh.object_triangles),
+                (found.len() as u64, found.len() as u64 - 1)
+            );
             found
         };
         let [still, then, last] = [(0, [0.0; 3]), (7, [5.0, 0.0, 0.0]), (7, [6.0, -1.0, 20.0])];

@@ -1,4 +1,5 @@
-//! Runs the core on a data set: owns the slab, feeds the frames, takes the times, checks limits, writes checkpoints.
+//! Runs the core on a data set: owns the slab, feeds the frames, takes the times, checks limits,
+//! writes checkpoints.
 
 mod bench;
 mod checkpoint;
@@ -28,7 +29,9 @@ pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput, Streaming};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::{RunError, step_reason};
 pub use execute::run;
-pub use folder::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole};
+pub use folder::{
+    FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole,
+};
 pub use map_objects::{ExportOptions, MapObjects};
 pub use plan::{FrameNumbers, Plan, check_bounds, frame_interval_s, resident_limit_bytes};
 pub use progress::Progress;

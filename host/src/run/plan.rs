@@ -10,9 +10,11 @@ use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config};
 use std::path::PathBuf;
 
-/// Bytes the host may use in addition to the slab, by default: the synthetic street, objects' meshes, the index of the block file.
+/// Bytes the host may use in addition to the slab, by default: the synthetic street, objects'
+/// meshes, the index of the block file.
 const HOST_BYTES: u64 = 256 << 20;
-/// The same for each pixel of an image: frames read ahead, their depth and masks, pictures of the report.
+/// The same for each pixel of an image: frames read ahead, their depth and masks, pictures of the
+/// report.
 const HOST_BYTES_PER_PIXEL: u64 = 64;
 
 /// Bytes a run may take in all unless it is told otherwise.
@@ -26,7 +28,8 @@ pub struct Plan {
     pub dataset: Box<dyn FrameSource>,
     /// Which of them to take.
     pub frames: FrameNumbers,
-    /// Whether frames that cannot be read or mapped are left out; otherwise the run ends before the first of them.
+    /// Whether frames that cannot be read or mapped are left out; otherwise the run ends before the
+    /// first of them.
     pub skip_bad_frames: bool,
     /// Asks the run to end.
     pub stop: StopRequest,
@@ -86,7 +89,12 @@ impl Plan {
             axes: self.export.axes,
             record: self.export.record,
             reference: match self.evaluate {
-                Some(reference) => ReferencePlan::all(dataset, self.frames.listed(), reference, self.evaluation_delay),
+                Some(reference) => ReferencePlan::all(
+                    dataset,
+                    self.frames.listed(),
+                    reference,
+                    self.evaluation_delay,
+                ),
                 None => ReferencePlan::sampled(dataset, self.frames.listed()),
             },
         }
@@ -96,9 +104,19 @@ impl Plan {
     pub(super) fn check(&self) -> Result<(), RunError> {
         let (width, height) = self.dataset.size();
         if let Some(reference) = self.evaluate
-            && ReferencePlan::all(self.dataset.as_ref(), self.frames.listed(), reference, self.evaluation_delay).is_none()
+            && ReferencePlan::all(
+                self.dataset.as_ref(),
+                self.frames.listed(),
+                reference,
+                self.evaluation_delay,
+            )
+            .is_none()
         {
-            return Err(RunError::NoReference { reference, frames: self.frames.listed().len(), delay: self.evaluation_delay });
+            return Err(RunError::NoReference {
+                reference,
+                frames: self.frames.listed().len(),
+                delay: self.evaluation_delay,
+            });
         }
         check_bounds((width, height), (&self.profile, &self.capacity), &self.config)
     }
@@ -108,10 +126,16 @@ impl Plan {
 ///
 /// # Errors
 /// What does not fit, and what to change.
-pub fn check_bounds((width, height): (usize, usize), (profile, bounds): (&str, &Capacity), config: &Config) -> Result<(), RunError> {
-    let fits = |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
+pub fn check_bounds(
+    (width, height): (usize, usize),
+    (profile, bounds): (&str, &Capacity),
+    config: &Config,
+) -> Result<(), RunError> {
+    let fits =
+        |capacity: &Capacity| width <= capacity.image_width && height <= capacity.image_height;
     if !fits(bounds) {
-        let scale = (bounds.image_width as f64 / width as f64).min(bounds.image_height as f64 / height as f64);
+        let scale = (bounds.image_width as f64 / width as f64)
+            .min(bounds.image_height as f64 / height as f64);
         let scale = (scale * 100.0).floor() / 100.0;
         let larger = Capacity::PROFILES.iter().find(|(_, capacity)| fits(capacity));
         return Err(RunError::ImageSize {
@@ -121,7 +145,9 @@ pub fn check_bounds((width, height): (usize, usize), (profile, bounds): (&str, &
             fits_width: bounds.image_width,
             fits_height: bounds.image_height,
             action: match larger {
-                Some((name, _)) => format!("Choose --profile {name}, or shrink the images with --scale {scale}"),
+                Some((name, _)) => {
+                    format!("Choose --profile {name}, or shrink the images with --scale {scale}")
+                }
                 None => format!("Shrink the images with --scale {scale}"),
             },
         });
@@ -134,7 +160,8 @@ pub fn check_bounds((width, height): (usize, usize), (profile, bounds): (&str, &
     if problems.is_empty() {
         return Ok(());
     }
-    let problems: Vec<String> = problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
+    let problems: Vec<String> =
+        problems.iter().map(|problem| format!("{} {}", problem.key, problem.rule)).collect();
     Err(RunError::Config { problems: problems.join("; ") })
 }
 
@@ -159,14 +186,23 @@ impl FrameNumbers {
     ///
     /// # Errors
     /// Nothing is left of the source.
-    pub fn of(source: &dyn FrameSource, start: usize, stride: usize, frames: Option<usize>) -> Result<Self, RunError> {
+    pub fn of(
+        source: &dyn FrameSource,
+        start: usize,
+        stride: usize,
+        frames: Option<usize>,
+    ) -> Result<Self, RunError> {
         let (stride, most) = (stride.max(1), frames.unwrap_or(usize::MAX));
         if source.stream().is_some() {
             return Ok(Self::Open { start, stride, most });
         }
         let len = source.len();
         let listed: Vec<usize> = (start..len).step_by(stride).take(most).collect();
-        if listed.is_empty() { Err(RunError::NoFrames { start, len }) } else { Ok(Self::Listed(listed)) }
+        if listed.is_empty() {
+            Err(RunError::NoFrames { start, len })
+        } else {
+            Ok(Self::Listed(listed))
+        }
     }
 
     /// All of them; empty where the end is unknown.
@@ -186,12 +222,16 @@ impl FrameNumbers {
     }
 
     /// Positions and numbers from a position on.
-    pub fn from_position(&self, first: usize) -> Box<dyn Iterator<Item = (usize, usize)> + Send + '_> {
+    pub fn from_position(
+        &self,
+        first: usize,
+    ) -> Box<dyn Iterator<Item = (usize, usize)> + Send + '_> {
         match self {
             Self::Listed(listed) => Box::new(listed.iter().copied().enumerate().skip(first)),
-            &Self::Open { start, stride, most } => {
-                Box::new((0..most).map_while(move |at| Some((at, at.checked_mul(stride)?.checked_add(start)?))))
-            }
+            &Self::Open { start, stride, most } => Box::new(
+                (0..most)
+                    .map_while(move |at| Some((at, at.checked_mul(stride)?.checked_add(start)?))),
+            ),
         }
     }
 
@@ -204,7 +244,9 @@ impl FrameNumbers {
 /// Median time between two of the frames, s; `None` where there is only one.
 pub fn frame_interval_s(source: &dyn FrameSource, frames: &FrameNumbers) -> Option<f64> {
     match frames {
-        FrameNumbers::Listed(listed) => median(listed.windows(2).map(|pair| source.time_s(pair[1]) - source.time_s(pair[0]))),
+        FrameNumbers::Listed(listed) => {
+            median(listed.windows(2).map(|pair| source.time_s(pair[1]) - source.time_s(pair[0])))
+        }
         &FrameNumbers::Open { stride, .. } => Some(source.time_s(stride) - source.time_s(0)),
     }
 }
@@ -217,7 +259,8 @@ mod tests {
 
     #[test]
     fn frames_are_taken_from_start_by_stride_up_to_a_number() {
-        let street = StreetFrames::new(StreetConfig { frames: 10, ..StreetConfig::default() }).unwrap();
+        let street =
+            StreetFrames::new(StreetConfig { frames: 10, ..StreetConfig::default() }).unwrap();
         let of = |start, stride, frames| FrameNumbers::of(&street, start, stride, frames);
         assert_eq!(of(2, 3, None).unwrap().listed(), [2, 5, 8]);
         assert_eq!(of(0, 1, Some(2)).unwrap().listed(), [0, 1]);

@@ -34,7 +34,10 @@ impl Progress {
             return Self::Lines { frames, begin: Instant::now() };
         }
         let (bar, template) = match frames {
-            Some(frames) => (ProgressBar::new(frames as u64), "{bar:32.cyan/blue} {pos}/{len} frames  {msg}  {eta} left"),
+            Some(frames) => (
+                ProgressBar::new(frames as u64),
+                "{bar:32.cyan/blue} {pos}/{len} frames  {msg}  {eta} left",
+            ),
             None => (ProgressBar::no_length(), "{spinner:.cyan} {pos} frames  {msg}"),
         };
         let style = ProgressStyle::with_template(template);
@@ -52,7 +55,11 @@ impl Progress {
 
     /// Frame `done` (from 1) is mapped; the block pool is `fill` full, in 0 to 1.
     pub fn frame(&self, done: usize, fps: f64, fill: f64, held: bool) {
-        let words = format!("{fps:5.1} fps  pool {:3.0} %{}", 100.0 * fill, if held { "  pose held" } else { "" });
+        let words = format!(
+            "{fps:5.1} fps  pool {:3.0} %{}",
+            100.0 * fill,
+            if held { "  pose held" } else { "" }
+        );
         match self {
             Self::Quiet => {}
             Self::Bar(bar) => {
@@ -63,7 +70,10 @@ impl Progress {
                 let (due, of) = match frames {
                     Some(frames) => {
                         let every = frames.div_ceil(PLAIN_LINES).max(1);
-                        (done == 1 || done.is_multiple_of(every) || done == *frames, format!("{done}/{frames}"))
+                        (
+                            done == 1 || done.is_multiple_of(every) || done == *frames,
+                            format!("{done}/{frames}"),
+                        )
                     }
                     None => (done == 1 || done.is_multiple_of(OPEN_EVERY), done.to_string()),
                 };

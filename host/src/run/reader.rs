@@ -23,7 +23,10 @@ pub struct ReadFrame {
 }
 
 /// The mapper's input as it was decoded; `None` where an image is empty.
-pub fn stereo_frame<'f>(images: &'f StereoImages, detections: &'f [Detection<'f>]) -> Option<StereoFrame<'f>> {
+pub fn stereo_frame<'f>(
+    images: &'f StereoImages,
+    detections: &'f [Detection<'f>],
+) -> Option<StereoFrame<'f>> {
     Some(StereoFrame {
         colour: images.colour.as_ref().and_then(|colour| colour.view()),
         disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
@@ -32,8 +35,9 @@ pub fn stereo_frame<'f>(images: &'f StereoImages, detections: &'f [Detection<'f>
     })
 }
 
-/// Runs `consume` with the frames of the source that `frames` numbers, decoded ahead in order. Reading ends after an error, or after one that
-/// ends the source where `skip_bad_frames` is set; all ends when `consume` returns.
+/// Runs `consume` with the frames of the source that `frames` numbers, decoded ahead in order.
+/// Reading ends after an error, or after one that ends the source where `skip_bad_frames` is set;
+/// all ends when `consume` returns.
 pub fn read_ahead<R>(
     source: &dyn FrameSource,
     frames: impl Iterator<Item = (usize, usize)> + Send,
@@ -46,7 +50,8 @@ pub fn read_ahead<R>(
         scope.spawn(move || {
             for (position, index) in frames {
                 let images = source.frame(index);
-                let last = images.as_ref().is_err_and(|error| error.ends_source() || !skip_bad_frames);
+                let last =
+                    images.as_ref().is_err_and(|error| error.ends_source() || !skip_bad_frames);
                 let frame = ReadFrame {
                     position,
                     index,

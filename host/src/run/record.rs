@@ -52,7 +52,8 @@ pub struct RunRecord {
     pub sections: Sections,
     /// Wall time of the run, s.
     pub seconds: f64,
-    /// The part of it for mapping and waiting for images: without pictures, evaluation and files that only the report needs, s.
+    /// The part of it for mapping and waiting for images: without pictures, evaluation and files
+    /// that only the report needs, s.
     pub mapping_seconds: f64,
     /// Most bytes resident, where the system reports it.
     pub rss_peak_bytes: Option<u64>,
@@ -61,7 +62,11 @@ pub struct RunRecord {
 impl RunRecord {
     /// Frames a second, over mapping and waiting for images.
     pub fn fps(&self) -> f64 {
-        if self.mapping_seconds > 0.0 { self.frames.len() as f64 / self.mapping_seconds } else { 0.0 }
+        if self.mapping_seconds > 0.0 {
+            self.frames.len() as f64 / self.mapping_seconds
+        } else {
+            0.0
+        }
     }
 
     /// Digest after the last frame.
@@ -71,6 +76,7 @@ impl RunRecord {
 
     /// Whether the file of stored blocks is a part of the result.
     pub fn keeps_blocks(&self) -> bool {
-        self.sections.blocks.store.records > 0 && self.header.streaming.is_some_and(|streaming| streaming.keep_file)
+        self.sections.blocks.store.records > 0
+            && self.header.streaming.is_some_and(|streaming| streaming.keep_file)
     }
 }

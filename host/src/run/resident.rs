@@ -19,7 +19,10 @@ mod tests {
 
     #[test]
     fn reads_the_two_lines_it_needs() {
-        assert_eq!(parse("VmPeak:\t 9 kB\nVmHWM:\t  20 kB\nVmRSS:\t  12 kB\n"), Some((12 * 1024, 20 * 1024)));
+        assert_eq!(
+            parse("VmPeak:\t 9 kB\nVmHWM:\t  20 kB\nVmRSS:\t  12 kB\n"),
+            Some((12 * 1024, 20 * 1024))
+        );
         assert_eq!(parse("nothing"), None);
     }
 }

@@ -5,11 +5,14 @@ use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
 use super::state::RunState;
 use super::view::LiveMap;
-use super::{FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes, stereo_frame};
+use super::{
+    FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead,
+    resident_bytes, stereo_frame,
+};
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume, Setup, StepTimes, VolumeCopy, from_first,
-    overview,
+    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume,
+    Setup, StepTimes, VolumeCopy, from_first, overview,
 };
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
@@ -41,23 +44,37 @@ struct RetiredVolumes(Vec<RetiredVolume>);
 
 impl ObjectSink for RetiredVolumes {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
-        self.0.push(RetiredVolume { summary: object.summary, volume: VolumeCopy::of(object.volume) });
+        self.0
+            .push(RetiredVolume { summary: object.summary, volume: VolumeCopy::of(object.volume) });
     }
 }
 
 impl<'p, 's> Session<'p, 's> {
     /// At the first frame.
-    pub fn begin(plan: &'p Plan, folder: &'p RunFolder, slab: &'s mut [u8]) -> Result<Self, RunError> {
+    pub fn begin(
+        plan: &'p Plan,
+        folder: &'p RunFolder,
+        slab: &'s mut [u8],
+    ) -> Result<Self, RunError> {
         let since = Instant::now();
-        let mapper = Mapper::new(&plan.capacity, &plan.config, slab).map_err(|error| refused(&plan.profile, error))?;
-        let store = DiskStore::begin(plan.streaming, folder, &plan.config).map_err(RunError::Store)?;
+        let mapper = Mapper::new(&plan.capacity, &plan.config, slab)
+            .map_err(|error| refused(&plan.profile, error))?;
+        let store =
+            DiskStore::begin(plan.streaming, folder, &plan.config).map_err(RunError::Store)?;
         Self::with(plan, folder, mapper, store, RunState::default(), since)
     }
 
     /// After the last frame of a checkpoint.
-    pub fn resume(plan: &'p Plan, folder: &'p RunFolder, slab: &'s mut [u8], mut checkpoint: Checkpoint) -> Result<Self, RunError> {
+    pub fn resume(
+        plan: &'p Plan,
+        folder: &'p RunFolder,
+        slab: &'s mut [u8],
+        mut checkpoint: Checkpoint,
+    ) -> Result<Self, RunError> {
         let since = Instant::now();
-        let store = DiskStore::resume(plan.streaming, folder, &plan.config, checkpoint.blocks.as_ref()).map_err(RunError::Reopen)?;
+        let store =
+            DiskStore::resume(plan.streaming, folder, &plan.config, checkpoint.blocks.as_ref())
+                .map_err(RunError::Reopen)?;
         let mapper = checkpoint.mapper(plan, slab)?;
         let mut session = Self::with(plan, folder, mapper, store, checkpoint.state, since)?;
         session.check_last_frame()?;
@@ -79,9 +96,13 @@ impl<'p, 's> Session<'p, 's> {
             folder,
             setup: plan.setup(folder),
             mapper,
-            threads: Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })?,
+            threads: Threads::new(plan.threads)
+                .map_err(|source| RunError::Threads { count: plan.threads, source })?,
             store,
-            poses: plan.poses.as_ref().map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>())),
+            poses: plan
+                .poses
+                .as_ref()
+                .map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>())),
             state,
             since,
         })
@@ -92,12 +113,18 @@ impl<'p, 's> Session<'p, 's> {
         let Some(row) = self.state.frames.last() else { return Ok(()) };
         let position = self.plan.frames.position_of(row.frame).unwrap_or_default();
         let images = self.plan.dataset.frame(row.frame)?;
-        let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let digest = self.stereo_frame((position, row.stamp_ns), &images, &detections).map(|frame| frame.digest());
+        let detections: Vec<_> =
+            images.masks.instances.iter().map(InstanceMask::detection).collect();
+        let digest = self
+            .stereo_frame((position, row.stamp_ns), &images, &detections)
+            .map(|frame| frame.digest());
         if digest == Some(row.report.digests.input) {
             return Ok(());
         }
-        Err(ResumeError::Different { differences: format!("frame {} of the data set has changed", row.frame) }.into())
+        Err(ResumeError::Different {
+            differences: format!("frame {} of the data set has changed", row.frame),
+        }
+        .into())
     }
 
     /// The mapper's input at a position and time; `None` where an image is empty.
@@ -111,12 +138,15 @@ impl<'p, 's> Session<'p, 's> {
         Some(StereoFrame { time_ns: stamp_ns, t_world_camera, ..stereo_frame(images, detections)? })
     }
 
-    /// Maps the remaining frames. What ends the run early is returned once a frame is mapped; before, it is an error.
+    /// Maps the remaining frames. What ends the run early is returned once a frame is mapped;
+    /// before, it is an error.
     pub fn frames(&mut self) -> Result<Option<Incomplete>, RunError> {
         let (plan, taken) = (self.plan, self.state.taken);
         let progress = Progress::new(plan.frames.count(), plan.quiet);
         let remaining = plan.frames.from_position(taken);
-        let mapped = read_ahead(plan.dataset.as_ref(), remaining, plan.skip_bad_frames, |read| self.take(read, &progress));
+        let mapped = read_ahead(plan.dataset.as_ref(), remaining, plan.skip_bad_frames, |read| {
+            self.take(read, &progress)
+        });
         progress.finish();
         let Err(error) = mapped else {
             return if self.state.frames.is_empty() { Err(self.no_frame()) } else { Ok(None) };
@@ -128,13 +158,18 @@ impl<'p, 's> Session<'p, 's> {
         if !matches!(error, RunError::Observe(_)) && plan.checkpoints.is_some() {
             self.write_checkpoint_or_warn(&progress);
         }
-        Ok(Some(Incomplete::of(&error, plan.frames.count().map(|count| count.saturating_sub(self.state.taken)))))
+        Ok(Some(Incomplete::of(
+            &error,
+            plan.frames.count().map(|count| count.saturating_sub(self.state.taken)),
+        )))
     }
 
     /// That evicted blocks were lost to the disk, where all frames were mapped.
     pub fn of_disk(&self) -> Option<Incomplete> {
         let failure = self.store.failure().filter(|_| self.store.disk_failed())?;
-        Some(Incomplete::of_disk(format!("map.blocks could not grow ({failure}), and blocks were lost. Free disk space and run again")))
+        Some(Incomplete::of_disk(format!(
+            "map.blocks could not grow ({failure}), and blocks were lost. Free disk space and run again"
+        )))
     }
 
     /// Why there is no frame at all.
@@ -154,7 +189,9 @@ impl<'p, 's> Session<'p, 's> {
             match plan.stop.signal() {
                 // Of a stream this is the usual end.
                 Some(_) if open => return Ok(()),
-                Some(signal) => return Err(RunError::Signal { signal, frames: self.state.frames.len() }),
+                Some(signal) => {
+                    return Err(RunError::Signal { signal, frames: self.state.frames.len() });
+                }
                 None => {}
             }
             let (position, index) = (frame.position, frame.index);
@@ -175,16 +212,23 @@ impl<'p, 's> Session<'p, 's> {
     /// Steps, observes, and writes a checkpoint where one is due.
     fn frame(&mut self, read: ReadFrame, progress: &Progress) -> Result<(), RunError> {
         let (position, index) = (read.position, read.index);
-        let failed_before = (self.store.failure().is_some(), self.state.observers.failure().is_some());
+        let failed_before =
+            (self.store.failure().is_some(), self.state.observers.failure().is_some());
         let (mut row, retired, images) = self.step(read)?;
         self.state.timers.add_since(&mut self.since);
         self.state.taken = position + 1;
         let RunState { frames, observers, timers, .. } = &mut self.state;
         let blocks = row.report.blocks;
         let fps = (frames.len() + 1) as f64 / timers.mapping().as_secs_f64();
-        progress.frame(position + 1, fps, f64::from(blocks.used) / f64::from(blocks.capacity), row.held());
+        progress.frame(
+            position + 1,
+            fps,
+            f64::from(blocks.used) / f64::from(blocks.capacity),
+            row.held(),
+        );
         let evicted = self.store.take_evicted();
-        let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
+        let mut view =
+            LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
         let mut context = FrameContext {
             position,
             row: &row,
@@ -196,12 +240,20 @@ impl<'p, 's> Session<'p, 's> {
         };
         let observed = observers.frame(&self.setup, &mut context);
         row.times.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
-        frames.add(row).map_err(|source| ObserveError::Write { path: frames.file().path(&self.setup.folder), source })?;
+        frames.add(row).map_err(|source| ObserveError::Write {
+            path: frames.file().path(&self.setup.folder),
+            source,
+        })?;
         observed?;
         self.state.write_due(&self.setup.folder)?;
         self.warn_of_disk(index, failed_before, progress);
         self.check_limits()?;
-        if self.plan.checkpoints.as_ref().is_some_and(|plan| (position + 1).is_multiple_of(plan.every)) {
+        if self
+            .plan
+            .checkpoints
+            .as_ref()
+            .is_some_and(|plan| (position + 1).is_multiple_of(plan.every))
+        {
             self.write_checkpoint_or_warn(progress);
         }
         self.state.timers.overhead += self.since.elapsed();
@@ -209,7 +261,12 @@ impl<'p, 's> Session<'p, 's> {
     }
 
     /// Warns of a disk that refused for the first time in this frame.
-    fn warn_of_disk(&self, index: usize, (store_before, files_before): (bool, bool), progress: &Progress) {
+    fn warn_of_disk(
+        &self,
+        index: usize,
+        (store_before, files_before): (bool, bool),
+        progress: &Progress,
+    ) {
         if let Some(failure) = self.store.failure().filter(|_| !store_before) {
             progress.warn(&format!("frame {index}: map.blocks cannot grow ({failure}). Blocks evicted from here on are lost"));
         }
@@ -218,13 +275,18 @@ impl<'p, 's> Session<'p, 's> {
         }
     }
 
-    fn step(&mut self, read: ReadFrame) -> Result<(FrameRow, Vec<RetiredVolume>, StereoImages), RunError> {
+    fn step(
+        &mut self,
+        read: ReadFrame,
+    ) -> Result<(FrameRow, Vec<RetiredVolume>, StereoImages), RunError> {
         let ReadFrame { position, index, stamp_ns, time_s, images } = read;
         let images = images?;
         let refused = |reason: String| RunError::Step { frame: index, reason };
-        let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let frame =
-            self.stereo_frame((position, stamp_ns), &images, &detections).ok_or_else(|| refused("the images are empty".to_owned()))?;
+        let detections: Vec<_> =
+            images.masks.instances.iter().map(InstanceMask::detection).collect();
+        let frame = self
+            .stereo_frame((position, stamp_ns), &images, &detections)
+            .ok_or_else(|| refused("the images are empty".to_owned()))?;
         self.threads.take_times();
         let begin = Instant::now();
         let (mapper, threads, store) = (&mut self.mapper, &self.threads, &mut self.store);
@@ -233,23 +295,35 @@ impl<'p, 's> Session<'p, 's> {
         let report = stepped.map_err(|error| refused(step_reason(error)))?;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
         let times = self.threads.take_times();
-        let row = FrameRow { frame: index, stamp_ns, time_s, step_ms, times, ..self.row(&images, report) };
+        let row = FrameRow {
+            frame: index,
+            stamp_ns,
+            time_s,
+            step_ms,
+            times,
+            ..self.row(&images, report)
+        };
         Ok((row, retired.0, images))
     }
 
     /// What is recorded of a frame, but for its number and times.
     fn row(&self, images: &StereoImages, report: Report) -> FrameRow {
-        let tracks_in = |state: MotionState| self.mapper.tracks().filter(|track| track.detected && track.state == state).count() as u32;
+        let tracks_in = |state: MotionState| {
+            self.mapper.tracks().filter(|track| track.detected && track.state == state).count()
+                as u32
+        };
         FrameRow {
             frame: 0,
             stamp_ns: None,
             time_s: 0.0,
             report,
             history_frames: self.mapper.background().history().len(),
-            track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(tracks_in),
+            track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic]
+                .map(tracks_in),
             disparity_mean_px: mean_px(self.mapper.disparity_q8()),
             mask_refusals: images.masks.refusals,
-            depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count()) + report.stereo.refused,
+            depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count())
+                + report.stereo.refused,
             step_ms: 0.0,
             rss_bytes: resident_bytes().map(|(now, _)| now),
             times: StepTimes::default(),
@@ -264,27 +338,34 @@ impl<'p, 's> Session<'p, 's> {
         }
         let limit_bytes = self.plan.rss_limit_bytes;
         match row.rss_bytes {
-            Some(rss_bytes) if rss_bytes > limit_bytes => Err(RunError::Resident { frame: row.frame, rss_bytes, limit_bytes }),
+            Some(rss_bytes) if rss_bytes > limit_bytes => {
+                Err(RunError::Resident { frame: row.frame, rss_bytes, limit_bytes })
+            }
             _ => Ok(()),
         }
     }
 
-    /// Writes a checkpoint of the frames mapped so far. One that cannot be written leaves the one before.
+    /// Writes a checkpoint of the frames mapped so far. One that cannot be written leaves the one
+    /// before.
     fn write_checkpoint_or_warn(&mut self, progress: &Progress) {
         if let Some(failure) = self.write_checkpoint().err() {
-            progress.warn(&format!("checkpoint not written ({failure}). A resumed run starts from the one before"));
+            progress.warn(&format!(
+                "checkpoint not written ({failure}). A resumed run starts from the one before"
+            ));
         }
     }
 
     fn write_checkpoint(&mut self) -> Result<(), FolderError> {
         let Some(plan) = &self.plan.checkpoints else { return Ok(()) };
-        let refused = self.state.sync(&self.setup.folder).into_iter().next().map(|(_, error)| error);
+        let refused =
+            self.state.sync(&self.setup.folder).into_iter().next().map(|(_, error)| error);
         let refused = refused.or(self.state.observers.checkpoint(&self.setup).err());
         if let Some(ObserveError::Write { path, source }) = refused {
             return Err(FolderError::Write { path, source });
         }
         let position = self.store.position();
-        let blocks = position.map_err(|source| FolderError::Write { path: self.folder.file(BLOCKS_FILE), source })?;
+        let blocks = position
+            .map_err(|source| FolderError::Write { path: self.folder.file(BLOCKS_FILE), source })?;
         checkpoint::write(self.folder, &plan.manifest, blocks, &self.state, &mut self.mapper)
     }
 
@@ -293,9 +374,11 @@ impl<'p, 's> Session<'p, 's> {
         let mut retired = RetiredVolumes::default();
         let pruned = self.mapper.finish_with(&mut retired);
         let RunState { frames, observers, .. } = &mut self.state;
-        let mut view = LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
+        let mut view =
+            LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };
         let last = frames.last();
-        let overview_jpeg = last.map(|row| overview(&mut view, &row.report.t_world_camera)).unwrap_or_default();
+        let overview_jpeg =
+            last.map(|row| overview(&mut view, &row.report.t_world_camera)).unwrap_or_default();
         let mut context = EndContext { last, retired: &retired.0, overview_jpeg, view: &mut view };
         observers.end(&self.setup, &mut context)?;
         Ok(pruned)
@@ -305,6 +388,7 @@ impl<'p, 's> Session<'p, 's> {
 /// Mean of the disparities that are known, px.
 fn mean_px(disparity_q8: View<'_, u16>) -> Option<f64> {
     let known = disparity_q8.rows().flatten().filter(|disparity| **disparity > 0);
-    let (sum, count) = known.fold((0u64, 0u64), |(sum, count), disparity| (sum + u64::from(*disparity), count + 1));
+    let (sum, count) = known
+        .fold((0u64, 0u64), |(sum, count), disparity| (sum + u64::from(*disparity), count + 1));
     (count > 0).then(|| sum as f64 / count as f64 / 256.0)
 }

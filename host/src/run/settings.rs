@@ -12,9 +12,15 @@ pub struct Setting {
 }
 
 /// The settings of two runs that differ, by key.
-pub(crate) fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Setting> {
+pub(crate) fn differing(
+    a: &BTreeMap<String, String>,
+    b: &BTreeMap<String, String>,
+) -> Vec<Setting> {
     let keys: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-    let pairs = keys.into_iter().map(|key| Setting { key: key.clone(), values: [a.get(key).cloned(), b.get(key).cloned()] });
+    let pairs = keys.into_iter().map(|key| Setting {
+        key: key.clone(),
+        values: [a.get(key).cloned(), b.get(key).cloned()],
+    });
     pairs.filter(|setting| setting.values[0] != setting.values[1]).collect()
 }
 

@@ -1,7 +1,8 @@
 //! Work and span of the core's stages: what they cost on one thread, and what bounds them on more.
 //!
-//! Everything runs on one thread, and its CPU time is taken apart at every `join`: so a loaded machine, or one with fewer processors,
-//! gives the same answer as an idle one. What threads themselves cost (waking, moving memory from cache to cache) is not in it.
+//! Everything runs on one thread, and its CPU time is taken apart at every `join`: so a loaded
+//! machine, or one with fewer processors, gives the same answer as an idle one. What threads
+//! themselves cost (waking, moving memory from cache to cache) is not in it.
 
 use cpu_time::ThreadTime;
 use dynvox_core::{Executor, Stage, parallel::Vectors};
@@ -14,10 +15,11 @@ use std::time::Duration;
 pub struct Cost {
     /// CPU time of all of it.
     pub work: Duration,
-    /// CPU time of the longest chain in it that must run one after the other: what it takes on ever so many threads.
+    /// CPU time of the longest chain in it that must run one after the other: what it takes on ever
+    /// so many threads.
     pub span: Duration,
-    /// What it takes on two threads at least: where two branches may run at once, half of their work or the span of either, whichever
-    /// is most.
+    /// What it takes on two threads at least: where two branches may run at once, half of their
+    /// work or the span of either, whichever is most.
     pub two_threads: Duration,
 }
 
@@ -62,7 +64,8 @@ thread_local! {
 }
 
 impl State {
-    /// Charges the time since the last call, and gives what was charged since the last fork; what follows begins at nothing.
+    /// Charges the time since the last call, and gives what was charged since the last fork; what
+    /// follows begins at nothing.
     fn take(&mut self) -> Cost {
         let since = SINCE.get();
         let now = ThreadTime::now();
@@ -141,11 +144,16 @@ mod tests {
         let spans = Spans::new(Vectors::BASELINE);
         let fork = || {
             burn(4);
-            spans.join(|| burn(10), || spans.stage(Stage::SceneFlow, || spans.join(|| burn(6), || burn(2))));
+            spans.join(
+                || burn(10),
+                || spans.stage(Stage::SceneFlow, || spans.join(|| burn(6), || burn(2))),
+            );
         };
         let ((), cost, stages) = spans.measure(|| spans.stage(Stage::Stereo, fork));
         let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
-        let near = |duration, expected: f64| assert!((ms(duration) - expected).abs() < 2.0, "{} for {expected} ms", ms(duration));
+        let near = |duration, expected: f64| {
+            assert!((ms(duration) - expected).abs() < 2.0, "{} for {expected} ms", ms(duration))
+        };
         near(cost.work, 22.0);
         near(cost.span, 14.0);
         near(cost.two_threads, 14.0);
@@ -153,7 +161,8 @@ mod tests {
         near(flow.work, 8.0);
         near(flow.span, 6.0);
         assert_eq!(stages[Stage::Fuse as usize], Cost::default());
-        let (_, again, _) = spans.measure(|| spans.join(|| burn(5), || spans.join(|| burn(5), || burn(4))));
+        let (_, again, _) =
+            spans.measure(|| spans.join(|| burn(5), || spans.join(|| burn(5), || burn(4))));
         near(again.span, 5.0);
         near(again.two_threads, 7.0);
     }

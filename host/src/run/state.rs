@@ -28,9 +28,13 @@ impl RunState {
         self.files().into_iter().try_for_each(|file| file.write_due(folder))
     }
 
-    /// Writes all rows, and waits until they are on the disk. Returns the files that cannot be written, and why.
+    /// Writes all rows, and waits until they are on the disk. Returns the files that cannot be
+    /// written, and why.
     pub fn sync(&mut self, folder: &Path) -> Vec<(String, ObserveError)> {
-        self.files().into_iter().filter_map(|file| Some((file.name().to_owned(), file.sync(folder).err()?))).collect()
+        self.files()
+            .into_iter()
+            .filter_map(|file| Some((file.name().to_owned(), file.sync(folder).err()?)))
+            .collect()
     }
 
     /// Brings the rows on disk back to those of the checkpoint.

@@ -1,8 +1,11 @@
-//! Threads and time for the core: a pool of N threads, the CPU time of all threads, and per stage the wall time and that CPU time.
+//! Threads and time for the core: a pool of N threads, the CPU time of all threads, and per stage
+//! the wall time and that CPU time.
 //!
-//! CPU time is the threads' own clock, so it counts work, not waiting, and does not grow when others use the machine. Each thread knows
-//! the stage it works for; whenever that changes (a stage begins or ends, a piece of work is taken over from another thread) the time since the
-//! last change is charged to the stage before. So work that runs elsewhere is charged once, to the right stage.
+//! CPU time is the threads' own clock, so it counts work, not waiting, and does not grow when
+//! others use the machine. Each thread knows the stage it works for; whenever that changes (a stage
+//! begins or ends, a piece of work is taken over from another thread) the time since the last
+//! change is charged to the stage before. So work that runs elsewhere is charged once, to the right
+//! stage.
 
 use crate::observe::{STAGES, StageTime, StepTimes};
 use cpu_time::ThreadTime;
@@ -31,7 +34,12 @@ thread_local! {
 impl Threads {
     /// A pool of `count` threads; one thread needs none and works where it is called.
     pub fn new(count: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let build = || rayon::ThreadPoolBuilder::new().num_threads(count).thread_name(|at| format!("dynvox-{at}")).build();
+        let build = || {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(count)
+                .thread_name(|at| format!("dynvox-{at}"))
+                .build()
+        };
         let pool = if count > 1 { Some(build()?) } else { None };
         Ok(Self {
             pool,
@@ -67,7 +75,8 @@ impl Threads {
         times
     }
 
-    /// Works for `stage` from here on; what was done before is charged to the stage before, which is returned.
+    /// Works for `stage` from here on; what was done before is charged to the stage before, which
+    /// is returned.
     fn switch(&self, stage: Option<usize>) -> Option<usize> {
         let now = ThreadTime::now();
         let before = WORKING_FOR.replace(stage.map(|stage| (stage, now)));
@@ -106,7 +115,8 @@ impl Executor for Threads {
             return (a(), b());
         }
         let stage = WORKING_FOR.get().map(|(stage, _)| stage);
-        // Either may run on another thread, or on this one while it waits within another stage's work.
+        // Either may run on another thread, or on this one while it waits within another stage's
+        // work.
         rayon::join(|| self.charged(stage, a), || self.charged(stage, b))
     }
 
@@ -155,10 +165,22 @@ mod tests {
             });
             let times = threads.take_times();
             let cpu = |stage: Stage| times.stages[stage as usize].cpu_ms;
-            assert!((40.0..48.0).contains(&cpu(Stage::Stereo)), "{count} threads: {}", cpu(Stage::Stereo));
-            assert!((30.0..38.0).contains(&cpu(Stage::SceneFlow)), "{count} threads: {}", cpu(Stage::SceneFlow));
+            assert!(
+                (40.0..48.0).contains(&cpu(Stage::Stereo)),
+                "{count} threads: {}",
+                cpu(Stage::Stereo)
+            );
+            assert!(
+                (30.0..38.0).contains(&cpu(Stage::SceneFlow)),
+                "{count} threads: {}",
+                cpu(Stage::SceneFlow)
+            );
             assert_eq!(cpu(Stage::Fuse), 0.0);
-            assert!((75.0..91.0).contains(&times.cpu_ms), "{count} threads: {}, and 5 ms of no stage", times.cpu_ms);
+            assert!(
+                (75.0..91.0).contains(&times.cpu_ms),
+                "{count} threads: {}, and 5 ms of no stage",
+                times.cpu_ms
+            );
             assert_eq!(threads.take_times(), StepTimes::default(), "taken times are gone");
         }
     }

@@ -1,8 +1,11 @@
-//! Mesh simplification by vertex clustering (Rossignac, Borrel, 1993): vertices in one cell of a lattice become their mean.
+//! Mesh simplification by vertex clustering (Rossignac, Borrel, 1993): vertices in one cell of a
+//! lattice become their mean.
 //!
-//! Triangles stream in, and memory is bounded by the result, not by the input: where too many would stay, it is told how large cells have to be, and
-//! all begins again. Cells that grew in between would not do: what was clustered before and what comes after would part along their borders. A
-//! vertex counts once for all triangles that share it within [`RECENT`] numbers of vertices; one that returns later counts again.
+//! Triangles stream in, and memory is bounded by the result, not by the input: where too many would
+//! stay, it is told how large cells have to be, and all begins again. Cells that grew in between
+//! would not do: what was clustered before and what comes after would part along their borders. A
+//! vertex counts once for all triangles that share it within [`RECENT`] numbers of vertices; one
+//! that returns later counts again.
 
 use super::IndexedMesh;
 use dynvox_core::view::Vertex;
@@ -93,12 +96,17 @@ impl VertexClustering {
         }
     }
 
-    /// Adds a triangle by the numbers of its vertices in the mesh that comes in; `vertex` tells those that are not known. Returns whether it counts: a
-    /// triangle with a vertex that is `None`, or nowhere, does not.
+    /// Adds a triangle by the numbers of its vertices in the mesh that comes in; `vertex` tells
+    /// those that are not known. Returns whether it counts: a triangle with a vertex that is
+    /// `None`, or nowhere, does not.
     ///
     /// # Errors
     /// Those of `vertex`.
-    pub fn add(&mut self, corners: [u32; 3], mut vertex: impl FnMut(u32) -> io::Result<Option<Vertex>>) -> io::Result<bool> {
+    pub fn add(
+        &mut self,
+        corners: [u32; 3],
+        mut vertex: impl FnMut(u32) -> io::Result<Option<Vertex>>,
+    ) -> io::Result<bool> {
         let [a, b, c] = corners;
         let Some(a) = self.cluster_of(a, &mut vertex)? else { return Ok(false) };
         let Some(b) = self.cluster_of(b, &mut vertex)? else { return Ok(false) };
@@ -114,17 +122,24 @@ impl VertexClustering {
 
     /// Whether more stay than may.
     pub fn is_full(&self) -> bool {
-        self.triangles.len() > self.most_triangles || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles
+        self.triangles.len() > self.most_triangles
+            || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles
     }
 
     /// The number of the cell that a vertex is in; it counts there unless it has just done so.
-    fn cluster_of(&mut self, number: u32, vertex: impl FnOnce(u32) -> io::Result<Option<Vertex>>) -> io::Result<Option<u32>> {
+    fn cluster_of(
+        &mut self,
+        number: u32,
+        vertex: impl FnOnce(u32) -> io::Result<Option<Vertex>>,
+    ) -> io::Result<Option<u32>> {
         let slot = number as usize % RECENT;
         let known = self.recent[slot];
         if known.vertex == number && known.cluster != Recent::NONE.cluster {
             return Ok(Some(known.cluster));
         }
-        let Some(vertex) = vertex(number)?.filter(|vertex| vertex.position_m.iter().all(|metres| metres.is_finite())) else {
+        let Some(vertex) = vertex(number)?
+            .filter(|vertex| vertex.position_m.iter().all(|metres| metres.is_finite()))
+        else {
             return Ok(None);
         };
         let cluster = self.cluster(vertex);
@@ -162,7 +177,8 @@ impl VertexClustering {
         let mut mesh = IndexedMesh::default();
         for triangle in &self.triangles {
             let corners = triangle.map(|corner| {
-                let (number, cluster) = (&mut numbers[corner as usize], &self.clusters[corner as usize]);
+                let (number, cluster) =
+                    (&mut numbers[corner as usize], &self.clusters[corner as usize]);
                 if *number == u32::MAX {
                     *number = mesh.positions_m.len() as u32;
                     mesh.positions_m.push(cluster.position_m());
@@ -183,7 +199,8 @@ mod tests {
 
     /// Adds a triangle of vertices that come with their numbers.
     fn add(clustering: &mut VertexClustering, corners: [(u32, Vertex); 3]) -> bool {
-        let vertex = |number| Ok(corners.iter().find(|(own, _)| *own == number).map(|(_, vertex)| *vertex));
+        let vertex =
+            |number| Ok(corners.iter().find(|(own, _)| *own == number).map(|(_, vertex)| *vertex));
         clustering.add(corners.map(|(number, _)| number), vertex).unwrap()
     }
 
@@ -201,9 +218,18 @@ mod tests {
         }
         let mesh = clustering.finish();
         let [low, high] = mesh.bounds_m().unwrap();
-        assert!(low[0] < 0.2 && high[0] > 4.8 && low[2] == 2.0 && high[2] == 2.0, "{low:?} {high:?}");
-        let area = |[a, b, c]: [[f32; 3]; 3]| 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
-        let whole: f32 = mesh.triangles.iter().map(|triangle| area(triangle.map(|corner| mesh.positions_m[corner as usize]))).sum();
+        assert!(
+            low[0] < 0.2 && high[0] > 4.8 && low[2] == 2.0 && high[2] == 2.0,
+            "{low:?} {high:?}"
+        );
+        let area = |[a, b, c]: [[f32; 3]; 3]| {
+            0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+        };
+        let whole: f32 = mesh
+            .triangles
+            .iter()
+            .map(|triangle| area(triangle.map(|corner| mesh.positions_m[corner as usize])))
+            .sum();
         assert!((22.0..=25.1).contains(&whole), "of 25 square metres {whole} are covered once");
         assert!(mesh.normals().iter().all(|normal| normal[2] > 0.999));
     }
@@ -211,8 +237,11 @@ mod tests {
     #[test]
     fn the_two_sides_of_a_sheet_become_one_and_nonsense_is_left_out() {
         let mut clustering = VertexClustering::new(0.03, 10);
-        let corner = |number: u32, position_m: [f32; 3]| (number, Vertex { position_m, ..Vertex::default() });
-        let corners = [corner(0, [0.0, 0.0, 1.0]), corner(1, [1.0, 0.0, 1.0]), corner(2, [0.0, 1.0, 1.0])];
+        let corner = |number: u32, position_m: [f32; 3]| {
+            (number, Vertex { position_m, ..Vertex::default() })
+        };
+        let corners =
+            [corner(0, [0.0, 0.0, 1.0]), corner(1, [1.0, 0.0, 1.0]), corner(2, [0.0, 1.0, 1.0])];
         assert!(add(&mut clustering, corners));
         add(&mut clustering, [corners[0], corners[2], corners[1]]);
         assert!(!add(&mut clustering, [corners[0], corners[1], corner(3, [f32::NAN, 0.0, 0.0])]));
@@ -221,7 +250,9 @@ mod tests {
 
     #[test]
     fn a_vertex_counts_once_however_many_triangles_share_it() {
-        let corner = |number: u32, x: f32, y: f32| (number, Vertex { position_m: [x, y, 1.0], ..Vertex::default() });
+        let corner = |number: u32, x: f32, y: f32| {
+            (number, Vertex { position_m: [x, y, 1.0], ..Vertex::default() })
+        };
         // A fan: its centre, and a vertex of one triangle in the same cell.
         let (centre, beside) = (corner(0, 0.01, 0.0), corner(1, 0.02, 0.0));
         let rim = [(0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)];

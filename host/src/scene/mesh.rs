@@ -16,7 +16,8 @@ pub struct IndexedMesh {
 }
 
 impl IndexedMesh {
-    /// Normals of the vertices, of length 1: the mean over their triangles by area. 0 where they cancel out.
+    /// Normals of the vertices, of length 1: the mean over their triangles by area. 0 where they
+    /// cancel out.
     pub fn normals(&self) -> Vec<[f32; 3]> {
         let mut sums = vec![Vector3::<f32>::zeros(); self.positions_m.len()];
         for triangle in &self.triangles {
@@ -31,7 +32,10 @@ impl IndexedMesh {
     pub fn bounds_m(&self) -> Option<[[f32; 3]; 2]> {
         let first = *self.positions_m.first()?;
         Some(self.positions_m.iter().fold([first; 2], |[low, high], at| {
-            [[0, 1, 2].map(|axis| low[axis].min(at[axis])), [0, 1, 2].map(|axis| high[axis].max(at[axis]))]
+            [
+                [0, 1, 2].map(|axis| low[axis].min(at[axis])),
+                [0, 1, 2].map(|axis| high[axis].max(at[axis])),
+            ]
         }))
     }
 }

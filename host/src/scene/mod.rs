@@ -1,4 +1,5 @@
-//! A finished run as a viewer shows it, read from the run folder and bounded: so many triangles, frames and pictures, however long the run.
+//! A finished run as a viewer shows it, read from the run folder and bounded: so many triangles,
+//! frames and pictures, however long the run.
 
 mod block_history;
 mod cluster;
@@ -14,7 +15,9 @@ mod tables;
 pub use block_history::BlockHistory;
 pub use mesh::IndexedMesh;
 pub use pictures::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
-pub use planning::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, PlanningCell, PlanningWindow, WindowScales};
+pub use planning::{
+    FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, PlanningCell, PlanningWindow, WindowScales,
+};
 pub use read::object_files;
 pub use surface_errors::SurfaceErrorMap;
 pub use tables::{FrameColumns, TrackColumns};

@@ -14,7 +14,8 @@ pub const OVERVIEW: &str = "overview.jpg";
 pub enum PictureKind {
     /// The left image.
     Left,
-    /// Instance masks in the colours of their motion states, transparent elsewhere, as large as the left picture.
+    /// Instance masks in the colours of their motion states, transparent elsewhere, as large as the
+    /// left picture.
     Masks,
     /// Disparity from far (blue) to near (red).
     Disparity,

@@ -68,14 +68,21 @@ impl PlanningWindow {
             return Ok(Self::default());
         }
         let damaged = |reason: String| FormatError::content(&path, reason, "Make the run again");
-        let of: WindowScales = serde_json::from_str(&read_text(&path)?).map_err(|error| damaged(error.to_string()))?;
+        let of: WindowScales =
+            serde_json::from_str(&read_text(&path)?).map_err(|error| damaged(error.to_string()))?;
         let Picture::Grey(map) = read_picture(&folder.join("map.pgm"))? else {
             return Err(damaged("map.pgm has no grey levels".to_owned()));
         };
-        let (heights, distances) = (read_png_deep(&folder.join("height.png"))?, read_png_deep(&folder.join("distance.png"))?);
-        let height_m = |value: u16| (value != u16::MAX).then(|| of.height_zero_m + of.height_unit_m * f64::from(value));
+        let (heights, distances) = (
+            read_png_deep(&folder.join("height.png"))?,
+            read_png_deep(&folder.join("distance.png"))?,
+        );
+        let height_m = |value: u16| {
+            (value != u16::MAX).then(|| of.height_zero_m + of.height_unit_m * f64::from(value))
+        };
         // Where no ground was seen, as below an obstacle, a column stands at the middle height.
-        let mut known_m: Vec<f64> = heights.pixels().iter().filter_map(|&value| height_m(value)).collect();
+        let mut known_m: Vec<f64> =
+            heights.pixels().iter().filter_map(|&value| height_m(value)).collect();
         known_m.sort_unstable_by(f64::total_cmp);
         let middle_m = known_m.get(known_m.len() / 2).copied().unwrap_or(of.origin_m[2]);
         let cell = |(u, v): (usize, usize)| {
@@ -86,14 +93,21 @@ impl PlanningWindow {
             };
             // Rows begin with the farthest.
             let column = [u as f64, (map.height() - 1 - v) as f64];
-            let [right_m, ahead_m] = [0, 1].map(|axis| of.origin_m[axis] + (column[axis] + 0.5) * of.cell_m);
+            let [right_m, ahead_m] =
+                [0, 1].map(|axis| of.origin_m[axis] + (column[axis] + 0.5) * of.cell_m);
             let up_m = heights.get(u, v).and_then(height_m).unwrap_or(middle_m);
-            let along = |axis: usize| of.right_world[axis] * right_m + of.ahead_world[axis] * ahead_m + of.up_world[axis] * up_m;
+            let along = |axis: usize| {
+                of.right_world[axis] * right_m
+                    + of.ahead_world[axis] * ahead_m
+                    + of.up_world[axis] * up_m
+            };
             let distance = distances.get(u, v).filter(|&value| value > 0);
             Some(PlanningCell {
                 position_m: [0, 1, 2].map(|axis| along(axis) as f32),
                 occupied,
-                distance_m: distance.map(|value| ((f64::from(value) - f64::from(of.distance_zero)) * of.distance_unit_m) as f32),
+                distance_m: distance.map(|value| {
+                    ((f64::from(value) - f64::from(of.distance_zero)) * of.distance_unit_m) as f32
+                }),
             })
         };
         let pixels = (0..map.height()).flat_map(|v| (0..map.width()).map(move |u| (u, v)));
@@ -124,12 +138,21 @@ mod tests {
         write_png_deep(&folder.join("height.png"), &image([0, 100, u16::MAX, 0])).unwrap();
         write_png_deep(&folder.join("distance.png"), &image([0, 32_868, 32_718, 0])).unwrap();
         let PlanningWindow { cell_m, up, cells } = PlanningWindow::read(run.path()).unwrap();
-        let cell = |position_m, occupied, distance_m| PlanningCell { position_m, occupied, distance_m };
-        let expected =
-            [cell([0.25, 1.4, 2.75], false, Some(1.0)), cell([-0.25, 1.5, 2.25], true, Some(-0.5)), cell([0.25, 1.5, 2.25], false, None)];
+        let cell =
+            |position_m, occupied, distance_m| PlanningCell { position_m, occupied, distance_m };
+        let expected = [
+            cell([0.25, 1.4, 2.75], false, Some(1.0)),
+            cell([-0.25, 1.5, 2.25], true, Some(-0.5)),
+            cell([0.25, 1.5, 2.25], false, None),
+        ];
         assert_eq!((cell_m, up), (0.5, [0.0, -1.0, 0.0]));
         assert_eq!(cells, expected);
         std::fs::write(folder.join("window.json"), "{}").unwrap();
-        assert!(PlanningWindow::read(run.path()).unwrap_err().to_string().contains("window.json cannot be used"));
+        assert!(
+            PlanningWindow::read(run.path())
+                .unwrap_err()
+                .to_string()
+                .contains("window.json cannot be used")
+        );
     }
 }

@@ -3,11 +3,12 @@
 use super::simplify::simplified;
 use super::tables::{FrameColumns, TrackColumns, read_rows};
 use super::{
-    BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PlanningWindow, Scene, SceneFrame,
-    SceneObject, SurfaceErrorMap,
+    BlockHistory, IndexedMesh, OBJECTS_FOLDER, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex,
+    PlanningWindow, Scene, SceneFrame, SceneObject, SurfaceErrorMap,
 };
 use crate::formats::{
-    FRAMES_FILE, FormatError, MAP_FILE, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE, read_numbered, read_poses, read_text,
+    FRAMES_FILE, FormatError, MAP_FILE, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
+    read_numbered, read_poses, read_text,
 };
 use dynvox_core::geometry::Transform;
 use std::collections::BTreeMap;
@@ -23,7 +24,8 @@ const MOST_OBJECT_TRIANGLES: usize = 20_000;
 const LEAST_OBJECT_TRIANGLES: usize = 500;
 
 impl Scene {
-    /// Reads a run folder: its map, objects, trajectories, tables and list of pictures. What the run could not write is left out.
+    /// Reads a run folder: its map, objects, trajectories, tables and list of pictures. What the
+    /// run could not write is left out.
     ///
     /// # Errors
     /// There is no trajectory or no table of frames, or a file is damaged.
@@ -31,8 +33,11 @@ impl Scene {
         let objects = objects(&folder.join(OBJECTS_FOLDER), most_triangles / OBJECT_SHARE)?;
         let of_objects: usize = objects.iter().map(|object| object.mesh.triangles.len()).sum();
         let map = folder.join(MAP_FILE);
-        let (static_map, static_triangles) =
-            if map.is_file() { simplified(&map, true, most_triangles.saturating_sub(of_objects))? } else { (IndexedMesh::default(), 0) };
+        let (static_map, static_triangles) = if map.is_file() {
+            simplified(&map, true, most_triangles.saturating_sub(of_objects))?
+        } else {
+            (IndexedMesh::default(), 0)
+        };
         let (frames, truth) = frames(folder)?;
         Ok(Self {
             frames,
@@ -55,7 +60,8 @@ impl Scene {
 pub fn object_files(folder: &Path) -> Result<Vec<(u32, String)>, FormatError> {
     let mut names = Vec::new();
     for entry in folder.read_dir().map_err(FormatError::read(folder))? {
-        let name = entry.map_err(FormatError::read(folder))?.file_name().to_string_lossy().into_owned();
+        let name =
+            entry.map_err(FormatError::read(folder))?.file_name().to_string_lossy().into_owned();
         let name = name.strip_suffix(".ply").unwrap_or_default().to_owned();
         // The mesh in world coordinates has a word in its name.
         let numbers: Option<Vec<u32>> = name.split('-').map(|number| number.parse().ok()).collect();
@@ -73,7 +79,8 @@ fn objects(folder: &Path, most_triangles: usize) -> Result<Vec<SceneObject>, For
         return Ok(Vec::new());
     }
     let names = object_files(folder)?;
-    let each = (most_triangles / names.len().max(1)).clamp(LEAST_OBJECT_TRIANGLES, MOST_OBJECT_TRIANGLES);
+    let each =
+        (most_triangles / names.len().max(1)).clamp(LEAST_OBJECT_TRIANGLES, MOST_OBJECT_TRIANGLES);
     let object = |(id, name): (u32, String)| {
         let t_world_object = read_numbered(&folder.join(format!("{name}_kitti.txt")))?;
         let (mesh, _) = simplified(&folder.join(format!("{name}.ply")), false, each)?;
@@ -90,9 +97,15 @@ fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatErro
     let truth_file = folder.join(TRUE_TRAJECTORY_FILE);
     let truth = if truth_file.is_file() { read_poses(&truth_file)?.poses } else { Vec::new() };
     let every = rows.len().div_ceil(MOST_FRAMES).max(1);
-    let frame = |(row, t_world_camera): (FrameColumns, Transform)| SceneFrame { row, t_world_camera, tracks: Vec::new() };
-    let mut frames: Vec<SceneFrame> = rows.into_iter().zip(poses).map(frame).step_by(every).collect();
-    let position: BTreeMap<usize, usize> = frames.iter().enumerate().map(|(at, frame)| (frame.row.frame, at)).collect();
+    let frame = |(row, t_world_camera): (FrameColumns, Transform)| SceneFrame {
+        row,
+        t_world_camera,
+        tracks: Vec::new(),
+    };
+    let mut frames: Vec<SceneFrame> =
+        rows.into_iter().zip(poses).map(frame).step_by(every).collect();
+    let position: BTreeMap<usize, usize> =
+        frames.iter().enumerate().map(|(at, frame)| (frame.row.frame, at)).collect();
     let tracks = folder.join(TRACKS_FILE);
     if tracks.is_file() {
         read_rows(&tracks, |track: TrackColumns| {
@@ -110,5 +123,6 @@ fn pictures(folder: &Path) -> Result<PictureIndex, FormatError> {
     if !path.is_file() {
         return Ok(PictureIndex::default());
     }
-    serde_json::from_str(&read_text(&path)?).map_err(|error| FormatError::content(&path, error.to_string(), "Make the run again"))
+    serde_json::from_str(&read_text(&path)?)
+        .map_err(|error| FormatError::content(&path, error.to_string(), "Make the run again"))
 }

@@ -13,19 +13,27 @@ const LEAST_CELL_M: f32 = 0.03;
 const LEAST_GROWTH: f32 = 1.05;
 /// Triangles that may stay at least: the eight cells around the origin, however large, have 56.
 const LEAST_TRIANGLES: usize = 64;
-/// The share of the triangles that may stay which is aimed at: those that are counted first need not be like the others.
+/// The share of the triangles that may stay which is aimed at: those that are counted first need
+/// not be like the others.
 const AIM: f64 = 0.9;
-/// Of a large mesh one of so many pieces is counted first, and of a small one so many pieces at least.
+/// Of a large mesh one of so many pieces is counted first, and of a small one so many pieces at
+/// least.
 const COUNTED_OF: u64 = 16;
 const COUNTED: u64 = 8;
-/// How often they are counted: triangles of a rough surface fall more slowly than by the square of the cells' sides, so a count far off is not enough.
+/// How often they are counted: triangles of a rough surface fall more slowly than by the square of
+/// the cells' sides, so a count far off is not enough.
 const COUNTS: usize = 2;
 
-/// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and their number on disk.
+/// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and
+/// their number on disk.
 ///
 /// # Errors
 /// The file cannot be read, or is no mesh.
-pub fn simplified(path: &Path, static_only: bool, most_triangles: usize) -> Result<(IndexedMesh, u64), FormatError> {
+pub fn simplified(
+    path: &Path,
+    static_only: bool,
+    most_triangles: usize,
+) -> Result<(IndexedMesh, u64), FormatError> {
     let mut mesh = MeshFile { ply: PlyMesh::open(path)?, static_only };
     mesh.simplified(most_triangles.max(LEAST_TRIANGLES)).map_err(FormatError::read(path))
 }
@@ -48,7 +56,8 @@ impl MeshFile {
     fn simplified(&mut self, most_triangles: usize) -> io::Result<(IndexedMesh, u64)> {
         let mut cell_m = self.cell_m(most_triangles)?;
         loop {
-            let Clustered { clustering, read, asked_for } = self.clustered(cell_m, most_triangles, 1)?;
+            let Clustered { clustering, read, asked_for } =
+                self.clustered(cell_m, most_triangles, 1)?;
             if !clustering.is_full() {
                 return Ok((clustering.finish(), asked_for));
             }
@@ -56,7 +65,8 @@ impl MeshFile {
         }
     }
 
-    /// How large cells have to be: of a mesh with more triangles than may stay, those that stay of some of its pieces tell.
+    /// How large cells have to be: of a mesh with more triangles than may stay, those that stay of
+    /// some of its pieces tell.
     fn cell_m(&mut self, most_triangles: usize) -> io::Result<f32> {
         let (all, most) = (self.ply.triangles as f64, most_triangles as f64);
         if all <= most {
@@ -65,7 +75,8 @@ impl MeshFile {
         let every = (self.ply.pieces() / COUNTED).min(COUNTED_OF) as usize;
         let mut cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
         for _ in 0..COUNTS {
-            let Clustered { clustering, read, .. } = self.clustered(cell_m, most_triangles, every)?;
+            let Clustered { clustering, read, .. } =
+                self.clustered(cell_m, most_triangles, every)?;
             let will_stay = clustering.triangles() as f64 * all / read as f64;
             cell_m = (cell_m * growth(will_stay / most)).max(LEAST_CELL_M);
         }
@@ -73,8 +84,14 @@ impl MeshFile {
     }
 
     /// Clusters the first of every so many pieces, until too many triangles stay.
-    fn clustered(&mut self, cell_m: f32, most_triangles: usize, every: usize) -> io::Result<Clustered> {
-        let (mut clustering, mut read, mut asked_for) = (VertexClustering::new(cell_m, most_triangles), 0, 0);
+    fn clustered(
+        &mut self,
+        cell_m: f32,
+        most_triangles: usize,
+        every: usize,
+    ) -> io::Result<Clustered> {
+        let (mut clustering, mut read, mut asked_for) =
+            (VertexClustering::new(cell_m, most_triangles), 0, 0);
         let static_only = self.static_only;
         self.ply.faces(every, |corners, vertices| {
             read += 1;
@@ -82,13 +99,18 @@ impl MeshFile {
                 let PlyVertex { object, vertex, .. } = vertices.get(number)?;
                 Ok((object == 0 || !static_only).then_some(vertex))
             })?);
-            Ok(if clustering.is_full() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+            Ok(if clustering.is_full() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            })
         })?;
         Ok(Clustered { clustering, read, asked_for })
     }
 }
 
-/// By how much cells grow where so many times the triangles stay that may: a surface has triangles by the inverse square of their sides.
+/// By how much cells grow where so many times the triangles stay that may: a surface has triangles
+/// by the inverse square of their sides.
 fn growth(times: f64) -> f32 {
     (times / AIM).sqrt() as f32
 }
@@ -101,7 +123,8 @@ mod tests {
     use std::collections::HashMap;
     use tempfile::TempDir;
 
-    /// A wavy square of `squares` x `squares` squares of a side, m, two triangles each, columns of eight squares one after the other.
+    /// A wavy square of `squares` x `squares` squares of a side, m, two triangles each, columns of
+    /// eight squares one after the other.
     fn write(path: &Path, squares: u32, side_m: f32) {
         let mut ply = PlyWriter::begin(path).unwrap();
         let corner = |x: u32, y: u32| {
@@ -112,7 +135,9 @@ mod tests {
             }
         };
         for first in (0..squares).step_by(8) {
-            for (x, y) in (0..squares).flat_map(|y| (first..(first + 8).min(squares)).map(move |x| (x, y))) {
+            for (x, y) in
+                (0..squares).flat_map(|y| (first..(first + 8).min(squares)).map(move |x| (x, y)))
+            {
                 ply.triangle([corner(x, y), corner(x + 1, y), corner(x, y + 1)]);
                 ply.triangle([corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)]);
             }
@@ -129,7 +154,11 @@ mod tests {
             write(&path, squares, side_m);
             let (mesh, on_disk) = simplified(&path, true, most).unwrap();
             assert_eq!(on_disk, u64::from(2 * squares * squares));
-            assert!((most / 2..=most).contains(&mesh.triangles.len()), "{} of {most} with sides of {side_m} m", mesh.triangles.len());
+            assert!(
+                (most / 2..=most).contains(&mesh.triangles.len()),
+                "{} of {most} with sides of {side_m} m",
+                mesh.triangles.len()
+            );
             let mut sides: HashMap<[u32; 2], i32> = HashMap::new();
             for [a, b, c] in mesh.triangles.iter().copied() {
                 for [from, to] in [[a, b], [b, c], [c, a]] {
@@ -139,8 +168,18 @@ mod tests {
             let extent_m = side_m * squares as f32;
             // Cells at the rim are cut off by it.
             let margin_m = 2.5 * extent_m / (most as f32 / 2.0).sqrt();
-            let is_inside = |at: u32| mesh.positions_m[at as usize][..2].iter().all(|c| (margin_m..extent_m - margin_m).contains(c));
-            assert!(sides.iter().all(|(ends, &triangles)| triangles > 1 || !ends.iter().all(|&end| is_inside(end))), "a crack");
+            let is_inside = |at: u32| {
+                mesh.positions_m[at as usize][..2]
+                    .iter()
+                    .all(|c| (margin_m..extent_m - margin_m).contains(c))
+            };
+            assert!(
+                sides
+                    .iter()
+                    .all(|(ends, &triangles)| triangles > 1
+                        || !ends.iter().all(|&end| is_inside(end))),
+                "a crack"
+            );
         }
     }
 

@@ -35,7 +35,10 @@ impl SurfaceErrorMap {
         let path = folder.join("surface_errors.csv");
         if path.is_file() {
             read_rows(&path, |SurfaceErrorColumns { x_m, y_m, z_m, error_m }| {
-                map.cells.entry(cell([x_m, y_m, z_m])).or_default().push(([x_m, y_m, z_m], error_m));
+                map.cells
+                    .entry(cell([x_m, y_m, z_m]))
+                    .or_default()
+                    .push(([x_m, y_m, z_m], error_m));
             })?;
         }
         Ok(map)
@@ -43,15 +46,19 @@ impl SurfaceErrorMap {
 
     /// The error of the comparison nearest to a place; `None` where none is within a cell's side.
     pub fn error_m(&self, position_m: [f32; 3]) -> Option<f32> {
-        let near = neighbourhood(cell(position_m)).filter_map(|cell| self.cells.get(&cell)).flatten();
-        let square = |at: &[f32; 3]| (0..3).map(|axis| (at[axis] - position_m[axis]).powi(2)).sum::<f32>();
-        let nearest = near.map(|(at, error_m)| (square(at), *error_m)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let near =
+            neighbourhood(cell(position_m)).filter_map(|cell| self.cells.get(&cell)).flatten();
+        let square =
+            |at: &[f32; 3]| (0..3).map(|axis| (at[axis] - position_m[axis]).powi(2)).sum::<f32>();
+        let nearest =
+            near.map(|(at, error_m)| (square(at), *error_m)).min_by(|a, b| a.0.total_cmp(&b.0));
         nearest.filter(|(square, _)| *square <= CELL_M * CELL_M).map(|(_, error_m)| error_m)
     }
 
     /// The error that four of five comparisons are below, m; `None` without any.
     pub fn most_m(&self) -> Option<f32> {
-        let mut errors_m: Vec<f32> = self.cells.values().flatten().map(|(_, error_m)| *error_m).collect();
+        let mut errors_m: Vec<f32> =
+            self.cells.values().flatten().map(|(_, error_m)| *error_m).collect();
         errors_m.sort_unstable_by(f32::total_cmp);
         errors_m.get(errors_m.len() * 4 / 5).copied()
     }
@@ -73,6 +80,9 @@ mod tests {
         std::fs::write(folder.path().join("surface_errors.csv"), rows).unwrap();
         let errors = SurfaceErrorMap::read(folder.path()).unwrap();
         assert_eq!(errors.most_m(), Some(0.4));
-        assert_eq!([0.2, 0.35, 0.75, 0.9].map(|x| errors.error_m([x, 0.1, 0.1])), [Some(0.02), Some(0.4), Some(0.4), None]);
+        assert_eq!(
+            [0.2, 0.35, 0.75, 0.9].map(|x| errors.error_m([x, 0.1, 0.1])),
+            [Some(0.02), Some(0.4), Some(0.4), None]
+        );
     }
 }

@@ -56,8 +56,12 @@ pub struct TrackColumns {
 ///
 /// # Errors
 /// It cannot be read, or a row is not as this program writes it.
-pub fn read_rows<R: DeserializeOwned>(path: &Path, mut sink: impl FnMut(R)) -> Result<(), FormatError> {
-    let refuse = |error: csv::Error| FormatError::content(path, error.to_string(), "Make the run again");
+pub fn read_rows<R: DeserializeOwned>(
+    path: &Path,
+    mut sink: impl FnMut(R),
+) -> Result<(), FormatError> {
+    let refuse =
+        |error: csv::Error| FormatError::content(path, error.to_string(), "Make the run again");
     let file = std::fs::File::open(path).map_err(FormatError::read(path))?;
     for row in csv::Reader::from_reader(std::io::BufReader::new(file)).deserialize() {
         sink(row.map_err(refuse)?);

@@ -1,4 +1,5 @@
-//! The figures of a sweep: boxes over evaluated frames, curves of means, the original's curves dashed.
+//! The figures of a sweep: boxes over evaluated frames, curves of means, the original's curves
+//! dashed.
 
 use super::page::Row;
 use super::{FrameSample, Kind, published};
@@ -28,8 +29,15 @@ fn labels(rows: &[Row<'_>]) -> Vec<String> {
     rows.iter().map(|(point, _)| point.value.clone()).collect()
 }
 
-fn boxes<'a>(name: &'a str, colour: usize, rows: &[Row<'_>], of: impl Fn(&FrameSample) -> Option<f64>) -> Boxes<'a> {
-    let numbers = |row: &Row<'_>| five_numbers(&row.1.as_ref()?.samples.iter().filter_map(&of).collect::<Vec<f64>>());
+fn boxes<'a>(
+    name: &'a str,
+    colour: usize,
+    rows: &[Row<'_>],
+    of: impl Fn(&FrameSample) -> Option<f64>,
+) -> Boxes<'a> {
+    let numbers = |row: &Row<'_>| {
+        five_numbers(&row.1.as_ref()?.samples.iter().filter_map(&of).collect::<Vec<f64>>())
+    };
     Boxes { name, colour: COLOURS[colour], boxes: rows.iter().map(numbers).collect() }
 }
 
@@ -52,21 +60,28 @@ fn original(name: &str, colour: usize, numbers: Vec<Option<f64>>) -> Curve<'_> {
 
 fn prune(rows: &[Row<'_>]) -> Markup {
     let at = |table: [f64; 7]| {
-        published_at(rows, |weight| published::PRUNE.weights.iter().position(|known| *known == weight).map(|at| table[at]))
+        published_at(rows, |weight| {
+            published::PRUNE.weights.iter().position(|known| *known == weight).map(|at| table[at])
+        })
     };
     let (elas, dispnet) = (published::PRUNE.elas, published::PRUNE.dispnet);
     let labels = labels(rows);
-    let figure = |title: &str, name: &str, of: fn(&FrameSample) -> Option<f64>, theirs: [[f64; 7]; 2]| {
-        let curves = [
-            ours("mean", 0, shares(rows, "fused", name)),
-            original("ELAS (original)", 1, at(theirs[0])),
-            original("DispNet (original)", 5, at(theirs[1])),
-        ];
-        boxes_and_curves(title, &labels, &[boxes("map, by frame", 0, rows, of)], &curves)
-    };
+    let figure =
+        |title: &str, name: &str, of: fn(&FrameSample) -> Option<f64>, theirs: [[f64; 7]; 2]| {
+            let curves = [
+                ours("mean", 0, shares(rows, "fused", name)),
+                original("ELAS (original)", 1, at(theirs[0])),
+                original("DispNet (original)", 5, at(theirs[1])),
+            ];
+            boxes_and_curves(title, &labels, &[boxes("map, by frame", 0, rows, of)], &curves)
+        };
     let relative = |table: [f64; 7]| at(table.map(|gib| gib / table[0]));
-    let unpruned = rows.iter().find(|(point, _)| point.value == "0").and_then(|(_, result)| result.as_ref()?.final_blocks());
-    let memory = rows.iter().map(|(_, result)| Some(result.as_ref()?.final_blocks()? / unpruned?)).collect();
+    let unpruned = rows
+        .iter()
+        .find(|(point, _)| point.value == "0")
+        .and_then(|(_, result)| result.as_ref()?.final_blocks());
+    let memory =
+        rows.iter().map(|(_, result)| Some(result.as_ref()?.final_blocks()? / unpruned?)).collect();
     let memory = boxes_and_curves(
         "blocks at the end, as a share of weight 0",
         &labels,
@@ -89,39 +104,67 @@ fn prune(rows: &[Row<'_>]) -> Markup {
 /// Blocks in use frame by frame, a line for each value.
 fn over_time(rows: &[Row<'_>]) -> Markup {
     let results = || rows.iter().filter_map(|(_, result)| result.as_ref());
-    let frames = results().map(|result| result.blocks.len() * result.blocks_every).max().unwrap_or_default();
+    let frames =
+        results().map(|result| result.blocks.len() * result.blocks_every).max().unwrap_or_default();
     if frames < 2 {
         return html! {};
     }
     let times: Vec<usize> = (0..TIMES).map(|nth| nth * (frames - 1) / (TIMES - 1)).collect();
     let curve = |(colour, (point, result)): (usize, &Row<'_>)| {
-        let blocks = |&at: &usize| result.as_ref().and_then(|result| Some(f64::from(*result.blocks.get(at / result.blocks_every)?) / 1e3));
+        let blocks = |&at: &usize| {
+            result.as_ref().and_then(|result| {
+                Some(f64::from(*result.blocks.get(at / result.blocks_every)?) / 1e3)
+            })
+        };
         (point.value.clone(), colour, times.iter().map(blocks).collect::<Vec<_>>())
     };
     let curves: Vec<_> = rows.iter().enumerate().map(curve).collect();
-    let curves: Vec<Curve<'_>> = curves.iter().map(|(name, colour, numbers)| ours(name, *colour, numbers.clone())).collect();
+    let curves: Vec<Curve<'_>> =
+        curves.iter().map(|(name, colour, numbers)| ours(name, *colour, numbers.clone())).collect();
     let labels: Vec<String> = times.iter().map(ToString::to_string).collect();
-    boxes_and_curves("thousand blocks in use by frame, a line for each weight", &labels, &[], &curves)
+    boxes_and_curves(
+        "thousand blocks in use by frame, a line for each weight",
+        &labels,
+        &[],
+        &curves,
+    )
 }
 
 fn rate(rows: &[Row<'_>]) -> Markup {
     let labels = labels(rows);
-    let of = |table: [f64; 12]| published_at(rows, |k| table.get((k as usize).checked_sub(1)?).copied());
+    let of =
+        |table: [f64; 12]| published_at(rows, |k| table.get((k as usize).checked_sub(1)?).copied());
     let figure = |title: &str, of_sample: fn(&FrameSample) -> Option<f64>, table| {
         let theirs = original("DispNet, medians (original)", 1, of(table));
         boxes_and_curves(title, &labels, &[boxes("map, by frame", 0, rows, of_sample)], &[theirs])
     };
     side_by_side([
-        figure("accuracy, fusing every k-th frame", |sample| sample.accuracy[1], published::RATE_ACCURACY),
-        figure("completeness, fusing every k-th frame", |sample| sample.completeness[1], published::RATE_COMPLETENESS),
+        figure(
+            "accuracy, fusing every k-th frame",
+            |sample| sample.accuracy[1],
+            published::RATE_ACCURACY,
+        ),
+        figure(
+            "completeness, fusing every k-th frame",
+            |sample| sample.completeness[1],
+            published::RATE_COMPLETENESS,
+        ),
     ])
 }
 
 fn scale(rows: &[Row<'_>]) -> Markup {
     let labels = labels(rows);
-    let wrong = |source: &str| shares(rows, source, "accuracy").into_iter().map(|share| share.map(|share| 1.0 - share)).collect();
-    let at =
-        |column: usize| published_at(rows, |percent| published::SCALE_ERRORS.iter().find(|row| row.0 == percent).map(|row| row.1[column]));
+    let wrong = |source: &str| {
+        shares(rows, source, "accuracy")
+            .into_iter()
+            .map(|share| share.map(|share| 1.0 - share))
+            .collect()
+    };
+    let at = |column: usize| {
+        published_at(rows, |percent| {
+            published::SCALE_ERRORS.iter().find(|row| row.0 == percent).map(|row| row.1[column])
+        })
+    };
     side_by_side([
         boxes_and_curves(
             "error rate (1 - accuracy) by scale, %",
@@ -138,7 +181,10 @@ fn scale(rows: &[Row<'_>]) -> Markup {
             "completeness by scale, %",
             &labels,
             &[],
-            &[ours("input", 3, shares(rows, "input", "completeness")), ours("map", 0, shares(rows, "fused", "completeness"))],
+            &[
+                ours("input", 3, shares(rows, "input", "completeness")),
+                ours("map", 0, shares(rows, "fused", "completeness")),
+            ],
         ),
     ])
 }
@@ -146,11 +192,16 @@ fn scale(rows: &[Row<'_>]) -> Markup {
 fn depth(rows: &[Row<'_>]) -> Markup {
     let labels = labels(rows);
     let figure = |title: &str, of: fn(&FrameSample, usize) -> Option<f64>| {
-        let both = [boxes("input", 3, rows, |sample| of(sample, 0)), boxes("map", 0, rows, |sample| of(sample, 1))];
+        let both = [
+            boxes("input", 3, rows, |sample| of(sample, 0)),
+            boxes("map", 0, rows, |sample| of(sample, 1)),
+        ];
         boxes_and_curves(title, &labels, &both, &[])
     };
     side_by_side([
         figure("static accuracy by source of depth", |sample, source| sample.accuracy[source]),
-        figure("static completeness by source of depth", |sample, source| sample.completeness[source]),
+        figure("static completeness by source of depth", |sample, source| {
+            sample.completeness[source]
+        }),
     ])
 }

@@ -1,8 +1,11 @@
-//! Many runs with one setting varied, and one page that compares them with the original's numbers: the paper's tables and figures.
+//! Many runs with one setting varied, and one page that compares them with the original's numbers:
+//! the paper's tables and figures.
 //!
-//! A [`Plan`] lists the points of each sweep and the runs they need; points with equal arguments share a run. Each finished run leaves one
-//! file, `runs/KEY.json`, written atomically: an interrupted sweep continues with the missing runs. `plan.json` is the folder's plan; parts
-//! made on several machines are merged when their plans are equal, and refused when their results differ.
+//! A [`Plan`] lists the points of each sweep and the runs they need; points with equal arguments
+//! share a run. Each finished run leaves one file, `runs/KEY.json`, written atomically: an
+//! interrupted sweep continues with the missing runs. `plan.json` is the folder's plan; parts made
+//! on several machines are merged when their plans are equal, and refused when their results
+//! differ.
 
 mod figures;
 mod page;
@@ -44,7 +47,9 @@ pub enum SweepError {
         reason: String,
     },
     /// The folder belongs to another sweep.
-    #[error("{path} belongs to another sweep. Repeat its arguments to continue it, or give another --out")]
+    #[error(
+        "{path} belongs to another sweep. Repeat its arguments to continue it, or give another --out"
+    )]
     Other {
         /// The folder's plan.
         path: PathBuf,

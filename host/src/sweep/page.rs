@@ -1,4 +1,5 @@
-//! The page: every sweep, on every data set, next to the original's numbers. One file, nothing fetched, no script.
+//! The page: every sweep, on every data set, next to the original's numbers. One file, nothing
+//! fetched, no script.
 
 use super::figures;
 use super::table::common_accuracy;
@@ -51,12 +52,17 @@ fn title(kind: Kind) -> &'static str {
 
 /// The reference the map was evaluated against.
 fn evaluated_against(rows: &[Row<'_>]) -> String {
-    let Some(result) = rows.iter().find_map(|(_, result)| *result) else { return "not run yet".to_owned() };
+    let Some(result) = rows.iter().find_map(|(_, result)| *result) else {
+        return "not run yet".to_owned();
+    };
     let (frames, reference) = (&result.summary["frames"], &result.summary["lidar"]);
     match reference["source"].as_str() {
         Some(source) => {
             let name = if source == "lidar" { "LiDAR" } else { "exact depth" };
-            format!("{frames} frames; {} evaluated against {name}, {} frames later", reference["frames"], reference["delay_frames"])
+            format!(
+                "{frames} frames; {} evaluated against {name}, {} frames later",
+                reference["frames"], reference["delay_frames"]
+            )
         }
         None => format!("{frames} frames; the data set has no reference depth"),
     }
@@ -95,7 +101,9 @@ fn table(kind: Kind, rows: &[Row<'_>], common: &BTreeMap<String, (f64, u64)>) ->
 fn tracking(result: Option<&RunResult>) -> Markup {
     match result.map(|result| (result.tracking_failures(), &result.summary["frames"])) {
         None => html! { "not run yet" },
-        Some((Some(failures), frames)) => html! { b { "tracking failure" } " in " (failures) " of " (frames) " frames" },
+        Some((Some(failures), frames)) => {
+            html! { b { "tracking failure" } " in " (failures) " of " (frames) " frames" }
+        }
         Some((None, _)) => html! { "ok" },
     }
 }
@@ -116,10 +124,11 @@ fn cells(result: Option<&RunResult>, common: Option<&(f64, u64)>) -> Vec<String>
         share.map_or_else(unknown, |share| format!("{share:.3}"))
     };
     let common = common.map_or_else(unknown, |(accuracy, _)| format!("{accuracy:.3}"));
-    let numbers = [("map", "blocks", 0), ("map", "swept_triangles", 0), ("egomotion", "ate_m", 3)].map(|(group, name, digits)| {
-        let number = result.and_then(|result| result.summary[group][name].as_f64());
-        number.map_or_else(unknown, |number| format!("{number:.digits$}"))
-    });
+    let numbers = [("map", "blocks", 0), ("map", "swept_triangles", 0), ("egomotion", "ate_m", 3)]
+        .map(|(group, name, digits)| {
+            let number = result.and_then(|result| result.summary[group][name].as_f64());
+            number.map_or_else(unknown, |number| format!("{number:.digits$}"))
+        });
     shares.map(shown).into_iter().chain([common]).chain(objects.map(shown)).chain(numbers).collect()
 }
 

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What is varied.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// The weight up to which voxels are pruned.
@@ -21,7 +23,8 @@ pub enum Kind {
     Depth,
     /// Whether objects are separate from the static map.
     Dynamic,
-    /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects; and objects without a detector.
+    /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects;
+    /// and objects without a detector.
     Methods,
 }
 
@@ -59,9 +62,13 @@ impl FromStr for Data {
             return Ok(Self { path: None, sequence: None });
         }
         // The colon of a Windows drive does not separate a sequence.
-        let split = text.rsplit_once(':').filter(|(path, name)| path.len() > 1 && !name.is_empty() && !name.contains(['/', '\\']));
+        let split = text.rsplit_once(':').filter(|(path, name)| {
+            path.len() > 1 && !name.is_empty() && !name.contains(['/', '\\'])
+        });
         Ok(match split {
-            Some((path, sequence)) => Self { path: Some(path.into()), sequence: Some(sequence.to_owned()) },
+            Some((path, sequence)) => {
+                Self { path: Some(path.into()), sequence: Some(sequence.to_owned()) }
+            }
             None => Self { path: Some(text.into()), sequence: None },
         })
     }
@@ -70,7 +77,10 @@ impl FromStr for Data {
 impl Data {
     /// A short name, the same on every machine.
     pub fn label(&self) -> String {
-        let name = |path: &Path| path.file_name().map_or_else(|| "data".to_owned(), |name| name.to_string_lossy().into_owned());
+        let name = |path: &Path| {
+            path.file_name()
+                .map_or_else(|| "data".to_owned(), |name| name.to_string_lossy().into_owned())
+        };
         match (&self.path, &self.sequence) {
             (None, _) => "street".to_owned(),
             (Some(_), Some(sequence)) => sequence.clone(),
@@ -181,7 +191,12 @@ impl Plan {
 
     /// Data sets of a sweep.
     pub fn data(&self, kind: Kind) -> Vec<&str> {
-        let mut names: Vec<&str> = self.points.iter().filter(|point| point.kind == kind).map(|point| point.data.as_str()).collect();
+        let mut names: Vec<&str> = self
+            .points
+            .iter()
+            .filter(|point| point.kind == kind)
+            .map(|point| point.data.as_str())
+            .collect();
         names.dedup();
         names
     }
@@ -190,10 +205,15 @@ impl Plan {
 /// No masks: objects are found by their motion. Otherwise the street is swept with its exact masks.
 const MOTION: [&str; 2] = ["--instances", "motion"];
 
-/// Values of one sweep on one data set: as shown, as arguments, and whether the map is evaluated later.
+/// Values of one sweep on one data set: as shown, as arguments, and whether the map is evaluated
+/// later.
 fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<String>, bool)> {
     let one = |value: &dyn std::fmt::Display, arguments: &[&str], delayed: bool| {
-        (value.to_string(), arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(), delayed)
+        (
+            value.to_string(),
+            arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(),
+            delayed,
+        )
     };
     // Defaults are not listed as arguments, so that sweeps share the runs they have in common.
     match kind {

@@ -1,5 +1,6 @@
-//! The original's numbers, for comparison: printed or digitised (to .002) from the figures of its evaluation notebooks, KITTI's rule, depth up to
-//! 20 m. Other data, another machine and a decade of seconds lie between: shapes can be compared, values cannot.
+//! The original's numbers, for comparison: printed or digitised (to .002) from the figures of its
+//! evaluation notebooks, KITTI's rule, depth up to 20 m. Other data, another machine and a decade
+//! of seconds lie between: shapes can be compared, values cannot.
 
 /// Prune weights, on odometry 09, 1000 frames.
 pub const PRUNE: PruneTable = PruneTable {
@@ -37,11 +38,14 @@ pub struct Pruned {
 }
 
 /// Fusing every k-th frame, k from 1 to 12, odometry 09, DispNet: medians of accuracy.
-pub const RATE_ACCURACY: [f64; 12] = [0.919, 0.916, 0.914, 0.903, 0.905, 0.908, 0.903, 0.899, 0.897, 0.895, 0.892, 0.886];
+pub const RATE_ACCURACY: [f64; 12] =
+    [0.919, 0.916, 0.914, 0.903, 0.905, 0.908, 0.903, 0.899, 0.897, 0.895, 0.892, 0.886];
 /// The same of completeness; the first one about 1.
-pub const RATE_COMPLETENESS: [f64; 12] = [1.0, 0.999, 0.997, 0.995, 0.993, 0.988, 0.984, 0.973, 0.960, 0.949, 0.936, 0.919];
+pub const RATE_COMPLETENESS: [f64; 12] =
+    [1.0, 0.999, 0.997, 0.995, 0.993, 0.988, 0.984, 0.973, 0.960, 0.949, 0.936, 0.919];
 
-/// Image scale in percent, on odometry 06: mean error rates (1 - accuracy) of ELAS' input, fused, of DispNet's input, fused.
+/// Image scale in percent, on odometry 06: mean error rates (1 - accuracy) of ELAS' input, fused,
+/// of DispNet's input, fused.
 pub const SCALE_ERRORS: [(u32, [f64; 4]); 4] = [
     (100, [0.0729, 0.0724, 0.0761, 0.0807]),
     (75, [0.0643, 0.0689, 0.0836, 0.1031]),
@@ -49,7 +53,8 @@ pub const SCALE_ERRORS: [(u32, [f64; 4]); 4] = [
     (25, [0.1162, 0.1624, 0.5206, 0.5989]),
 ];
 
-/// Table I, which is tracking sequence 09: method, ELAS' accuracy and completeness, DispNet's; none where tracking failed.
+/// Table I, which is tracking sequence 09: method, ELAS' accuracy and completeness, DispNet's; none
+/// where tracking failed.
 pub const METHODS: [(&str, Option<[f64; 4]>); 3] = [
     ("InfiniTAM, its own ICP", None),
     ("stereo odometry, not dynamic", Some([0.921, 0.974, 0.875, 0.984])),
@@ -70,7 +75,8 @@ pub const DYNAMIC_ELAS: [[f64; 3]; 10] = [
     [0.9184, 0.9210, 0.9238],
 ];
 
-/// Means over odometry 00 to 10: static accuracy and completeness, dynamic accuracy and completeness; of ELAS' input, fused, DispNet's input, fused.
+/// Means over odometry 00 to 10: static accuracy and completeness, dynamic accuracy and
+/// completeness; of ELAS' input, fused, DispNet's input, fused.
 pub const DEPTHS: [(&str, [f64; 4]); 4] = [
     ("ELAS, input", [0.9102, 0.7942, 0.8415, 0.8650]),
     ("ELAS, fused", [0.9157, 0.9378, 0.8158, 0.9470]),

@@ -1,4 +1,5 @@
-//! The result of a run: its summary, and per frame the numbers that boxes and curves show. One file a run, written atomically.
+//! The result of a run: its summary, and per frame the numbers that boxes and curves show. One file
+//! a run, written atomically.
 
 use super::SweepError;
 use crate::evaluate::reference::{EvaluatedFrame, PointOutcomes, Region};
@@ -66,9 +67,25 @@ impl RunResult {
         Ok(Self {
             arguments: arguments.to_vec(),
             summary: serde_json::to_value(Summary::of(run))?,
-            samples: run.sections.reference.iter().flat_map(|reference| &reference.frames).map(FrameSample::of).collect(),
-            outcomes: run.sections.reference.iter().flat_map(|reference| &reference.outcomes).cloned().collect(),
-            blocks: charts.series(Charted::BlocksUsed).into_iter().map(|blocks| blocks as u32).collect(),
+            samples: run
+                .sections
+                .reference
+                .iter()
+                .flat_map(|reference| &reference.frames)
+                .map(FrameSample::of)
+                .collect(),
+            outcomes: run
+                .sections
+                .reference
+                .iter()
+                .flat_map(|reference| &reference.outcomes)
+                .cloned()
+                .collect(),
+            blocks: charts
+                .series(Charted::BlocksUsed)
+                .into_iter()
+                .map(|blocks| blocks as u32)
+                .collect(),
             blocks_every: charts.frames_per_point(),
         })
     }
@@ -83,7 +100,10 @@ impl RunResult {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(SweepError::Read { path: path.to_path_buf(), source }),
         };
-        serde_json::from_str(&text).map(Some).map_err(|error| SweepError::Foreign { path: path.to_path_buf(), reason: error.to_string() })
+        serde_json::from_str(&text).map(Some).map_err(|error| SweepError::Foreign {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        })
     }
 
     /// Writes it atomically.
@@ -91,8 +111,10 @@ impl RunResult {
     /// # Errors
     /// The disk refuses.
     pub fn write(&self, path: &Path) -> Result<(), SweepError> {
-        let text =
-            serde_json::to_vec_pretty(self).map_err(|error| SweepError::Foreign { path: path.to_path_buf(), reason: error.to_string() })?;
+        let text = serde_json::to_vec_pretty(self).map_err(|error| SweepError::Foreign {
+            path: path.to_path_buf(),
+            reason: error.to_string(),
+        })?;
         Ok(write_whole(path, |file| file.write_all(&text))?)
     }
 

@@ -23,15 +23,18 @@ impl SweepFolder {
     pub fn open(root: &Path, plan: &Plan) -> Result<Self, SweepError> {
         let folder = Self { root: root.to_path_buf() };
         let runs = folder.root.join("runs");
-        std::fs::create_dir_all(&runs).map_err(|source| FolderError::Write { path: runs, source })?;
+        std::fs::create_dir_all(&runs)
+            .map_err(|source| FolderError::Write { path: runs, source })?;
         let path = folder.root.join("plan.json");
         if path.is_file() {
             if folder.plan()? != *plan {
                 return Err(SweepError::Other { path });
             }
         } else {
-            let text =
-                serde_json::to_vec_pretty(plan).map_err(|error| SweepError::Foreign { path: path.clone(), reason: error.to_string() })?;
+            let text = serde_json::to_vec_pretty(plan).map_err(|error| SweepError::Foreign {
+                path: path.clone(),
+                reason: error.to_string(),
+            })?;
             write_whole(&path, |file| file.write_all(&text))?;
         }
         Ok(folder)
@@ -48,8 +51,10 @@ impl SweepFolder {
     /// There is no plan.
     pub fn plan(&self) -> Result<Plan, SweepError> {
         let path = self.root.join("plan.json");
-        let text = std::fs::read_to_string(&path).map_err(|source| SweepError::Read { path: path.clone(), source })?;
-        serde_json::from_str(&text).map_err(|error| SweepError::Foreign { path, reason: error.to_string() })
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| SweepError::Read { path: path.clone(), source })?;
+        serde_json::from_str(&text)
+            .map_err(|error| SweepError::Foreign { path, reason: error.to_string() })
     }
 
     /// Where the result of a run is or will be.
@@ -77,7 +82,10 @@ impl SweepFolder {
             let path = self.result(key);
             if let Some(result) = RunResult::read(&path)? {
                 if result.arguments != *arguments {
-                    return Err(SweepError::Foreign { path, reason: "it is of other arguments".to_owned() });
+                    return Err(SweepError::Foreign {
+                        path,
+                        reason: "it is of other arguments".to_owned(),
+                    });
                 }
                 results.insert(key.clone(), result);
             }
@@ -91,10 +99,14 @@ impl SweepFolder {
     /// The disk refuses.
     pub fn draw(&self, plan: &Plan, results: &Results) -> Result<PathBuf, SweepError> {
         for kind in plan.kinds() {
-            write_whole(&self.root.join(format!("{}.csv", kind.name())), |file| file.write_all(&table::csv(plan, kind, results)?))?;
+            write_whole(&self.root.join(format!("{}.csv", kind.name())), |file| {
+                file.write_all(&table::csv(plan, kind, results)?)
+            })?;
         }
         let page = self.root.join("report.html");
-        write_whole(&page, |file| file.write_all(page::html(plan, results).into_string().as_bytes()))?;
+        write_whole(&page, |file| {
+            file.write_all(page::html(plan, results).into_string().as_bytes())
+        })?;
         Ok(page)
     }
 }
@@ -117,14 +129,22 @@ pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Res
             return Err(SweepError::Other { path: root.join("plan.json") });
         }
         for (run, result) in results {
-            let digest = |result: &RunResult| result.summary["digest"].as_str().unwrap_or_default().to_owned();
+            let digest = |result: &RunResult| {
+                result.summary["digest"].as_str().unwrap_or_default().to_owned()
+            };
             if let Some(known) = all.get(&run).filter(|known| digest(known) != digest(&result)) {
-                return Err(SweepError::Differs { path: root.clone(), run, ours: digest(known), theirs: digest(&result) });
+                return Err(SweepError::Differs {
+                    path: root.clone(),
+                    run,
+                    ours: digest(known),
+                    theirs: digest(&result),
+                });
             }
             all.insert(run, result);
         }
     }
-    let (plan, results) = merged.unwrap_or_else(|| (Plan { points: Vec::new(), runs: BTreeMap::new() }, Results::new()));
+    let (plan, results) = merged
+        .unwrap_or_else(|| (Plan { points: Vec::new(), runs: BTreeMap::new() }, Results::new()));
     let folder = SweepFolder::open(target, &plan)?;
     for (key, result) in &results {
         result.write(&folder.result(key))?;

@@ -51,24 +51,45 @@ pub fn csv(plan: &Plan, kind: Kind, results: &Results) -> io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for point in plan.points.iter().filter(|point| point.kind == kind) {
         let common = common_accuracy(plan, kind, &point.data, results);
-        writer.serialize(columns(point, results.get(&point.run), common.get(&point.run).copied())).map_err(io::Error::other)?;
+        writer
+            .serialize(columns(point, results.get(&point.run), common.get(&point.run).copied()))
+            .map_err(io::Error::other)?;
     }
     writer.into_inner().map_err(|error| io::Error::other(error.to_string()))
 }
 
-/// By run: accuracy of the static map on the points that the maps of all finished runs of a sweep on one data set show, and how many these are.
-pub(super) fn common_accuracy(plan: &Plan, kind: Kind, data: &str, results: &Results) -> BTreeMap<String, (f64, u64)> {
+/// By run: accuracy of the static map on the points that the maps of all finished runs of a sweep
+/// on one data set show, and how many these are.
+pub(super) fn common_accuracy(
+    plan: &Plan,
+    kind: Kind,
+    data: &str,
+    results: &Results,
+) -> BTreeMap<String, (f64, u64)> {
     // What the tracker lost shows nothing that could be compared.
-    let is_whole = |result: &&RunResult| !result.outcomes.is_empty() && result.tracking_failures().is_none();
-    let runs: BTreeMap<&String, &RunResult> =
-        plan.of(kind, data).filter_map(|point| Some((&point.run, results.get(&point.run).filter(is_whole)?))).collect();
+    let is_whole =
+        |result: &&RunResult| !result.outcomes.is_empty() && result.tracking_failures().is_none();
+    let runs: BTreeMap<&String, &RunResult> = plan
+        .of(kind, data)
+        .filter_map(|point| Some((&point.run, results.get(&point.run).filter(is_whole)?)))
+        .collect();
     let outcomes: Vec<_> = runs.values().map(|result| result.outcomes.as_slice()).collect();
-    let Some((accuracy, points)) = on_common_points(&outcomes).filter(|_| runs.len() > 1) else { return BTreeMap::new() };
-    runs.into_keys().zip(accuracy).map(|(run, accuracy)| (run.clone(), (accuracy, points))).collect()
+    let Some((accuracy, points)) = on_common_points(&outcomes).filter(|_| runs.len() > 1) else {
+        return BTreeMap::new();
+    };
+    runs.into_keys()
+        .zip(accuracy)
+        .map(|(run, accuracy)| (run.clone(), (accuracy, points)))
+        .collect()
 }
 
-fn columns<'a>(point: &'a Point, result: Option<&'a RunResult>, common: Option<(f64, u64)>) -> PointColumns<'a> {
-    let value = |group: &str, name: &str| -> Option<&'a Value> { result?.summary.get(group)?.get(name) };
+fn columns<'a>(
+    point: &'a Point,
+    result: Option<&'a RunResult>,
+    common: Option<(f64, u64)>,
+) -> PointColumns<'a> {
+    let value =
+        |group: &str, name: &str| -> Option<&'a Value> { result?.summary.get(group)?.get(name) };
     let number = |group: &str, name: &str| value(group, name).and_then(Value::as_f64);
     let whole = |group: &str, name: &str| value(group, name).and_then(Value::as_u64);
     let share = |region: &str, source: &str, name: &str| result?.share(region, source, name);

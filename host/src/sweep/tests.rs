@@ -18,7 +18,8 @@ fn request(kinds: &[Kind]) -> SweepRequest {
     }
 }
 
-const ALL: [Kind; 6] = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale, Kind::Depth, Kind::Dynamic, Kind::Methods];
+const ALL: [Kind; 6] =
+    [Kind::PruneWeight, Kind::FrameRate, Kind::Scale, Kind::Depth, Kind::Dynamic, Kind::Methods];
 
 fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
     let share = json!({"accuracy": accuracy, "completeness": 0.9, "f1": 0.85});
@@ -31,7 +32,11 @@ fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
         }),
         outcomes: Vec::new(),
         samples: [accuracy - 0.01, accuracy, accuracy + 0.01]
-            .map(|accuracy| FrameSample { frame: 1, accuracy: [Some(accuracy); 2], completeness: [Some(0.9), None] })
+            .map(|accuracy| FrameSample {
+                frame: 1,
+                accuracy: [Some(accuracy); 2],
+                completeness: [Some(0.9), None],
+            })
             .to_vec(),
         blocks: vec![10, 20, 30],
         blocks_every: 1,
@@ -46,8 +51,14 @@ fn results(plan: &Plan) -> Results {
 fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
     let data = |text: &str| text.parse::<Data>().unwrap();
     assert_eq!(data("street").label(), "street");
-    assert_eq!(data("a/kitti:06"), Data { path: Some("a/kitti".into()), sequence: Some("06".to_owned()) });
-    assert_eq!((data("a/kitti:06").label(), data("a/rig").label()), ("06".to_owned(), "rig".to_owned()));
+    assert_eq!(
+        data("a/kitti:06"),
+        Data { path: Some("a/kitti".into()), sequence: Some("06".to_owned()) }
+    );
+    assert_eq!(
+        (data("a/kitti:06").label(), data("a/rig").label()),
+        ("06".to_owned(), "rig".to_owned())
+    );
     assert_eq!(data(r"C:\rig").sequence, None);
     assert!("".parse::<Data>().is_err());
 }
@@ -55,13 +66,23 @@ fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
 #[test]
 fn points_that_mean_the_same_run_share_it() {
     let plan = Plan::new(&request(&ALL));
-    let run = |kind: Kind, value: &str| plan.of(kind, "street").find(|point| point.value == value).map(|point| point.run.clone());
-    assert_eq!(run(Kind::PruneWeight, "1"), run(Kind::FrameRate, "1"), "both are the default, looked at late");
+    let run = |kind: Kind, value: &str| {
+        plan.of(kind, "street").find(|point| point.value == value).map(|point| point.run.clone())
+    };
+    assert_eq!(
+        run(Kind::PruneWeight, "1"),
+        run(Kind::FrameRate, "1"),
+        "both are the default, looked at late"
+    );
     assert_eq!(run(Kind::Scale, "100"), run(Kind::Dynamic, "on"));
     assert_eq!(run(Kind::Depth, "elas"), run(Kind::Methods, "stereo egomotion, separate objects"));
     assert_ne!(run(Kind::FrameRate, "1"), run(Kind::Scale, "100"), "the one is looked at late");
-    assert!(run(Kind::Depth, "exact").is_some() && plan.of(Kind::Depth, "06").count() == 1, "only the street has exact depth");
-    // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker, motion; on the street exact depth as well.
+    assert!(
+        run(Kind::Depth, "exact").is_some() && plan.of(Kind::Depth, "06").count() == 1,
+        "only the street has exact depth"
+    );
+    // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker, motion; on the street exact
+    // depth as well.
     assert_eq!(plan.runs.len(), 2 * 9 + 1);
     let paths = plan.runs.values().flatten().any(|argument| argument.contains("where"));
     assert!(!paths, "a plan is the same wherever the data lie");
@@ -100,7 +121,11 @@ fn parts_are_put_together_unless_they_disagree() {
     let all = results(&plan);
     for (part, root) in [&a, &b].into_iter().enumerate() {
         let folder = SweepFolder::open(root.path(), &plan).unwrap();
-        plan.keys().iter().skip(part).step_by(2).for_each(|key| all[*key].write(&folder.result(key)).unwrap());
+        plan.keys()
+            .iter()
+            .skip(part)
+            .step_by(2)
+            .for_each(|key| all[*key].write(&folder.result(key)).unwrap());
     }
     let parts = [a.path().to_path_buf(), b.path().to_path_buf()];
     let (merged, folder, found) = merge(&parts, c.path()).unwrap();
@@ -109,10 +134,15 @@ fn parts_are_put_together_unless_they_disagree() {
     assert!(c.path().join("report.html").is_file() && c.path().join("scale.csv").is_file());
     let (key, arguments) = plan.runs.iter().next().unwrap();
     for (root, digest) in [(&a, "one"), (&b, "two")] {
-        result(arguments, digest, 0.9).write(&SweepFolder::open(root.path(), &plan).unwrap().result(key)).unwrap();
+        result(arguments, digest, 0.9)
+            .write(&SweepFolder::open(root.path(), &plan).unwrap().result(key))
+            .unwrap();
     }
     let message = merge(&parts, c.path()).unwrap_err().to_string();
-    assert!(message.contains("but one in an earlier folder") && message.contains(key.as_str()), "{message}");
+    assert!(
+        message.contains("but one in an earlier folder") && message.contains(key.as_str()),
+        "{message}"
+    );
 }
 
 #[test]
@@ -122,12 +152,21 @@ fn tables_and_page_have_every_point_made_or_not() {
     let missing = found.pop_first().unwrap().0;
     for kind in ALL {
         let csv = String::from_utf8(table::csv(&plan, kind, &found).unwrap()).unwrap();
-        let rows: Vec<csv::StringRecord> = csv::Reader::from_reader(csv.as_bytes()).records().collect::<Result<_, _>>().unwrap();
-        let points: Vec<&str> = plan.points.iter().filter(|point| point.kind == kind).map(|point| point.value.as_str()).collect();
+        let rows: Vec<csv::StringRecord> =
+            csv::Reader::from_reader(csv.as_bytes()).records().collect::<Result<_, _>>().unwrap();
+        let points: Vec<&str> = plan
+            .points
+            .iter()
+            .filter(|point| point.kind == kind)
+            .map(|point| point.value.as_str())
+            .collect();
         assert_eq!(rows.iter().map(|row| &row[1]).collect::<Vec<_>>(), points, "{csv}");
     }
     let page = page::html(&plan, &found).into_string();
-    assert_eq!(page.matches("not run yet").count(), plan.points.iter().filter(|point| point.run == missing).count());
+    assert_eq!(
+        page.matches("not run yet").count(),
+        plan.points.iter().filter(|point| point.run == missing).count()
+    );
     assert!(page.contains("<b>tracking failure</b> in 2 of 3 frames") && page.contains("0.920"));
     // The original's numbers stand beside ours.
     for theirs in ["0.961", "0.9238", "0.878 / 0.923 / 0.955", "(original)"] {

@@ -1,4 +1,5 @@
-//! Where the camera is: along the street at constant speed, with a driver's and a car's small motions.
+//! Where the camera is: along the street at constant speed, with a driver's and a car's small
+//! motions.
 
 use dynvox_core::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
@@ -25,10 +26,14 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
     let mut rng = Rng::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {
         let full_circle_rad = 2.0 * core::f64::consts::PI;
-        let sum: f64 = parts.iter().map(|&(size, rate)| size * libm::sin(full_circle_rad * (rate * time_s + rng.unit()))).sum();
+        let sum: f64 = parts
+            .iter()
+            .map(|&(size, rate)| size * libm::sin(full_circle_rad * (rate * time_s + rng.unit())))
+            .sum();
         sum * config.shake
     };
-    let (pitch, roll, yaw, bounce, drift) = (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
+    let (pitch, roll, yaw, bounce, drift) =
+        (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
     let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
     on_road

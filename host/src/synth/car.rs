@@ -1,14 +1,16 @@
-//! Car bodies: a hull lofted over cross-sections, wheels and mirrors. In a car's frame x runs right, y down from the road, z forward;
-//! the origin is the middle of its footprint.
+//! Car bodies: a hull lofted over cross-sections, wheels and mirrors. In a car's frame x runs
+//! right, y down from the road, z forward; the origin is the middle of its footprint.
 
 use super::config::CarKind;
 use super::mesh::{Mesh, Point, Triangle, Vertex};
 use super::surface::{Kind, Surface, tone};
 
-/// Cross-section: position along the car, height of the roof or bonnet, of the belt line, half widths there, height of the sill; m.
+/// Cross-section: position along the car, height of the roof or bonnet, of the belt line, half
+/// widths there, height of the sill; m.
 type Section = (f64, f64, f64, f64, f64, f64);
 
-/// What the painter of a body needs: where glass, lamps and wheels are, m in the car's frame, heights upwards.
+/// What the painter of a body needs: where glass, lamps and wheels are, m in the car's frame,
+/// heights upwards.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Half length and half width of the hull.
@@ -120,35 +122,65 @@ pub fn shape(kind: CarKind) -> Shape {
             [1.27, -1.22],
             0.30,
             [0.68, 0.90],
-            s([0.80, -1.52, 0.12, -1.22], [0.98, 1.36], [-0.36, -1.05], [1.04, 1.38, 0.66, 0.52], [1.08, 1.38, 0.60, 0.48]),
+            s(
+                [0.80, -1.52, 0.12, -1.22],
+                [0.98, 1.36],
+                [-0.36, -1.05],
+                [1.04, 1.38, 0.66, 0.52],
+                [1.08, 1.38, 0.60, 0.48],
+            ),
         ),
         CarKind::Saloon => (
             [2.28, 0.91],
             [1.38, -1.36],
             0.32,
             [0.66, 0.82],
-            s([0.82, -1.46, 0.14, -0.98], [0.95, 1.31], [-0.34, -1.22], [1.00, 1.33, 0.68, 0.53], [1.08, 1.34, 0.62, 0.50]),
+            s(
+                [0.82, -1.46, 0.14, -0.98],
+                [0.95, 1.31],
+                [-0.34, -1.22],
+                [1.00, 1.33, 0.68, 0.53],
+                [1.08, 1.34, 0.62, 0.50],
+            ),
         ),
         CarKind::Estate => (
             [2.32, 0.91],
             [1.40, -1.36],
             0.32,
             [0.67, 0.86],
-            s([0.84, -1.98, 0.16, -1.74], [0.97, 1.36], [-0.34, -1.16], [1.02, 1.37, 0.68, 0.54], [1.06, 1.34, 0.58, 0.50]),
+            s(
+                [0.84, -1.98, 0.16, -1.74],
+                [0.97, 1.36],
+                [-0.34, -1.16],
+                [1.02, 1.37, 0.68, 0.54],
+                [1.06, 1.34, 0.58, 0.50],
+            ),
         ),
         CarKind::Offroad => (
             [2.20, 0.94],
             [1.36, -1.32],
             0.37,
             [0.84, 0.98],
-            s([0.88, -1.90, 0.26, -1.72], [1.12, 1.56], [-0.32, -1.16], [1.16, 1.57, 0.72, 0.60], [1.18, 1.52, 0.62, 0.56]),
+            s(
+                [0.88, -1.90, 0.26, -1.72],
+                [1.12, 1.56],
+                [-0.32, -1.16],
+                [1.16, 1.57, 0.72, 0.60],
+                [1.18, 1.52, 0.62, 0.56],
+            ),
         ),
         CarKind::Van => (
             [2.55, 0.98],
             [1.72, -1.60],
             0.34,
             [0.90, 1.00],
-            s([1.62, 0.52, 1.12, 0.52], [1.24, 1.78], [9.0, 9.0], [1.30, 1.94, 0.76, 0.72], [1.30, 1.80, 0.68, 0.66]),
+            s(
+                [1.62, 0.52, 1.12, 0.52],
+                [1.24, 1.78],
+                [9.0, 9.0],
+                [1.30, 1.94, 0.76, 0.72],
+                [1.30, 1.80, 0.68, 0.66],
+            ),
         ),
     };
     let (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m) = glass;
@@ -230,7 +262,8 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
         .map(|section| {
             let half = half_ring(section);
             let right = half.iter().map(|&(x, height)| Point::new(x, -height, section.0));
-            let left = half.iter().rev().skip(1).map(|&(x, height)| Point::new(-x, -height, section.0));
+            let left =
+                half.iter().rev().skip(1).map(|&(x, height)| Point::new(-x, -height, section.0));
             right.chain(left).collect()
         })
         .collect();
@@ -250,7 +283,12 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
     let index = |row: usize, column: usize| first + (row * columns + column) as u32;
     for row in 0..rows - 1 {
         for column in 0..columns - 1 {
-            let (a, b, c, d) = (index(row, column), index(row, column + 1), index(row + 1, column), index(row + 1, column + 1));
+            let (a, b, c, d) = (
+                index(row, column),
+                index(row, column + 1),
+                index(row + 1, column),
+                index(row + 1, column + 1),
+            );
             mesh.triangles.push(Triangle { corners: [a, b, c], surface, slight: false });
             mesh.triangles.push(Triangle { corners: [b, d, c], surface, slight: false });
         }

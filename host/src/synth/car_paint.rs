@@ -18,7 +18,12 @@ struct BodyPoint {
 }
 
 /// The shell.
-pub fn shell(painter: &Painter, shape: &Shape, surface_point: &SurfacePoint, coat: Tone) -> Painted {
+pub fn shell(
+    painter: &Painter,
+    shape: &Shape,
+    surface_point: &SurfacePoint,
+    coat: Tone,
+) -> Painted {
     let [x, y, z] = surface_point.surface_m;
     let [fx, fy, fz] = surface_point.footprint_m;
     let point = BodyPoint { x, up: -y, z, f: fx.max(fy).max(fz).max(0.002) };
@@ -34,13 +39,17 @@ pub fn shell(painter: &Painter, shape: &Shape, surface_point: &SurfacePoint, coa
     // The strip below the doors and the bumpers' lower edge are black.
     tone = blend(tone, BLACK, 1.0 - above(0.30, point.up, point.f));
     for axle in shape.axles_m {
-        let radius = ((z - axle) * (z - axle) + (point.up - shape.wheel_m) * (point.up - shape.wheel_m)).sqrt();
-        let arch = (1.0 - above(shape.wheel_m + 0.055, radius, point.f)) * above(0.6, x.abs() / shape.half_m[1], 0.1);
+        let radius = ((z - axle) * (z - axle)
+            + (point.up - shape.wheel_m) * (point.up - shape.wheel_m))
+            .sqrt();
+        let arch = (1.0 - above(shape.wheel_m + 0.055, radius, point.f))
+            * above(0.6, x.abs() / shape.half_m[1], 0.1);
         tone = blend(tone, BLACK, arch);
     }
     let glass = glass(shape, &point, side, nz);
     if glass > 0.0 {
-        let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0) + 0.05 * above(shape.side_height_m[0] + 0.2, point.up, 0.2);
+        let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0)
+            + 0.05 * above(shape.side_height_m[0] + 0.2, point.up, 0.2);
         tone = blend(tone, blend(GLASS, [0.45, 0.52, 0.62], sky), glass);
         gloss += 0.20 * glass;
     }
@@ -60,29 +69,39 @@ fn joints(shape: &Shape, p: &BodyPoint) -> f32 {
     let line = |at: f32| within(at - 0.008, at + 0.008, p.z, p.f);
     let middle = if shape.pillars_m[0] < 5.0 { shape.pillars_m[0] } else { -0.2 };
     let doors = line(front - 0.02).max(line(middle)).max(line((rear + 0.15).max(middle - 0.85)));
-    let handle = |at: f32| within(at, at + 0.16, p.z, p.f) * within(-0.11, -0.085, p.up - shape.side_height_m[0], p.f);
+    let handle = |at: f32| {
+        within(at, at + 0.16, p.z, p.f) * within(-0.11, -0.085, p.up - shape.side_height_m[0], p.f)
+    };
     let crease = 0.35 * within(-0.30, -0.285, p.up - shape.side_height_m[0], p.f);
-    (doors * low).max(handle(middle + 0.05)).max(handle((rear + 0.25).max(middle - 0.8))).max(crease)
+    (doors * low)
+        .max(handle(middle + 0.05))
+        .max(handle((rear + 0.25).max(middle - 0.8)))
+        .max(crease)
 }
 
 fn glass(shape: &Shape, p: &BodyPoint, side: f32, nz: f32) -> f32 {
     let [belt, roof] = shape.side_height_m;
-    let along = |low: f32, high: f32, at: f32, from: f32, to: f32| low + (high - low) * (at - from) / (to - from);
+    let along = |low: f32, high: f32, at: f32, from: f32, to: f32| {
+        low + (high - low) * (at - from) / (to - from)
+    };
     let mut share: f32 = 0.0;
     if p.up > belt - 0.1 && side > 0.0 {
         let [front, rear, front_top, rear_top] = shape.side_glass_m;
-        let (head, tail) = (along(front, front_top, p.up, belt, roof), along(rear, rear_top, p.up, belt, roof));
+        let (head, tail) =
+            (along(front, front_top, p.up, belt, roof), along(rear, rear_top, p.up, belt, roof));
         let mut pane = within(belt, roof, p.up, p.f) * within(tail, head, p.z, p.f) * side;
         for pillar in shape.pillars_m {
             pane *= 1.0 - within(pillar - 0.035, pillar + 0.035, p.z, p.f);
         }
         share = share.max(pane);
     }
-    for (facing, [low, high, wide, narrow]) in [(nz, shape.windscreen_m), (-nz, shape.rear_glass_m)] {
+    for (facing, [low, high, wide, narrow]) in [(nz, shape.windscreen_m), (-nz, shape.rear_glass_m)]
+    {
         let toward = above(0.25, facing, 0.1);
         if toward > 0.0 && p.up > low - 0.1 {
             let half = along(wide, narrow, p.up, low, high);
-            share = share.max(within(low, high, p.up, p.f) * within(-half, half, p.x, p.f) * toward);
+            share =
+                share.max(within(low, high, p.up, p.f) * within(-half, half, p.x, p.f) * toward);
         }
     }
     share
@@ -93,13 +112,24 @@ fn front(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
     let nose = above(shape.half_m[0] - 0.14, p.z, 0.05);
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[0]);
     let away = p.x.abs();
-    let lamps = depth * within(lamp - 0.075, lamp + 0.065, p.up, p.f) * within(0.60 * half, 0.97 * half, away, p.f);
-    let core = depth * within(lamp - 0.045, lamp + 0.04, p.up, p.f) * within(0.66 * half, 0.86 * half, away, p.f);
-    let grille = nose * within(lamp - 0.10, lamp + 0.03, p.up, p.f) * (1.0 - above(0.50 * half, away, p.f));
+    let lamps = depth
+        * within(lamp - 0.075, lamp + 0.065, p.up, p.f)
+        * within(0.60 * half, 0.97 * half, away, p.f);
+    let core = depth
+        * within(lamp - 0.045, lamp + 0.04, p.up, p.f)
+        * within(0.66 * half, 0.86 * half, away, p.f);
+    let grille =
+        nose * within(lamp - 0.10, lamp + 0.03, p.up, p.f) * (1.0 - above(0.50 * half, away, p.f));
     let ribs = 0.5 + 0.5 * stripes(p.up, 0.05, 0.02, p.f);
     let intake = nose * within(0.27, 0.38, p.up, p.f) * (1.0 - above(0.72 * half, away, p.f));
     let plate = nose * within(0.42, 0.53, p.up, p.f) * (1.0 - above(0.26, away, p.f));
-    [(lamps, [0.10, 0.10, 0.11]), (core, [0.75, 0.77, 0.80]), (grille * ribs, BLACK), (intake, BLACK), (plate, plate_tone(p))]
+    [
+        (lamps, [0.10, 0.10, 0.11]),
+        (core, [0.75, 0.77, 0.80]),
+        (grille * ribs, BLACK),
+        (intake, BLACK),
+        (plate, plate_tone(p)),
+    ]
 }
 
 fn rear(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
@@ -108,11 +138,20 @@ fn rear(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[1]);
     let away = p.x.abs();
     let lamps = depth * within(lamp - 0.13, lamp + 0.09, p.up, p.f) * above(0.64 * half, away, p.f);
-    let reverse = depth * within(lamp - 0.06, lamp - 0.02, p.up, p.f) * within(0.66 * half, 0.90 * half, away, p.f);
+    let reverse = depth
+        * within(lamp - 0.06, lamp - 0.02, p.up, p.f)
+        * within(0.66 * half, 0.90 * half, away, p.f);
     let lid = depth * within(0.62, 0.635, p.up, p.f) * (1.0 - above(0.8 * half, away, p.f));
-    let plate = depth * within(lamp - 0.16, lamp - 0.05, p.up, p.f) * (1.0 - above(0.26, away, p.f));
+    let plate =
+        depth * within(lamp - 0.16, lamp - 0.05, p.up, p.f) * (1.0 - above(0.26, away, p.f));
     let skirt = tail * within(0.28, 0.40, p.up, p.f) * (1.0 - above(0.75 * half, away, p.f));
-    [(lamps, [0.42, 0.015, 0.015]), (reverse, [0.6, 0.55, 0.55]), (lid, [0.03; 3]), (plate, plate_tone(p)), (skirt, BLACK)]
+    [
+        (lamps, [0.42, 0.015, 0.015]),
+        (reverse, [0.6, 0.55, 0.55]),
+        (lid, [0.03; 3]),
+        (plate, plate_tone(p)),
+        (skirt, BLACK),
+    ]
 }
 
 fn plate_tone(p: &BodyPoint) -> Tone {

@@ -24,15 +24,18 @@ pub struct StreetConfig {
     pub baseline_m: f64,
     /// Height of the cameras above the road, m.
     pub camera_height_m: f64,
-    /// Speed of the camera along the street, m/s. The camera never brakes: scripted cars in its lane must be faster or leave it.
+    /// Speed of the camera along the street, m/s. The camera never brakes: scripted cars in its
+    /// lane must be faster or leave it.
     pub speed_m_s: f64,
     /// Whether the street bends; straight on otherwise.
     pub curvature: bool,
-    /// Steepest rise of the street, rise over run, 0 to 0.3: it goes up and down once in 60 m; 0 is level.
+    /// Steepest rise of the street, rise over run, 0 to 0.3: it goes up and down once in 60 m; 0 is
+    /// level.
     pub hills: f64,
     /// Scale of the camera's pitch, roll and bounce; 0 is a rail.
     pub shake: f64,
-    /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read noise, half shot noise; 0 is off.
+    /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read
+    /// noise, half shot noise; 0 is off.
     pub noise_sigma: f64,
     /// How much brighter the right camera is, as a share of the light.
     pub gain_difference: f64,
@@ -40,7 +43,8 @@ pub struct StreetConfig {
     pub lidar_noise_m: f64,
     /// Share of parking spaces that are taken, 0 to 1.
     pub parked_density: f64,
-    /// The lens of both cameras. With one, images come raw; depth, masks and poses stay those of the ideal rig they are rectified to.
+    /// The lens of both cameras. With one, images come raw; depth, masks and poses stay those of
+    /// the ideal rig they are rectified to.
     pub lens: StreetLens,
     /// How far the right camera is from where its calibration has it.
     pub rig_error: RigError,
@@ -114,7 +118,9 @@ impl StreetConfig {
         }
         for (name, value, low, high) in held {
             if !(low..=high).contains(&value) {
-                return Some(format!("street.{name} is {value}; it must lie within {low} to {high}"));
+                return Some(format!(
+                    "street.{name} is {value}; it must lie within {low} to {high}"
+                ));
             }
         }
         self.rig_error.problem().or_else(|| self.traffic.problem())
@@ -140,13 +146,22 @@ impl Default for Traffic {
 impl Traffic {
     fn problem(&self) -> Option<String> {
         let Self::Moving(moving) = self else { return None };
-        for (name, gap) in [("oncoming_gap_m", moving.oncoming_gap_m), ("overtaking_gap_m", moving.overtaking_gap_m)] {
+        for (name, gap) in [
+            ("oncoming_gap_m", moving.oncoming_gap_m),
+            ("overtaking_gap_m", moving.overtaking_gap_m),
+        ] {
             if !(gap == 0.0 || (30.0..=1e6).contains(&gap)) {
-                return Some(format!("street.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"));
+                return Some(format!(
+                    "street.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"
+                ));
             }
         }
         let speeds = [moving.oncoming_speed_m_s, moving.overtaking_speed_m_s];
-        if speeds.into_iter().chain(moving.cars.iter().map(|car| car.profile.speed_m_s())).any(|speed| !(0.0..=60.0).contains(&speed)) {
+        if speeds
+            .into_iter()
+            .chain(moving.cars.iter().map(|car| car.profile.speed_m_s()))
+            .any(|speed| !(0.0..=60.0).contains(&speed))
+        {
             return Some("a speed in street.traffic lies outside 0 to 60 m/s".to_owned());
         }
         moving.cars.iter().find_map(|car| match car.profile {
@@ -179,14 +194,26 @@ pub struct MovingTraffic {
 
 impl Default for MovingTraffic {
     fn default() -> Self {
-        let car = |kind, lane, to_lane, start_m, profile| ScriptedCar { kind, lane, to_lane, start_m, profile };
+        let car = |kind, lane, to_lane, start_m, profile| ScriptedCar {
+            kind,
+            lane,
+            to_lane,
+            start_m,
+            profile,
+        };
         Self {
             oncoming_gap_m: 70.0,
             oncoming_speed_m_s: 8.0,
             overtaking_gap_m: 90.0,
             overtaking_speed_m_s: 13.0,
             cars: vec![
-                car(CarKind::Hatchback, Lane::Ego, None, 40.0, SpeedProfile::Constant { speed_m_s: 12.0 }),
+                car(
+                    CarKind::Hatchback,
+                    Lane::Ego,
+                    None,
+                    40.0,
+                    SpeedProfile::Constant { speed_m_s: 12.0 },
+                ),
                 car(
                     CarKind::Saloon,
                     Lane::ParkedRight,
@@ -214,7 +241,8 @@ pub struct ScriptedCar {
     pub kind: CarKind,
     /// Where it is at frame 0.
     pub lane: Lane,
-    /// Where it changes to: at once when it starts driving, just before it stands when it stops. Of the same direction as `lane`.
+    /// Where it changes to: at once when it starts driving, just before it stands when it stops. Of
+    /// the same direction as `lane`.
     #[serde(default)]
     pub to_lane: Option<Lane>,
     /// How far ahead of the camera's start it is at frame 0, m along the street.
@@ -255,7 +283,9 @@ pub enum SpeedProfile {
 impl SpeedProfile {
     fn speed_m_s(&self) -> f64 {
         match *self {
-            Self::Constant { speed_m_s } | Self::Starting { speed_m_s, .. } | Self::Stopping { speed_m_s, .. } => speed_m_s,
+            Self::Constant { speed_m_s }
+            | Self::Starting { speed_m_s, .. }
+            | Self::Stopping { speed_m_s, .. } => speed_m_s,
         }
     }
 }
@@ -294,7 +324,8 @@ pub enum CarKind {
 
 impl CarKind {
     /// All bodies.
-    pub const ALL: [Self; 5] = [Self::Hatchback, Self::Saloon, Self::Estate, Self::Offroad, Self::Van];
+    pub const ALL: [Self; 5] =
+        [Self::Hatchback, Self::Saloon, Self::Estate, Self::Offroad, Self::Van];
 
     /// Class name in the files' vocabulary.
     pub const fn class(self) -> &'static str {

@@ -2,8 +2,8 @@
 
 use dynvox_core::geometry::Transform;
 
-/// A stereo pair and everything true about it. Images are row by row: depth and masks `width` x `height`, colour and grey `image_size`,
-/// which is the same unless images are raw.
+/// A stereo pair and everything true about it. Images are row by row: depth and masks `width` x
+/// `height`, colour and grey `image_size`, which is the same unless images are raw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SynthFrame {
     /// Number of the frame.
@@ -38,7 +38,8 @@ impl SynthFrame {
     /// Whether a left pixel sees a car that moves.
     pub fn is_moving(&self, pixel: usize) -> bool {
         let instance = self.instances.get(pixel).copied().unwrap_or(0);
-        instance > 0 && self.objects.get(usize::from(instance) - 1).is_some_and(|object| object.moving)
+        instance > 0
+            && self.objects.get(usize::from(instance) - 1).is_some_and(|object| object.moving)
     }
 }
 
@@ -51,7 +52,8 @@ pub struct ObjectTruth {
     pub class: &'static str,
     /// Car to world: x right, y down, z forward, origin in the middle of its footprint on the road.
     pub t_world_object: Transform,
-    /// Width, height, length of the box around it: x within ±width/2, y within -height..0, z within ±length/2.
+    /// Width, height, length of the box around it: x within ±width/2, y within -height..0, z within
+    /// ±length/2.
     pub dimensions_m: [f64; 3],
     /// Whether it drives at this frame.
     pub moving: bool,

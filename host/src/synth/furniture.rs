@@ -1,4 +1,5 @@
-//! Trees, hedges, lamps, signs and what else stands on pavements. Each is built around its foot at the origin, y down.
+//! Trees, hedges, lamps, signs and what else stands on pavements. Each is built around its foot at
+//! the origin, y down.
 
 use super::mesh::{Mesh, Point};
 use super::random::Rng;
@@ -20,7 +21,11 @@ fn direction(rng: &mut Rng) -> Point {
 pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
     let height = rng.between(5.0, 8.0);
     let crown = rng.between(1.5, 2.2);
-    let bark = mesh.surface(Surface::new(Kind::Bark, scaled(tone(104, 90, 74), rng.between(0.7, 1.2)), rng.seed()));
+    let bark = mesh.surface(Surface::new(
+        Kind::Bark,
+        scaled(tone(104, 90, 74), rng.between(0.7, 1.2)),
+        rng.seed(),
+    ));
     let lean = Point::new(rng.between(-0.2, 0.2), 0.0, rng.between(-0.2, 0.2));
     let fork = lean - Point::y() * (0.42 * height);
     let radius = rng.between(0.09, 0.17);
@@ -29,22 +34,31 @@ pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
     let green = scaled(tone(red, green, blue), rng.between(0.75, 1.15));
     let leaves: Vec<u16> = (0..4)
         .map(|k| {
-            let surface = Surface::new(Kind::Leaves, scaled(green, 0.72 + 0.18 * f64::from(k)), rng.seed());
+            let surface =
+                Surface::new(Kind::Leaves, scaled(green, 0.72 + 0.18 * f64::from(k)), rng.seed());
             mesh.surface(Surface { two_sided: true, ..surface })
         })
         .collect();
     let middle = lean - Point::y() * (height - crown);
     for _ in 0..7 {
         let toward = direction(rng);
-        let blob = middle + Point::new(toward.x * 0.55 * crown, toward.y * 0.5 * crown, toward.z * 0.55 * crown);
+        let blob = middle
+            + Point::new(toward.x * 0.55 * crown, toward.y * 0.5 * crown, toward.z * 0.55 * crown);
         mesh.bar(bark, (fork, 0.5 * radius), (blob, 0.15 * radius), 5);
         let radius = crown * rng.between(0.45, 0.65);
         crown_part(mesh, rng, &leaves, (blob, middle), radius);
     }
 }
 
-/// One bough: leaf sheets on a ragged ball. Their normals lean outwards, so that the crown is lit as a whole.
-fn crown_part(mesh: &mut Mesh, rng: &mut Rng, leaves: &[u16], (blob, middle): (Point, Point), radius: f64) {
+/// One bough: leaf sheets on a ragged ball. Their normals lean outwards, so that the crown is lit
+/// as a whole.
+fn crown_part(
+    mesh: &mut Mesh,
+    rng: &mut Rng,
+    leaves: &[u16],
+    (blob, middle): (Point, Point),
+    radius: f64,
+) {
     for _ in 0..44 {
         let out = direction(rng);
         let point = blob + out * (radius * rng.between(0.55, 1.05));
@@ -57,10 +71,19 @@ fn crown_part(mesh: &mut Mesh, rng: &mut Rng, leaves: &[u16], (blob, middle): (P
         let shade = ((lit + 1.0) * 1.4 + rng.between(0.0, 1.2)) as usize;
         let surface = leaves[shade.min(leaves.len() - 1)];
         let shift = [rng.between(0.0, 2.0), rng.between(0.0, 2.0)];
-        let corner = |a: f64, b: f64| (point + (u * a + v * b) * size, [(shift[0] + a * size) as f32, (shift[1] + b * size) as f32, 0.0]);
+        let corner = |a: f64, b: f64| {
+            (
+                point + (u * a + v * b) * size,
+                [(shift[0] + a * size) as f32, (shift[1] + b * size) as f32, 0.0],
+            )
+        };
         let (p, q) = (rng.between(0.5, 1.0), rng.between(0.5, 1.0));
         let first = mesh.vertices.len();
-        mesh.polygon(surface, facing, &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)]);
+        mesh.polygon(
+            surface,
+            facing,
+            &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)],
+        );
         let soft = (facing * 0.35 + (point - middle).normalize() + out * 0.5).normalize();
         for vertex in &mut mesh.vertices[first..] {
             vertex.normal = [soft.x as f32, soft.y as f32, soft.z as f32];
@@ -71,10 +94,16 @@ fn crown_part(mesh: &mut Mesh, rng: &mut Rng, leaves: &[u16], (blob, middle): (P
 /// A clipped hedge along z, `length` m long.
 pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
     let (red, green, blue) = rng.pick(&GREENS);
-    let leaves = mesh.surface(Surface::new(Kind::Leaves, scaled(tone(red, green, blue), rng.between(0.6, 0.9)), rng.seed()));
+    let leaves = mesh.surface(Surface::new(
+        Kind::Leaves,
+        scaled(tone(red, green, blue), rng.between(0.6, 0.9)),
+        rng.seed(),
+    ));
     let height = rng.between(0.9, 1.5);
     let steps = libm::ceil(length / 0.7) as usize;
-    let edge = |rng: &mut Rng| (rng.between(-0.06, 0.06), rng.between(-0.06, 0.06), rng.between(0.32, 0.42));
+    let edge = |rng: &mut Rng| {
+        (rng.between(-0.06, 0.06), rng.between(-0.06, 0.06), rng.between(0.32, 0.42))
+    };
     let mut near = edge(rng);
     for k in 0..steps {
         let (z0, z1) = (length * k as f64 / steps as f64, length * (k + 1) as f64 / steps as f64);
@@ -84,25 +113,41 @@ pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
                 let point = Point::new(side * w + 0.3 * x, -(height + y) * h, z);
                 (point, [z as f32, point.y as f32, 0.0])
             };
-            let corners = [at(z0, near, 0.0), at(z1, far, 0.0), at(z1, far, 1.0), at(z0, near, 1.0)];
+            let corners =
+                [at(z0, near, 0.0), at(z1, far, 0.0), at(z1, far, 1.0), at(z0, near, 1.0)];
             mesh.polygon(leaves, Point::new(side, 0.0, 0.0), &corners);
         }
         let at = |z: f64, (x, y, w): (f64, f64, f64), side: f64| {
             let point = Point::new(side * w + 0.3 * x, -(height + y), z);
             (point, [z as f32, point.x as f32, 0.0])
         };
-        mesh.polygon(leaves, -Point::y(), &[at(z0, near, -1.0), at(z1, far, -1.0), at(z1, far, 1.0), at(z0, near, 1.0)]);
+        mesh.polygon(
+            leaves,
+            -Point::y(),
+            &[at(z0, near, -1.0), at(z1, far, -1.0), at(z1, far, 1.0), at(z0, near, 1.0)],
+        );
         near = far;
     }
     for (z, out) in [(0.0, -1.0), (length, 1.0)] {
         let (u, v) = (Point::new(0.7, 0.0, 0.0), Point::new(0.0, height, 0.0));
-        mesh.sheet(leaves, Point::new(0.0, 0.0, out), Point::new(-0.35, -height, z), u, v, [0.0; 3]);
+        mesh.sheet(
+            leaves,
+            Point::new(0.0, 0.0, out),
+            Point::new(-0.35, -height, z),
+            u,
+            v,
+            [0.0; 3],
+        );
     }
 }
 
 /// A lamp post whose arm reaches along -x.
 pub fn lamp(mesh: &mut Mesh, rng: &mut Rng) {
-    let metal = mesh.surface(Surface::new(Kind::Plain, scaled(tone(108, 114, 116), rng.between(0.5, 1.2)), rng.seed()));
+    let metal = mesh.surface(Surface::new(
+        Kind::Plain,
+        scaled(tone(108, 114, 116), rng.between(0.5, 1.2)),
+        rng.seed(),
+    ));
     let glass = mesh.surface(Surface::new(Kind::Plain, tone(220, 216, 200), rng.seed()));
     let top = Point::new(0.0, -6.4, 0.0);
     mesh.bar(metal, (Point::zeros(), 0.11), (Point::new(0.0, -1.1, 0.0), 0.10), 10);
@@ -111,7 +156,12 @@ pub fn lamp(mesh: &mut Mesh, rng: &mut Rng) {
     let end = Point::new(-1.5, -7.0, 0.0);
     mesh.bar(metal, (top, 0.05), (bend, 0.045), 8);
     mesh.bar(metal, (bend, 0.045), (end, 0.04), 8);
-    mesh.cuboid(metal, end + Point::new(-0.55, -0.09, -0.13), end + Point::new(0.1, 0.02, 0.13), &[]);
+    mesh.cuboid(
+        metal,
+        end + Point::new(-0.55, -0.09, -0.13),
+        end + Point::new(0.1, 0.02, 0.13),
+        &[],
+    );
     mesh.cuboid(glass, end + Point::new(-0.5, 0.02, -0.1), end + Point::new(0.0, 0.07, 0.1), &[2]);
 }
 
@@ -157,7 +207,8 @@ pub fn bollard(mesh: &mut Mesh, rng: &mut Rng) {
 /// A litter bin on a post.
 pub fn bin(mesh: &mut Mesh, rng: &mut Rng) {
     let shell = rng.pick(&[(70, 92, 70), (150, 84, 40), (80, 84, 90)]);
-    let shell = mesh.surface(Surface::new(Kind::Fence, tone(shell.0, shell.1, shell.2), rng.seed()));
+    let shell =
+        mesh.surface(Surface::new(Kind::Fence, tone(shell.0, shell.1, shell.2), rng.seed()));
     let dark = mesh.surface(Surface::new(Kind::Plain, tone(40, 40, 42), rng.seed()));
     mesh.bar(dark, (Point::zeros(), 0.05), (Point::new(0.0, -0.4, 0.0), 0.05), 8);
     mesh.bar(shell, (Point::new(0.0, -0.3, 0.0), 0.19), (Point::new(0.0, -0.95, 0.0), 0.22), 12);
@@ -166,7 +217,10 @@ pub fn bin(mesh: &mut Mesh, rng: &mut Rng) {
 
 /// A cabinet of the telephone company.
 pub fn cabinet(mesh: &mut Mesh, rng: &mut Rng) {
-    let grey = mesh.surface(Surface::new(Kind::Door, scaled(tone(150, 156, 148), rng.between(0.7, 1.1)), rng.seed()).sized(1.1, 1.2));
+    let grey = mesh.surface(
+        Surface::new(Kind::Door, scaled(tone(150, 156, 148), rng.between(0.7, 1.1)), rng.seed())
+            .sized(1.1, 1.2),
+    );
     mesh.cuboid(grey, Point::new(-0.22, -1.25, -0.6), Point::new(0.22, 0.0, 0.6), &[3]);
 }
 
@@ -185,13 +239,27 @@ pub fn bench(mesh: &mut Mesh, rng: &mut Rng) {
 /// A garden wall or fence along z.
 pub fn fence(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
     if rng.chance(0.5) {
-        let wall = Surface::new(Kind::Brick, scaled(tone(150, 110, 90), rng.between(0.7, 1.2)), rng.seed()).with(tone(150, 146, 138));
+        let wall = Surface::new(
+            Kind::Brick,
+            scaled(tone(150, 110, 90), rng.between(0.7, 1.2)),
+            rng.seed(),
+        )
+        .with(tone(150, 146, 138));
         let wall = mesh.surface(wall);
         mesh.cuboid(wall, Point::new(-0.12, -1.1, 0.0), Point::new(0.12, 0.1, length), &[3, 2]);
         let cap = mesh.surface(Surface::new(Kind::Plain, tone(160, 158, 150), rng.seed()));
-        mesh.cuboid(cap, Point::new(-0.16, -1.18, -0.02), Point::new(0.16, -1.1, length + 0.02), &[]);
+        mesh.cuboid(
+            cap,
+            Point::new(-0.16, -1.18, -0.02),
+            Point::new(0.16, -1.1, length + 0.02),
+            &[],
+        );
     } else {
-        let boards = mesh.surface(Surface::new(Kind::Fence, scaled(tone(130, 106, 80), rng.between(0.6, 1.2)), rng.seed()));
+        let boards = mesh.surface(Surface::new(
+            Kind::Fence,
+            scaled(tone(130, 106, 80), rng.between(0.6, 1.2)),
+            rng.seed(),
+        ));
         mesh.cuboid(boards, Point::new(-0.03, -1.5, 0.0), Point::new(0.03, 0.05, length), &[3]);
     }
 }

@@ -25,10 +25,16 @@ impl StreetLens {
     pub fn model(&self) -> Option<LensModel> {
         match *self {
             Self::Ideal => None,
-            Self::RadialTangential(RadialTangential { radial, tangential }) => Some(LensModel::RadialTangential { radial, tangential }),
+            Self::RadialTangential(RadialTangential { radial, tangential }) => {
+                Some(LensModel::RadialTangential { radial, tangential })
+            }
             Self::Equidistant(Equidistant { radial }) => Some(LensModel::Equidistant { radial }),
-            Self::DoubleSphere(DoubleSphere { xi, alpha }) => Some(LensModel::DoubleSphere { xi, alpha }),
-            Self::ExtendedUnified(ExtendedUnified { alpha, beta }) => Some(LensModel::ExtendedUnified { alpha, beta }),
+            Self::DoubleSphere(DoubleSphere { xi, alpha }) => {
+                Some(LensModel::DoubleSphere { xi, alpha })
+            }
+            Self::ExtendedUnified(ExtendedUnified { alpha, beta }) => {
+                Some(LensModel::ExtendedUnified { alpha, beta })
+            }
         }
     }
 }

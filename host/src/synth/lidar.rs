@@ -1,7 +1,8 @@
-//! A spinning LiDAR above the camera: 64 beams, 2000 directions, one revolution without the camera's motion in it.
+//! A spinning LiDAR above the camera: 64 beams, 2000 directions, one revolution without the
+//! camera's motion in it.
 //!
-//! Every beam is tested against every triangle that may cross it, so ranges are exact before noise. Axes are the sensor's: x forward,
-//! y left, z up. Time: a few tens of milliseconds a scan.
+//! Every beam is tested against every triangle that may cross it, so ranges are exact before noise.
+//! Axes are the sensor's: x forward, y left, z up. Time: a few tens of milliseconds a scan.
 
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
@@ -38,23 +39,36 @@ struct Face {
 impl Street {
     /// Sensor to left camera.
     pub fn t_camera_lidar(&self) -> Transform {
-        Transform::from_rotation_matrix(&[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], POSITION_M)
+        Transform::from_rotation_matrix(
+            &[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
+            POSITION_M,
+        )
     }
 
-    /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam by beam from the top, each from behind
-    /// over the right side, the front and the left side.
+    /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam
+    /// by beam from the top, each from behind over the right side, the front and the left side.
     pub fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
         let around = self.surroundings(index);
         let scene = &around.scene;
-        let faces: Vec<Face> = (0..scene.objects.len()).into_par_iter().flat_map_iter(|number| self.faces(scene, number)).collect();
-        let sectors: Vec<Vec<(f64, u32)>> = (0..SECTORS).into_par_iter().map(|sector| scan(&faces, sector)).collect();
+        let faces: Vec<Face> = (0..scene.objects.len())
+            .into_par_iter()
+            .flat_map_iter(|number| self.faces(scene, number))
+            .collect();
+        let sectors: Vec<Vec<(f64, u32)>> =
+            (0..SECTORS).into_par_iter().map(|sector| scan(&faces, sector)).collect();
         let width = DIRECTIONS / SECTORS;
         let mut points = Vec::new();
         for beam in 0..BEAMS {
             for direction in 0..DIRECTIONS {
                 let (nearness, face) = sectors[direction / width][beam * width + direction % width];
                 if nearness > 1.0 / RANGE_M.1 && nearness < 1.0 / RANGE_M.0 {
-                    points.push(self.echo(scene, &faces[face as usize], index, (beam, direction), 1.0 / nearness));
+                    points.push(self.echo(
+                        scene,
+                        &faces[face as usize],
+                        index,
+                        (beam, direction),
+                        1.0 / nearness,
+                    ));
                 }
             }
         }
@@ -71,7 +85,8 @@ impl Street {
         if to_sensor(mesh.middle_m).norm() > RANGE_M.1 + mesh.radius_m {
             return Vec::new();
         }
-        let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| to_sensor(vertex.position_m)).collect();
+        let positions: Vec<Point> =
+            mesh.vertices.iter().map(|vertex| to_sensor(vertex.position_m)).collect();
         let face = |(triangle, face): (usize, &super::mesh::Triangle)| {
             let corners = face.corners.map(|corner| positions[corner as usize]);
             let [a, b, c] = corners;
@@ -93,7 +108,14 @@ impl Street {
         mesh.triangles.iter().enumerate().filter_map(face).collect()
     }
 
-    fn echo(&self, scene: &Scene, face: &Face, index: u32, (beam, direction): (usize, usize), range_m: f64) -> [f32; 4] {
+    fn echo(
+        &self,
+        scene: &Scene,
+        face: &Face,
+        index: u32,
+        (beam, direction): (usize, usize),
+        range_m: f64,
+    ) -> [f32; 4] {
         let ray = ray(beam, direction);
         let object = &scene.objects[face.object as usize];
         let mesh = object.mesh(self.bodies());
@@ -109,12 +131,25 @@ impl Street {
             footprint_m: [spread; 3],
             own_normal: mix(|vertex| vertex.normal),
         };
-        let painted = self.painter().paint(&mesh.surfaces[triangle.surface as usize], &surface_point, object.coat);
+        let painted = self.painter().paint(
+            &mesh.surfaces[triangle.surface as usize],
+            &surface_point,
+            object.coat,
+        );
         let [red, green, blue] = painted.tone;
         let noise_m = self.config().lidar_noise_m;
-        let range_m = if noise_m > 0.0 { range_m + noise_m * normal(self.config().seed, index, (beam, direction)) } else { range_m };
+        let range_m = if noise_m > 0.0 {
+            range_m + noise_m * normal(self.config().seed, index, (beam, direction))
+        } else {
+            range_m
+        };
         let point = ray * range_m;
-        [point.x as f32, point.y as f32, point.z as f32, (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0)]
+        [
+            point.x as f32,
+            point.y as f32,
+            point.z as f32,
+            (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0),
+        ]
     }
 }
 
@@ -146,7 +181,9 @@ fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
         let delta_rad = angle - angles[0];
         delta_rad - TURN * libm::round(delta_rad / TURN)
     });
-    let (low, high) = deltas_rad.iter().fold((0.0_f64, 0.0_f64), |(low, high), &delta_rad| (low.min(delta_rad), high.max(delta_rad)));
+    let (low, high) = deltas_rad.iter().fold((0.0_f64, 0.0_f64), |(low, high), &delta_rad| {
+        (low.min(delta_rad), high.max(delta_rad))
+    });
     let around = high - low >= 0.5 * TURN;
     let per_rad = DIRECTIONS as f64 / TURN;
     let directions = if around {
@@ -157,13 +194,22 @@ fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
         (first, last - first + 1)
     };
     let flat = |p: Point| libm::sqrt(p.x * p.x + p.y * p.y);
-    let near = if around { 1e-6 } else { (0..3).map(|k| segment_distance(corners[k], corners[(k + 1) % 3])).fold(f64::MAX, f64::min) };
+    let near = if around {
+        1e-6
+    } else {
+        (0..3).map(|k| segment_distance(corners[k], corners[(k + 1) % 3])).fold(f64::MAX, f64::min)
+    };
     let far = corners.map(flat).into_iter().fold(0.0, f64::max);
-    let (bottom, top) = corners.iter().fold((f64::MAX, f64::MIN), |(low, high), corner| (low.min(corner.z), high.max(corner.z)));
-    let angle = |height: f64, outward: bool| libm::atan2(height, if (height > 0.0) == outward { near.max(1e-6) } else { far });
+    let (bottom, top) = corners
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(low, high), corner| (low.min(corner.z), high.max(corner.z)));
+    let angle = |height: f64, outward: bool| {
+        libm::atan2(height, if (height > 0.0) == outward { near.max(1e-6) } else { far })
+    };
     let step = (TOP_DEG - BOTTOM_DEG) * (TURN / 360.0) / (BEAMS - 1) as f64;
     let beam = |angle: f64| (elevation(0) - angle) / step;
-    let (first, last) = (libm::floor(beam(angle(top, true))), libm::ceil(beam(angle(bottom, false))));
+    let (first, last) =
+        (libm::floor(beam(angle(top, true))), libm::ceil(beam(angle(bottom, false))));
     if last < 0.0 || first > (BEAMS - 1) as f64 {
         return None;
     }
@@ -183,7 +229,9 @@ fn segment_distance(a: Point, b: Point) -> f64 {
 fn scan(faces: &[Face], sector: usize) -> Vec<(f64, u32)> {
     let width = DIRECTIONS / SECTORS;
     let start = (sector * width) as i64;
-    let rays: Vec<Point> = (0..BEAMS).flat_map(|beam| (0..width).map(move |k| ray(beam, sector * width + k))).collect();
+    let rays: Vec<Point> = (0..BEAMS)
+        .flat_map(|beam| (0..width).map(move |k| ray(beam, sector * width + k)))
+        .collect();
     let mut nearest = vec![(0.0, u32::MAX); BEAMS * width];
     for (number, face) in faces.iter().enumerate() {
         let (first, count) = face.directions;

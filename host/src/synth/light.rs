@@ -21,8 +21,17 @@ pub struct Light {
 }
 
 impl Light {
-    /// Light that leaves a surface towards the eye. `sunlit` and `open` are the shares of sun and sky that reach it.
-    pub fn shade(&self, painted: &Painted, normal: Direction, to_eye: Direction, sunlit: f32, open: f32, thin: bool) -> Tone {
+    /// Light that leaves a surface towards the eye. `sunlit` and `open` are the shares of sun and
+    /// sky that reach it.
+    pub fn shade(
+        &self,
+        painted: &Painted,
+        normal: Direction,
+        to_eye: Direction,
+        sunlit: f32,
+        open: f32,
+        thin: bool,
+    ) -> Tone {
         let facing = normal.dot(&self.to_sun);
         // Leaves let light through.
         let direct = if thin { 0.30 + 0.45 * facing.max(-0.4 * facing) } else { facing.max(0.0) };
@@ -62,7 +71,8 @@ impl Light {
         }
         let height = up.sqrt();
         let zenith = [0.13, 0.30, 0.72];
-        let mut tone = [0, 1, 2].map(|k| HAZE[k] * 1.12 + (zenith[k] - HAZE[k] * 1.12) * height * 0.95);
+        let mut tone =
+            [0, 1, 2].map(|k| HAZE[k] * 1.12 + (zenith[k] - HAZE[k] * 1.12) * height * 0.95);
         let near = direction.dot(&self.to_sun).max(0.0);
         let glow = near * near * near * near;
         // Clouds hang on a ceiling; near the horizon they are small and many.
@@ -86,7 +96,8 @@ impl Light {
     }
 }
 
-/// Linear light as a grey level 0 to 255, before noise: a soft shoulder, the root as the curve of the eye, and a black point.
+/// Linear light as a grey level 0 to 255, before noise: a soft shoulder, the root as the curve of
+/// the eye, and a black point.
 #[inline]
 pub fn develop(light: f32) -> f32 {
     let soft = light * (1.0 + light * 0.16) / (1.0 + light * 0.95);

@@ -26,7 +26,8 @@ pub struct Triangle {
     pub corners: [u32; 3],
     /// Position in `Mesh::surfaces`.
     pub surface: u16,
-    /// Part of something about a tenth of a metre thick that covers no hole: not drawn where that is far below a pixel.
+    /// Part of something about a tenth of a metre thick that covers no hole: not drawn where that
+    /// is far below a pixel.
     pub slight: bool,
 }
 
@@ -37,7 +38,8 @@ pub struct Mesh {
     pub vertices: Vec<Vertex>,
     /// Faces.
     pub triangles: Vec<Triangle>,
-    /// Each face's plane: normal and offset, a face is seen from where normal * eye >= offset; infinite where seen from both sides.
+    /// Each face's plane: normal and offset, a face is seen from where normal * eye >= offset;
+    /// infinite where seen from both sides.
     pub planes: Vec<[f64; 4]>,
     /// Materials.
     pub surfaces: Vec<Surface>,
@@ -59,27 +61,53 @@ impl Mesh {
     /// Adds a convex polygon that faces `outward`; texture coordinates come with the corners.
     pub fn polygon(&mut self, surface: u16, outward: Point, corners: &[(Point, [f32; 3])]) {
         let fan = corners.windows(2).skip(1);
-        let raw = fan.fold(Point::zeros(), |sum, pair| sum + (pair[0].0 - corners[0].0).cross(&(pair[1].0 - corners[0].0)));
+        let raw = fan.fold(Point::zeros(), |sum, pair| {
+            sum + (pair[0].0 - corners[0].0).cross(&(pair[1].0 - corners[0].0))
+        });
         let flipped = raw.dot(&outward) < 0.0;
         let scale = if flipped { -1.0 } else { 1.0 } / (raw.norm() + 1e-12);
         let normal = [0, 1, 2].map(|k| (raw[k] * scale) as f32);
         let first = self.vertices.len() as u32;
-        self.vertices.extend(corners.iter().map(|&(position_m, surface_m)| Vertex { position_m, surface_m, normal }));
+        self.vertices.extend(corners.iter().map(|&(position_m, surface_m)| Vertex {
+            position_m,
+            surface_m,
+            normal,
+        }));
         for k in 1..corners.len() as u32 - 1 {
             let (a, b) = if flipped { (k + 1, k) } else { (k, k + 1) };
-            self.triangles.push(Triangle { corners: [first, first + a, first + b], surface, slight: self.slight });
+            self.triangles.push(Triangle {
+                corners: [first, first + a, first + b],
+                surface,
+                slight: self.slight,
+            });
         }
     }
 
-    /// Adds a parallelogram from `origin` along `u` and `v`; texture coordinates are metres from `texture`.
-    pub fn sheet(&mut self, surface: u16, outward: Point, origin: Point, u: Point, v: Point, texture: [f64; 3]) {
+    /// Adds a parallelogram from `origin` along `u` and `v`; texture coordinates are metres from
+    /// `texture`.
+    pub fn sheet(
+        &mut self,
+        surface: u16,
+        outward: Point,
+        origin: Point,
+        u: Point,
+        v: Point,
+        texture: [f64; 3],
+    ) {
         let (lu, lv) = (u.norm(), v.norm());
-        let at = |a: f64, b: f64| [(texture[0] + a * lu) as f32, (texture[1] + b * lv) as f32, texture[2] as f32];
+        let at = |a: f64, b: f64| {
+            [(texture[0] + a * lu) as f32, (texture[1] + b * lv) as f32, texture[2] as f32]
+        };
         let corner = |a: f64, b: f64| (origin + u * a + v * b, at(a, b));
-        self.polygon(surface, outward, &[corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);
+        self.polygon(
+            surface,
+            outward,
+            &[corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)],
+        );
     }
 
-    /// Adds an upright box between two corners. `faces` lists what to leave out: -x, +x, -y (top), +y (bottom), -z, +z.
+    /// Adds an upright box between two corners. `faces` lists what to leave out: -x, +x, -y (top),
+    /// +y (bottom), -z, +z.
     pub fn cuboid(&mut self, surface: u16, low: Point, high: Point, omit: &[usize]) {
         let size = high - low;
         for face in 0..6 {
@@ -133,8 +161,13 @@ impl Mesh {
     pub fn facing(&mut self, corners: [u32; 3], surface: u16) {
         let [a, b, c] = corners.map(|k| self.vertices[k as usize]);
         let raw = (b.position_m - a.position_m).cross(&(c.position_m - a.position_m));
-        let normal = [0, 1, 2].map(|k| f64::from(a.normal[k]) + f64::from(b.normal[k]) + f64::from(c.normal[k]));
-        let corners = if raw.dot(&Point::from(normal)) < 0.0 { [corners[0], corners[2], corners[1]] } else { corners };
+        let normal = [0, 1, 2]
+            .map(|k| f64::from(a.normal[k]) + f64::from(b.normal[k]) + f64::from(c.normal[k]));
+        let corners = if raw.dot(&Point::from(normal)) < 0.0 {
+            [corners[0], corners[2], corners[1]]
+        } else {
+            corners
+        };
         self.triangles.push(Triangle { corners, surface, slight: self.slight });
     }
 
@@ -142,7 +175,8 @@ impl Mesh {
     pub fn move_by(&mut self, first: usize, t_mesh_part: &Transform) {
         let rotation = Matrix3::from(t_mesh_part.rotation_matrix()).transpose();
         for vertex in &mut self.vertices[first..] {
-            vertex.position_m = rotation * vertex.position_m + Vector3::from(t_mesh_part.translation_m);
+            vertex.position_m =
+                rotation * vertex.position_m + Vector3::from(t_mesh_part.translation_m);
             let normal = rotation * Point::from(vertex.normal.map(f64::from));
             vertex.normal = [normal.x as f32, normal.y as f32, normal.z as f32];
         }
@@ -154,21 +188,28 @@ impl Mesh {
             if self.surfaces[triangle.surface as usize].two_sided {
                 return [f64::INFINITY; 4];
             }
-            let [a, b, c] = triangle.corners.map(|corner| self.vertices[corner as usize].position_m);
+            let [a, b, c] =
+                triangle.corners.map(|corner| self.vertices[corner as usize].position_m);
             let normal = (b - a).cross(&(c - a));
             [normal.x, normal.y, normal.z, normal.dot(&a)]
         };
         self.planes = self.triangles.iter().map(plane).collect();
         let (low, high) = self.bounds_m();
         self.middle_m = (low + high) * 0.5;
-        self.radius_m = self.vertices.iter().map(|vertex| (vertex.position_m - self.middle_m).norm()).fold(0.0, f64::max);
+        self.radius_m = self
+            .vertices
+            .iter()
+            .map(|vertex| (vertex.position_m - self.middle_m).norm())
+            .fold(0.0, f64::max);
         self
     }
 
     /// Smallest upright box around the mesh.
     pub fn bounds_m(&self) -> (Point, Point) {
-        self.vertices.iter().fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| {
-            (low.inf(&vertex.position_m), high.sup(&vertex.position_m))
-        })
+        self.vertices
+            .iter()
+            .fold((Point::repeat(1e9), Point::repeat(-1e9)), |(low, high), vertex| {
+                (low.inf(&vertex.position_m), high.sup(&vertex.position_m))
+            })
     }
 }

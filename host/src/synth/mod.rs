@@ -1,16 +1,21 @@
 //! A synthetic street: seeded, endless, with exact truth about everything in it.
 //!
-//! A [`Street`] gives rectified stereo pairs in colour and grey with sensor noise, exact depth, instance masks, poses of the camera and
-//! of every car, and simulated LiDAR. Frame `i` depends on the configuration and `i` alone: frames may be asked for in any order, on any
-//! number of threads. Only plain arithmetic, the root and `libm` are used, so that the pictures are the same bits on every machine.
+//! A [`Street`] gives rectified stereo pairs in colour and grey with sensor noise, exact depth,
+//! instance masks, poses of the camera and of every car, and simulated LiDAR. Frame `i` depends on
+//! the configuration and `i` alone: frames may be asked for in any order, on any number of threads.
+//! Only plain arithmetic, the root and `libm` are used, so that the pictures are the same bits on
+//! every machine.
 //!
-//! Memory: about a dozen [`SEGMENT_M`]-metre segments of street near the camera and one frame's buffers, however far the camera drives.
-//! Time: about 40,000 triangles a view are set up at any size, the rest is linear in pixels. What can go wrong: a configuration
-//! out of range is refused by [`Street::new`].
+//! Memory: about a dozen [`SEGMENT_M`]-metre segments of street near the camera and one frame's
+//! buffers, however far the camera drives. Time: about 40,000 triangles a view are set up at any
+//! size, the rest is linear in pixels. What can go wrong: a configuration out of range is refused
+//! by [`Street::new`].
 //!
-//! Through a lens of [`StreetLens`] images come raw, with a calibration; a [`RigError`] is what that calibration does not know.
+//! Through a lens of [`StreetLens`] images come raw, with a calibration; a [`RigError`] is what
+//! that calibration does not know.
 //!
-//! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the LiDAR's revolution takes no time.
+//! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the
+//! LiDAR's revolution takes no time.
 //!
 //! ```
 //! use dynvox::synth::{Street, StreetConfig};
@@ -54,7 +59,9 @@ mod writer;
 
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
-pub use lens::{DoubleSphere, Equidistant, ExtendedUnified, RadialTangential, RigError, StreetLens};
+pub use lens::{
+    DoubleSphere, Equidistant, ExtendedUnified, RadialTangential, RigError, StreetLens,
+};
 pub use path::SEGMENT_M;
 pub use street::{Street, SynthError};
 pub use writer::write_kitti;

@@ -1,4 +1,5 @@
-//! What a surface shows at a point: reflectance from noise pictures and box-filtered patterns, all attached to the surface.
+//! What a surface shows at a point: reflectance from noise pictures and box-filtered patterns, all
+//! attached to the surface.
 
 use super::car::{Shape, shape};
 use super::config::CarKind;
@@ -113,7 +114,12 @@ impl Painter {
             Kind::Bark => self.bark(surface, surface_point),
             Kind::Leaves => self.leaves(surface, surface_point),
             Kind::Sign => window_paint::sign(surface, surface_point),
-            Kind::Car => car_paint::shell(self, &self.shapes[surface.size_m[0] as usize % 5], surface_point, coat),
+            Kind::Car => car_paint::shell(
+                self,
+                &self.shapes[surface.size_m[0] as usize % 5],
+                surface_point,
+                coat,
+            ),
             Kind::Wheel => car_paint::wheel(surface, surface_point),
         }
     }
@@ -143,7 +149,8 @@ impl Painter {
         let lane = (d - 1.6) * (1.0 / 3.2);
         let across = (lane - floor(lane) as f32 - 0.5).abs() * 3.2;
         if d > -8.0 && d < 1.6 {
-            shade += 0.07 * within(0.45, 1.05, across, 0.4 + fd) - 0.06 * within(-0.3, 0.3, across, 0.4 + fd);
+            shade += 0.07 * within(0.45, 1.05, across, 0.4 + fd)
+                - 0.06 * within(-0.3, 0.3, across, 0.4 + fd);
         } else {
             shade -= 0.10 + 0.05 * broad;
             shade -= 0.25 * (1.0 - within(-10.0, 3.6, d, 0.3 + fd));
@@ -154,12 +161,21 @@ impl Painter {
         }
         let worn = (0.86 + 0.16 * broad + 0.10 * fine).clamp(0.25, 1.0);
         let marking = markings(surface.size_m[0] > 0.5, (s, d), (fs, fd)) * worn;
-        let painted = blend(times(tint, shade), times([0.72, 0.72, 0.68], 1.0 + 0.06 * fine), marking);
+        let painted =
+            blend(times(tint, shade), times([0.72, 0.72, 0.68], 1.0 + 0.06 * fine), marking);
         Painted { tone: painted, gloss: 0.02, open: 1.0 }
     }
 
-    /// Patches of newer asphalt and sealed cracks, at most one of each in every cell of 8 m by 3.5 m.
-    fn repairs(&self, seed: u32, (s, d): (f32, f32), (fs, fd): (f32, f32), broad: f32, shade: &mut f32) {
+    /// Patches of newer asphalt and sealed cracks, at most one of each in every cell of 8 m by 3.5
+    /// m.
+    fn repairs(
+        &self,
+        seed: u32,
+        (s, d): (f32, f32),
+        (fs, fd): (f32, f32),
+        broad: f32,
+        shade: &mut f32,
+    ) {
         let (cs, cd) = (floor(s * 0.125), floor((d + 10.2) * (1.0 / 3.5)));
         let h = cell(seed.wrapping_mul(31), cs, cd);
         let (ls, ld) = (s - cs as f32 * 8.0, d + 10.2 - cd as f32 * 3.5);
@@ -168,14 +184,18 @@ impl Painter {
             let (s0, s1) = (0.5 + 3.0 * a, 4.0 + 3.5 * b);
             let (d0, d1) = (0.2 + 1.2 * b, 2.0 + 1.3 * a);
             let inside = within(s0, s1, ls, fs) * within(d0, d1, ld, fd);
-            let rim = inside - within(s0 + 0.05, s1 - 0.05, ls, fs) * within(d0 + 0.05, d1 - 0.05, ld, fd);
+            let rim = inside
+                - within(s0 + 0.05, s1 - 0.05, ls, fs) * within(d0 + 0.05, d1 - 0.05, ld, fd);
             *shade *= 1.0 - inside * (0.34 - 0.3 * unit(h << 18)) - 0.5 * rim;
         }
         if h & 12 == 4 {
             // A crack wanders like a sum of triangle waves.
             let wave = |x: f32| ((x - floor(x) as f32) - 0.5).abs() - 0.25;
             let phase = unit(h << 7) * 10.0;
-            let wander = 1.6 * wave(d * 0.31 + phase) + 0.5 * wave(d * 1.3 + phase) + 0.16 * wave(d * 4.7) + 0.05 * broad;
+            let wander = 1.6 * wave(d * 0.31 + phase)
+                + 0.5 * wave(d * 1.3 + phase)
+                + 0.16 * wave(d * 4.7)
+                + 0.05 * broad;
             let off = ls - (4.0 + 1.5 * wander);
             let crack = within(-0.025, 0.025, off, fs);
             *shade *= 1.0 - 0.55 * crack;
@@ -191,8 +211,10 @@ impl Painter {
         let (row, size) = (floor(d * 2.0), 0.5);
         let shifted = s + 0.25 * (row & 1) as f32;
         let column = floor(shifted * 2.0);
-        let joint = 1.0 - (1.0 - stripes(shifted, size, 0.012, fs)) * (1.0 - stripes(d, size, 0.012, fd));
-        let own = (unit(cell(surface.seed, column.rem_euclid(480), row)) - 0.5) * survives(size, fs.max(fd));
+        let joint =
+            1.0 - (1.0 - stripes(shifted, size, 0.012, fs)) * (1.0 - stripes(d, size, 0.012, fd));
+        let own = (unit(cell(surface.seed, column.rem_euclid(480), row)) - 0.5)
+            * survives(size, fs.max(fd));
         let fine = self.fine(3, surface_point, 1.0);
         let broad = self.broad(4, surface_point, 1.0);
         let shade = 1.0 + 0.22 * fine + 0.10 * broad + 0.26 * own;
@@ -204,8 +226,10 @@ impl Painter {
         let [fs, ..] = surface_point.footprint_m;
         let joint = stripes(s, 1.0, 0.015, fs);
         let own = unit(cell(surface.seed, floor(s), 0)) - 0.5;
-        let shade =
-            1.0 + 0.16 * self.fine(6, surface_point, 1.3) + 0.3 * own * survives(1.0, fs) + 0.08 * self.broad(7, surface_point, 1.0);
+        let shade = 1.0
+            + 0.16 * self.fine(6, surface_point, 1.3)
+            + 0.3 * own * survives(1.0, fs)
+            + 0.08 * self.broad(7, surface_point, 1.0);
         Painted::dull(blend(times(surface.tone, shade), surface.second, joint))
     }
 
@@ -234,13 +258,20 @@ impl Painter {
     }
 
     /// Running bond: (length, height, joint) of a stone in m, spread of the stones' tones.
-    fn masonry(&self, surface: &Surface, surface_point: &SurfacePoint, (length, height, joint): (f32, f32, f32), spread: f32) -> Painted {
+    fn masonry(
+        &self,
+        surface: &Surface,
+        surface_point: &SurfacePoint,
+        (length, height, joint): (f32, f32, f32),
+        spread: f32,
+    ) -> Painted {
         let [u, v, _] = surface_point.surface_m;
         let [fu, fv, _] = surface_point.footprint_m;
         let row = floor(v / height);
         let along = u + 0.5 * length * (row & 1) as f32;
         let column = floor(along / length);
-        let gap = 1.0 - (1.0 - stripes(along, length, joint, fu)) * (1.0 - stripes(v, height, joint, fv));
+        let gap =
+            1.0 - (1.0 - stripes(along, length, joint, fu)) * (1.0 - stripes(v, height, joint, fv));
         let h = cell(surface.seed, column, row);
         let kept = survives(length, fu) * survives(height, fv);
         let own = (unit(h) - 0.5) * 2.0 * spread * kept;
@@ -261,21 +292,28 @@ impl Painter {
         let lip = stripes(v, tall, 0.05, fv);
         let roll = stripes(u, wide, 0.07, fu);
         let own = (unit(cell(surface.seed, column, row)) - 0.5) * survives(wide, fu.max(fv)) * 0.45;
-        let shade = 1.0 + own + 0.10 * self.fine(surface.seed, surface_point, 1.0) + 0.14 * self.broad(surface.seed, surface_point, 1.0)
+        let shade = 1.0
+            + own
+            + 0.10 * self.fine(surface.seed, surface_point, 1.0)
+            + 0.14 * self.broad(surface.seed, surface_point, 1.0)
             - 0.5 * lip
             - 0.2 * roll;
         Painted::dull(times(surface.tone, shade))
     }
 
     fn plain(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
-        let shade = 1.0 + 0.05 * self.fine(surface.seed, surface_point, 1.0) + 0.06 * self.broad(surface.seed, surface_point, 2.0);
+        let shade = 1.0
+            + 0.05 * self.fine(surface.seed, surface_point, 1.0)
+            + 0.06 * self.broad(surface.seed, surface_point, 2.0);
         Painted { tone: times(surface.tone, shade), gloss: 0.04, open: 1.0 }
     }
 
     fn fence(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
         let [u, ..] = surface_point.surface_m;
         let [fu, ..] = surface_point.footprint_m;
-        let shade = 1.0 + 0.10 * self.fine(surface.seed, surface_point, 1.0) + 0.05 * self.broad(surface.seed, surface_point, 1.0);
+        let shade = 1.0
+            + 0.10 * self.fine(surface.seed, surface_point, 1.0)
+            + 0.05 * self.broad(surface.seed, surface_point, 1.0);
         if surface.second != surface.tone {
             // Cloth: two tones in turn.
             let share = stripes(u, 0.6, 0.3, fu);
@@ -343,7 +381,8 @@ fn markings(crossing: bool, (s, d): (f32, f32), (fs, fd): (f32, f32)) -> f32 {
         let middle = layout::CROSSING_M as f32;
         let zone = within(middle - 3.6, middle + 3.6, s, fs);
         let bars = stripes(d + 0.2, 1.0, 0.5, fd) * within(middle - 1.7, middle + 1.7, s, fs);
-        let stops = within(-1.5 * lane, 0.5 * lane, d, fd) * within(middle - 3.4, middle - 3.0, s, fs);
+        let stops =
+            within(-1.5 * lane, 0.5 * lane, d, fd) * within(middle - 3.4, middle - 3.0, s, fs);
         share = share * (1.0 - zone) + (bars + stops).min(1.0);
     }
     share

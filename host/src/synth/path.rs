@@ -1,7 +1,9 @@
-//! The street's reference line (the middle of the camera's lane): heading in closed form, position by Gauss–Legendre quadrature.
+//! The street's reference line (the middle of the camera's lane): heading in closed form, position
+//! by Gauss–Legendre quadrature.
 //!
-//! The heading is a bounded sum of sines, so that the street never meets itself however long it gets. Positions are summed from the
-//! street's start segment by segment in one order: any frame, asked for alone, finds the same bits.
+//! The heading is a bounded sum of sines, so that the street never meets itself however long it
+//! gets. Positions are summed from the street's start segment by segment in one order: any frame,
+//! asked for alone, finds the same bits.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -36,7 +38,8 @@ pub struct Centerline {
     phase_rad: [f64; 2],
     /// Steepest rise; 0 is level.
     hills: f64,
-    /// A segment already walked to and its start: driving on costs nothing more. The sum is the same from there as from the start.
+    /// A segment already walked to and its start: driving on costs nothing more. The sum is the
+    /// same from there as from the start.
     walked: Mutex<(i64, Vector3<f64>)>,
 }
 
@@ -57,7 +60,8 @@ impl Centerline {
     pub fn heading_rad(&self, s_m: f64) -> f64 {
         let wave = |k: usize| {
             let phase = self.phase_rad[k];
-            self.amplitude_rad[k] * (libm::sin(TURN * s_m / WAVELENGTH_M[k] + phase) - libm::sin(phase))
+            self.amplitude_rad[k]
+                * (libm::sin(TURN * s_m / WAVELENGTH_M[k] + phase) - libm::sin(phase))
         };
         if self.amplitude_rad[0] == 0.0 { 0.0 } else { wave(0) + wave(1) }
     }
@@ -76,11 +80,14 @@ impl Centerline {
         })
     }
 
-    /// The span of street from segment `first` to segment `last`, both included. Time: linear in the way
-    /// from the last span when driving on, else from the street's start.
+    /// The span of street from segment `first` to segment `last`, both included. Time: linear in
+    /// the way from the last span when driving on, else from the street's start.
     pub fn span(&self, first: i64, last: i64) -> RoadSpan<'_> {
-        let step = |segment: i64| self.advance(segment as f64 * SEGMENT_M, (segment + 1) as f64 * SEGMENT_M);
-        // Both ways from the street's start, so that a segment's position does not depend on where the span begins.
+        let step = |segment: i64| {
+            self.advance(segment as f64 * SEGMENT_M, (segment + 1) as f64 * SEGMENT_M)
+        };
+        // Both ways from the street's start, so that a segment's position does not depend on where
+        // the span begins.
         let mut starts_m = Vec::new();
         let mut start = Vector3::zeros();
         for segment in (first..0).rev() {
@@ -117,10 +124,12 @@ impl RoadSpan<'_> {
     pub fn point(&self, s_m: f64) -> Vector3<f64> {
         let last = self.starts_m.len() as i64 - 1;
         let at = (libm::floor(s_m / SEGMENT_M) as i64 - self.first).clamp(0, last);
-        self.starts_m[at as usize] + self.centerline.advance((at + self.first) as f64 * SEGMENT_M, s_m)
+        self.starts_m[at as usize]
+            + self.centerline.advance((at + self.first) as f64 * SEGMENT_M, s_m)
     }
 
-    /// The frame that stands on the road at `s_m`, `lateral_m` to the right of the reference line, rotated by `yaw_rad` against it.
+    /// The frame that stands on the road at `s_m`, `lateral_m` to the right of the reference line,
+    /// rotated by `yaw_rad` against it.
     pub fn t_street_local(&self, s_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
         let heading = self.centerline.heading_rad(s_m);
         let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
@@ -128,8 +137,10 @@ impl RoadSpan<'_> {
         pose.translation_m = (self.point(s_m) + right * lateral_m).into();
         if self.centerline.hills != 0.0 {
             let (height_m, rise) = self.centerline.height(s_m);
-            let rotation = |x: f64, y: f64| Transform::new(Vector3::new(x, y, 0.0), Vector3::zeros());
-            let tilted = rotation(0.0, heading) * rotation(libm::atan(rise), 0.0) * rotation(0.0, yaw_rad);
+            let rotation =
+                |x: f64, y: f64| Transform::new(Vector3::new(x, y, 0.0), Vector3::zeros());
+            let tilted =
+                rotation(0.0, heading) * rotation(libm::atan(rise), 0.0) * rotation(0.0, yaw_rad);
             pose.rotation = tilted.rotation;
             pose.translation_m[1] -= height_m;
         }
@@ -155,7 +166,10 @@ mod tests {
             let pose = span.t_street_local(s, 0.0, 0.0);
             assert!((pose.translation_m[1] + low.0).abs() < 1e-9);
             let ahead = pose.rotate(Vector3::z());
-            assert!((ahead.y + libm::sin(libm::atan(low.1))).abs() < 1e-9, "the frame looks along the road");
+            assert!(
+                (ahead.y + libm::sin(libm::atan(low.1))).abs() < 1e-9,
+                "the frame looks along the road"
+            );
         }
         assert!((steepest - 0.2).abs() < 1e-3);
     }
@@ -170,10 +184,17 @@ mod tests {
             let s = f64::from(step) * 0.1;
             let delta = span.point(s + 0.1) - span.point(s);
             let heading = centerline.heading_rad(s + 0.05);
-            assert!((delta - Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * 0.1).norm() < 1e-6);
+            assert!(
+                (delta - Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * 0.1).norm()
+                    < 1e-6
+            );
             length += delta.norm();
         }
         assert!((length - 240.0).abs() < 1e-3);
-        assert_eq!(centerline.span(7, 8).point(180.0), span.point(180.0), "asked for alone, the same bits");
+        assert_eq!(
+            centerline.span(7, 8).point(180.0),
+            span.point(180.0),
+            "asked for alone, the same bits"
+        );
     }
 }

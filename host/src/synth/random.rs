@@ -1,4 +1,5 @@
-//! Hashes and random numbers: every random figure is a function of what it belongs to, never of what was asked for before.
+//! Hashes and random numbers: every random figure is a function of what it belongs to, never of
+//! what was asked for before.
 
 use dynvox_core::random::Random;
 
@@ -12,7 +13,8 @@ pub fn mix(value: u64) -> u64 {
 
 /// One hash of a seed and two counters.
 pub fn hash(seed: u64, a: i64, b: i64) -> u64 {
-    mix(mix(seed ^ (a as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)).wrapping_add((b as u64).wrapping_mul(0xD1B5_4A32_D192_ED03)))
+    mix(mix(seed ^ (a as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        .wrapping_add((b as u64).wrapping_mul(0xD1B5_4A32_D192_ED03)))
 }
 
 /// A cheap hash of a texture cell, for the shader.

@@ -1,17 +1,19 @@
 //! Visibility: which triangle each sample of a band of rows sees.
 //!
-//! Edges are planes through the eye (homogeneous rasterisation, Olano and Greer 1997), so nothing is clipped; the same three planes give
-//! exact inverse depth and perspective-correct barycentric coordinates anywhere in the pixel. A band's result depends on the order of the
-//! triangles alone.
+//! Edges are planes through the eye (homogeneous rasterisation, Olano and Greer 1997), so nothing
+//! is clipped; the same three planes give exact inverse depth and perspective-correct barycentric
+//! coordinates anywhere in the pixel. A band's result depends on the order of the triangles alone.
 
 use nalgebra::Vector3;
 
 /// Nothing seen: the sky.
 pub const SKY: u32 = u32::MAX;
-/// Samples per pixel: the centre, which gives depth and masks, and four around it for colour at edges.
+/// Samples per pixel: the centre, which gives depth and masks, and four around it for colour at
+/// edges.
 pub const SAMPLES: usize = 5;
 /// Where they are, px from the pixel's centre.
-pub const OFFSETS_PX: [(f64, f64); SAMPLES] = [(0.0, 0.0), (-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)];
+pub const OFFSETS_PX: [(f64, f64); SAMPLES] =
+    [(0.0, 0.0), (-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)];
 const NEAR_M: f64 = 0.05;
 
 /// A pinhole as the rasteriser needs it.
@@ -100,7 +102,9 @@ fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<Reach> {
     if high.0 < -0.5 || high.1 < -0.5 || low.0 > last.0 + 0.5 || low.1 > last.1 + 0.5 {
         return None;
     }
-    let span = |low: f64, high: f64, last: f64| ((low - 0.5).max(0.0) as i32, (high + 0.5).min(last) as i32);
+    let span = |low: f64, high: f64, last: f64| {
+        ((low - 0.5).max(0.0) as i32, (high + 0.5).min(last) as i32)
+    };
     Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1), (low.1 - 1e-9, high.1 + 1e-9)))
 }
 
@@ -142,7 +146,8 @@ impl Band {
         let slope = per_column as f32;
         let sides = Sides::new(setup);
         for (sample, (du, dv)) in OFFSETS_PX.into_iter().enumerate() {
-            // Rows whose sample lies within the triangle's extent; casts saturate at the band's own rows.
+            // Rows whose sample lies within the triangle's extent; casts saturate at the band's own
+            // rows.
             let (top, bottom) = (setup.extent_px.0 - dv, setup.extent_px.1 - dv);
             let top_row = top as i32 + i32::from(top > f64::from(top as i32));
             if bottom < 0.0 {
@@ -153,7 +158,8 @@ impl Band {
                 let row = row as usize;
                 let Some((from, to)) = sides.span(du, v) else { continue };
                 let start = (sample * self.rows + row - self.first_row) * self.width;
-                let begin = (per_column * (f64::from(from as u32) + du) + per_row * v + constant) as f32;
+                let begin =
+                    (per_column * (f64::from(from as u32) + du) + per_row * v + constant) as f32;
                 let range = start + from..=start + to;
                 let slots = self.inverse_depth[range.clone()].iter_mut().zip(&mut self.seen[range]);
                 for (k, (near, seen)) in slots.enumerate() {
@@ -167,7 +173,8 @@ impl Band {
     }
 }
 
-/// A triangle's edges as columns over rows: inside is right of all of the left ones and left of all of the right ones.
+/// A triangle's edges as columns over rows: inside is right of all of the left ones and left of all
+/// of the right ones.
 struct Sides {
     left: [(f64, f64); 3],
     right: [(f64, f64); 3],
@@ -198,8 +205,14 @@ impl Sides {
         let at = |(slope, start): (f64, f64)| slope * v + start - du;
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let smaller = |a: f64, b: f64| if a < b { a } else { b };
-        let from = larger(larger(at(self.left[0]), at(self.left[1])), larger(at(self.left[2]), self.columns.0));
-        let to = smaller(smaller(at(self.right[0]), at(self.right[1])), smaller(at(self.right[2]), self.columns.1));
+        let from = larger(
+            larger(at(self.left[0]), at(self.left[1])),
+            larger(at(self.left[2]), self.columns.0),
+        );
+        let to = smaller(
+            smaller(at(self.right[0]), at(self.right[1])),
+            smaller(at(self.right[2]), self.columns.1),
+        );
         if from > to {
             return None;
         }

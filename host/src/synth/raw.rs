@@ -1,8 +1,9 @@
-//! Images through a lens, or of a rig that is off: sampled from a rendering of the ideal pinhole that is twice as fine and as large as the
-//! image needs.
+//! Images through a lens, or of a rig that is off: sampled from a rendering of the ideal pinhole
+//! that is twice as fine and as large as the image needs.
 //!
-//! The two ideal pinholes of [`super::camera::rig`] stay what depth, masks and poses are of: rectifying the raw images by the calibration
-//! gives their images. Each raw camera is rotated against its pinhole by a fixed small angle, so that rectification has to rotate.
+//! The two ideal pinholes of [`super::camera::rig`] stay what depth, masks and poses are of:
+//! rectifying the raw images by the calibration gives their images. Each raw camera is rotated
+//! against its pinhole by a fixed small angle, so that rectification has to rotate.
 //!
 //! Memory: 16 bytes a pixel and camera. Time: four views in place of one.
 
@@ -37,11 +38,16 @@ const RIM_PX: f64 = 2.0;
 const SIDE_POINTS: u32 = 64;
 
 /// The calibration of a street's raw cameras; `None` where images come rectified.
-pub fn calibration(config: &StreetConfig, rig: &StereoRig) -> Result<Option<StereoCalibration>, SynthError> {
+pub fn calibration(
+    config: &StreetConfig,
+    rig: &StereoRig,
+) -> Result<Option<StereoCalibration>, SynthError> {
     let Some(model) = config.lens.model() else { return Ok(None) };
-    let refused = |reason: String| SynthError::Config(format!("street.lens cannot be used: {reason}"));
+    let refused =
+        |reason: String| SynthError::Config(format!("street.lens cannot be used: {reason}"));
     let lens = |focal_px: f64, center_px: [f64; 2]| {
-        Lens::new([focal_px, ASPECT * focal_px], center_px, model).map_err(|problem| refused(problem.to_string()))
+        Lens::new([focal_px, ASPECT * focal_px], center_px, model)
+            .map_err(|problem| refused(problem.to_string()))
     };
     // The middle at the scale of the ideal images.
     let plain = lens(rig.focal_px, [0.0; 2])?;
@@ -58,8 +64,13 @@ pub fn calibration(config: &StreetConfig, rig: &StereoRig) -> Result<Option<Ster
     };
     let [width, height] = [side(0), side(1)];
     let camera = |[low, high]: [[f64; 2]; 2]| {
-        let center = |axis: usize, side: u32| 0.5 * (f64::from(side) - 1.0) - 0.5 * (low[axis] + high[axis]);
-        Ok::<_, SynthError>(RawCamera { lens: lens(focal_px, [center(0, width), center(1, height)])?, width, height })
+        let center =
+            |axis: usize, side: u32| 0.5 * (f64::from(side) - 1.0) - 0.5 * (low[axis] + high[axis]);
+        Ok::<_, SynthError>(RawCamera {
+            lens: lens(focal_px, [center(0, width), center(1, height)])?,
+            width,
+            height,
+        })
     };
     let [r_rectified_left, r_rectified_right] = rotations;
     Ok(Some(StereoCalibration {
@@ -91,8 +102,14 @@ fn rotation(rotation_rad: [f64; 3]) -> Matrix3<f64> {
     Matrix3::from(Transform::new(rotation_rad, [0.0; 3]).rotation_matrix()).transpose()
 }
 
-/// Raw pixels that the ideal image's border shows: smallest and largest; `None` where the lens does not show all of it.
-fn extent(lens: &Lens, r_rectified_raw: &Matrix3<f64>, config: &StreetConfig, rig: &StereoRig) -> Option<[[f64; 2]; 2]> {
+/// Raw pixels that the ideal image's border shows: smallest and largest; `None` where the lens does
+/// not show all of it.
+fn extent(
+    lens: &Lens,
+    r_rectified_raw: &Matrix3<f64>,
+    config: &StreetConfig,
+    rig: &StereoRig,
+) -> Option<[[f64; 2]; 2]> {
     let last = [f64::from(config.width) - 1.0, f64::from(config.height) - 1.0];
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
     for step in 0..=SIDE_POINTS {
@@ -120,21 +137,48 @@ pub struct CameraView {
 }
 
 /// Both views of a street that is not taken by an ideal rig; `None` where it is.
-pub fn views(config: &StreetConfig, rig: &StereoRig, calibration: Option<&StereoCalibration>) -> Option<[CameraView; 2]> {
+pub fn views(
+    config: &StreetConfig,
+    rig: &StereoRig,
+    calibration: Option<&StereoCalibration>,
+) -> Option<[CameraView; 2]> {
     if calibration.is_none() && config.rig_error.is_none() {
         return None;
     }
     let rectification = calibration.and_then(rectification);
     let ideal = [config.width, config.height];
-    let left = CameraView::new(rig, ideal, rectification.as_ref().map(|both| &both.left), &RigError::default());
-    Some([left, CameraView::new(rig, ideal, rectification.as_ref().map(|both| &both.right), &config.rig_error)])
+    let left = CameraView::new(
+        rig,
+        ideal,
+        rectification.as_ref().map(|both| &both.left),
+        &RigError::default(),
+    );
+    Some([
+        left,
+        CameraView::new(
+            rig,
+            ideal,
+            rectification.as_ref().map(|both| &both.right),
+            &config.rig_error,
+        ),
+    ])
 }
 
 /// How raw images are rectified.
 pub fn rectification(calibration: &StereoCalibration) -> Option<Rectification> {
-    let Placement::Rectified { r_rectified_left, r_rectified_right, size, .. } = calibration.placement else { return None };
-    let camera = |raw: RawCamera, r_rectified_raw: Matrix3<f64>| TurnedCamera { raw, r_rectified_raw };
-    Rectification::given(camera(calibration.left, r_rectified_left), camera(calibration.right, r_rectified_right), size).ok()
+    let Placement::Rectified { r_rectified_left, r_rectified_right, size, .. } =
+        calibration.placement
+    else {
+        return None;
+    };
+    let camera =
+        |raw: RawCamera, r_rectified_raw: Matrix3<f64>| TurnedCamera { raw, r_rectified_raw };
+    Rectification::given(
+        camera(calibration.left, r_rectified_left),
+        camera(calibration.right, r_rectified_right),
+        size,
+    )
+    .ok()
 }
 
 impl CameraView {
@@ -143,7 +187,9 @@ impl CameraView {
         let off = Misalignment::new(error, rig);
         let tangents = |[u, v]: [f64; 2]| {
             let ray = match raw {
-                Some(camera) => camera.r_rectified_raw * Vector3::from(camera.raw.lens.unproject([u, v])?),
+                Some(camera) => {
+                    camera.r_rectified_raw * Vector3::from(camera.raw.lens.unproject([u, v])?)
+                }
                 None => ray(rig, [u, v]),
             };
             (ray.z > 0.05).then(|| off.seen([ray.x / ray.z, ray.y / ray.z]))
@@ -151,11 +197,13 @@ impl CameraView {
         let of_pixel = |pixel: u32| {
             let [u, v] = [f64::from(pixel % width), f64::from(pixel / width)];
             SAMPLES_PX.map(|[du, dv]| {
-                let at = tangents([u + du, v + dv]).filter(|at| at.iter().all(|tangent| tangent.abs() <= WIDEST_TANGENT));
+                let at = tangents([u + du, v + dv])
+                    .filter(|at| at.iter().all(|tangent| tangent.abs() <= WIDEST_TANGENT));
                 at.unwrap_or([f64::NAN; 2])
             })
         };
-        let tangents: Vec<[[f64; 2]; 4]> = (0..width * height).into_par_iter().map(of_pixel).collect();
+        let tangents: Vec<[[f64; 2]; 4]> =
+            (0..width * height).into_par_iter().map(of_pixel).collect();
         let (mut low, mut high) = ([0.0f64; 2], [0.0f64; 2]);
         for [x, y] in tangents.iter().flatten() {
             // The smaller of a number and NaN is the number.
@@ -164,9 +212,13 @@ impl CameraView {
         }
         let focal_px = FINENESS * rig.focal_px;
         let first = low.map(|low| MARGIN_PX - focal_px * low);
-        let side = |axis: usize| (focal_px * (high[axis] - low[axis]) + 2.0 * MARGIN_PX).ceil() as usize + 1;
-        let pinhole = Pinhole { width: side(0), height: side(1), focal_px, center_px: (first[0], first[1]) };
-        let in_rendering = |[x, y]: [f64; 2]| [(focal_px * x + first[0]) as f32, (focal_px * y + first[1]) as f32];
+        let side = |axis: usize| {
+            (focal_px * (high[axis] - low[axis]) + 2.0 * MARGIN_PX).ceil() as usize + 1
+        };
+        let pinhole =
+            Pinhole { width: side(0), height: side(1), focal_px, center_px: (first[0], first[1]) };
+        let in_rendering =
+            |[x, y]: [f64; 2]| [(focal_px * x + first[0]) as f32, (focal_px * y + first[1]) as f32];
         Self {
             pinhole,
             size: [width as usize, height as usize],
@@ -219,7 +271,10 @@ impl Misalignment {
         let roll = rotation([0.0, 0.0, -error.roll_deg.to_radians()]);
         Self {
             rotation: pitch * roll,
-            shift: [error.disparity_offset_px / rig.focal_px, error.vertical_shift_px / rig.focal_px],
+            shift: [
+                error.disparity_offset_px / rig.focal_px,
+                error.vertical_shift_px / rig.focal_px,
+            ],
         }
     }
 

@@ -25,7 +25,8 @@ fn street(lens: StreetLens, rig_error: RigError) -> Street {
 }
 
 fn lenses() -> [StreetLens; 5] {
-    let rational = RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [1e-4, 1e-4] };
+    let rational =
+        RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [1e-4, 1e-4] };
     [
         StreetLens::RadialTangential(RadialTangential::default()),
         StreetLens::RadialTangential(rational),
@@ -35,7 +36,8 @@ fn lenses() -> [StreetLens; 5] {
     ]
 }
 
-/// By how many columns and rows `a` is moved against `b`, px, near a guess: where the squared difference is least.
+/// By how many columns and rows `a` is moved against `b`, px, near a guess: where the squared
+/// difference is least.
 fn moved(a: &[u8], b: &[u8], [near_u, near_v]: [i32; 2]) -> [f64; 2] {
     let (width, height) = (WIDTH as i32, HEIGHT as i32);
     let at = |image: &[u8], u: i32, v: i32| i64::from(image[(v * width + u) as usize]);
@@ -66,7 +68,11 @@ fn raw_images_rectify_to_what_the_ideal_rig_sees() {
         let frame = street.frame(3);
         let [raw_width, raw_height] = frame.image_size;
         assert_ne!(frame.image_size, [WIDTH as usize, HEIGHT as usize]);
-        assert_eq!((&frame.depth_m, &frame.instances), (&ideal.depth_m, &ideal.instances), "truth is that of the ideal rig");
+        assert_eq!(
+            (&frame.depth_m, &frame.instances),
+            (&ideal.depth_m, &ideal.instances),
+            "truth is that of the ideal rig"
+        );
         let capacity = Capacity {
             image_width: WIDTH as usize,
             image_height: HEIGHT as usize,
@@ -87,7 +93,10 @@ fn raw_images_rectify_to_what_the_ideal_rig_sees() {
             colour: None,
         };
         let rectified = rectifier.rectify(&raw, &mut images, &Serial).unwrap();
-        for (camera, ours, theirs) in [("left", rectified.left, &ideal.left_grey), ("right", rectified.right, &ideal.right_grey)] {
+        for (camera, ours, theirs) in [
+            ("left", rectified.left, &ideal.left_grey),
+            ("right", rectified.right, &ideal.right_grey),
+        ] {
             let ours = ours.rows().flatten().copied().collect::<Vec<u8>>();
             let by = moved(&ours, theirs, [0, 0]);
             assert!(is_near(by, [0.0, 0.0]), "{lens:?}, {camera}: {by:?}");
@@ -99,19 +108,27 @@ fn raw_images_rectify_to_what_the_ideal_rig_sees() {
 fn a_rig_that_is_off_moves_right_images_and_nothing_else() {
     let ideal = street(StreetLens::Ideal, RigError::default()).frame(3);
     let with = |rig_error: RigError| street(StreetLens::Ideal, rig_error).frame(3);
-    let shifted = with(RigError { disparity_offset_px: 1.7, vertical_shift_px: 3.0, ..RigError::default() });
+    let shifted =
+        with(RigError { disparity_offset_px: 1.7, vertical_shift_px: 3.0, ..RigError::default() });
     let by = moved(&shifted.right_grey, &ideal.right_grey, [2, 3]);
     assert!(is_near(by, [1.7, 3.0]), "{by:?}");
     assert!(is_near(moved(&shifted.left_grey, &ideal.left_grey, [0, 0]), [0.0, 0.0]));
     assert_eq!(shifted.depth_m, ideal.depth_m);
-    // 1.4 degrees are 3.4 px at a focal length of 139 px, and a little more at the sides: what is seen moves down.
-    let [_, down] = moved(&with(RigError { pitch_deg: 1.4, ..RigError::default() }).right_grey, &ideal.right_grey, [0, 3]);
+    // 1.4 degrees are 3.4 px at a focal length of 139 px, and a little more at the sides: what is
+    // seen moves down.
+    let [_, down] = moved(
+        &with(RigError { pitch_deg: 1.4, ..RigError::default() }).right_grey,
+        &ideal.right_grey,
+        [0, 3],
+    );
     assert!((3.2..4.0).contains(&down), "{down}");
     // Clockwise about the middle: all in all it stays where it is, but not with the same pixels.
     let rolled = with(RigError { roll_deg: 0.6, ..RigError::default() }).right_grey;
     let rows = |from: usize, to: usize| -> (Vec<u8>, Vec<u8>) {
         let blanked = |image: &[u8]| {
-            let pixel = |(at, &grey): (usize, &u8)| if (from..to).contains(&(at % WIDTH as usize)) { grey } else { 0 };
+            let pixel = |(at, &grey): (usize, &u8)| {
+                if (from..to).contains(&(at % WIDTH as usize)) { grey } else { 0 }
+            };
             image.iter().enumerate().map(pixel).collect()
         };
         (blanked(&rolled), blanked(&ideal.right_grey))
@@ -126,19 +143,33 @@ fn a_rig_that_is_off_moves_right_images_and_nothing_else() {
 #[test]
 fn both_written_calibrations_tell_of_the_same_cameras() {
     for lens in lenses() {
-        let street = Street::new(StreetConfig { frames: 1, ..street(lens.clone(), RigError::default()).config().clone() }).unwrap();
+        let street = Street::new(StreetConfig {
+            frames: 1,
+            ..street(lens.clone(), RigError::default()).config().clone()
+        })
+        .unwrap();
         let parent = tempfile::TempDir::new().unwrap();
         let folder = parent.path().join("street");
         write_kitti(&street, &folder, |_, _| ()).unwrap();
-        let read = |name: &str| StereoCalibration::read(&[&folder.join("sequences/00").join(name)], None);
+        let read =
+            |name: &str| StereoCalibration::read(&[&folder.join("sequences/00").join(name)], None);
         let own = read("calibration.toml").unwrap();
-        assert_eq!(StereoCalibration { format: "the street", ..own }, *street.calibration().unwrap());
+        assert_eq!(
+            StereoCalibration { format: "the street", ..own },
+            *street.calibration().unwrap()
+        );
         let Ok(kalibr) = read("camchain.yaml") else {
-            assert!(matches!(lens, StreetLens::RadialTangential(RadialTangential { radial, .. }) if radial[3] != 0.0), "{lens:?}");
+            assert!(
+                matches!(lens, StreetLens::RadialTangential(RadialTangential { radial, .. }) if radial[3] != 0.0),
+                "{lens:?}"
+            );
             continue;
         };
         assert_eq!((kalibr.left, kalibr.right), (own.left, own.right));
-        assert!((kalibr.baseline_m() - 0.54).abs() < 1e-9 && (kalibr.angle_deg() - own.angle_deg()).abs() < 1e-9);
+        assert!(
+            (kalibr.baseline_m() - 0.54).abs() < 1e-9
+                && (kalibr.angle_deg() - own.angle_deg()).abs() < 1e-9
+        );
     }
 }
 

@@ -1,8 +1,8 @@
 //! Pictures of a scene: visibility first, then every visible surface is shaded once per pixel.
 //!
-//! The picture is cut into bands of fixed height; each is rasterized and shaded by itself, so that the number of threads cannot matter.
-//! A pixel's depth and instance are those of the ray through its centre; its colour is the mean of five samples where they see
-//! different surfaces.
+//! The picture is cut into bands of fixed height; each is rasterized and shaded by itself, so that
+//! the number of threads cannot matter. A pixel's depth and instance are those of the ray through
+//! its centre; its colour is the mean of five samples where they see different surfaces.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -16,7 +16,8 @@ use super::sensor::Sensor;
 use super::surface::{Kind, Tone};
 
 const BAND_ROWS: usize = 16;
-/// Slight parts are left out where they are thinner than a third of a pixel: depth over focal length, m/px.
+/// Slight parts are left out where they are thinner than a third of a pixel: depth over focal
+/// length, m/px.
 const SLIGHT_PER_PX: f64 = 0.25;
 /// Group of the sky.
 const NO_GROUP: u32 = u32::MAX;
@@ -46,14 +47,19 @@ pub struct Picture {
 impl Renderer<'_> {
     /// Draws the scene `offset_m` to the right of the left camera, with so much light let in.
     pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32, sensor: &Sensor) -> Picture {
-        let parts: Vec<Vec<Setup>> =
-            scene.objects.par_iter().enumerate().map(|(number, object)| self.set_up(object, number as u32, offset_m)).collect();
+        let parts: Vec<Vec<Setup>> = scene
+            .objects
+            .par_iter()
+            .enumerate()
+            .map(|(number, object)| self.set_up(object, number as u32, offset_m))
+            .collect();
         let setups: Vec<Setup> = parts.into_iter().flatten().collect();
         let (width, height) = (self.pinhole.width, self.pinhole.height);
         let bands = height.div_ceil(BAND_ROWS);
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
         for (number, setup) in setups.iter().enumerate() {
-            let (first, last) = (setup.rows.0 as usize / BAND_ROWS, setup.rows.1 as usize / BAND_ROWS);
+            let (first, last) =
+                (setup.rows.0 as usize / BAND_ROWS, setup.rows.1 as usize / BAND_ROWS);
             lists[first..=last].iter_mut().for_each(|list| list.push(number as u32));
         }
         let bands: Vec<Picture> = lists
@@ -65,7 +71,8 @@ impl Renderer<'_> {
                 for &number in list {
                     band.rasterize(number, &setups[number as usize]);
                 }
-                Shading { renderer: self, scene, setups: &setups, offset_m, gain, sensor }.band(&band)
+                Shading { renderer: self, scene, setups: &setups, offset_m, gain, sensor }
+                    .band(&band)
             })
             .collect();
         let mut picture = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
@@ -87,7 +94,11 @@ impl Renderer<'_> {
         let far = middle.z - mesh.radius_m > SLIGHT_PER_PX * self.pinhole.focal_px;
         // The eye in the mesh's frame tells faces that look away before anything is computed.
         let eye = object.to_camera.rotation.tr_mul(&(shift - object.to_camera.shift));
-        let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| object.to_camera.point(vertex.position_m) - shift).collect();
+        let positions: Vec<Point> = mesh
+            .vertices
+            .iter()
+            .map(|vertex| object.to_camera.point(vertex.position_m) - shift)
+            .collect();
         let mut setups = Vec::new();
         for (index, (triangle, plane)) in mesh.triangles.iter().zip(&mesh.planes).enumerate() {
             let two_sided = plane[0].is_infinite();
@@ -158,7 +169,11 @@ impl Shading<'_> {
                 let levels = light.map(|value| develop(value * self.gain));
                 picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
                 picture.depth_m.push(depth_m);
-                picture.instances.push(if centre == SKY { 0 } else { self.object(centre).instance });
+                picture.instances.push(if centre == SKY {
+                    0
+                } else {
+                    self.object(centre).instance
+                });
             }
         }
         picture
@@ -186,12 +201,22 @@ impl Shading<'_> {
     /// Light and depth along one ray.
     fn sample(&self, u: f64, v: f64, seen: u32) -> (Tone, f32) {
         let pinhole = &self.renderer.pinhole;
-        let ray = Vector3::new((u - pinhole.center_px.0) / pinhole.focal_px, (v - pinhole.center_px.1) / pinhole.focal_px, 1.0);
+        let ray = Vector3::new(
+            (u - pinhole.center_px.0) / pinhole.focal_px,
+            (v - pinhole.center_px.1) / pinhole.focal_px,
+            1.0,
+        );
         let rotation = &self.scene.anchor_camera.rotation;
         let direction = (rotation * ray).map(|value| value as f32);
         let painter = self.renderer.painter;
         if seen == SKY {
-            return (self.renderer.light.sky(direction * (1.0 / direction.dot(&direction).sqrt()), &painter.textures.broad), 0.0);
+            return (
+                self.renderer.light.sky(
+                    direction * (1.0 / direction.dot(&direction).sqrt()),
+                    &painter.textures.broad,
+                ),
+                0.0,
+            );
         }
         let setup = &self.setups[seen as usize];
         let object = &self.scene.objects[setup.object as usize];
@@ -199,26 +224,38 @@ impl Shading<'_> {
         let triangle = &mesh.triangles[setup.triangle as usize];
         let surface = &mesh.surfaces[triangle.surface as usize];
         let [first, second, third] = triangle.corners;
-        let corners = [&mesh.vertices[first as usize], &mesh.vertices[second as usize], &mesh.vertices[third as usize]];
+        let corners = [
+            &mesh.vertices[first as usize],
+            &mesh.vertices[second as usize],
+            &mesh.vertices[third as usize],
+        ];
         let inverse = setup.inverse_depth();
         let depth = 1.0 / (inverse[0] * u + inverse[1] * v + inverse[2]);
-        // Barycentric coordinates of the second and third corner, and how they change per column and row.
+        // Barycentric coordinates of the second and third corner, and how they change per column
+        // and row.
         let share = |k: usize| {
             let plane = &setup.weights[k];
             let value = (plane[0] * u + plane[1] * v + plane[2]) * depth;
-            (value as f32, ((plane[0] - value * inverse[0]) * depth) as f32, ((plane[1] - value * inverse[1]) * depth) as f32)
+            (
+                value as f32,
+                ((plane[0] - value * inverse[0]) * depth) as f32,
+                ((plane[1] - value * inverse[1]) * depth) as f32,
+            )
         };
         let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
-        let mut surface_point = SurfacePoint { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
+        let mut surface_point =
+            SurfacePoint { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
         for k in 0..3 {
-            let [p, q, r] = [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
+            let [p, q, r] =
+                [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
             surface_point.surface_m[k] = p + b * (q - p) + c * (r - p);
             let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
             surface_point.footprint_m[k] = (du * du + dv * dv).sqrt();
             let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
             surface_point.own_normal[k] = p + b * (q - p) + c * (r - p);
         }
-        let position = rotation * (ray * depth + Point::new(self.offset_m, 0.0, 0.0)) + self.scene.anchor_camera.shift;
+        let position = rotation * (ray * depth + Point::new(self.offset_m, 0.0, 0.0))
+            + self.scene.anchor_camera.shift;
         let position = position.map(|value| value as f32);
         let own = Vector3::from(surface_point.own_normal);
         let normal = object.rotation * own;
@@ -230,8 +267,19 @@ impl Shading<'_> {
         }
         let painted = painter.paint(surface, &surface_point, object.coat);
         let open = self.openness(surface.kind, position);
-        let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 { self.scene.shadow.light(position, normal) } else { 0.0 };
-        let light = self.renderer.light.shade(&painted, normal, to_eye, sunlit, open, surface.kind == Kind::Leaves);
+        let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 {
+            self.scene.shadow.light(position, normal)
+        } else {
+            0.0
+        };
+        let light = self.renderer.light.shade(
+            &painted,
+            normal,
+            to_eye,
+            sunlit,
+            open,
+            surface.kind == Kind::Leaves,
+        );
         (self.renderer.light.through_air(light, depth as f32), depth as f32)
     }
 

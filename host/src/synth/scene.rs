@@ -84,7 +84,8 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Poses what `segments` and `cars` hold and draws the shadows. `anchor` is a point of the street near the camera.
+    /// Poses what `segments` and `cars` hold and draws the shadows. `anchor` is a point of the
+    /// street near the camera.
     pub fn new(
         bodies: &[Mesh; 5],
         segments: &[Arc<Segment>],
@@ -106,7 +107,12 @@ impl Scene {
         let mut objects = Vec::new();
         for segment in segments {
             for number in 0..segment.meshes.len() {
-                objects.push(object(Source::Segment(Arc::clone(segment), number), &segment.t_street_segment, [0.5; 3], 0));
+                objects.push(object(
+                    Source::Segment(Arc::clone(segment), number),
+                    &segment.t_street_segment,
+                    [0.5; 3],
+                    0,
+                ));
             }
         }
         for (number, (kind, coat, t_street_car)) in cars.iter().enumerate() {
@@ -130,7 +136,12 @@ impl Scene {
             shadow.lay(&ShadowTile::new(&sun, core::iter::once((mesh, pose))));
             let (low, high) = mesh.bounds_m();
             let half = (0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z));
-            ground.cover(pose.shift - anchor, pose.rotation * Vector3::x(), pose.rotation * Vector3::z(), half);
+            ground.cover(
+                pose.shift - anchor,
+                pose.rotation * Vector3::x(),
+                pose.rotation * Vector3::z(),
+                half,
+            );
         }
         Self { objects, anchor_camera, shadow, ground }
     }

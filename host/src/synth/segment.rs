@@ -1,4 +1,5 @@
-//! One segment of street, generated from the seed and its number: ground, houses, furniture, parked cars.
+//! One segment of street, generated from the seed and its number: ground, houses, furniture, parked
+//! cars.
 
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
@@ -68,7 +69,12 @@ pub fn choose_car(rng: &mut Rng) -> (CarKind, Tone) {
 }
 
 /// Generates segment `number`.
-pub fn segment(config: &StreetConfig, centerline: &Centerline, sun: &SunAxes, number: i64) -> Segment {
+pub fn segment(
+    config: &StreetConfig,
+    centerline: &Centerline,
+    sun: &SunAxes,
+    number: i64,
+) -> Segment {
     let builder = Builder::new(config, centerline, number);
     let mut meshes = builder.ground();
     for side in [Side::Left, Side::Right] {
@@ -128,7 +134,8 @@ impl<'a> Builder<'a> {
 
     /// Frame in the segment, `along_m` from its start.
     fn local(&self, along_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
-        self.t_street_segment.inverse() * self.span.t_street_local(self.start_m + along_m, lateral_m, yaw_rad)
+        self.t_street_segment.inverse()
+            * self.span.t_street_local(self.start_m + along_m, lateral_m, yaw_rad)
     }
 
     /// Strips of ground, swept along the line in steps of one metre.
@@ -137,10 +144,15 @@ impl<'a> Builder<'a> {
         let seed = rng.seed();
         let crossing = if layout::crossing(self.config.seed, self.number) { 1.0 } else { 0.0 };
         let mut mesh = Mesh::default();
-        let road = mesh.surface(Surface::new(Kind::Road, tone(98, 98, 100), self.number as u32).sized(crossing, 0.0));
-        let slabs = mesh.surface(Surface::new(Kind::Pavement, tone(150, 146, 140), 5).with(tone(104, 100, 96)));
-        let kerb = mesh.surface(Surface::new(Kind::Kerb, tone(162, 160, 156), 9).with(tone(90, 88, 84)));
-        let yard = mesh.surface(Surface::new(Kind::Yard, tone(104, 112, 70), seed).with(tone(130, 122, 106)));
+        let road = mesh.surface(
+            Surface::new(Kind::Road, tone(98, 98, 100), self.number as u32).sized(crossing, 0.0),
+        );
+        let slabs = mesh
+            .surface(Surface::new(Kind::Pavement, tone(150, 146, 140), 5).with(tone(104, 100, 96)));
+        let kerb =
+            mesh.surface(Surface::new(Kind::Kerb, tone(162, 160, 156), 9).with(tone(90, 88, 84)));
+        let yard = mesh
+            .surface(Surface::new(Kind::Yard, tone(104, 112, 70), seed).with(tone(130, 122, 106)));
         let up = -layout::KERB_HEIGHT_M;
         let (left, right) = (layout::KERB_LEFT_M, layout::KERB_RIGHT_M);
         let (out_left, out_right) = (layout::FRONT_LEFT_M - 0.5, layout::FRONT_RIGHT_M + 0.5);
@@ -165,8 +177,16 @@ impl<'a> Builder<'a> {
                     (point, [k as f32, (lateral + y) as f32, y as f32])
                 };
                 let upright = from.0 == to.0;
-                let outward = if upright { frames[k].rotate(Point::new(-from.0.signum(), 0.0, 0.0)) } else { -Point::y() };
-                mesh.polygon(surface, outward, &[corner(k, from), corner(k, to), corner(k + 1, to), corner(k + 1, from)]);
+                let outward = if upright {
+                    frames[k].rotate(Point::new(-from.0.signum(), 0.0, 0.0))
+                } else {
+                    -Point::y()
+                };
+                mesh.polygon(
+                    surface,
+                    outward,
+                    &[corner(k, from), corner(k, to), corner(k + 1, to), corner(k + 1, from)],
+                );
             }
         }
         vec![mesh.finish()]
@@ -191,11 +211,18 @@ impl<'a> Builder<'a> {
             let setback = if rng.chance(0.2) { rng.between(1.0, 2.5) } else { 0.0 };
             let lateral = side.front_m() + side.sign() * setback;
             let corner = |along: f64| Point::from(self.local(along, lateral, 0.0).translation_m);
-            let (a, b) = if side == Side::Right { (corner(from), corner(to)) } else { (corner(to), corner(from)) };
+            let (a, b) = if side == Side::Right {
+                (corner(from), corner(to))
+            } else {
+                (corner(to), corner(from))
+            };
             let along = b - a;
             let mut mesh = Mesh::default();
             facade::house(&mut mesh, &mut rng, along.norm());
-            let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(-along.z, along.x), 0.0), Vector3::zeros());
+            let mut pose = Transform::new(
+                Vector3::new(0.0, libm::atan2(-along.z, along.x), 0.0),
+                Vector3::zeros(),
+            );
             pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
             mesh.move_by(0, &pose);
             meshes.push(mesh.finish());
@@ -229,16 +256,27 @@ impl<'a> Builder<'a> {
             furniture::fence(&mut mesh, rng, to - from);
         }
         let lateral = side.front_m() + side.sign() * 0.35;
-        let (a, b) = (Point::from(self.local(from, lateral, 0.0).translation_m), Point::from(self.local(to, lateral, 0.0).translation_m));
+        let (a, b) = (
+            Point::from(self.local(from, lateral, 0.0).translation_m),
+            Point::from(self.local(to, lateral, 0.0).translation_m),
+        );
         let along = b - a;
-        let mut pose = Transform::new(Vector3::new(0.0, libm::atan2(along.x, along.z), 0.0), Vector3::zeros());
+        let mut pose =
+            Transform::new(Vector3::new(0.0, libm::atan2(along.x, along.z), 0.0), Vector3::zeros());
         pose.translation_m = (a - Point::y() * layout::KERB_HEIGHT_M).into();
         mesh.move_by(0, &pose);
         meshes.push(mesh.finish());
     }
 
     /// Puts a mesh on the pavement.
-    fn stand(&self, mut mesh: Mesh, along_m: f64, lateral_m: f64, yaw_rad: f64, meshes: &mut Vec<Mesh>) {
+    fn stand(
+        &self,
+        mut mesh: Mesh,
+        along_m: f64,
+        lateral_m: f64,
+        yaw_rad: f64,
+        meshes: &mut Vec<Mesh>,
+    ) {
         let mut pose = self.local(along_m, lateral_m, yaw_rad);
         pose.translation_m[1] -= layout::KERB_HEIGHT_M;
         mesh.move_by(0, &pose);
@@ -253,7 +291,13 @@ impl<'a> Builder<'a> {
         for k in 0..trees {
             let mut mesh = Mesh::default();
             furniture::tree(&mut mesh, &mut rng);
-            self.stand(mesh, 6.0 + 11.0 * k as f64 + rng.between(-1.5, 1.5), lateral, rng.between(0.0, 3.0), meshes);
+            self.stand(
+                mesh,
+                6.0 + 11.0 * k as f64 + rng.between(-1.5, 1.5),
+                lateral,
+                rng.between(0.0, 3.0),
+                meshes,
+            );
         }
         if (self.number + i64::from(side == Side::Left)) % 2 == 0 {
             let mut mesh = Mesh::default();
@@ -277,7 +321,13 @@ impl<'a> Builder<'a> {
             for k in 0..6 {
                 let mut mesh = Mesh::default();
                 furniture::bollard(&mut mesh, &mut rng);
-                self.stand(mesh, 13.4 + 1.5 * f64::from(k), side.kerb_m() + side.sign() * 0.4, 0.0, meshes);
+                self.stand(
+                    mesh,
+                    13.4 + 1.5 * f64::from(k),
+                    side.kerb_m() + side.sign() * 0.4,
+                    0.0,
+                    meshes,
+                );
             }
         }
     }
@@ -296,11 +346,21 @@ impl<'a> Builder<'a> {
             let lateral = layout::parking_m(side == Side::Right) + rng.between(-0.1, 0.1);
             let facing_rad = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
             let yaw = facing_rad + rng.between(-0.025, 0.025);
-            let blocked = cleared.iter().any(|&(right, from, to)| right == (side == Side::Right) && (from..to).contains(&at));
-            let on_crossing = layout::crossing(self.config.seed, self.number) && (along - layout::CROSSING_M).abs() < 5.0;
+            let blocked = cleared.iter().any(|&(right, from, to)| {
+                right == (side == Side::Right) && (from..to).contains(&at)
+            });
+            let on_crossing = layout::crossing(self.config.seed, self.number)
+                && (along - layout::CROSSING_M).abs() < 5.0;
             if occupied && !blocked && !on_crossing {
-                let id = layout::PARKED_IDS + (self.number.rem_euclid(10_000_000) as u32) * 8 + slot as u32;
-                cars.push(ParkedCar { id, kind, paint, t_street_car: self.span.t_street_local(at, lateral, yaw) });
+                let id = layout::PARKED_IDS
+                    + (self.number.rem_euclid(10_000_000) as u32) * 8
+                    + slot as u32;
+                cars.push(ParkedCar {
+                    id,
+                    kind,
+                    paint,
+                    t_street_car: self.span.t_street_local(at, lateral, yaw),
+                });
             }
         }
         cars

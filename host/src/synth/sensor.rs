@@ -1,4 +1,5 @@
-//! The camera's noise: a function of seed, frame, camera and pixel, so that any frame alone is the same.
+//! The camera's noise: a function of seed, frame, camera and pixel, so that any frame alone is the
+//! same.
 
 use super::random::mix;
 

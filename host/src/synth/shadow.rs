@@ -1,5 +1,6 @@
-//! Light from the sun and how much sky the road sees. Both live in pictures whose texels are fixed in the street, so that a shadow's edge
-//! stays where it is from frame to frame and from left to right.
+//! Light from the sun and how much sky the road sees. Both live in pictures whose texels are fixed
+//! in the street, so that a shadow's edge stays where it is from frame to frame and from left to
+//! right.
 
 use nalgebra::Vector3;
 
@@ -26,11 +27,16 @@ impl SunAxes {
 
     /// Texel coordinates and way towards the sun of a point in the street.
     fn texel(&self, point: Point) -> Point {
-        Point::new(point.dot(&self.0[0]) / TEXEL_M, point.dot(&self.0[1]) / TEXEL_M, point.dot(&self.0[2]))
+        Point::new(
+            point.dot(&self.0[0]) / TEXEL_M,
+            point.dot(&self.0[1]) / TEXEL_M,
+            point.dot(&self.0[2]),
+        )
     }
 }
 
-/// What a segment of street or a car holds up against the sun, on the texels of the whole street. Depths count from `base_m`.
+/// What a segment of street or a car holds up against the sun, on the texels of the whole street.
+/// Depths count from `base_m`.
 pub struct ShadowTile {
     corner: [i64; 2],
     size: [usize; 2],
@@ -39,8 +45,12 @@ pub struct ShadowTile {
 }
 
 impl ShadowTile {
-    /// Draws meshes, each with its pose in the street. Only faces towards the sun count: what is closed throws the same shadow.
-    pub fn new<'a>(axes: &SunAxes, meshes: impl Iterator<Item = (&'a Mesh, MatrixPose)> + Clone) -> Self {
+    /// Draws meshes, each with its pose in the street. Only faces towards the sun count: what is
+    /// closed throws the same shadow.
+    pub fn new<'a>(
+        axes: &SunAxes,
+        meshes: impl Iterator<Item = (&'a Mesh, MatrixPose)> + Clone,
+    ) -> Self {
         let (mut low, mut high) = (Point::repeat(f64::MAX), Point::repeat(f64::MIN));
         for (mesh, pose) in meshes.clone() {
             for vertex in &mesh.vertices {
@@ -50,10 +60,15 @@ impl ShadowTile {
         }
         let corner = [libm::floor(low.x) as i64, libm::floor(low.y) as i64];
         let size = [(high.x - low.x) as usize + 2, (high.y - low.y) as usize + 2];
-        let mut tile = Self { corner, size, base_m: high.z, depth_m: vec![FAR_M; size[0] * size[1]] };
+        let mut tile =
+            Self { corner, size, base_m: high.z, depth_m: vec![FAR_M; size[0] * size[1]] };
         let origin = Point::new(corner[0] as f64, corner[1] as f64, high.z);
         for (mesh, pose) in meshes {
-            let positions: Vec<Point> = mesh.vertices.iter().map(|vertex| axes.texel(pose.point(vertex.position_m)) - origin).collect();
+            let positions: Vec<Point> = mesh
+                .vertices
+                .iter()
+                .map(|vertex| axes.texel(pose.point(vertex.position_m)) - origin)
+                .collect();
             for triangle in &mesh.triangles {
                 tile.rasterize(
                     triangle.corners.map(|corner| positions[corner as usize]),
@@ -70,7 +85,9 @@ impl ShadowTile {
             return;
         }
         let low = |p: f64, q: f64, r: f64| libm::ceil(p.min(q).min(r)).max(0.0);
-        let high = |p: f64, q: f64, r: f64, last: usize| libm::floor(p.max(q).max(r)).min(last as f64 - 1.0);
+        let high = |p: f64, q: f64, r: f64, last: usize| {
+            libm::floor(p.max(q).max(r)).min(last as f64 - 1.0)
+        };
         let (first, last) = (low(a.y, b.y, c.y), high(a.y, b.y, c.y, self.size[1]));
         if first > last || low(a.x, b.x, c.x) > high(a.x, b.x, c.x, self.size[0]) {
             return;
@@ -88,12 +105,14 @@ impl ShadowTile {
                     to = to.max(u);
                 }
             }
-            let (from, to) = (libm::ceil(from).max(0.0), libm::floor(to).min(self.size[0] as f64 - 1.0));
+            let (from, to) =
+                (libm::ceil(from).max(0.0), libm::floor(to).min(self.size[0] as f64 - 1.0));
             if from > to {
                 continue;
             }
             let begin = a.z + slope_u * (from - a.x) + slope_v * (v - a.y);
-            let cells = &mut self.depth_m[row * self.size[0] + from as usize..=row * self.size[0] + to as usize];
+            let cells = &mut self.depth_m
+                [row * self.size[0] + from as usize..=row * self.size[0] + to as usize];
             for (k, cell) in cells.iter_mut().enumerate() {
                 let here = (begin + slope_u * k as f64) as f32;
                 *cell = if here > *cell { here } else { *cell };
@@ -113,10 +132,12 @@ pub struct ShadowMap {
 }
 
 impl ShadowMap {
-    /// An empty map around `focus`; positions are given relative to `anchor`, a point of the street.
+    /// An empty map around `focus`; positions are given relative to `anchor`, a point of the
+    /// street.
     pub fn new(axes: SunAxes, anchor: Point, focus: Point) -> Self {
         let (middle, anchor) = (axes.texel(focus), axes.texel(anchor));
-        let corner = [middle.x, middle.y].map(|value| libm::floor(value) as i64 - (SIDE / 2) as i64);
+        let corner =
+            [middle.x, middle.y].map(|value| libm::floor(value) as i64 - (SIDE / 2) as i64);
         let offset = [anchor.x - corner[0] as f64, anchor.y - corner[1] as f64];
         Self { axes, corner, base_m: anchor.z, offset, depth_m: vec![FAR_M; SIDE * SIDE] }
     }
@@ -128,18 +149,23 @@ impl ShadowMap {
             let (from, to) = (shift[k].max(0), (shift[k] + tile.size[k] as i64).min(SIDE as i64));
             (from < to).then(|| (from as usize, to as usize, (from - shift[k]) as usize))
         };
-        let (Some((left, right, skip_u)), Some((top, bottom, skip_v))) = (span(0), span(1)) else { return };
+        let (Some((left, right, skip_u)), Some((top, bottom, skip_v))) = (span(0), span(1)) else {
+            return;
+        };
         let lift = (tile.base_m - self.base_m) as f32;
         for row in top..bottom {
             let source = &tile.depth_m[(row - top + skip_v) * tile.size[0] + skip_u..];
-            for (cell, &here) in self.depth_m[row * SIDE + left..row * SIDE + right].iter_mut().zip(source) {
+            for (cell, &here) in
+                self.depth_m[row * SIDE + left..row * SIDE + right].iter_mut().zip(source)
+            {
                 let here = here + lift;
                 *cell = if here > *cell { here } else { *cell };
             }
         }
     }
 
-    /// Shares of sunlight that reach `point` (relative to the anchor), 0 to 1; outside the map it shines.
+    /// Shares of sunlight that reach `point` (relative to the anchor), 0 to 1; outside the map it
+    /// shines.
     pub fn light(&self, point: Vector3<f32>, normal: Vector3<f32>) -> f32 {
         let axis = |k: usize| self.axes.0[k].map(|value| value as f32);
         let lifted = point + normal * 0.06;
@@ -179,15 +205,20 @@ impl GroundLight {
     /// Open ground around `focus`.
     pub fn new(anchor: Point, focus: Point) -> Self {
         let offset = [anchor.x, anchor.z].map(|value| value / GROUND_TEXEL_M);
-        let corner = [focus.x, focus.z].map(|value| libm::floor(value / GROUND_TEXEL_M) - 0.5 * GROUND_SIDE as f64);
+        let corner = [focus.x, focus.z]
+            .map(|value| libm::floor(value / GROUND_TEXEL_M) - 0.5 * GROUND_SIDE as f64);
         let offset = [offset[0] - corner[0], offset[1] - corner[1]];
         Self { offset, open: vec![1.0; GROUND_SIDE * GROUND_SIDE] }
     }
 
-    /// Darkens the ground under and beside a box: `middle` relative to the anchor, `right` and `ahead` its axes, half sizes in m.
+    /// Darkens the ground under and beside a box: `middle` relative to the anchor, `right` and
+    /// `ahead` its axes, half sizes in m.
     pub fn cover(&mut self, middle: Point, right: Point, ahead: Point, half_m: (f64, f64)) {
         let reach = half_m.0 + half_m.1 + 1.0;
-        let (u, v) = (middle.x / GROUND_TEXEL_M + self.offset[0], middle.z / GROUND_TEXEL_M + self.offset[1]);
+        let (u, v) = (
+            middle.x / GROUND_TEXEL_M + self.offset[0],
+            middle.z / GROUND_TEXEL_M + self.offset[1],
+        );
         let span = |at: f64| {
             let low = (at - reach / GROUND_TEXEL_M).max(0.0) as usize;
             (low, (at + reach / GROUND_TEXEL_M).clamp(0.0, GROUND_SIDE as f64 - 1.0) as usize)
@@ -195,10 +226,12 @@ impl GroundLight {
         let ((u0, u1), (v0, v1)) = (span(u), span(v));
         for row in v0..=v1 {
             for column in u0..=u1 {
-                let (x, z) = ((column as f64 - u) * GROUND_TEXEL_M, (row as f64 - v) * GROUND_TEXEL_M);
+                let (x, z) =
+                    ((column as f64 - u) * GROUND_TEXEL_M, (row as f64 - v) * GROUND_TEXEL_M);
                 let across = ((x * right.x + z * right.z).abs() - half_m.0).max(-0.6);
                 let along = ((x * ahead.x + z * ahead.z).abs() - half_m.1).max(-0.6);
-                let outside = libm::sqrt(across.max(0.0) * across.max(0.0) + along.max(0.0) * along.max(0.0));
+                let outside =
+                    libm::sqrt(across.max(0.0) * across.max(0.0) + along.max(0.0) * along.max(0.0));
                 let distance = if outside > 0.0 { outside } else { across.max(along) };
                 let x = ((distance + 0.35) / 0.95).clamp(0.0, 1.0);
                 let open = 0.16 + 0.84 * x * x * (3.0 - 2.0 * x);
@@ -211,7 +244,8 @@ impl GroundLight {
     /// Share of sky seen from `point`, relative to the anchor.
     pub fn open(&self, point: Vector3<f32>) -> f32 {
         let scale = 1.0 / GROUND_TEXEL_M as f32;
-        let (u, v) = (point.x * scale + self.offset[0] as f32, point.z * scale + self.offset[1] as f32);
+        let (u, v) =
+            (point.x * scale + self.offset[0] as f32, point.z * scale + self.offset[1] as f32);
         let limit = GROUND_SIDE as f32 - 2.0;
         if !(u > 0.0 && v > 0.0 && u < limit && v < limit) {
             return 1.0;

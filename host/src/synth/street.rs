@@ -88,7 +88,8 @@ pub(super) struct Surroundings {
 }
 
 impl Street {
-    /// A street for a configuration; nothing of it is built yet but its noise pictures and car bodies.
+    /// A street for a configuration; nothing of it is built yet but its noise pictures and car
+    /// bodies.
     ///
     /// # Errors
     /// A figure out of range, with its name.
@@ -98,10 +99,12 @@ impl Street {
         }
         let centerline = Centerline::new(&config);
         let mut rng = Rng::new(config.seed, 0x50_1A2, 0);
-        // The sun stands behind the camera's left shoulder: houses on the right are lit, those on the left throw shadows on the road.
+        // The sun stands behind the camera's left shoulder: houses on the right are lit, those on
+        // the left throw shadows on the road.
         let (height, side) = (rng.between(0.70, 0.85), rng.between(-1.25, -0.65));
         let flat = libm::cos(height);
-        let to_sun = Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
+        let to_sun =
+            Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
         let t_street_camera = camera::t_street_camera(&config, &centerline.span(0, 0), 0.0);
         let rig = camera::rig(&config);
         let calibration = raw::calibration(&config, &rig)?;
@@ -147,25 +150,41 @@ impl Street {
     /// Camera pose at frame `index`; exactly the identity at frame 0.
     pub fn t_world_camera(&self, index: u32) -> Transform {
         let at = libm::floor(camera::along_m(&self.config, self.time_s(index)) / SEGMENT_M) as i64;
-        self.to_world(&camera::t_street_camera(&self.config, &self.centerline.span(at, at), self.time_s(index)), index)
+        self.to_world(
+            &camera::t_street_camera(
+                &self.config,
+                &self.centerline.span(at, at),
+                self.time_s(index),
+            ),
+            index,
+        )
     }
 
     fn to_world(&self, t_street_camera: &Transform, index: u32) -> Transform {
-        if index == 0 { Transform::IDENTITY } else { (self.t_camera0_street * t_street_camera).normalized() }
+        if index == 0 {
+            Transform::IDENTITY
+        } else {
+            (self.t_camera0_street * t_street_camera).normalized()
+        }
     }
 
     /// Frame `index` with all its truth.
     pub fn frame(&self, index: u32) -> SynthFrame {
         let around = self.surroundings(index);
         let ideal = camera::pinhole(&self.config);
-        let (left, right) = rayon::join(|| self.view(&around.scene, index, 0), || self.view(&around.scene, index, 1));
-        // What an ideal rig sees holds depth and masks as well; through a lens they are rendered for themselves.
+        let (left, right) = rayon::join(
+            || self.view(&around.scene, index, 0),
+            || self.view(&around.scene, index, 1),
+        );
+        // What an ideal rig sees holds depth and masks as well; through a lens they are rendered
+        // for themselves.
         let truth = match &self.views {
             None => None,
             Some(_) => Some(self.render(&around.scene, ideal, 0, &Sensor::new(0, 0, 0, 0.0))),
         };
         let Picture { rgb: left_rgb, depth_m, instances } = left;
-        let (depth_m, instances) = truth.map_or((depth_m, instances), |truth| (truth.depth_m, truth.instances));
+        let (depth_m, instances) =
+            truth.map_or((depth_m, instances), |truth| (truth.depth_m, truth.instances));
         let right_rgb = right.rgb;
         let objects = around.cars.iter().map(|car| self.truth(car)).collect();
         SynthFrame {
@@ -173,7 +192,10 @@ impl Street {
             time_s: self.time_s(index),
             width: self.config.width as usize,
             height: self.config.height as usize,
-            image_size: self.views.as_ref().map_or([ideal.width, ideal.height], |[left, _]| left.size),
+            image_size: self
+                .views
+                .as_ref()
+                .map_or([ideal.width, ideal.height], |[left, _]| left.size),
             left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
             right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
             left_rgb,
@@ -191,15 +213,25 @@ impl Street {
         match self.views.as_ref().and_then(|views| views.get(camera as usize)) {
             None => self.render(scene, camera::pinhole(&self.config), camera, &sensor),
             Some(view) => {
-                let rendering = self.render(scene, view.pinhole, camera, &Sensor::new(0, 0, 0, 0.0));
-                Picture { rgb: view.image(&rendering, &sensor), depth_m: Vec::new(), instances: Vec::new() }
+                let rendering =
+                    self.render(scene, view.pinhole, camera, &Sensor::new(0, 0, 0, 0.0));
+                Picture {
+                    rgb: view.image(&rendering, &sensor),
+                    depth_m: Vec::new(),
+                    instances: Vec::new(),
+                }
             }
         }
     }
 
     fn render(&self, scene: &Scene, pinhole: Pinhole, camera: u32, sensor: &Sensor) -> Picture {
-        let renderer = Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole };
-        let (offset_m, gain) = if camera == 0 { (0.0, 1.0) } else { (self.config.baseline_m, 1.0 + self.config.gain_difference) };
+        let renderer =
+            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole };
+        let (offset_m, gain) = if camera == 0 {
+            (0.0, 1.0)
+        } else {
+            (self.config.baseline_m, 1.0 + self.config.gain_difference)
+        };
         renderer.picture(scene, offset_m, gain as f32, sensor)
     }
 
@@ -220,18 +252,28 @@ impl Street {
         let time_s = self.time_s(index);
         let along = camera::along_m(&self.config, time_s);
         let reach = (along - REACH_M.0, along + REACH_M.1);
-        let (first, last) = (libm::floor(reach.0 / SEGMENT_M) as i64, libm::floor(reach.1 / SEGMENT_M) as i64);
+        let (first, last) =
+            (libm::floor(reach.0 / SEGMENT_M) as i64, libm::floor(reach.1 / SEGMENT_M) as i64);
         let span = self.centerline.span(first, last);
         let t_street_camera = camera::t_street_camera(&self.config, &span, time_s);
-        let segments: Vec<Arc<Segment>> = (first..=last).map(|number| self.segment(number)).collect();
+        let segments: Vec<Arc<Segment>> =
+            (first..=last).map(|number| self.segment(number)).collect();
         let cars = self.present(&segments, &span, time_s, reach);
         let anchor = span.point(libm::floor(along / SEGMENT_M) * SEGMENT_M);
-        let posed_cars: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
-        let scene = Scene::new(&self.bodies, &segments, &posed_cars, &t_street_camera, (anchor, self.sun));
+        let posed_cars: Vec<_> =
+            cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
+        let scene =
+            Scene::new(&self.bodies, &segments, &posed_cars, &t_street_camera, (anchor, self.sun));
         Surroundings { scene, t_street_camera, cars }
     }
 
-    fn present(&self, segments: &[Arc<Segment>], span: &RoadSpan<'_>, time_s: f64, reach: (f64, f64)) -> Vec<Present> {
+    fn present(
+        &self,
+        segments: &[Arc<Segment>],
+        span: &RoadSpan<'_>,
+        time_s: f64,
+        reach: (f64, f64),
+    ) -> Vec<Present> {
         let mut cars: Vec<Present> = Vec::new();
         for driver in traffic::drivers(&self.config, span, time_s, reach) {
             let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
@@ -247,7 +289,8 @@ impl Street {
             });
         }
         cars.sort_by_key(|car| car.id);
-        // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts could reach it.
+        // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts
+        // could reach it.
         cars.truncate(usize::from(u8::MAX));
         debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
         cars
@@ -256,7 +299,10 @@ impl Street {
     /// A segment, from the few that are cached or made anew: either way the same.
     fn segment(&self, number: i64) -> Arc<Segment> {
         let find = |cached: &VecDeque<(i64, Arc<Segment>)>| {
-            cached.iter().find(|(known, _)| *known == number).map(|(_, segment)| Arc::clone(segment))
+            cached
+                .iter()
+                .find(|(known, _)| *known == number)
+                .map(|(_, segment)| Arc::clone(segment))
         };
         let lock = || self.segments.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(known) = find(&lock()) {

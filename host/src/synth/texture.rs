@@ -1,5 +1,6 @@
-//! Noise pictures with every reduction in both directions (a "ripmap"): one look-up gives the mean over a footprint that may be long
-//! and thin, so that grazing asphalt neither flickers nor blurs sideways.
+//! Noise pictures with every reduction in both directions (a "ripmap"): one look-up gives the mean
+//! over a footprint that may be long and thin, so that grazing asphalt neither flickers nor blurs
+//! sideways.
 //!
 //! Memory: 2 B x (2 x side)² per picture, 2 MiB at 512. Time: one look-up reads 4 to 16 values.
 
@@ -23,7 +24,8 @@ impl Ripmap {
     fn new(mut base: Vec<f32>, tile_m: f32) -> Self {
         let mean = base.iter().sum::<f32>() / base.len() as f32;
         base.iter_mut().for_each(|value| *value -= mean);
-        let deviation = (base.iter().map(|value| value * value).sum::<f32>() / base.len() as f32).sqrt();
+        let deviation =
+            (base.iter().map(|value| value * value).sum::<f32>() / base.len() as f32).sqrt();
         base.iter_mut().for_each(|value| *value /= deviation);
         let mut texels: Vec<i16> = Vec::with_capacity(4 * SIDE * SIDE);
         let mut starts = [0; (LOG + 1) * (LOG + 1)];
@@ -39,7 +41,9 @@ impl Ripmap {
             }
             if lv < LOG {
                 let pairs = column.chunks_exact(2 * SIDE);
-                column = pairs.flat_map(|two| (0..SIDE).map(|k| 0.5 * (two[k] + two[SIDE + k]))).collect();
+                column = pairs
+                    .flat_map(|two| (0..SIDE).map(|k| 0.5 * (two[k] + two[SIDE + k])))
+                    .collect();
             }
         }
         Self { texels, starts, texels_per_m: SIDE as f32 / tile_m }
@@ -55,12 +59,16 @@ impl Ripmap {
             for y in 0..SIDE as i32 {
                 for x in 0..SIDE as i32 {
                     let (cx, cy) = (x / step, y / step);
-                    let (fx, fy) = ((x % step) as f32 / step as f32, (y % step) as f32 / step as f32);
+                    let (fx, fy) =
+                        ((x % step) as f32 / step as f32, (y % step) as f32 / step as f32);
                     let (fx, fy) = (fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy));
-                    let at = |dx: i32, dy: i32| unit(cell(seed ^ octave, (cx + dx) % cells, (cy + dy) % cells)) - 0.5;
+                    let at = |dx: i32, dy: i32| {
+                        unit(cell(seed ^ octave, (cx + dx) % cells, (cy + dy) % cells)) - 0.5
+                    };
                     let top = at(0, 0) * (1.0 - fx) + at(1, 0) * fx;
                     let bottom = at(0, 1) * (1.0 - fx) + at(1, 1) * fx;
-                    base[y as usize * SIDE + x as usize] += strength * (top * (1.0 - fy) + bottom * fy);
+                    base[y as usize * SIDE + x as usize] +=
+                        strength * (top * (1.0 - fy) + bottom * fy);
                 }
             }
             strength *= tilt;
@@ -83,7 +91,8 @@ impl Ripmap {
             for dy in -reach..=reach {
                 for dx in -reach..=reach {
                     let (fx, fy) = (f64::from(dx), f64::from(dy));
-                    let (a, b) = ((fx * cosine + fy * sine) / long, (fy * cosine - fx * sine) / short);
+                    let (a, b) =
+                        ((fx * cosine + fy * sine) / long, (fy * cosine - fx * sine) / short);
                     if a * a + b * b < 1.0 {
                         let column = (x as i32 + dx).rem_euclid(SIDE as i32) as usize;
                         let row = (y as i32 + dy).rem_euclid(SIDE as i32) as usize;
@@ -118,14 +127,16 @@ impl Ripmap {
 
     #[inline]
     fn bilinear(&self, lu: usize, lv: usize, u: i32, v: i32) -> f32 {
-        let picture = &self.texels[self.starts[lv * (LOG + 1) + lu] as usize..][..1 << (2 * LOG - lu - lv)];
+        let picture =
+            &self.texels[self.starts[lv * (LOG + 1) + lu] as usize..][..1 << (2 * LOG - lu - lv)];
         let (wide, tall) = (LOG - lu, LOG - lv);
         // Texels are centred on halves.
         let (u, v) = ((u >> lu) - 128, (v >> lv) - 128);
         let (fu, fv) = (u & 255, v & 255);
         let (mask_u, mask_v) = ((1_i32 << wide) - 1, (1_i32 << tall) - 1);
         let (u0, u1) = (((u >> 8) & mask_u) as usize, (((u >> 8) + 1) & mask_u) as usize);
-        let (v0, v1) = ((((v >> 8) & mask_v) as usize) << wide, ((((v >> 8) + 1) & mask_v) as usize) << wide);
+        let (v0, v1) =
+            ((((v >> 8) & mask_v) as usize) << wide, ((((v >> 8) + 1) & mask_v) as usize) << wide);
         let at = |k: usize| i32::from(picture[k]);
         let (a, b, c, d) = (at(v0 + u0), at(v0 + u1), at(v1 + u0), at(v1 + u1));
         // 16 + 8 bits, four of them dropped so that the second product fits 32.
@@ -141,7 +152,8 @@ pub fn floor(value: f32) -> i32 {
     integer.wrapping_sub(i32::from(value < integer as f32))
 }
 
-/// Level of reduction for a footprint in texels, and how far towards the next: the logarithm read off the exponent.
+/// Level of reduction for a footprint in texels, and how far towards the next: the logarithm read
+/// off the exponent.
 #[inline]
 fn level(texels: f32) -> (usize, f32) {
     // Nearly a texel is a texel: the look-up's own interpolation is wider than that.

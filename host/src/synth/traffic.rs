@@ -2,7 +2,9 @@
 
 use dynvox_core::geometry::Transform;
 
-use super::config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
+use super::config::{
+    CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic,
+};
 use super::layout;
 use super::path::RoadSpan;
 use super::random::Rng;
@@ -46,7 +48,10 @@ fn travelled(profile: &SpeedProfile, time_s: f64, rate_hz: f64) -> (f64, f64) {
             if time_s < begin {
                 (speed_m_s * time_s, speed_m_s)
             } else if braking < stand {
-                (speed_m_s * (begin + braking) - 0.5 * deceleration_m_s2 * braking * braking, speed_m_s - deceleration_m_s2 * braking)
+                (
+                    speed_m_s * (begin + braking) - 0.5 * deceleration_m_s2 * braking * braking,
+                    speed_m_s - deceleration_m_s2 * braking,
+                )
             } else {
                 (speed_m_s * (begin + 0.5 * stand), 0.0)
             }
@@ -80,7 +85,12 @@ fn lateral(car: &ScriptedCar, way_m: f64, rate_hz: f64) -> (f64, f64) {
 }
 
 /// All cars of the traffic between two positions along the street.
-pub fn drivers(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64, (from_m, to_m): (f64, f64)) -> Vec<Driver> {
+pub fn drivers(
+    config: &StreetConfig,
+    span: &RoadSpan<'_>,
+    time_s: f64,
+    (from_m, to_m): (f64, f64),
+) -> Vec<Driver> {
     let Traffic::Moving(moving) = &config.traffic else { return Vec::new() };
     let mut drivers = Vec::new();
     for (number, car) in moving.cars.iter().enumerate() {
@@ -95,7 +105,13 @@ pub fn drivers(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64, (from_m,
         let yaw = facing_rad + libm::atan(slope * sign);
         let paint = choose_car(&mut Rng::new(config.seed, number as i64, 0x5C21)).1;
         let t_street_car = span.t_street_local(at, lateral_m, yaw);
-        drivers.push(Driver { id: number as u32 + 1, kind: car.kind, paint, t_street_car, speed_m_s });
+        drivers.push(Driver {
+            id: number as u32 + 1,
+            kind: car.kind,
+            paint,
+            t_street_car,
+            speed_m_s,
+        });
     }
     flow(config, moving, span, time_s, (from_m, to_m), Lane::Oncoming, &mut drivers);
     flow(config, moving, span, time_s, (from_m, to_m), Lane::Overtaking, &mut drivers);
@@ -113,7 +129,9 @@ fn flow(
     drivers: &mut Vec<Driver>,
 ) {
     let (gap, speed, sign, first_id) = match lane {
-        Lane::Oncoming => (moving.oncoming_gap_m, moving.oncoming_speed_m_s, -1.0, layout::ONCOMING_IDS),
+        Lane::Oncoming => {
+            (moving.oncoming_gap_m, moving.oncoming_speed_m_s, -1.0, layout::ONCOMING_IDS)
+        }
         _ => (moving.overtaking_gap_m, moving.overtaking_speed_m_s, 1.0, layout::OVERTAKING_IDS),
     };
     if gap <= 0.0 {
@@ -128,7 +146,8 @@ fn flow(
         let offset_m = rng.between(-0.15, 0.15);
         if (from_m..to_m).contains(&at) {
             let facing_rad = if sign < 0.0 { core::f64::consts::PI } else { 0.0 };
-            let t_street_car = span.t_street_local(at, layout::lateral_m(lane) + offset_m, facing_rad);
+            let t_street_car =
+                span.t_street_local(at, layout::lateral_m(lane) + offset_m, facing_rad);
             let id = first_id + slot.rem_euclid(1_000_000) as u32;
             drivers.push(Driver { id, kind, paint, t_street_car, speed_m_s: speed });
         }

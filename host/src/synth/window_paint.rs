@@ -1,6 +1,8 @@
 //! Panes, shop fronts, doors and boards.
 
-use super::paint::{Painted, Painter, SurfacePoint, above, blend, stripes, survives, times, within};
+use super::paint::{
+    Painted, Painter, SurfacePoint, above, blend, stripes, survives, times, within,
+};
 use super::random::{cell, unit};
 use super::surface::{Surface, Tone};
 use super::texture::floor;
@@ -10,13 +12,15 @@ fn glass(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> 
     let height = surface.size_m[1];
     let up = 1.0 - surface_point.surface_m[1] / height;
     let mirrored = painter.broad(surface.seed, surface_point, 3.0);
-    let sky = (0.02 + 0.12 * up * up) * (1.0 + 0.55 * mirrored).max(0.0) * (0.4 + unit(surface.seed));
+    let sky =
+        (0.02 + 0.12 * up * up) * (1.0 + 0.55 * mirrored).max(0.0) * (0.4 + unit(surface.seed));
     blend(times(surface.tone, 0.7), [0.42, 0.52, 0.66], sky.min(0.6))
 }
 
 /// A window: frame, bars, and what hangs behind it.
 pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let ([u, v, _], [fu, fv, _], [width, height]) =
+        (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let h = surface.seed;
     let mut tone = glass(painter, surface, surface_point);
     let folds = || {
@@ -27,7 +31,8 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
         };
         1.0 + 0.12 * painter.fine(h, &hung, 1.0)
     };
-    let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]][(h >> 3) as usize & 3];
+    let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]]
+        [(h >> 3) as usize & 3];
     match h % 6 {
         0 | 1 => {
             let open = 0.2 + 0.25 * unit(h << 6);
@@ -43,7 +48,8 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
         _ => {}
     }
     let border = 0.055;
-    let mut bars = 1.0 - within(border, width - border, u, fu) * within(border, height - border, v, fv);
+    let mut bars =
+        1.0 - within(border, width - border, u, fu) * within(border, height - border, v, fv);
     if width > 0.75 {
         let sashes = if width > 1.5 { 3.0 } else { 2.0 };
         let step = width / sashes;
@@ -59,7 +65,8 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
 
 /// A shop: large panes, goods and lamps behind them.
 pub fn shop(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let ([u, v, _], [fu, fv, _], [width, height]) =
+        (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let mut tone = glass(painter, surface, surface_point);
     // Goods: boxes on shelves, each of its own tone.
     let shelf = height / 4.0;
@@ -67,7 +74,13 @@ pub fn shop(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) 
     let h = cell(surface.seed, column, row);
     let tall = (0.25 + 0.65 * unit(h << 3)) * shelf;
     let goods = within((row + 1) as f32 * shelf - tall, (row + 1) as f32 * shelf - 0.03, v, fv);
-    let goods = goods * within(column as f32 * 0.42 + 0.03, column as f32 * 0.42 + 0.2 + 0.2 * unit(h << 9), u, fu);
+    let goods = goods
+        * within(
+            column as f32 * 0.42 + 0.03,
+            column as f32 * 0.42 + 0.2 + 0.2 * unit(h << 9),
+            u,
+            fu,
+        );
     let own = [unit(h), unit(h << 5), unit(h << 11)].map(|value| 0.03 + 0.30 * value * value);
     let kept = survives(0.42, fu.max(fv));
     if row > 0 {
@@ -84,10 +97,12 @@ pub fn shop(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) 
 
 /// A shop's name: letters of strokes that spell nothing.
 pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let ([u, v, _], [fu, fv, _], [width, height]) =
+        (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let ground = times(
         surface.tone,
-        1.0 + 0.05 * painter.fine(surface.seed, surface_point, 1.0) + 0.05 * painter.broad(surface.seed, surface_point, 1.0),
+        1.0 + 0.05 * painter.fine(surface.seed, surface_point, 1.0)
+            + 0.05 * painter.broad(surface.seed, surface_point, 1.0),
     );
     let letter = 0.34;
     let count = 5 + (surface.seed % 6) as i32;
@@ -103,7 +118,11 @@ pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint)
     let upright = |at: f32| within(at, at + 0.055, x, fu) * within(0.0, 1.0, y, fy);
     let bar = |at: f32| within(at - 0.08, at + 0.08, y, fy) * within(0.04, 0.26, x, fu);
     let mut ink: f32 = 0.0;
-    for (bit, stroke) in [upright(0.04), upright(0.205), bar(0.08), bar(0.5), bar(0.92), upright(0.12)].into_iter().enumerate() {
+    for (bit, stroke) in
+        [upright(0.04), upright(0.205), bar(0.08), bar(0.5), bar(0.92), upright(0.12)]
+            .into_iter()
+            .enumerate()
+    {
         if h >> bit & 1 == 1 || bit == (h >> 8) as usize % 2 {
             ink = ink.max(stroke);
         }
@@ -114,20 +133,25 @@ pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint)
 
 /// A door with panels and a light above.
 pub fn door(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
-    let ([u, v, _], [fu, fv, _], [width, height]) = (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
+    let ([u, v, _], [fu, fv, _], [width, height]) =
+        (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let wood = times(surface.tone, 1.0 + 0.08 * painter.fine(surface.seed, surface_point, 1.0));
     let mut tone = wood;
     for (from, to) in [(0.30, 0.58), (0.64, 0.95)] {
         for (a, b) in [(0.14, 0.46), (0.54, 0.86)] {
-            let panel =
-                |grow: f32| within(a * width - grow, b * width + grow, u, fu) * within(from * height - grow, to * height + grow, v, fv);
+            let panel = |grow: f32| {
+                within(a * width - grow, b * width + grow, u, fu)
+                    * within(from * height - grow, to * height + grow, v, fv)
+            };
             let groove = panel(0.015) - panel(-0.015);
             tone = blend(tone, times(wood, 0.45), groove.max(0.0));
         }
     }
-    let light = within(0.10 * width, 0.90 * width, u, fu) * within(0.04 * height, 0.22 * height, v, fv);
+    let light =
+        within(0.10 * width, 0.90 * width, u, fu) * within(0.04 * height, 0.22 * height, v, fv);
     tone = blend(tone, [0.05, 0.06, 0.075], light);
-    let handle = within(0.86 * width, 0.92 * width, u, fu) * within(0.56 * height, 0.62 * height, v, fv);
+    let handle =
+        within(0.86 * width, 0.92 * width, u, fu) * within(0.56 * height, 0.62 * height, v, fv);
     tone = blend(tone, [0.6, 0.55, 0.4], handle);
     let frame = 1.0 - within(0.05, width - 0.05, u, fu) * above(0.05, v, fv);
     Painted { tone: blend(tone, surface.second, frame), gloss: 0.04, open: 1.0 }
@@ -139,10 +163,12 @@ pub fn sign(surface: &Surface, surface_point: &SurfacePoint) -> Painted {
     let [fx, fy, _] = surface_point.footprint_m;
     let f = fx.max(fy);
     let radius = (x * x + y * y).sqrt();
-    let (red, white, blue, black) = ([0.50, 0.02, 0.02], [0.80, 0.80, 0.78], [0.02, 0.10, 0.42], [0.02, 0.02, 0.02]);
+    let (red, white, blue, black) =
+        ([0.50, 0.02, 0.02], [0.80, 0.80, 0.78], [0.02, 0.10, 0.42], [0.02, 0.02, 0.02]);
     let tone = match surface.seed {
         0 => {
-            let ink = within(-0.32, -0.10, x, fx) * within(-0.3, 0.3, y, fy) + within(0.08, 0.36, x, fx) * within(-0.3, 0.3, y, fy);
+            let ink = within(-0.32, -0.10, x, fx) * within(-0.3, 0.3, y, fy)
+                + within(0.08, 0.36, x, fx) * within(-0.3, 0.3, y, fy);
             let hole = within(0.16, 0.28, x, fx) * within(-0.2, 0.2, y, fy);
             blend(blend(white, black, (ink - hole).clamp(0.0, 1.0)), red, above(0.72, radius, f))
         }
@@ -158,12 +184,16 @@ pub fn sign(surface: &Surface, surface_point: &SurfacePoint) -> Painted {
         }
         3 => {
             let stem = within(-0.28, -0.12, x, fx) * within(-0.45, 0.45, y, fy);
-            let bowl = within(-0.12, 0.26, x, fx) * within(-0.45, 0.05, y, fy) - within(-0.12, 0.1, x, fx) * within(-0.3, -0.1, y, fy);
+            let bowl = within(-0.12, 0.26, x, fx) * within(-0.45, 0.05, y, fy)
+                - within(-0.12, 0.1, x, fx) * within(-0.3, -0.1, y, fy);
             let rim = 1.0 - within(-0.64, 0.64, x, fx) * within(-0.64, 0.64, y, fy);
             blend(blue, white, (stem + bowl + rim).clamp(0.0, 1.0))
         }
         _ => {
-            let stripes = within(-0.5, 0.5, x, fx) * (within(-0.35, -0.2, y, fy) + within(-0.05, 0.1, y, fy) + within(0.25, 0.4, y, fy));
+            let stripes = within(-0.5, 0.5, x, fx)
+                * (within(-0.35, -0.2, y, fy)
+                    + within(-0.05, 0.1, y, fy)
+                    + within(0.25, 0.4, y, fy));
             blend([0.72, 0.56, 0.05], black, stripes)
         }
     };

@@ -1,6 +1,7 @@
 //! The street as a KITTI odometry folder with all its truth beside it.
 //!
-//! Everything goes into a sibling folder first, which takes the asked-for name when it is complete: what stands under that name is whole.
+//! Everything goes into a sibling folder first, which takes the asked-for name when it is complete:
+//! what stands under that name is whole.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -20,20 +21,30 @@ const CALIBRATION_FILE: &str = "calibration.toml";
 
 /// Writes the configured number of frames to `folder` in KITTI's odometry layout, as sequence 00:
 ///
-/// - `sequences/00/image_{0,1}` grey and `image_{2,3}` colour pairs, `times.txt`, `calib.txt` (`P0`..`P3`, `Tr` from LiDAR to camera),
-///   `velodyne/NNNNNN.bin`;
-/// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where it is missing or does not fit;
-/// - `sequences/00/instances/NNNNNN.png` (k = the frame's instance k) and `.txt` (`id class score x1 y1 x2 y2`);
-/// - `sequences/00/objects.csv`: every car near the camera at every frame, `instance` being its value in the masks;
+/// - `sequences/00/image_{0,1}` grey and `image_{2,3}` colour pairs, `times.txt`, `calib.txt`
+///   (`P0`..`P3`, `Tr` from LiDAR to camera), `velodyne/NNNNNN.bin`;
+/// - `sequences/00/depth` (1/256 m) and `disp` (1/256 px) as 16-bit PNG, 0 where it is missing or
+///   does not fit;
+/// - `sequences/00/instances/NNNNNN.png` (k = the frame's instance k) and `.txt`
+///   (`id class score x1 y1 x2 y2`);
+/// - `sequences/00/objects.csv`: every car near the camera at every frame, `instance` being its
+///   value in the masks;
 /// - `poses/00.txt`;
-/// - where images are raw, their calibration as `sequences/00/calibration.toml`, and as `camchain.yaml` for lenses that Kalibr has. Depth, masks,
-///   poses and `calib.txt` are then of the rectified pair.
+/// - where images are raw, their calibration as `sequences/00/calibration.toml`, and as
+///   `camchain.yaml` for lenses that Kalibr has. Depth, masks, poses and `calib.txt` are then of
+///   the rectified pair.
 ///
-/// `progress` receives (frames written, frames in all). Colour and grey cameras share one position, so `P2` equals `P0` and `P3` equals `P1`.
+/// `progress` receives (frames written, frames in all). Colour and grey cameras share one position,
+/// so `P2` equals `P0` and `P3` equals `P1`.
 ///
 /// # Errors
-/// `folder` exists and is not empty, or a file cannot be written; nothing half-written stays behind.
-pub fn write_kitti(street: &Street, folder: &Path, mut progress: impl FnMut(u32, u32)) -> Result<(), SynthError> {
+/// `folder` exists and is not empty, or a file cannot be written; nothing half-written stays
+/// behind.
+pub fn write_kitti(
+    street: &Street,
+    folder: &Path,
+    mut progress: impl FnMut(u32, u32),
+) -> Result<(), SynthError> {
     if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         return Err(SynthError::NotEmpty(folder.to_path_buf()));
     }
@@ -51,9 +62,15 @@ fn at(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
     move |source| SynthError::Write { path, source }
 }
 
-fn write_all(street: &Street, folder: &Path, progress: &mut impl FnMut(u32, u32)) -> Result<(), SynthError> {
+fn write_all(
+    street: &Street,
+    folder: &Path,
+    progress: &mut impl FnMut(u32, u32),
+) -> Result<(), SynthError> {
     let sequence = folder.join("sequences/00");
-    for name in ["image_0", "image_1", "image_2", "image_3", "depth", "disp", "velodyne", "instances"] {
+    for name in
+        ["image_0", "image_1", "image_2", "image_3", "depth", "disp", "velodyne", "instances"]
+    {
         let path = sequence.join(name);
         fs::create_dir_all(&path).map_err(at(&path))?;
     }
@@ -102,7 +119,8 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
 
 /// The upper three rows of a motion, row by row.
 fn row(motion: &Transform, separator: &str) -> String {
-    let texts: Vec<String> = motion.matrix_3x4().as_flattened().iter().map(|value| format!("{value:.12e}")).collect();
+    let texts: Vec<String> =
+        motion.matrix_3x4().as_flattened().iter().map(|value| format!("{value:.12e}")).collect();
     texts.join(separator)
 }
 
@@ -112,17 +130,27 @@ fn calibration(street: &Street) -> String {
     for (name, shift) in [("P0", 0.0), ("P1", 1.0), ("P2", 0.0), ("P3", 1.0)] {
         let (f, u, v) = (rig.focal_px, rig.center_u_px, rig.center_v_px);
         let offset = -shift * rig.focal_baseline_px_m();
-        let values = [f, 0.0, u, offset, 0.0, f, v, 0.0, 0.0, 0.0, 1.0, 0.0].map(|value| format!("{value:.12e}"));
+        let values = [f, 0.0, u, offset, 0.0, f, v, 0.0, 0.0, 0.0, 1.0, 0.0]
+            .map(|value| format!("{value:.12e}"));
         let _ = writeln!(text, "{name}: {}", values.join(" "));
     }
     let _ = writeln!(text, "Tr: {}", row(&street.t_camera_lidar(), " "));
     text
 }
 
-fn write_frame(street: &Street, sequence: &Path, frame: &SynthFrame, scan: &[[f32; 4]]) -> Result<(), SynthError> {
+fn write_frame(
+    street: &Street,
+    sequence: &Path,
+    frame: &SynthFrame,
+    scan: &[[f32; 4]],
+) -> Result<(), SynthError> {
     let focal_baseline = street.rig().focal_baseline_px_m() as f32;
-    let fixed = |value: f32| if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 };
-    let sixteen = |of: &dyn Fn(f32) -> f32| -> Vec<u8> { frame.depth_m.iter().flat_map(|&z| fixed(of(z)).to_ne_bytes()).collect() };
+    let fixed = |value: f32| {
+        if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 }
+    };
+    let sixteen = |of: &dyn Fn(f32) -> f32| -> Vec<u8> {
+        frame.depth_m.iter().flat_map(|&z| fixed(of(z)).to_ne_bytes()).collect()
+    };
     let (images, truth) = (frame.image_size, [frame.width, frame.height]);
     let pictures = [
         ("image_0", frame.left_grey.clone(), L8, images),
@@ -148,7 +176,9 @@ fn write_frame(street: &Street, sequence: &Path, frame: &SynthFrame, scan: &[[f3
 fn instance_list(frame: &SynthFrame) -> String {
     let mut boxes = vec![(usize::MAX, usize::MAX, 0, 0); frame.objects.len()];
     for (pixel, &instance) in frame.instances.iter().enumerate() {
-        if let Some(b) = usize::from(instance).checked_sub(1).and_then(|number| boxes.get_mut(number)) {
+        if let Some(b) =
+            usize::from(instance).checked_sub(1).and_then(|number| boxes.get_mut(number))
+        {
             let (u, v) = (pixel % frame.width, pixel / frame.width);
             *b = (b.0.min(u), b.1.min(v), b.2.max(u + 1), b.3.max(v + 1));
         }
@@ -156,7 +186,16 @@ fn instance_list(frame: &SynthFrame) -> String {
     let mut text = String::from("# id class score x1 y1 x2 y2\n");
     for (number, (object, b)) in frame.objects.iter().zip(&boxes).enumerate() {
         if b.0 != usize::MAX {
-            let _ = writeln!(text, "{} {} 1.00 {}.0 {}.0 {}.0 {}.0", number + 1, object.class, b.0, b.1, b.2, b.3);
+            let _ = writeln!(
+                text,
+                "{} {} 1.00 {}.0 {}.0 {}.0 {}.0",
+                number + 1,
+                object.class,
+                b.0,
+                b.1,
+                b.2,
+                b.3
+            );
         }
     }
     text

@@ -53,7 +53,9 @@ impl Cdr {
 }
 
 fn picture(root: &Path, side: usize, frame: usize) -> image::GrayImage {
-    image::open(root.join(format!("street/sequences/00/image_{side}/{frame:06}.png"))).unwrap().into_luma8()
+    image::open(root.join(format!("street/sequences/00/image_{side}/{frame:06}.png")))
+        .unwrap()
+        .into_luma8()
 }
 
 /// Both encodings of a picture: raw, or its PNG file.
@@ -61,7 +63,10 @@ fn message(root: &Path, side: usize, frame: usize, compressed: bool) -> Vec<u8> 
     let mut cdr = Cdr::with_header(frame as u64 * NS);
     if compressed {
         cdr.text("png");
-        cdr.bytes(&fs::read(root.join(format!("street/sequences/00/image_{side}/{frame:06}.png"))).unwrap());
+        cdr.bytes(
+            &fs::read(root.join(format!("street/sequences/00/image_{side}/{frame:06}.png")))
+                .unwrap(),
+        );
         return cdr.0;
     }
     let picture = picture(root, side, frame);
@@ -101,16 +106,28 @@ fn record(root: &Path, name: &str, compressed: bool) {
     let infos = writer.add_schema("sensor_msgs/msg/CameraInfo", "ros2msg", b"").unwrap();
     let ending = if compressed { "image_rect/compressed" } else { "image_rect" };
     let channels = ["left", "right"].map(|side| {
-        let mut add = |schema, topic: String| writer.add_channel(schema, &topic, "cdr", &BTreeMap::new()).unwrap();
-        [add(images, format!("/stereo/{side}/{ending}")), add(infos, format!("/stereo/{side}/camera_info"))]
+        let mut add = |schema, topic: String| {
+            writer.add_channel(schema, &topic, "cdr", &BTreeMap::new()).unwrap()
+        };
+        [
+            add(images, format!("/stereo/{side}/{ending}")),
+            add(infos, format!("/stereo/{side}/camera_info")),
+        ]
     });
     for frame in 0..FRAMES {
         for (side, [image, calibration]) in channels.iter().enumerate() {
             // Recorded later than taken, the right camera later than the left one.
             let log_time = frame as u64 * NS + 7_000_000 * (side as u64 + 1);
-            let header = |channel_id| MessageHeader { channel_id, sequence: frame as u32, log_time, publish_time: log_time };
+            let header = |channel_id| MessageHeader {
+                channel_id,
+                sequence: frame as u32,
+                log_time,
+                publish_time: log_time,
+            };
             writer.write_to_known_channel(&header(*calibration), &info(root, side)).unwrap();
-            writer.write_to_known_channel(&header(*image), &message(root, side, frame, compressed)).unwrap();
+            writer
+                .write_to_known_channel(&header(*image), &message(root, side, frame, compressed))
+                .unwrap();
         }
     }
     writer.finish().unwrap();
@@ -121,10 +138,15 @@ fn a_recorded_street_has_the_digests_of_the_folder_and_broken_ones_a_sentence() 
     let root = TempDir::new().unwrap();
     let root = root.path();
     let size = ["--set", "street.width=320", "--set", "street.height=96"];
-    assert!(dynvox(root, &[&["synth", "--out", "street", "--frames", "5"], &size[..]].concat()).status.success());
+    assert!(
+        dynvox(root, &[&["synth", "--out", "street", "--frames", "5"], &size[..]].concat())
+            .status
+            .success()
+    );
     let coarse = ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
     let digest = |path: &str, out: &str, more: &[&str]| {
-        let run = dynvox(root, &[&["run", path, "--json", "--out", out], &coarse[..], more].concat());
+        let run =
+            dynvox(root, &[&["run", path, "--json", "--out", out], &coarse[..], more].concat());
         assert!(run.status.success(), "{path}: {}", output_text(&run));
         serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()["digest"].clone()
     };
@@ -133,11 +155,21 @@ fn a_recorded_street_has_the_digests_of_the_folder_and_broken_ones_a_sentence() 
     record(root, "compressed.mcap", true);
     assert_eq!(digest("raw.mcap", "raw", &[]), folder);
     assert_eq!(digest("compressed.mcap", "compressed", &[]), folder);
-    let named = ["--topics", "/stereo/left/image_rect,/stereo/right/image_rect", "--calibration", "street/sequences/00/calib.txt"];
+    let named = [
+        "--topics",
+        "/stereo/left/image_rect,/stereo/right/image_rect",
+        "--calibration",
+        "street/sequences/00/calib.txt",
+    ];
     assert_eq!(digest("raw.mcap", "named", &named), folder);
     let inspected = dynvox(root, &["inspect", "raw.mcap"]);
     let text = String::from_utf8_lossy(&inspected.stdout).into_owned();
-    assert!(inspected.status.success() && text.contains("5 stereo pairs of 320 x 96 px") && text.contains("dynvox run raw.mcap"), "{text}");
+    assert!(
+        inspected.status.success()
+            && text.contains("5 stereo pairs of 320 x 96 px")
+            && text.contains("dynvox run raw.mcap"),
+        "{text}"
+    );
 
     let whole = fs::read(root.join("raw.mcap")).unwrap();
     fs::write(root.join("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
@@ -148,7 +180,11 @@ fn a_recorded_street_has_the_digests_of_the_folder_and_broken_ones_a_sentence() 
         ("cut.mcap", &[][..], "Repair it with `mcap recover cut.mcap -o repaired.mcap`"),
         ("old.db3", &[], "`mcap convert old.db3 old.mcap`"),
         ("old.bag", &[], "`mcap convert old.bag old.mcap`"),
-        ("raw.mcap", &["--topics", "/a,/b"], "it has no images at /a. Its image topics are /stereo/left/image_rect, "),
+        (
+            "raw.mcap",
+            &["--topics", "/a,/b"],
+            "it has no images at /a. Its image topics are /stereo/left/image_rect, ",
+        ),
     ] {
         let run = dynvox(root, &[&["run", path, "--out", "result"], more].concat());
         assert_eq!(run.status.code(), Some(1), "{path}");

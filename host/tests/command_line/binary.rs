@@ -21,8 +21,10 @@ pub fn output_text(output: &Output) -> String {
 
 /// Names in the folder, hidden ones included, sorted.
 pub fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -32,7 +34,11 @@ pub fn rig(root: &Path, frames: u32) {
     for (side, shift) in [("left", 0), ("right", 10)] {
         fs::create_dir_all(root.join("rig").join(side)).unwrap();
         for at in 0..frames {
-            let texture = |u: u32, v: u32| Luma([((u / 3).wrapping_mul(2_654_435_761) ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8]);
+            let texture =
+                |u: u32, v: u32| {
+                    Luma([((u / 3).wrapping_mul(2_654_435_761)
+                        ^ (v / 3).wrapping_mul(40_503_777) >> 7) as u8])
+                };
             let image = GrayImage::from_fn(160, 64, |u, v| texture(u + shift, v));
             image.save(root.join("rig").join(side).join(format!("{at:03}.png"))).unwrap();
         }

@@ -44,16 +44,29 @@ impl Drop for Running {
 }
 
 impl Visit<'_> {
-    /// Opens a page from disk and returns what the visit's script hands to `report`. An error on the console fails the test.
+    /// Opens a page from disk and returns what the visit's script hands to `report`. An error on
+    /// the console fails the test.
     pub fn report(&self) -> Value {
         let Window(width, height) = self.window;
         let profile = TempDir::new().unwrap();
         let url = format!("file://{}{}", self.page().display(), self.part);
         let mut command = Command::new(dynvox_needs::browser_program!());
-        command.args(["--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]);
-        command.args(["--hide-scrollbars", "--enable-logging=stderr", "--v=0", &format!("--window-size={width},{height}")]);
+        command.args([
+            "--headless=new",
+            "--no-sandbox",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+        ]);
+        command.args([
+            "--hide-scrollbars",
+            "--enable-logging=stderr",
+            "--v=0",
+            &format!("--window-size={width},{height}"),
+        ]);
         command.arg(format!("--user-data-dir={}", profile.path().display())).arg(url);
-        let mut running = Running(command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap());
+        let mut running =
+            Running(command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap());
         let lines = BufReader::new(running.0.stderr.take().unwrap());
         let (sender, receiver) = mpsc::channel();
         std::thread::spawn(move || {
@@ -63,8 +76,12 @@ impl Visit<'_> {
             }
         });
         let line = receiver.recv_timeout(PATIENCE).expect("the page reports in time");
-        let text = line.split_once("\"RESULT ").unwrap_or_else(|| panic!("an error on the console: {line}")).1;
-        serde_json::from_str(text.rsplit_once("\", source:").expect("a line of the console").0).unwrap()
+        let text = line
+            .split_once("\"RESULT ")
+            .unwrap_or_else(|| panic!("an error on the console: {line}"))
+            .1;
+        serde_json::from_str(text.rsplit_once("\", source:").expect("a line of the console").0)
+            .unwrap()
     }
 
     /// A copy of the page, next to it, that runs the scripts.
@@ -72,9 +89,13 @@ impl Visit<'_> {
         let html = std::fs::read_to_string(self.page).unwrap();
         let (head, body) = html.split_once("<body>").expect("a page");
         let report = "const report = (value) => console.log(`RESULT ${JSON.stringify(value)}`);";
-        let late = format!("window.addEventListener(\"load\", async () => {{ {report} {} }});", self.script);
+        let late = format!(
+            "window.addEventListener(\"load\", async () => {{ {report} {} }});",
+            self.script
+        );
         let copy = self.page.with_file_name("tested.html");
-        std::fs::write(&copy, format!("{head}<body><script>{}{late}</script>{body}", self.before)).unwrap();
+        std::fs::write(&copy, format!("{head}<body><script>{}{late}</script>{body}", self.before))
+            .unwrap();
         std::fs::canonicalize(copy).unwrap()
     }
 }

@@ -23,28 +23,58 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
         assert!(text.contains(words), "{words} in {text}");
     }
     assert!(text.contains("no LiDAR scans") && text.contains("no masks"), "{text}");
-    for (path, words) in
-        [("rig/left", "is a part of the data set rig"), ("rig/left/000.png", "is a file"), ("nothing", "there is no data set at")]
-    {
+    for (path, words) in [
+        ("rig/left", "is a part of the data set rig"),
+        ("rig/left/000.png", "is a file"),
+        ("nothing", "there is no data set at"),
+    ] {
         let printed = dynvox(root.path(), &["inspect", path]);
-        assert!(!printed.status.success() && output_text(&printed).contains(words), "{path}: {}", output_text(&printed));
+        assert!(
+            !printed.status.success() && output_text(&printed).contains(words),
+            "{path}: {}",
+            output_text(&printed)
+        );
     }
-    let json =
-        |path: &str| -> serde_json::Value { serde_json::from_slice(&dynvox(root.path(), &["inspect", path, "--json"]).stdout).unwrap() };
+    let json = |path: &str| -> serde_json::Value {
+        serde_json::from_slice(&dynvox(root.path(), &["inspect", path, "--json"]).stdout).unwrap()
+    };
     let found = json("rig");
     let described = &found["sequences"][0]["dataset"];
-    assert_eq!((&found["layout"], &described["pairs"], &described["width"]), (&"folder".into(), &2.into(), &160.into()), "{found}");
-    assert_eq!((&described["rig"]["baseline_m"], &described["command"]), (&0.5.into(), &"dynvox run rig".into()), "{found}");
-    assert!(described["least_bytes"].as_u64().unwrap() > 1 << 20 && described["masks"] == "none", "{found}");
+    assert_eq!(
+        (&found["layout"], &described["pairs"], &described["width"]),
+        (&"folder".into(), &2.into(), &160.into()),
+        "{found}"
+    );
+    assert_eq!(
+        (&described["rig"]["baseline_m"], &described["command"]),
+        (&0.5.into(), &"dynvox run rig".into()),
+        "{found}"
+    );
+    assert!(
+        described["least_bytes"].as_u64().unwrap() > 1 << 20 && described["masks"] == "none",
+        "{found}"
+    );
     fs::create_dir_all(root.path().join("run")).unwrap();
     fs::write(root.path().join("run/summary.json"), "{}").unwrap();
-    assert_eq!((&json("run")["layout"], json("run")["commands"].as_array().unwrap().len()), (&"run".into(), 2));
+    assert_eq!(
+        (&json("run")["layout"], json("run")["commands"].as_array().unwrap().len()),
+        (&"run".into(), 2)
+    );
     let printed = String::from_utf8(dynvox(root.path(), &["inspect", "run"]).stdout).unwrap();
-    assert!(printed.contains("the results of a run") && printed.contains("dynvox evaluate trajectory run TRUTH"), "{printed}");
+    assert!(
+        printed.contains("the results of a run")
+            && printed.contains("dynvox evaluate trajectory run TRUTH"),
+        "{printed}"
+    );
     fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
     let printed = dynvox(root.path(), &["inspect", "rig"]);
-    assert!(!printed.status.success() && String::from_utf8_lossy(&printed.stdout).contains("calib.txt is missing"));
-    assert!(json("rig")["sequences"][0]["error"].as_str().unwrap().contains("calib.txt is missing"));
+    assert!(
+        !printed.status.success()
+            && String::from_utf8_lossy(&printed.stdout).contains("calib.txt is missing")
+    );
+    assert!(
+        json("rig")["sequences"][0]["error"].as_str().unwrap().contains("calib.txt is missing")
+    );
 }
 
 #[test]
@@ -52,8 +82,11 @@ fn budget_shows_every_profile_and_the_regions_sum_to_the_slab() {
     let root = TempDir::new().unwrap();
     let all = String::from_utf8(dynvox(root.path(), &["budget"]).stdout).unwrap();
     assert!(["tiny", "small", "onboard", "desktop"].iter().all(|name| all.contains(name)));
-    let tiny = String::from_utf8(dynvox(root.path(), &["budget", "--profile", "tiny"]).stdout).unwrap();
-    let bytes = |line: &str| -> u64 { line.split_whitespace().nth_back(2).unwrap().replace(',', "").parse().unwrap() };
+    let tiny =
+        String::from_utf8(dynvox(root.path(), &["budget", "--profile", "tiny"]).stdout).unwrap();
+    let bytes = |line: &str| -> u64 {
+        line.split_whitespace().nth_back(2).unwrap().replace(',', "").parse().unwrap()
+    };
     let lines: Vec<&str> = tiny.lines().skip(1).collect();
     let (slab, regions) = lines.split_last().unwrap();
     assert_eq!(regions.iter().map(|line| bytes(line)).sum::<u64>(), bytes(slab));
@@ -65,11 +98,20 @@ fn a_budget_is_printed_for_every_language_and_summed_up_for_a_target() {
     let root = TempDir::new().unwrap();
     let asked = ["budget", "--memory", "48MiB", "--image", "752x480", "--raw", "800x500"];
     let text = String::from_utf8(dynvox(root.path(), &asked).stdout).unwrap();
-    for line in ["raw_width = 800", "    raw_width: 800,", "  .raw_width = 800,", "  .colour = 0,\n", "pruning window: 64 frames"] {
+    for line in [
+        "raw_width = 800",
+        "    raw_width: 800,",
+        "  .raw_width = 800,",
+        "  .colour = 0,\n",
+        "pruning window: 64 frames",
+    ] {
         assert!(text.contains(line), "{line} in {text}");
     }
     let json = |more: &[&str]| -> serde_json::Value {
-        serde_json::from_slice(&dynvox(root.path(), &[&asked[..], more, &["--json"]].concat()).stdout).unwrap()
+        serde_json::from_slice(
+            &dynvox(root.path(), &[&asked[..], more, &["--json"]].concat()).stdout,
+        )
+        .unwrap()
     };
     let (solved, summed) = (json(&[]), json(&["--stack"]));
     let number = |value: &serde_json::Value| value.as_u64().unwrap();
@@ -89,7 +131,8 @@ fn files_are_evaluated_without_a_run() {
         assert!(printed.status.success(), "{}", output_text(&printed));
         serde_json::from_slice::<serde_json::Value>(&printed.stdout).unwrap()
     };
-    // The plane as a pair of KITTI 2015: its left half is an object with a true disparity 5 px from the visible one.
+    // The plane as a pair of KITTI 2015: its left half is an object with a true disparity 5 px from
+    // the visible one.
     let file_in = |folder: &str| {
         fs::create_dir_all(root.path().join("set/training").join(folder)).unwrap();
         root.path().join("set/training").join(folder).join("000000_10.png")
@@ -101,54 +144,94 @@ fn files_are_evaluated_without_a_run() {
     GrayImage::from_fn(160, 64, |u, _| Luma([u8::from(u < 80)])).save(file_in("obj_map")).unwrap();
     let found = json(&["evaluate", "stereo", "set", "--json"]);
     let regions = &found["regions"];
-    assert_eq!((&found["benchmark"], &regions["noc"]["pixels"]), (&"kitti-2015".into(), &10_240.into()));
+    assert_eq!(
+        (&found["benchmark"], &regions["noc"]["pixels"]),
+        (&"kitti-2015".into(), &10_240.into())
+    );
     assert!(
-        regions["noc_background"]["coverage"].as_f64().unwrap() > 0.6 && regions["noc_background"]["d1"].as_f64().unwrap() < 0.01,
+        regions["noc_background"]["coverage"].as_f64().unwrap() > 0.6
+            && regions["noc_background"]["d1"].as_f64().unwrap() < 0.01,
         "{found}"
     );
     let foreground = &regions["noc_foreground"];
     assert!(
-        foreground["d1"].as_f64().unwrap() > 0.99 && (foreground["mean_signed_error_px"].as_f64().unwrap() + 5.0).abs() < 0.1,
+        foreground["d1"].as_f64().unwrap() > 0.99
+            && (foreground["mean_signed_error_px"].as_f64().unwrap() + 5.0).abs() < 0.1,
         "{found}"
     );
     assert!(regions["occ"].is_null());
-    let given = json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
-    assert_eq!((&given["regions"]["noc"]["d1_filled"], &given["regions"]["noc"]["coverage"]), (&0.0.into(), &1.0.into()));
+    let given =
+        json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
+    assert_eq!(
+        (&given["regions"]["noc"]["d1_filled"], &given["regions"]["noc"]["coverage"]),
+        (&0.0.into(), &1.0.into())
+    );
     let printed = String::from_utf8(dynvox(root.path(), &["inspect", "set"]).stdout).unwrap();
-    assert!(printed.contains("kitti-2015, 1 pairs") && printed.contains("dynvox evaluate stereo set"), "{printed}");
+    assert!(
+        printed.contains("kitti-2015, 1 pairs") && printed.contains("dynvox evaluate stereo set"),
+        "{printed}"
+    );
     let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
-    assert!(!refused.status.success() && output_text(&refused).contains("is not a stereo benchmark"), "{}", output_text(&refused));
+    assert!(
+        !refused.status.success() && output_text(&refused).contains("is not a stereo benchmark"),
+        "{}",
+        output_text(&refused)
+    );
     // A run's folder against its own poses in the other format.
-    let small = ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
+    let small =
+        ["--set", "street.width=160", "--set", "street.height=64", "--set", "street.frames=3"];
     json(&[&["run", "--profile", "tiny", "--out", "run", "--json"], &small[..]].concat());
     let same = json(&["evaluate", "trajectory", "run", "run/trajectory_kitti.txt", "--json"]);
-    assert!(same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6, "{same}");
+    assert!(
+        same["ate_m"].as_f64().unwrap() < 1e-9 && same["rpe_r_deg"].as_f64().unwrap() < 1e-6,
+        "{same}"
+    );
     let refused = dynvox(root.path(), &["evaluate", "trajectory", "run", "rig/calib.txt"]);
-    assert!(!refused.status.success() && output_text(&refused).contains("line 1 is not a pose"), "{}", output_text(&refused));
+    assert!(
+        !refused.status.success() && output_text(&refused).contains("line 1 is not a pose"),
+        "{}",
+        output_text(&refused)
+    );
 }
 
 #[test]
 fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
     let root = TempDir::new().unwrap();
-    let street = ["street.width=160", "street.height=64", "street.frames=14", "volume.voxel_size_m=0.2"].map(|set| ["--set", set]).concat();
+    let street =
+        ["street.width=160", "street.height=64", "street.frames=14", "volume.voxel_size_m=0.2"]
+            .map(|set| ["--set", set])
+            .concat();
     let run = |more: &[&str]| {
-        let done = dynvox(root.path(), &[&["run", "--profile", "tiny", "--quiet"], &street[..], more].concat());
+        let done = dynvox(
+            root.path(),
+            &[&["run", "--profile", "tiny", "--quiet"], &street[..], more].concat(),
+        );
         assert!(done.status.success(), "{}", output_text(&done));
     };
     run(&["--out", "all"]);
     run(&["--out", "some", "--start", "3", "--stride", "2", "--frames", "4"]);
-    let evaluate = |folder: &str, truth: &str| dynvox(root.path(), &["evaluate", "trajectory", folder, truth, "--json"]);
+    let evaluate = |folder: &str, truth: &str| {
+        dynvox(root.path(), &["evaluate", "trajectory", folder, truth, "--json"])
+    };
     let ate_m = |printed: &std::process::Output| -> f64 {
         assert!(printed.status.success(), "{}", output_text(printed));
-        serde_json::from_slice::<serde_json::Value>(&printed.stdout).unwrap()["ate_m"].as_f64().unwrap()
+        serde_json::from_slice::<serde_json::Value>(&printed.stdout).unwrap()["ate_m"]
+            .as_f64()
+            .unwrap()
     };
-    let summary: serde_json::Value = serde_json::from_slice(&fs::read(root.path().join("some/summary.json")).unwrap()).unwrap();
+    let summary: serde_json::Value =
+        serde_json::from_slice(&fs::read(root.path().join("some/summary.json")).unwrap()).unwrap();
     // The same by the rows of the frames as by the run's own truth.
     let by_rows = ate_m(&evaluate("some", "all/trajectory_truth_kitti.txt"));
     assert!((by_rows - ate_m(&evaluate("some", "some/trajectory_truth_kitti.txt"))).abs() < 1e-6);
     assert!((by_rows - summary["egomotion"]["ate_m"].as_f64().unwrap()).abs() < 1e-4, "{by_rows}");
     let text = fs::read_to_string(root.path().join("all/trajectory_truth_kitti.txt")).unwrap();
-    fs::write(root.path().join("short.txt"), text.lines().take(8).collect::<Vec<_>>().join("\n")).unwrap();
+    fs::write(root.path().join("short.txt"), text.lines().take(8).collect::<Vec<_>>().join("\n"))
+        .unwrap();
     let refused = evaluate("some", "short.txt");
-    assert!(output_text(&refused).contains("the run mapped frame 9, and the true poses have 8 rows"), "{}", output_text(&refused));
+    assert!(
+        output_text(&refused).contains("the run mapped frame 9, and the true poses have 8 rows"),
+        "{}",
+        output_text(&refused)
+    );
 }

@@ -1,4 +1,5 @@
-//! `dynvox diff` as a user meets it: one pixel, one stage, one setting, one frame fewer, and folders that are none.
+//! `dynvox diff` as a user meets it: one pixel, one stage, one setting, one frame fewer, and
+//! folders that are none.
 
 use super::binary::{dynvox, rig};
 use std::fs;
@@ -14,14 +15,18 @@ fn prepared() -> TempDir {
 }
 
 fn run(root: &Path, out: &str, more: &[&str]) {
-    let output = dynvox(root, &[&["run", "rig", "--profile", "tiny", "--quiet", "--out", out], more].concat());
+    let output = dynvox(
+        root,
+        &[&["run", "rig", "--profile", "tiny", "--quiet", "--out", out], more].concat(),
+    );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 /// Exit code and all output.
 fn diff(root: &Path, args: &[&str]) -> (i32, String) {
     let output = dynvox(root, &[&["diff"], args].concat());
-    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
     (output.status.code().unwrap(), text)
 }
 
@@ -38,10 +43,15 @@ fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     run(root.path(), "dirty", &[]);
     let (code, output) = diff(root.path(), &["clean", "dirty"]);
     assert_eq!((code, output.lines().next()), (1, Some("first divergence: frame 2, input")));
-    assert!(output.contains("\napart in frame 2: pose 0.0") && output.contains("\napart at most: pose 0.0"), "{output}");
+    assert!(
+        output.contains("\napart in frame 2: pose 0.0")
+            && output.contains("\napart at most: pose 0.0"),
+        "{output}"
+    );
 }
 
-/// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's tests; here, that the stage is named.
+/// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's
+/// tests; here, that the stage is named.
 #[test]
 fn one_bit_of_a_stages_digest_names_the_stage() {
     let root = prepared();
@@ -51,7 +61,8 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
     let table: Vec<Vec<&str>> = clean.lines().map(|line| line.split(',').collect()).collect();
     for stage in ["input", "disparity", "matches", "egomotion", "tracks", "background", "objects"] {
         let column = table[0].iter().position(|name| *name == format!("{stage}_digest")).unwrap();
-        let mut dirty: Vec<Vec<String>> = table.iter().map(|row| row.iter().map(|&cell| cell.to_owned()).collect()).collect();
+        let mut dirty: Vec<Vec<String>> =
+            table.iter().map(|row| row.iter().map(|&cell| cell.to_owned()).collect()).collect();
         let cell = &mut dirty[3][column];
         // No car drives through these images: an object's digest is one too many.
         *cell = match u64::from_str_radix(cell, 16) {
@@ -62,7 +73,10 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
         fs::write(&csv, lines.concat()).unwrap();
         let (code, output) = diff(root.path(), &["clean", "dirty"]);
         let named = if stage == "objects" { "object 7" } else { stage };
-        assert_eq!((code, output.lines().next()), (1, Some(format!("first divergence: frame 2, {named}").as_str())));
+        assert_eq!(
+            (code, output.lines().next()),
+            (1, Some(format!("first divergence: frame 2, {named}").as_str()))
+        );
     }
 }
 
@@ -72,8 +86,14 @@ fn a_setting_is_named_beside_the_stage_it_reaches_first() {
     run(root.path(), "coarse", &["--set", "volume.voxel_size_m=0.1"]);
     let (code, output) = diff(root.path(), &["clean", "coarse"]);
     assert_eq!(code, 1);
-    assert!(output.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"), "{output}");
-    assert!(output.contains("\nfirst divergence: frame 0, background\napart in frame 0: "), "{output}");
+    assert!(
+        output.contains("setting volume.voxel_size_m: 0.05 in clean, 0.1 in coarse"),
+        "{output}"
+    );
+    assert!(
+        output.contains("\nfirst divergence: frame 0, background\napart in frame 0: "),
+        "{output}"
+    );
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
     let (code, output) = diff(root.path(), &["clean", "sparse"]);
     assert!(code == 1 && output.contains("\nfirst divergence: frame 1, matches\n"), "{output}");
@@ -84,7 +104,10 @@ fn a_shorter_run_is_the_beginning_of_a_longer_one() {
     let root = prepared();
     run(root.path(), "short", &["--frames", "3"]);
     let (code, output) = diff(root.path(), &["clean", "short"]);
-    assert_eq!((code, output.as_str()), (1, "short is a prefix of clean: equal in all its 3 frames, 1 more follow\n"));
+    assert_eq!(
+        (code, output.as_str()),
+        (1, "short is a prefix of clean: equal in all its 3 frames, 1 more follow\n")
+    );
     assert_eq!(diff(root.path(), &["clean", "short", "--shared"]).0, 0);
     run(root.path(), "first", &["--frames", "1"]);
     run(root.path(), "rest", &["--start", "1"]);

@@ -1,4 +1,5 @@
-//! Documents say what there is: files, keys and columns of a run folder, settings with their defaults, options.
+//! Documents say what there is: files, keys and columns of a run folder, settings with their
+//! defaults, options.
 
 use super::binary::{dynvox, output_text};
 use serde_json::Value;
@@ -42,18 +43,28 @@ fn document(name: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name)).unwrap()
 }
 
-/// The part of a document below a heading that begins so, up to the next of its level; the part before the first heading for none.
+/// The part of a document below a heading that begins so, up to the next of its level; the part
+/// before the first heading for none.
 fn section<'d>(document: &'d str, heading: &str) -> &'d str {
-    document.split("\n## ").find(|part| part.starts_with(heading)).unwrap_or_else(|| panic!("no section {heading}"))
+    document
+        .split("\n## ")
+        .find(|part| part.starts_with(heading))
+        .unwrap_or_else(|| panic!("no section {heading}"))
 }
 
 /// What stands between backticks, `a.{b, c}` as `a.b` and `a.c`, words one by one.
 fn names(text: &str) -> BTreeSet<String> {
-    text.split('`').skip(1).step_by(2).flat_map(expanded).flat_map(|name| name.split(' ').map(str::to_owned).collect::<Vec<_>>()).collect()
+    text.split('`')
+        .skip(1)
+        .step_by(2)
+        .flat_map(expanded)
+        .flat_map(|name| name.split(' ').map(str::to_owned).collect::<Vec<_>>())
+        .collect()
 }
 
 fn expanded(name: &str) -> Vec<String> {
-    let braces = name.split_once('{').and_then(|(before, rest)| Some((before, rest.split_once('}')?)));
+    let braces =
+        name.split_once('{').and_then(|(before, rest)| Some((before, rest.split_once('}')?)));
     let Some((before, (within, after))) = braces else { return vec![name.to_owned()] };
     within.split(',').flat_map(|part| expanded(&[before, part.trim(), after].concat())).collect()
 }
@@ -62,13 +73,16 @@ fn expanded(name: &str) -> Vec<String> {
 fn stands_for(documented: &str, name: &str) -> bool {
     match PLACEHOLDERS.iter().find_map(|word| documented.split_once(word)) {
         None => documented == name,
-        Some((before, after)) => name
-            .strip_prefix(before)
-            .is_some_and(|rest| (1..=rest.len()).any(|at| rest.is_char_boundary(at) && stands_for(after, &rest[at..]))),
+        Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
+            (1..=rest.len()).any(|at| rest.is_char_boundary(at) && stands_for(after, &rest[at..]))
+        }),
     }
 }
 
-fn undocumented<'n>(found: impl IntoIterator<Item = &'n str>, documented: &BTreeSet<String>) -> Vec<&'n str> {
+fn undocumented<'n>(
+    found: impl IntoIterator<Item = &'n str>,
+    documented: &BTreeSet<String>,
+) -> Vec<&'n str> {
     found.into_iter().filter(|name| !documented.iter().any(|one| stands_for(one, name))).collect()
 }
 
@@ -77,7 +91,11 @@ fn keys(prefix: &str, value: &Value, found: &mut BTreeSet<String>) {
     match value {
         Value::Object(map) if !map.is_empty() => {
             for (key, value) in map {
-                keys(&if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") }, value, found);
+                keys(
+                    &if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") },
+                    value,
+                    found,
+                );
             }
         }
         Value::Array(list) if list.first().is_some_and(Value::is_object) => {
@@ -90,14 +108,20 @@ fn keys(prefix: &str, value: &Value, found: &mut BTreeSet<String>) {
 /// A key or one above it is documented.
 fn is_documented(key: &str, documented: &BTreeSet<String>) -> bool {
     let ends = key.match_indices('.').map(|(at, _)| at).chain([key.len()]);
-    ends.map(|end| &key[..end]).any(|key| documented.iter().any(|one| stands_for(one, key) || one.strip_suffix("[]") == Some(key)))
+    ends.map(|end| &key[..end]).any(|key| {
+        documented.iter().any(|one| stands_for(one, key) || one.strip_suffix("[]") == Some(key))
+    })
 }
 
 /// Files of a folder, those in folders with their folder.
 fn files(folder: &Path, prefix: &str, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).unwrap().flatten() {
         let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-        if entry.path().is_dir() { files(&entry.path(), &format!("{name}/"), found) } else { found.push(name) }
+        if entry.path().is_dir() {
+            files(&entry.path(), &format!("{name}/"), found)
+        } else {
+            found.push(name)
+        }
     }
 }
 
@@ -105,8 +129,20 @@ fn files(folder: &Path, prefix: &str, found: &mut Vec<String>) {
 fn run(root: &Path, frames: u32) {
     let frames = format!("street.frames={frames}");
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", &frames];
-    let all = ["--profile", "tiny", "--evaluate", "exact", "--instances", "exact", "--mcap", "--planning", "40x40x8", "--keep-blocks"];
-    let done = dynvox(root, &[&["run", "--quiet", "--out", "result"], &street[..], &all[..]].concat());
+    let all = [
+        "--profile",
+        "tiny",
+        "--evaluate",
+        "exact",
+        "--instances",
+        "exact",
+        "--mcap",
+        "--planning",
+        "40x40x8",
+        "--keep-blocks",
+    ];
+    let done =
+        dynvox(root, &[&["run", "--quiet", "--out", "result"], &street[..], &all[..]].concat());
     assert!(done.status.success(), "{}", output_text(&done));
 }
 
@@ -121,15 +157,30 @@ fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     // Files of a folder are named with it once, and then without.
     let known: BTreeSet<String> = table
         .iter()
-        .flat_map(|name| ["", "objects/", "pictures/", "planning/"].map(|folder| format!("{folder}{name}")))
-        .chain(table.iter().filter(|name| name.starts_with('_')).map(|name| format!("pictures/NNNNNN{name}")))
+        .flat_map(|name| {
+            ["", "objects/", "pictures/", "planning/"].map(|folder| format!("{folder}{name}"))
+        })
+        .chain(
+            table
+                .iter()
+                .filter(|name| name.starts_with('_'))
+                .map(|name| format!("pictures/NNNNNN{name}")),
+        )
         .collect();
-    assert_eq!(undocumented(written.iter().map(String::as_str), &known), Vec::<&str>::new(), "files");
-    let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(
+        undocumented(written.iter().map(String::as_str), &known),
+        Vec::<&str>::new(),
+        "files"
+    );
+    let summary: Value =
+        serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
     let (mut found, documented) = (BTreeSet::new(), names(section(&page, "`summary.json`")));
     keys("", &summary, &mut found);
     let missing: Vec<_> = found.iter().filter(|key| !is_documented(key, &documented)).collect();
-    assert!(missing.is_empty() && found.len() > 60, "keys of summary.json that no line describes: {missing:?}");
+    assert!(
+        missing.is_empty() && found.len() > 60,
+        "keys of summary.json that no line describes: {missing:?}"
+    );
     for (file, heading) in [
         ("frames.csv", "`frames.csv`"),
         ("tracks.csv", "`tracks.csv`"),
@@ -140,7 +191,11 @@ fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     ] {
         let table = fs::read_to_string(folder.join(file)).unwrap();
         let columns: Vec<&str> = table.lines().next().unwrap().split(',').collect();
-        assert_eq!(undocumented(columns, &names(section(&page, heading))), Vec::<&str>::new(), "columns of {file}");
+        assert_eq!(
+            undocumented(columns, &names(section(&page, heading))),
+            Vec::<&str>::new(),
+            "columns of {file}"
+        );
     }
 }
 
@@ -151,7 +206,9 @@ fn leaves(prefix: &str, table: &toml::Table, found: &mut BTreeMap<String, String
         match value {
             toml::Value::Table(inner) => leaves(&key, inner, found),
             toml::Value::String(text) => drop(found.insert(key, text.clone())),
-            toml::Value::Array(list) if list.first().is_some_and(toml::Value::is_table) => drop(found.insert(key, "a list".to_owned())),
+            toml::Value::Array(list) if list.first().is_some_and(toml::Value::is_table) => {
+                drop(found.insert(key, "a list".to_owned()))
+            }
             value => drop(found.insert(key, value.to_string())),
         }
     }
@@ -161,7 +218,8 @@ fn leaves(prefix: &str, table: &toml::Table, found: &mut BTreeMap<String, String
 fn every_setting_is_on_its_page_once_with_its_default() {
     let root = TempDir::new().unwrap();
     run(root.path(), 1);
-    let config: toml::Table = fs::read_to_string(root.path().join("result/config.toml")).unwrap().parse().unwrap();
+    let config: toml::Table =
+        fs::read_to_string(root.path().join("result/config.toml")).unwrap().parse().unwrap();
     let mut settings = BTreeMap::new();
     leaves("", &config, &mut settings);
     let page = document("docs/settings.md");
@@ -174,7 +232,10 @@ fn every_setting_is_on_its_page_once_with_its_default() {
     for row in &rows {
         let [key, default, text] = row[..] else { panic!("three cells: {row:?}") };
         assert!(text.len() > 8, "{key} has no text");
-        assert!(described.insert(key.to_owned(), default.to_owned()).is_none(), "{key} is described twice");
+        assert!(
+            described.insert(key.to_owned(), default.to_owned()).is_none(),
+            "{key} is described twice"
+        );
     }
     // Of the run above, and what depends on its images and its bounds.
     let of_the_run = [
@@ -186,8 +247,13 @@ fn every_setting_is_on_its_page_once_with_its_default() {
         "volume.prune_lag",
     ];
     for (key, value) in &settings {
-        let default = described.get(key).unwrap_or_else(|| panic!("docs/settings.md has no line for {key} = {value}"));
-        assert!(of_the_run.contains(&key.as_str()) || default == value, "{key} is {value}, and docs/settings.md says {default}");
+        let default = described
+            .get(key)
+            .unwrap_or_else(|| panic!("docs/settings.md has no line for {key} = {value}"));
+        assert!(
+            of_the_run.contains(&key.as_str()) || default == value,
+            "{key} is {value}, and docs/settings.md says {default}"
+        );
     }
     // Without a default in the file, but taken.
     for key in described.keys().filter(|key| !settings.contains_key(*key)) {
@@ -208,7 +274,10 @@ fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
     let mut last = None;
     for line in help.lines() {
         let text = line.trim_start();
-        let option = text.split([' ', ',']).find(|word| word.starts_with("--")).filter(|_| text.starts_with('-'));
+        let option = text
+            .split([' ', ','])
+            .find(|word| word.starts_with("--"))
+            .filter(|_| text.starts_with('-'));
         if let Some(option) = option {
             let rest = text.split_once("  ").map_or("", |(_, rest)| rest.trim());
             found.insert(option.to_owned(), rest.to_owned());
@@ -223,7 +292,8 @@ fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
 #[test]
 fn every_option_is_described_and_documents_use_options_that_are_there() {
     let root = TempDir::new().unwrap();
-    let known: BTreeMap<&str, BTreeMap<String, String>> = COMMANDS.map(|command| (command, options(root.path(), command))).into();
+    let known: BTreeMap<&str, BTreeMap<String, String>> =
+        COMMANDS.map(|command| (command, options(root.path(), command))).into();
     for (command, options) in &known {
         assert!(options.len() > 1, "dynvox {command} --help lists its options");
         for (option, text) in options {
@@ -242,14 +312,22 @@ fn every_option_is_described_and_documents_use_options_that_are_there() {
     for page in pages {
         let text = document(page);
         for line in text.split(['`', '\n', '#', '|']) {
-            let words: Vec<&str> = line.split_whitespace().skip_while(|word| *word != "dynvox").skip(1).collect();
+            let words: Vec<&str> =
+                line.split_whitespace().skip_while(|word| *word != "dynvox").skip(1).collect();
             let Some(first) = words.first() else { continue };
             let two = words.get(1).map(|second| format!("{first} {second}"));
-            let Some(options) = two.and_then(|two| known.get(two.as_str())).or_else(|| known.get(*first)) else { continue };
-            for word in words.iter().take_while(|word| **word != "--").filter(|word| word.starts_with("--")) {
+            let Some(options) =
+                two.and_then(|two| known.get(two.as_str())).or_else(|| known.get(*first))
+            else {
+                continue;
+            };
+            for word in
+                words.iter().take_while(|word| **word != "--").filter(|word| word.starts_with("--"))
+            {
                 let option = word.split(['=', ',', ')', ':', '.', ';']).next().unwrap_or_default();
                 // What follows `bench` is a run's.
-                let known = options.contains_key(option) || *first == "bench" && known["run"].contains_key(option);
+                let known = options.contains_key(option)
+                    || *first == "bench" && known["run"].contains_key(option);
                 assert!(known, "{page}: dynvox {first} has no {option}: {line}");
             }
         }

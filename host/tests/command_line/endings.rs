@@ -1,4 +1,5 @@
-//! A run always ends as a run: what stops it, what was mapped until then is there, marked as incomplete.
+//! A run always ends as a run: what stops it, what was mapped until then is there, marked as
+//! incomplete.
 
 use super::binary::{dynvox, names, output_text, rig};
 use std::fs;
@@ -41,13 +42,24 @@ fn an_unreadable_frame_ends_the_run_with_all_that_was_mapped() {
     let run = dynvox(root.path(), &[&args[..], &["part"]].concat());
     let text = output_text(&run);
     assert_eq!(run.status.code(), INCOMPLETE, "{text}");
-    assert!(text.contains("right/005.png cannot be read") && text.contains("--skip-bad-frames"), "{text}");
+    assert!(
+        text.contains("right/005.png cannot be read") && text.contains("--skip-bad-frames"),
+        "{text}"
+    );
     assert!(text.contains("What was mapped until then is in part"), "{text}");
     let part = root.path().join("part");
     assert_eq!(names(&part), names(&root.path().join("whole")), "every file is there");
     let of = summary(&part);
-    assert_eq!((&of["incomplete"]["cause"], &of["incomplete"]["frames_left"]), (&"input".into(), &3.into()), "{of}");
-    assert_eq!((&of["frames"], of["map"]["triangles"].as_u64() > Some(0)), (&5.into(), true), "{of}");
+    assert_eq!(
+        (&of["incomplete"]["cause"], &of["incomplete"]["frames_left"]),
+        (&"input".into(), &3.into()),
+        "{of}"
+    );
+    assert_eq!(
+        (&of["frames"], of["map"]["triangles"].as_u64() > Some(0)),
+        (&5.into(), true),
+        "{of}"
+    );
     assert_eq!(lines(&part.join("trajectory_kitti.txt")), 5);
     assert_eq!(digests(&part, 5), digests(&root.path().join("whole"), 5));
     assert!(summary(&root.path().join("whole"))["incomplete"].is_null());
@@ -80,7 +92,16 @@ fn a_run_of_which_no_frame_can_be_mapped_is_an_error_and_leaves_nothing() {
 /// Starts a long street, sends the signal after its first line, and waits for its end.
 #[cfg(unix)]
 fn signalled(root: &Path, signal: &str, more: &[&str]) -> (Option<i32>, String) {
-    let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", "street.frames=2000", "--profile", "tiny"];
+    let street = [
+        "--set",
+        "street.width=320",
+        "--set",
+        "street.height=96",
+        "--set",
+        "street.frames=2000",
+        "--profile",
+        "tiny",
+    ];
     let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
         .args([&["run", "--out", "result"], &street[..], more].concat())
         .current_dir(root)
@@ -107,9 +128,19 @@ fn a_signal_ends_the_run_after_its_frame() {
         let (result, of) = (root.path().join("result"), summary(&root.path().join("result")));
         let frames = of["frames"].as_u64().unwrap() as usize;
         assert!((1..2000).contains(&frames), "{frames}");
-        assert_eq!((&of["incomplete"]["cause"], of["incomplete"]["frames_left"].as_u64()), (&"signal".into(), Some(2000 - frames as u64)));
-        assert_eq!((lines(&result.join("trajectory_tum.txt")), lines(&result.join("frames.csv"))), (frames, frames + 1));
-        assert!(result.join("map.ply").is_file() && !result.join("map.blocks").exists() && !result.join("run.snapshot").exists());
+        assert_eq!(
+            (&of["incomplete"]["cause"], of["incomplete"]["frames_left"].as_u64()),
+            (&"signal".into(), Some(2000 - frames as u64))
+        );
+        assert_eq!(
+            (lines(&result.join("trajectory_tum.txt")), lines(&result.join("frames.csv"))),
+            (frames, frames + 1)
+        );
+        assert!(
+            result.join("map.ply").is_file()
+                && !result.join("map.blocks").exists()
+                && !result.join("run.snapshot").exists()
+        );
         assert_eq!(names(root.path()), ["result"]);
     }
 }
@@ -123,17 +154,36 @@ fn a_run_with_snapshots_that_was_stopped_has_its_results_and_can_be_resumed() {
     assert!(text.contains("`dynvox run --resume result` resumes the run"), "{text}");
     let result = root.path().join("result");
     let frames = summary(&result)["frames"].as_u64().unwrap() as usize;
-    assert!(["map.ply", "map.blocks", "run.snapshot", "report.html"].iter().all(|file| result.join(file).is_file()));
+    assert!(
+        ["map.ply", "map.blocks", "run.snapshot", "report.html"]
+            .iter()
+            .all(|file| result.join(file).is_file())
+    );
     let before = fs::read(result.join("frames.csv")).unwrap();
     let refused = dynvox(root.path(), &["run", "--out", "result"]);
-    assert!(output_text(&refused).contains("an interrupted run to result has a snapshot"), "{}", output_text(&refused));
-    let run = dynvox(root.path(), &["run", "--resume", "result", "--quiet", "--rss-limit-mib", "1"]);
+    assert!(
+        output_text(&refused).contains("an interrupted run to result has a snapshot"),
+        "{}",
+        output_text(&refused)
+    );
+    let run =
+        dynvox(root.path(), &["run", "--resume", "result", "--quiet", "--rss-limit-mib", "1"]);
     assert_eq!(run.status.code(), INCOMPLETE, "{}", output_text(&run));
     let of = summary(&result);
-    assert_eq!((&of["frames"], &of["incomplete"]["cause"]), (&(frames + 1).into(), &"memory".into()), "one frame further");
+    assert_eq!(
+        (&of["frames"], &of["incomplete"]["cause"]),
+        (&(frames + 1).into(), &"memory".into()),
+        "one frame further"
+    );
     let after = fs::read_to_string(result.join("frames.csv")).unwrap();
     let known = String::from_utf8(before).unwrap();
-    assert!(known.lines().zip(after.lines()).skip(1).all(|(a, b)| a.split(',').nth(2) == b.split(',').nth(2)));
+    assert!(
+        known
+            .lines()
+            .zip(after.lines())
+            .skip(1)
+            .all(|(a, b)| a.split(',').nth(2) == b.split(',').nth(2))
+    );
     assert_eq!(names(root.path()), ["result"]);
 }
 
@@ -151,8 +201,17 @@ fn a_file_size_limit_in_place_of_a_full_disk_loses_the_map_and_nothing_else() {
     let text = output_text(&run);
     assert_eq!(run.status.code(), INCOMPLETE, "{text}");
     let of = summary(&root.path().join("result"));
-    assert_eq!((&of["incomplete"]["cause"], &of["incomplete"]["missing"][0]), (&"disk".into(), &"map.ply".into()), "{of}");
+    assert_eq!(
+        (&of["incomplete"]["cause"], &of["incomplete"]["missing"][0]),
+        (&"disk".into(), &"map.ply".into()),
+        "{of}"
+    );
     assert_eq!(lines(&root.path().join("result/trajectory_kitti.txt")), 12);
     let files = names(&root.path().join("result"));
-    assert!(!files.iter().any(|name| name.ends_with(".faces") || name == "map.ply" || name == ".reserve"), "{files:?}");
+    assert!(
+        !files
+            .iter()
+            .any(|name| name.ends_with(".faces") || name == "map.ply" || name == ".reserve"),
+        "{files:?}"
+    );
 }

@@ -6,8 +6,18 @@ use tempfile::TempDir;
 /// What the report says of one fault from frame 8 on, in 18 frames of a small street.
 fn outcome(fault: &str) -> serde_json::Value {
     let root = TempDir::new().unwrap();
-    let of_faults = ["evaluate", "faults", "--json", "--at", "8", "--frames", "18", "--fault", fault, "--"];
-    let of_run = ["--profile", "small", "--instances", "none", "--set", "street.width=416", "--set", "street.height=128"];
+    let of_faults =
+        ["evaluate", "faults", "--json", "--at", "8", "--frames", "18", "--fault", fault, "--"];
+    let of_run = [
+        "--profile",
+        "small",
+        "--instances",
+        "none",
+        "--set",
+        "street.width=416",
+        "--set",
+        "street.height=128",
+    ];
     let run = dynvox(root.path(), &[&of_faults[..], &of_run].concat());
     assert!(run.status.success(), "{fault}: {}", output_text(&run));
     serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()[0].clone()
@@ -18,7 +28,11 @@ fn outcome(fault: &str) -> serde_json::Value {
 fn after_blind_frames_the_camera_is_found_again() {
     for fault in ["black@8..11", "noise=60@8..11", "exchange@8", "occlude:left=0.95@8..11"] {
         let of = outcome(fault);
-        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+        assert_eq!(
+            (of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()),
+            (Some(0), Some(0)),
+            "{of}"
+        );
         assert!(of["held"].as_u64() > Some(0) && of["unreported_m"].as_f64() < Some(0.15), "{of}");
     }
 }
@@ -28,7 +42,11 @@ fn after_blind_frames_the_camera_is_found_again() {
 fn images_that_both_repeat_while_the_camera_moves_are_old() {
     for fault in ["freeze@8..12", "duplicate@8..10"] {
         let of = outcome(fault);
-        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+        assert_eq!(
+            (of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()),
+            (Some(0), Some(0)),
+            "{of}"
+        );
         assert!(of["held"].as_u64() > Some(0), "{of}");
     }
 }
@@ -36,7 +54,10 @@ fn images_that_both_repeat_while_the_camera_moves_are_old() {
 #[test]
 fn a_camera_a_frame_late_is_noticed() {
     let of = outcome("delay:left@8..");
-    assert!(of["unreported_frames"].as_u64() <= Some(1) && of["map_affected"].as_u64() >= Some(8), "{of}");
+    assert!(
+        of["unreported_frames"].as_u64() <= Some(1) && of["map_affected"].as_u64() >= Some(8),
+        "{of}"
+    );
 }
 
 /// As docs/faults.md has it.
@@ -44,11 +65,26 @@ fn a_camera_a_frame_late_is_noticed() {
 #[test]
 fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {
     let root = TempDir::new().unwrap();
-    let run = dynvox(root.path(), &["evaluate", "faults", "--json", "--fault", "delay:right@20..", "--fault", "delay:left@20.."]);
+    let run = dynvox(
+        root.path(),
+        &[
+            "evaluate",
+            "faults",
+            "--json",
+            "--fault",
+            "delay:right@20..",
+            "--fault",
+            "delay:left@20..",
+        ],
+    );
     assert!(run.status.success(), "{}", output_text(&run));
     let table = serde_json::from_slice::<Vec<serde_json::Value>>(&run.stdout).unwrap();
     for of in &table {
-        assert_eq!((of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()), (Some(0), Some(0)), "{of}");
+        assert_eq!(
+            (of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()),
+            (Some(0), Some(0)),
+            "{of}"
+        );
     }
     assert_eq!(table.len(), 2);
 }
@@ -67,9 +103,32 @@ fn a_frozen_camera_and_a_jump_are_not_taken_for_motion() {
 fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
     let root = TempDir::new().unwrap();
     super::binary::rig(root.path(), 4);
-    let run =
-        dynvox(root.path(), &["evaluate", "faults", "--at", "2", "--frames", "4", "--fault", "black@2", "--", "rig", "--profile", "tiny"]);
-    assert!(!run.status.success() && output_text(&run).contains("has no true poses"), "{}", output_text(&run));
+    let run = dynvox(
+        root.path(),
+        &[
+            "evaluate",
+            "faults",
+            "--at",
+            "2",
+            "--frames",
+            "4",
+            "--fault",
+            "black@2",
+            "--",
+            "rig",
+            "--profile",
+            "tiny",
+        ],
+    );
+    assert!(
+        !run.status.success() && output_text(&run).contains("has no true poses"),
+        "{}",
+        output_text(&run)
+    );
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--faults", "melt@3"]);
-    assert!(run.status.code() == Some(2) && output_text(&run).contains("there is no fault melt"), "{}", output_text(&run));
+    assert!(
+        run.status.code() == Some(2) && output_text(&run).contains("there is no fault melt"),
+        "{}",
+        output_text(&run)
+    );
 }

@@ -10,7 +10,11 @@ use tempfile::TempDir;
 fn pinned() -> TempDir {
     let root = TempDir::new().unwrap();
     let size = ["--set", "street.width=320", "--set", "street.height=96"];
-    assert!(dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "8"], &size[..]].concat()).status.success());
+    assert!(
+        dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "8"], &size[..]].concat())
+            .status
+            .success()
+    );
     let made = dynvox(
         root.path(),
         &[
@@ -50,35 +54,71 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
     let root = root.path();
     assert_eq!(
         names(&root.join("pinned")),
-        ["blessings.txt", "calib.txt", "digests.txt", "fixture.toml", "instances", "left", "right", "settings.toml"]
+        [
+            "blessings.txt",
+            "calib.txt",
+            "digests.txt",
+            "fixture.toml",
+            "instances",
+            "left",
+            "right",
+            "settings.toml"
+        ]
     );
-    assert_eq!((names(&root.join("pinned/left")).len(), names(root)), (6, vec!["pinned".to_owned(), "street".to_owned()]));
+    assert_eq!(
+        (names(&root.join("pinned/left")).len(), names(root)),
+        (6, vec!["pinned".to_owned(), "street".to_owned()])
+    );
     let verified = dynvox(root, &["fixtures", "verify", "pinned", "--junit", "report.xml"]);
-    assert!(verified.status.success() && printed(&verified).contains("pinned: 6 frames, all digests equal"), "{}", output_text(&verified));
-    assert!(fs::read_to_string(root.join("report.xml")).unwrap().contains("tests=\"6\" failures=\"0\""));
+    assert!(
+        verified.status.success()
+            && printed(&verified).contains("pinned: 6 frames, all digests equal"),
+        "{}",
+        output_text(&verified)
+    );
+    assert!(
+        fs::read_to_string(root.join("report.xml")).unwrap().contains("tests=\"6\" failures=\"0\"")
+    );
 
     change_a_pixel(&root.join("pinned/right/000003.png"));
     let golden = fs::read(root.join("pinned/digests.txt")).unwrap();
-    let verified = dynvox(root, &["fixtures", "verify", "pinned", "--json", "--junit", "report.xml"]);
+    let verified =
+        dynvox(root, &["fixtures", "verify", "pinned", "--json", "--junit", "report.xml"]);
     assert_eq!(verified.status.code(), Some(1));
-    assert!(output_text(&verified).contains("dynvox fixtures bless pinned --reason"), "{}", output_text(&verified));
+    assert!(
+        output_text(&verified).contains("dynvox fixtures bless pinned --reason"),
+        "{}",
+        output_text(&verified)
+    );
     let verdicts: serde_json::Value = serde_json::from_slice(&verified.stdout).unwrap();
     let differences = &verdicts[0]["differences"];
-    assert_eq!((&differences[0]["frame"], &differences[0]["columns"][0]), (&3.into(), &"input".into()), "{verdicts}");
+    assert_eq!(
+        (&differences[0]["frame"], &differences[0]["columns"][0]),
+        (&3.into(), &"input".into()),
+        "{verdicts}"
+    );
     let report = fs::read_to_string(root.join("report.xml")).unwrap();
-    assert!(report.contains("name=\"frame 3\"><failure message=\"digests differ: input"), "{report}");
+    assert!(
+        report.contains("name=\"frame 3\"><failure message=\"digests differ: input"),
+        "{report}"
+    );
     let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run", "--json"]);
     let dry: serde_json::Value = serde_json::from_slice(&dry.stdout).unwrap();
     assert!(!dry[0]["differences"].as_array().unwrap().is_empty(), "{dry}");
     let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run"]);
-    assert!(dry.status.success() && printed(&dry).contains("first divergence: frame 3, input"), "{}", printed(&dry));
+    assert!(
+        dry.status.success() && printed(&dry).contains("first divergence: frame 3, input"),
+        "{}",
+        printed(&dry)
+    );
     assert!(fs::read(root.join("pinned/digests.txt")).unwrap() == golden, "nothing is written");
     let blessed = dynvox(root, &["fixtures", "bless", "pinned", "--reason", "another sensor"]);
     assert!(blessed.status.success(), "{}", output_text(&blessed));
     assert!(dynvox(root, &["fixtures", "verify", "pinned"]).status.success());
     let log = fs::read_to_string(root.join("pinned/blessings.txt")).unwrap();
     assert!(
-        log.lines().next().unwrap().ends_with("Made of kitti-odometry-00, frames 1 to 6") && log.ends_with(" another sensor\n"),
+        log.lines().next().unwrap().ends_with("Made of kitti-odometry-00, frames 1 to 6")
+            && log.ends_with(" another sensor\n"),
         "{log}"
     );
 }
@@ -86,10 +126,18 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
 #[test]
 fn bounds_and_settings_are_packed_as_rust_beside_the_clip() {
     let root = pinned();
-    let packed = dynvox(root.path(), &["fixtures", "pack", "pinned", "--out", "clip.bin", "--rust", "clip.rs"]);
+    let packed = dynvox(
+        root.path(),
+        &["fixtures", "pack", "pinned", "--out", "clip.bin", "--rust", "clip.rs"],
+    );
     assert!(packed.status.success(), "{}", output_text(&packed));
     let text = fs::read_to_string(root.path().join("clip.rs")).unwrap();
-    for line in ["image_width: 320,", "image_height: 96,", "voxel_size_m: 0.1,", "pub const CAPACITY: Capacity = Capacity {"] {
+    for line in [
+        "image_width: 320,",
+        "image_height: 96,",
+        "voxel_size_m: 0.1,",
+        "pub const CAPACITY: Capacity = Capacity {",
+    ] {
         assert!(text.contains(line), "{line} in {text}");
     }
     let clip = fs::read(root.path().join("clip.bin")).unwrap();
@@ -113,10 +161,19 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     verify("objects.voxel_sise_m = 0.05: there is no such setting");
     fs::write(&settings, &text).unwrap();
     let bounds = fs::read_to_string(root.join("pinned/fixture.toml")).unwrap();
-    fs::write(root.join("pinned/fixture.toml"), bounds.replace("image_height = 96", "image_height = 64")).unwrap();
+    fs::write(
+        root.join("pinned/fixture.toml"),
+        bounds.replace("image_height = 96", "image_height = 64"),
+    )
+    .unwrap();
     verify("its bounds do not hold images of 320 x 96 px");
     let again = dynvox(root, &["fixtures", "new", "pinned", "--from", "street"]);
     assert!(output_text(&again).contains("pinned exists"), "{}", output_text(&again));
-    let refused = dynvox(root, &["fixtures", "new", "other", "--from", "street", "--memory", "1MiB"]);
-    assert!(output_text(&refused).contains("the least that works is") && !root.join("other").exists(), "{}", output_text(&refused));
+    let refused =
+        dynvox(root, &["fixtures", "new", "other", "--from", "street", "--memory", "1MiB"]);
+    assert!(
+        output_text(&refused).contains("the least that works is") && !root.join("other").exists(),
+        "{}",
+        output_text(&refused)
+    );
 }

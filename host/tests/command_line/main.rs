@@ -1,4 +1,5 @@
-//! The binary as a user meets it, in one program that is compiled once: `cargo test -p dynvox --test command_line fleet::` runs one part.
+//! The binary as a user meets it, in one program that is compiled once:
+//! `cargo test -p dynvox --test command_line fleet::` runs one part.
 #![allow(missing_docs)]
 
 mod bags;

@@ -1,4 +1,5 @@
-//! A run that was killed or failed resumes after its last snapshot, identical to an uninterrupted one; another run is refused by name.
+//! A run that was killed or failed resumes after its last snapshot, identical to an uninterrupted
+//! one; another run is refused by name.
 
 use super::binary::{dynvox, names, output_text, rig};
 use super::same_run::{assert_same, summary};
@@ -40,11 +41,16 @@ fn killed_at(folder: &Path, args: &[&str], line: &str) {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    let output_text =
-        BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap).find(|output_text| output_text.starts_with(line));
+    let output_text = BufReader::new(run.stderr.take().unwrap())
+        .lines()
+        .map(Result::unwrap)
+        .find(|output_text| output_text.starts_with(line));
     // SIGKILL: the run cannot clean up.
     run.kill().unwrap();
-    assert!(!run.wait().unwrap().success() && output_text.is_some(), "the run printed the line and was killed");
+    assert!(
+        !run.wait().unwrap().success() && output_text.is_some(),
+        "the run printed the line and was killed"
+    );
 }
 
 #[test]
@@ -52,7 +58,11 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
     let root = TempDir::new().unwrap();
     let street = |out: &'static str, more: &[&'static str]| [&STREET[..], &[out], more].concat();
     assert!(dynvox(root.path(), &street("whole", &["--quiet", "--threads", "1"])).status.success());
-    killed_at(root.path(), &street("stopped", &["--snapshot-every", "4", "--threads", "2"]), "frame 9/24");
+    killed_at(
+        root.path(),
+        &street("stopped", &["--snapshot-every", "4", "--threads", "2"]),
+        "frame 9/24",
+    );
     assert!(!root.path().join("stopped").exists(), "not before the run is complete");
     // What a kill in the middle of writing leaves.
     let partial = root.path().join(".stopped.partial");
@@ -67,7 +77,9 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
         .and_then(|mut file| std::io::Write::write_all(&mut file, &[7; 99]))
         .unwrap();
     // Rows that came after it, the last one torn.
-    for table in ["blocks.csv", "frames.csv", "tracks.csv", "trajectory_kitti.txt", "trajectory_tum.txt"] {
+    for table in
+        ["blocks.csv", "frames.csv", "tracks.csv", "trajectory_kitti.txt", "trajectory_tum.txt"]
+    {
         let file = fs::OpenOptions::new().append(true).open(partial.join(table));
         file.and_then(|mut file| std::io::Write::write_all(&mut file, b"8,0.8\n9,0.")).unwrap();
     }
@@ -78,10 +90,16 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
     killed_at(&elsewhere, &["run", "--resume", "../stopped", "--threads", "1"], "frame 24/24");
     let last = dynvox(root.path(), &["run", "--resume", "stopped", "--json"]);
     assert!(last.status.success(), "{}", output_text(&last));
-    assert!(serde_json::from_slice::<serde_json::Value>(&last.stdout).is_ok() && output_text(&last).is_empty());
+    assert!(
+        serde_json::from_slice::<serde_json::Value>(&last.stdout).is_ok()
+            && output_text(&last).is_empty()
+    );
     assert_eq!(names(root.path()), ["elsewhere", "stopped", "whole"]);
     let of = summary(&root.path().join("whole"));
-    assert!(of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2, "{of}");
+    assert!(
+        of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2,
+        "{of}"
+    );
     assert!(!names(&root.path().join("whole/objects")).is_empty());
     // The number of threads is that of the last resumption.
     let path = root.path().join("stopped/summary.json");
@@ -95,12 +113,37 @@ fn stopped() -> TempDir {
     let root = TempDir::new().unwrap();
     rig(root.path(), 8);
     fs::write(root.path().join("settings.toml"), "[volume]\nvoxel_size_m = 0.08\n").unwrap();
-    let whole = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "whole"]);
+    let whole = dynvox(
+        root.path(),
+        &[
+            "run",
+            "rig",
+            "--profile",
+            "tiny",
+            "--config",
+            "settings.toml",
+            "--quiet",
+            "--out",
+            "whole",
+        ],
+    );
     assert!(whole.status.success(), "{}", output_text(&whole));
     let image = root.path().join("rig/left/005.png");
     fs::rename(&image, root.path().join("005.png")).unwrap();
     GrayImage::new(50, 50).save(&image).unwrap();
-    let args = ["run", "rig", "--profile", "tiny", "--config", "settings.toml", "--quiet", "--out", "out/it", "--snapshot-every", "2"];
+    let args = [
+        "run",
+        "rig",
+        "--profile",
+        "tiny",
+        "--config",
+        "settings.toml",
+        "--quiet",
+        "--out",
+        "out/it",
+        "--snapshot-every",
+        "2",
+    ];
     let run = dynvox(root.path(), &args);
     assert_eq!(run.status.code(), Some(4));
     assert!(
@@ -113,7 +156,9 @@ fn stopped() -> TempDir {
     assert_eq!(names(&root.path().join("out")), ["it"]);
     let files = names(&root.path().join("out/it"));
     assert!(
-        ["map.blocks", "map.ply", "run.snapshot", "summary.json"].iter().all(|name| files.iter().any(|file| file == name)),
+        ["map.blocks", "map.ply", "run.snapshot", "summary.json"]
+            .iter()
+            .all(|name| files.iter().any(|file| file == name)),
         "{files:?}"
     );
     root
@@ -123,12 +168,20 @@ fn stopped() -> TempDir {
 fn a_run_that_failed_resumes_when_the_cause_is_repaired() {
     let root = stopped();
     let again = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "out/it"]);
-    assert!(output_text(&again).contains("an interrupted run to out/it has a snapshot"), "{}", output_text(&again));
+    assert!(
+        output_text(&again).contains("an interrupted run to out/it has a snapshot"),
+        "{}",
+        output_text(&again)
+    );
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_same(root.path(), "whole", "out/it");
     let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
-    assert!(output_text(&twice).contains("it has no snapshot: it is complete"), "{}", output_text(&twice));
+    assert!(
+        output_text(&twice).contains("it has no snapshot: it is complete"),
+        "{}",
+        output_text(&twice)
+    );
 }
 
 /// Resuming the run of [`stopped`] is refused with a sentence and changes nothing.
@@ -137,7 +190,11 @@ fn assert_refused(root: &TempDir, sentence: &str) {
     let before = fs::read(&snapshot).unwrap();
     let run = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     assert_eq!(run.status.code(), Some(1));
-    assert!(output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
+    assert!(
+        output_text(&run).starts_with("error: ") && output_text(&run).contains(sentence),
+        "{sentence}: {}",
+        output_text(&run)
+    );
     assert_eq!(names(&root.path().join("out")), ["it"]);
     assert!(fs::read(&snapshot).unwrap() == before);
 }
@@ -164,7 +221,8 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     let snapshot = "out/it/run.snapshot";
     let whole = fs::read(path(snapshot)).unwrap();
     fs::remove_file(path("out/it/run.snapshot.previous")).unwrap();
-    let refused = |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
+    let refused =
+        |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
     let changed = |at: usize, byte: u8| {
         let mut bytes = whole.clone();
         bytes[at] = byte;
@@ -181,15 +239,30 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     fs::rename(&blocks, path("blocks")).unwrap();
     assert_refused(&root, "map.blocks is missing");
     fs::rename(path("blocks"), &blocks).unwrap();
-    assert_refused_with(&root, "out/it/map.blocks", b"dynvox", "map.blocks is not as the run left it");
+    assert_refused_with(
+        &root,
+        "out/it/map.blocks",
+        b"dynvox",
+        "map.blocks is not as the run left it",
+    );
     for table in ["frames.csv", "tracks.csv", "trajectory_tum.txt"] {
         let known = fs::read(path(&format!("out/it/{table}"))).unwrap();
         if known.is_empty() {
             continue;
         }
         let sentence = format!("{table} is not as the run left it");
-        assert_refused_with(&root, &format!("out/it/{table}"), &known[..known.len() / 2], &sentence);
-        assert_refused_with(&root, &format!("out/it/{table}"), &[b"#", &known[1..]].concat(), &sentence);
+        assert_refused_with(
+            &root,
+            &format!("out/it/{table}"),
+            &known[..known.len() / 2],
+            &sentence,
+        );
+        assert_refused_with(
+            &root,
+            &format!("out/it/{table}"),
+            &[b"#", &known[1..]].concat(),
+            &sentence,
+        );
     }
     assert_resumes(&root);
 }
@@ -203,7 +276,9 @@ fn a_run_whose_last_snapshot_is_damaged_resumes_from_the_one_before() {
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     let text = output_text(&resumed);
     assert!(
-        resumed.status.success() && text.contains("run.snapshot is damaged") && text.contains("The snapshot before it is taken"),
+        resumed.status.success()
+            && text.contains("run.snapshot is damaged")
+            && text.contains("The snapshot before it is taken"),
         "{text}"
     );
     assert_same(root.path(), "whole", "out/it");
@@ -213,14 +288,23 @@ fn a_run_whose_last_snapshot_is_damaged_resumes_from_the_one_before() {
 #[test]
 fn objects_written_before_a_snapshot_are_checked() {
     let root = TempDir::new().unwrap();
-    killed_at(root.path(), &[&STREET[..], &["stopped", "--snapshot-every", "4", "--threads", "2"]].concat(), "frame 24/24");
+    killed_at(
+        root.path(),
+        &[&STREET[..], &["stopped", "--snapshot-every", "4", "--threads", "2"]].concat(),
+        "frame 24/24",
+    );
     let objects = root.path().join(".stopped.partial/objects");
-    let meshes: Vec<_> = names(&objects).into_iter().filter(|name| name.ends_with(".ply")).collect();
+    let meshes: Vec<_> =
+        names(&objects).into_iter().filter(|name| name.ends_with(".ply")).collect();
     let first = objects.join(meshes.first().expect("an object has left"));
     let whole = fs::read(&first).unwrap();
     let refused = |sentence: &str| {
         let run = dynvox(root.path(), &["run", "--resume", "stopped", "--quiet"]);
-        assert!(run.status.code() == Some(1) && output_text(&run).contains(sentence), "{sentence}: {}", output_text(&run));
+        assert!(
+            run.status.code() == Some(1) && output_text(&run).contains(sentence),
+            "{sentence}: {}",
+            output_text(&run)
+        );
     };
     fs::remove_file(&first).unwrap();
     refused("is not as the run left it: it is missing");
@@ -235,13 +319,25 @@ fn objects_written_before_a_snapshot_are_checked() {
 fn another_run_or_a_changed_data_set_is_refused_by_name() {
     let root = stopped();
     let path = |name: &str| root.path().join(name);
-    assert_refused_with(&root, "settings.toml", b"[volume]\nvoxel_size_m = 0.09\n", "volume.voxel_size_m was 0.08 and is 0.09");
-    let calibration = fs::read_to_string(path("rig/calib.txt")).unwrap().replace("baseline_m 0.5", "baseline_m 0.6");
+    assert_refused_with(
+        &root,
+        "settings.toml",
+        b"[volume]\nvoxel_size_m = 0.09\n",
+        "volume.voxel_size_m was 0.08 and is 0.09",
+    );
+    let calibration = fs::read_to_string(path("rig/calib.txt"))
+        .unwrap()
+        .replace("baseline_m 0.5", "baseline_m 0.6");
     assert_refused_with(&root, "rig/calib.txt", calibration.as_bytes(), "the data set's rig was ");
     let mut pixels = image::open(path("rig/right/004.png")).unwrap().into_luma8();
     pixels.get_pixel_mut(80, 40).0[0] ^= 1;
     pixels.save(path("other.png")).unwrap();
-    assert_refused_with(&root, "rig/right/004.png", &fs::read(path("other.png")).unwrap(), "frame 4 of the data set has changed");
+    assert_refused_with(
+        &root,
+        "rig/right/004.png",
+        &fs::read(path("other.png")).unwrap(),
+        "frame 4 of the data set has changed",
+    );
     let [last, away] = ["rig/left/007.png", "away.png"].map(path);
     fs::rename(&last, &away).unwrap();
     fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
@@ -255,7 +351,11 @@ fn another_run_or_a_changed_data_set_is_refused_by_name() {
         (vec!["run", "--snapshot-every", "9", "--evaluate", "exact"], "cannot be used with"),
     ] {
         let run = dynvox(root.path(), &args);
-        assert!(!run.status.success() && output_text(&run).contains(sentence), "{args:?}: {}", output_text(&run));
+        assert!(
+            !run.status.success() && output_text(&run).contains(sentence),
+            "{args:?}: {}",
+            output_text(&run)
+        );
     }
     assert_resumes(&root);
 }
@@ -263,7 +363,21 @@ fn another_run_or_a_changed_data_set_is_refused_by_name() {
 #[test]
 fn a_stopped_run_is_replaced_with_overwrite() {
     let root = stopped();
-    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--quiet", "--frames", "2", "--out", "out/it", "--overwrite"]);
+    let run = dynvox(
+        root.path(),
+        &[
+            "run",
+            "rig",
+            "--profile",
+            "tiny",
+            "--quiet",
+            "--frames",
+            "2",
+            "--out",
+            "out/it",
+            "--overwrite",
+        ],
+    );
     assert!(run.status.success(), "{}", output_text(&run));
     assert_eq!(names(&root.path().join("out")), ["it"]);
     assert!(!names(&root.path().join("out/it")).contains(&"run.snapshot".to_owned()));

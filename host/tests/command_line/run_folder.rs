@@ -28,13 +28,22 @@ const PICTURES: usize = 6;
 impl FakeRun {
     pub fn write(&self, folder: &Path) {
         fs::write(folder.join("summary.json"), "{\"dataset\": \"floor\"}").unwrap();
-        let (mut frames, mut poses, mut tracks) = (String::from("frame,time_s,step_ms,blocks_used\n"), String::new(), track_header());
+        let (mut frames, mut poses, mut tracks) =
+            (String::from("frame,time_s,step_ms,blocks_used\n"), String::new(), track_header());
         for at in 0..self.frames {
             writeln!(frames, "{},{},{},{}", 2 * at, 0.2 * at as f64, 9 + at % 3, 100 + at).unwrap();
-            writeln!(poses, "{}", row(&Transform::from_translation([0.0, 0.0, self.z_m(at)]))).unwrap();
+            writeln!(poses, "{}", row(&Transform::from_translation([0.0, 0.0, self.z_m(at)])))
+                .unwrap();
             for id in (1..=self.objects.min(8)).filter(|&id| self.is_seen(id, at)) {
                 let state = ["static", "dynamic"][id % 2];
-                writeln!(tracks, "{},{id},car,{state},1.5,0.1,{},10,{},30,0.9,20,18,1,5", 2 * at, 4 * id, 4 * id + 20).unwrap();
+                writeln!(
+                    tracks,
+                    "{},{id},car,{state},1.5,0.1,{},10,{},30,0.9,20,18,1,5",
+                    2 * at,
+                    4 * id,
+                    4 * id + 20
+                )
+                .unwrap();
             }
         }
         fs::write(folder.join("frames.csv"), frames).unwrap();
@@ -68,14 +77,17 @@ impl FakeRun {
                 weight: 1 + (z % 50) as u8,
             }
         };
-        for (x, z) in (0..self.squares * self.squares).map(|at| (at % self.squares, at / self.squares)) {
+        for (x, z) in
+            (0..self.squares * self.squares).map(|at| (at % self.squares, at / self.squares))
+        {
             ply.triangle([corner(x, z), corner(x, z + 1), corner(x + 1, z)]);
             ply.triangle([corner(x + 1, z), corner(x, z + 1), corner(x + 1, z + 1)]);
         }
         ply.finish().unwrap();
     }
 
-    /// The blocks of the floor, two more that pruning took, and two places that were compared with a reference, and a planner's window.
+    /// The blocks of the floor, two more that pruning took, and two places that were compared with
+    /// a reference, and a planner's window.
     fn write_blocks(&self, folder: &Path) {
         fs::write(folder.join("config.toml"), "[volume]\nvoxel_size_m = 0.1\n").unwrap();
         let mut rows = String::from("x,y,z,last_frame,fate\n");
@@ -102,28 +114,36 @@ impl FakeRun {
             let position_m = [0, 1, 2].map(|axis| (bits >> axis & 1) as f32);
             Vertex { position_m, colour: [200, 200, 40], weight: 0 }
         };
-        for side in [[0, 2, 1, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 4, 2, 6], [1, 3, 5, 7]] {
+        for side in
+            [[0, 2, 1, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 6, 3, 7], [0, 4, 2, 6], [1, 3, 5, 7]]
+        {
             let [a, b, c, d] = side.map(corner);
             ply.triangle([a, b, c]);
             ply.triangle([b, d, c]);
         }
         ply.finish().unwrap();
         let x = (id % 8) as f64 - 3.0;
-        let pose = |at: usize| Transform::from_translation([x, 0.6, 4.0 + (id / 8) as f64 + self.z_m(at)]);
-        let rows = (0..self.frames).filter(|&at| self.is_seen(id, at)).map(|at| format!("{} {}\n", 2 * at, row(&pose(at))));
+        let pose =
+            |at: usize| Transform::from_translation([x, 0.6, 4.0 + (id / 8) as f64 + self.z_m(at)]);
+        let rows = (0..self.frames)
+            .filter(|&at| self.is_seen(id, at))
+            .map(|at| format!("{} {}\n", 2 * at, row(&pose(at))));
         fs::write(folder.join(format!("{id}_kitti.txt")), rows.collect::<String>()).unwrap();
     }
 
     fn write_pictures(&self, folder: &Path) {
         fs::create_dir_all(folder).unwrap();
         let every = self.frames.div_ceil(PICTURES);
-        let mut numbers: Vec<usize> = (0..self.frames).step_by(every).chain([self.frames - 1]).map(|at| 2 * at).collect();
+        let mut numbers: Vec<usize> =
+            (0..self.frames).step_by(every).chain([self.frames - 1]).map(|at| 2 * at).collect();
         numbers.dedup();
-        let picture = |shade: usize| RgbImage::from_fn(64, 32, |u, v| Rgb([u as u8 * 3, v as u8 * 7, shade as u8]));
+        let picture = |shade: usize| {
+            RgbImage::from_fn(64, 32, |u, v| Rgb([u as u8 * 3, v as u8 * 7, shade as u8]))
+        };
         for &number in &numbers {
-            ["left", "disparity", "map"]
-                .iter()
-                .for_each(|name| picture(number).save(folder.join(format!("{number:06}_{name}.jpg"))).unwrap());
+            ["left", "disparity", "map"].iter().for_each(|name| {
+                picture(number).save(folder.join(format!("{number:06}_{name}.jpg"))).unwrap()
+            });
         }
         picture(99).save(folder.join("overview.jpg")).unwrap();
         let index = serde_json::json!({ "width": 128, "height": 64, "frames": numbers });
@@ -140,7 +160,9 @@ fn write_planning(folder: &Path) {
         "distance_zero": 32768, "distance_unit_m": 0.01,
     });
     fs::write(folder.join("window.json"), window.to_string()).unwrap();
-    GrayImage::from_fn(8, 8, |u, _| Luma([if u == 0 { 0 } else { 254 }])).save(folder.join("map.pgm")).unwrap();
+    GrayImage::from_fn(8, 8, |u, _| Luma([if u == 0 { 0 } else { 254 }]))
+        .save(folder.join("map.pgm"))
+        .unwrap();
     let numbers = |of: fn(u32) -> u16| ImageBuffer::from_fn(8, 8, |u, _| Luma([of(u)]));
     numbers(|_| 0).save(folder.join("height.png")).unwrap();
     numbers(|u| (32_758 + 20 * u) as u16).save(folder.join("distance.png")).unwrap();

@@ -22,7 +22,8 @@ fn rows(folder: &Path) -> Vec<String> {
 
 /// The summary without times.
 pub fn summary(folder: &Path) -> serde_json::Value {
-    let mut summary: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let mut summary: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
     for key in ["seconds", "fps", "stages", "rss_peak_bytes"] {
         assert!(!summary[key].is_null());
         summary[key] = serde_json::Value::Null;
@@ -41,7 +42,10 @@ pub fn assert_same(root: &Path, whole: &str, resumed: &str) {
     let of_the_machine = ["frames.csv", "summary.json", "report.html"];
     let same_files = |a: &Path, b: &Path| {
         assert_eq!(names(a), names(b));
-        for name in names(a).iter().filter(|name| !of_the_machine.contains(&name.as_str()) && a.join(name).is_file()) {
+        for name in names(a)
+            .iter()
+            .filter(|name| !of_the_machine.contains(&name.as_str()) && a.join(name).is_file())
+        {
             assert!(fs::read(a.join(name)).unwrap() == fs::read(b.join(name)).unwrap(), "{name}");
         }
     };

@@ -62,14 +62,22 @@ const SMALL_SWEEP: [&str; 21] = [
 /// The results in a sweep's folder, by name.
 fn results(folder: &Path) -> Vec<PathBuf> {
     let list = fs::read_dir(folder.join("runs")).into_iter().flatten().flatten();
-    let mut paths: Vec<_> = list.map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|ending| ending == "json")).collect();
+    let mut paths: Vec<_> = list
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "json"))
+        .collect();
     paths.sort();
     paths
 }
 
 /// Begins a sweep in folder `out` of `root` and kills it once `count` results are there.
 fn kill_after_results(root: &Path, args: &[&str], out: &str, count: usize) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).arg(out).current_dir(root).spawn().unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dynvox"))
+        .args(args)
+        .arg(out)
+        .current_dir(root)
+        .spawn()
+        .unwrap();
     while results(&root.join(out)).len() < count && child.try_wait().unwrap().is_none() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
@@ -94,7 +102,10 @@ fn a_killed_sweep_does_not_repeat_what_was_done() {
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
     assert_eq!(results(&root.path().join("cut")).len(), 3, "three weights");
-    assert_eq!(names(&root.path().join("cut")), ["plan.json", "prune-weight.csv", "report.html", "runs"]);
+    assert_eq!(
+        names(&root.path().join("cut")),
+        ["plan.json", "prune-weight.csv", "report.html", "runs"]
+    );
 }
 
 #[test]
@@ -112,7 +123,8 @@ fn shares_of_a_sweep_are_merged_to_the_tables_of_the_whole() {
         assert_eq!(results(&root.path().join(machine)).len(), 1);
     }
     done(&["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
-    let [whole, alone] = ["whole", "alone"].map(|out| fs::read_to_string(root.path().join(out).join("prune-weight.csv")).unwrap());
+    let [whole, alone] = ["whole", "alone"]
+        .map(|out| fs::read_to_string(root.path().join(out).join("prune-weight.csv")).unwrap());
     assert_eq!((whole.lines().count(), whole), (3, alone));
 }
 
@@ -129,18 +141,34 @@ fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_eq!(before.iter().map(made).collect::<Vec<_>>(), kept, "finished runs are not repeated");
     assert_eq!(results("cut").len(), 7, "two late, two scales, tracker, no objects and motion");
-    assert_eq!(names(&root.path().join("cut")), ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]);
-    assert!(names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")), "only its result stays of a run");
+    assert_eq!(
+        names(&root.path().join("cut")),
+        ["methods.csv", "plan.json", "prune-weight.csv", "report.html", "runs", "scale.csv"]
+    );
+    assert!(
+        names(&root.path().join("cut/runs")).iter().all(|name| name.ends_with(".json")),
+        "only its result stays of a run"
+    );
     for (machine, share) in [("1", "0/2"), ("2", "1/2")] {
         let planned = dynvox(root.path(), &[&SWEEP[..], &[machine, "--plan"]].concat());
-        assert!(planned.stdout.starts_with(b"7 jobs in ") && results(machine).is_empty(), "{}", output_text(&planned));
+        assert!(
+            planned.stdout.starts_with(b"7 jobs in ") && results(machine).is_empty(),
+            "{}",
+            output_text(&planned)
+        );
         let run = dynvox(root.path(), &["fleet", "run", machine, "--shard", share]);
         assert!(run.status.success() && results(machine).len() >= 3, "{}", output_text(&run));
         let again = dynvox(root.path(), &["fleet", "run", machine, "--shard", share]);
         assert!(again.status.success() && again.stdout.is_empty(), "what is done is left alone");
-        let status: serde_json::Value =
-            serde_json::from_slice(&dynvox(root.path(), &["fleet", "status", machine, "--json"]).stdout).unwrap();
-        let done = status.as_array().unwrap().iter().filter(|job| job["state"] == "done" && job["bytes"].as_u64() > Some(1 << 20));
+        let status: serde_json::Value = serde_json::from_slice(
+            &dynvox(root.path(), &["fleet", "status", machine, "--json"]).stdout,
+        )
+        .unwrap();
+        let done = status
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|job| job["state"] == "done" && job["bytes"].as_u64() > Some(1 << 20));
         assert_eq!(done.count(), results(machine).len(), "{status}");
     }
     let merged = dynvox(root.path(), &["fleet", "resample", "1"]);
@@ -148,16 +176,21 @@ fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
     assert!(merged.status.success(), "{}", output_text(&merged));
     for table in ["prune-weight.csv", "scale.csv", "methods.csv"] {
-        let [whole, cut] = ["whole", "cut"].map(|out| fs::read_to_string(root.path().join(out).join(table)).unwrap());
+        let [whole, cut] = ["whole", "cut"]
+            .map(|out| fs::read_to_string(root.path().join(out).join(table)).unwrap());
         assert_eq!(whole, cut, "{table}");
         assert!(
-            whole
-                .lines()
-                .skip(1)
-                .all(|line| line.split(',').nth_back(18).is_some_and(|accuracy| accuracy.parse::<f64>().is_ok() || line.contains("ICP"))),
+            whole.lines().skip(1).all(|line| line
+                .split(',')
+                .nth_back(18)
+                .is_some_and(|accuracy| accuracy.parse::<f64>().is_ok() || line.contains("ICP"))),
             "{whole}"
         );
     }
     let other = dynvox(root.path(), &[&SWEEP[..], &["cut", "--set", "volume.far_m=10"]].concat());
-    assert!(!other.status.success() && output_text(&other).contains("belongs to another sweep"), "{}", output_text(&other));
+    assert!(
+        !other.status.success() && output_text(&other).contains("belongs to another sweep"),
+        "{}",
+        output_text(&other)
+    );
 }

@@ -1,4 +1,5 @@
-//! The viewer of finished runs, in a browser where one is installed: it draws, scrubs and toggles, without an error on the console.
+//! The viewer of finished runs, in a browser where one is installed: it draws, scrubs and toggles,
+//! without an error on the console.
 
 use super::binary::{dynvox, output_text, rig};
 use super::browser::{Visit, Window};
@@ -49,18 +50,28 @@ fn view_writes_one_file_that_fetches_nothing_and_refuses_what_is_no_run() {
     let page = fs::read_to_string(viewer(root.path())).unwrap();
     assert!(!page.contains("http") && !page.contains("src=\"/") && !page.contains("@import"));
     assert!(
-        page.contains("<figcaption class=\"reason\">The map as a picture") && page.contains("data:image/jpeg;base64,"),
+        page.contains("<figcaption class=\"reason\">The map as a picture")
+            && page.contains("data:image/jpeg;base64,"),
         "without scripts"
     );
     fs::write(root.path().join("frames.csv"), "frame\nx\n").unwrap();
     let damaged = dynvox(root.path(), &["view", ".", "--no-open"]);
-    assert!(!damaged.status.success() && output_text(&damaged).contains("frames.csv cannot be used"), "{}", output_text(&damaged));
+    assert!(
+        !damaged.status.success() && output_text(&damaged).contains("frames.csv cannot be used"),
+        "{}",
+        output_text(&damaged)
+    );
     fs::remove_file(root.path().join("summary.json")).unwrap();
     let refused = dynvox(root.path(), &["view", ".", "--no-open"]);
-    assert!(!refused.status.success() && output_text(&refused).contains("is not a run folder"), "{}", output_text(&refused));
+    assert!(
+        !refused.status.success() && output_text(&refused).contains("is not a run folder"),
+        "{}",
+        output_text(&refused)
+    );
 }
 
-/// Scrubs through the frames, switches layers and colours, turns the view, and tells what each changes.
+/// Scrubs through the frames, switches layers and colours, turns the view, and tells what each
+/// changes.
 const TOGGLES: &str = r#"
 const all = shown(), result = { share: all.share, triangles: Number(data.triangles), error: data.error };
 await scrub(0);
@@ -114,18 +125,44 @@ fn the_viewer_draws_scrubs_and_toggles() {
     let of = visit(&viewer(root.path()), "", TOGGLES);
     assert!(of["share"].as_f64().unwrap() > 0.1, "the map is drawn: {of}");
     assert_eq!((&of["first"], &of["last"]), (&"0".into(), &"22".into()), "{of}");
-    assert!(of["caption"].as_str().unwrap().ends_with("frame 0") && of["lastCaption"].as_str().unwrap().ends_with("frame 22"), "{of}");
+    assert!(
+        of["caption"].as_str().unwrap().ends_with("frame 0")
+            && of["lastCaption"].as_str().unwrap().ends_with("frame 22"),
+        "{of}"
+    );
     assert_eq!(of["left"], 64, "{of}");
     let triangles = |key: &str| of[key].as_u64().unwrap();
     // The first object is last seen in the middle, the second at the end.
     assert_eq!((triangles("objects"), triangles("now")), (2 * 12, 12), "{of}");
     assert_eq!(triangles("back"), 2 * 60 * 60 + 12, "{of}");
-    for key in ["colour1", "colour2", "colour3", "colour4", "colour5", "colour6", "pruned", "planning", "photoLegend", "turned", "swept"] {
+    for key in [
+        "colour1",
+        "colour2",
+        "colour3",
+        "colour4",
+        "colour5",
+        "colour6",
+        "pruned",
+        "planning",
+        "photoLegend",
+        "turned",
+        "swept",
+    ] {
         assert_eq!(of[key], true, "{key}: {of}");
     }
-    assert_eq!(of["colours"], serde_json::json!(["photo", "height", "normal", "state", "weight", "last seen", "error"]));
     assert_eq!(
-        (&of["legend1"], &of["legend3"], &of["legend4"], &of["legend5"], &of["legend6"], &of["prunedName"]),
+        of["colours"],
+        serde_json::json!(["photo", "height", "normal", "state", "weight", "last seen", "error"])
+    );
+    assert_eq!(
+        (
+            &of["legend1"],
+            &of["legend3"],
+            &of["legend4"],
+            &of["legend5"],
+            &of["legend6"],
+            &of["prunedName"]
+        ),
         (
             &"-1.7 m to -1.6 m".into(),
             &"".into(),
@@ -155,7 +192,12 @@ report({ whole, moving, rest: Number(data.triangles), share, movingShare });
 "#;
     let of = visit(&viewer(root.path()), "", script);
     let triangles = |key: &str| of[key].as_f64().unwrap();
-    assert!(triangles("whole") > 60_000.0 && triangles("rest") > 8.0 * triangles("moving") && triangles("moving") > 100.0, "{of}");
+    assert!(
+        triangles("whole") > 60_000.0
+            && triangles("rest") > 8.0 * triangles("moving")
+            && triangles("moving") > 100.0,
+        "{of}"
+    );
     assert!((triangles("share") - triangles("movingShare")).abs() < 0.1, "the same is seen: {of}");
 }
 
@@ -177,7 +219,10 @@ report({ share: shown().share, frame: data.frame, map: layer("map").checked, wid
         script,
     }
     .report();
-    assert!(of["share"].as_f64().unwrap() > 0.05 && of["frame"] == "6" && of["map"] == true, "{of}");
+    assert!(
+        of["share"].as_f64().unwrap() > 0.05 && of["frame"] == "6" && of["map"] == true,
+        "{of}"
+    );
     assert!(of["wide"].as_i64().unwrap() <= 0, "{of}");
 }
 
@@ -196,20 +241,30 @@ report({
         visit(&viewer(root.path()), before, script)
     };
     let empty = of(FakeRun { frames: 3, objects: 0, squares: 0, pictures: false }, "");
-    assert!(empty["note"] == "The map is empty" && empty["live"] == true && empty["colours"] == 4, "{empty}");
+    assert!(
+        empty["note"] == "The map is empty" && empty["live"] == true && empty["colours"] == 4,
+        "{empty}"
+    );
     let many = of(FakeRun { frames: 40, objects: 64, squares: 60, pictures: true }, "");
     assert!(many["triangles"].as_u64().unwrap() > 7_200, "{many}");
     let long = of(FakeRun { frames: 5_000, objects: 1, squares: 60, pictures: true }, "");
     assert!(long["frames"] == "4999" && long["live"] == true, "{long}");
-    let none = of(FakeRun { frames: 3, objects: 0, squares: 10, pictures: true }, "HTMLCanvasElement.prototype.getContext = () => null;");
-    assert!(none["live"] == false && none["reason"].as_str().unwrap().contains("no WebGL 2"), "{none}");
+    let none = of(
+        FakeRun { frames: 3, objects: 0, squares: 10, pictures: true },
+        "HTMLCanvasElement.prototype.getContext = () => null;",
+    );
+    assert!(
+        none["live"] == false && none["reason"].as_str().unwrap().contains("no WebGL 2"),
+        "{none}"
+    );
 }
 
 /// A run of three frames, in `result`.
 fn finished_run() -> TempDir {
     let root = TempDir::new().unwrap();
     rig(root.path(), 3);
-    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--quiet"]);
+    let run =
+        dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--quiet"]);
     assert!(run.status.success(), "{}", output_text(&run));
     root
 }
@@ -219,8 +274,13 @@ fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
     let root = finished_run();
     let result = root.path().join("result");
     let report = fs::read_to_string(result.join("report.html")).unwrap();
-    assert!(report.contains("id=\"dynvox-viewer\"") && report.contains("dynvox-000002_left.jpg") && !report.contains("no viewer"));
-    let index: serde_json::Value = serde_json::from_slice(&fs::read(result.join("pictures/index.json")).unwrap()).unwrap();
+    assert!(
+        report.contains("id=\"dynvox-viewer\"")
+            && report.contains("dynvox-000002_left.jpg")
+            && !report.contains("no viewer")
+    );
+    let index: serde_json::Value =
+        serde_json::from_slice(&fs::read(result.join("pictures/index.json")).unwrap()).unwrap();
     assert_eq!(index, serde_json::json!({ "width": 160, "height": 64, "frames": [0, 1, 2] }));
     let left = image::open(result.join("pictures/000001_left.jpg")).unwrap();
     assert_eq!((left.width(), left.height()), (160, 64));
@@ -230,6 +290,7 @@ fn the_report_of_a_run_has_the_viewer_and_its_pictures() {
 #[test]
 fn the_viewer_in_the_report_of_a_run_draws() {
     let root = finished_run();
-    let of = visit(&root.path().join("result/report.html"), "", "report({ share: shown().share });");
+    let of =
+        visit(&root.path().join("result/report.html"), "", "report({ share: shown().share });");
     assert!(of["share"].as_f64().unwrap() > 0.01, "{of}");
 }

@@ -1,7 +1,10 @@
-//! Lens models against independent ones: the crate `apex-camera-models` projects what we unproject; OpenCV's numbers stand for
-//! the rational model, which the crate lacks.
+//! Lens models against independent ones: the crate `apex-camera-models` projects what we unproject;
+//! OpenCV's numbers stand for the rational model, which the crate lacks.
 
-use apex_camera_models::{CameraModel, DistortionModel, DoubleSphereCamera, EucmCamera, KannalaBrandtCamera, PinholeParams, RadTanCamera};
+use apex_camera_models::{
+    CameraModel, DistortionModel, DoubleSphereCamera, EucmCamera, KannalaBrandtCamera,
+    PinholeParams, RadTanCamera,
+};
 use dynvox_core::rectify::{Lens, LensModel};
 use nalgebra::Vector3;
 
@@ -18,8 +21,9 @@ fn lens(model: LensModel) -> Lens {
     Lens::new(FOCAL_PX, CENTER_PX, model).unwrap()
 }
 
-/// Unprojects every fifth pixel of a 640 x 480 image with our lens and projects the ray with theirs and with ours. Returns the largest
-/// distance from the pixel, px. Their own inverse stops at a millionth of the focal length, too coarse for this bound.
+/// Unprojects every fifth pixel of a 640 x 480 image with our lens and projects the ray with theirs
+/// and with ours. Returns the largest distance from the pixel, px. Their own inverse stops at a
+/// millionth of the focal length, too coarse for this bound.
 fn worst(ours: &Lens, theirs: &impl CameraModel) -> f64 {
     let mut worst = 0.0;
     for at in 0..128 * 96u32 {
@@ -39,23 +43,45 @@ fn worst(ours: &Lens, theirs: &impl CameraModel) -> f64 {
 fn every_model_agrees_with_an_independent_one_to_a_millionth_of_a_pixel() {
     let radial = [-0.28, 0.07, -0.002, 0.0, 0.0, 0.0];
     let bent = lens(LensModel::RadialTangential { radial, tangential: [2e-4, -3e-4] });
-    let theirs = RadTanCamera::new(pinhole(), DistortionModel::BrownConrady { k1: -0.28, k2: 0.07, p1: 2e-4, p2: -3e-4, k3: -0.002 });
+    let theirs = RadTanCamera::new(
+        pinhole(),
+        DistortionModel::BrownConrady { k1: -0.28, k2: 0.07, p1: 2e-4, p2: -3e-4, k3: -0.002 },
+    );
     let radial_tangential = worst(&bent, &theirs.unwrap());
     let fisheye = lens(LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] });
-    let theirs = KannalaBrandtCamera::new(pinhole(), DistortionModel::KannalaBrandt { k1: -0.013, k2: 0.02, k3: -0.012, k4: 0.002 });
+    let theirs = KannalaBrandtCamera::new(
+        pinhole(),
+        DistortionModel::KannalaBrandt { k1: -0.013, k2: 0.02, k3: -0.012, k4: 0.002 },
+    );
     let equidistant = worst(&fisheye, &theirs.unwrap());
     let spheres = lens(LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 });
-    let theirs = DoubleSphereCamera::new(pinhole(), DistortionModel::DoubleSphere { xi: -0.18, alpha: 0.59 });
+    let theirs = DoubleSphereCamera::new(
+        pinhole(),
+        DistortionModel::DoubleSphere { xi: -0.18, alpha: 0.59 },
+    );
     let double_sphere = worst(&spheres, &theirs.unwrap());
     let unified = lens(LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 });
     let theirs = EucmCamera::new(pinhole(), DistortionModel::EUCM { alpha: 0.6, beta: 1.1 });
     let extended_unified = worst(&unified, &theirs.unwrap());
-    println!("largest difference, px: {radial_tangential:e} {equidistant:e} {double_sphere:e} {extended_unified:e}");
-    assert!([radial_tangential, equidistant, double_sphere, extended_unified].iter().all(|off| *off < BOUND_PX));
+    println!(
+        "largest difference, px: {radial_tangential:e} {equidistant:e} {double_sphere:e} {extended_unified:e}"
+    );
+    assert!(
+        [radial_tangential, equidistant, double_sphere, extended_unified]
+            .iter()
+            .all(|off| *off < BOUND_PX)
+    );
 }
 
 /// What OpenCV 5.0 makes of rays with z 1 (`cv2.projectPoints`, `cv2.fisheye.projectPoints`).
-const RAYS: [[f64; 2]; 6] = [[0.017, 0.328], [0.631, -0.091], [-0.498, 0.05], [0.628, -0.472], [-0.263, 0.254], [-0.107, 0.038]];
+const RAYS: [[f64; 2]; 6] = [
+    [0.017, 0.328],
+    [0.631, -0.091],
+    [-0.498, 0.05],
+    [0.628, -0.472],
+    [-0.263, 0.254],
+    [-0.107, 0.038],
+];
 const RATIONAL: [[f64; 2]; 6] = [
     [316.5965003964711, 364.466664224808],
     [536.8889412936421, 202.9706700968478],
@@ -75,12 +101,18 @@ const FISHEYE: [[f64; 2]; 6] = [
 
 #[test]
 fn the_rational_and_the_fisheye_model_give_opencvs_pixels() {
-    let rational = LensModel::RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [1e-4, 1e-4] };
+    let rational = LensModel::RadialTangential {
+        radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05],
+        tangential: [1e-4, 1e-4],
+    };
     let fisheye = LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] };
     for (model, pixels) in [(rational, RATIONAL), (fisheye, FISHEYE)] {
         for ([x, y], expected) in RAYS.into_iter().zip(pixels) {
             let found = lens(model).project([x, y, 1.0]).unwrap();
-            assert!((found[0] - expected[0]).hypot(found[1] - expected[1]) < BOUND_PX, "{found:?} {expected:?}");
+            assert!(
+                (found[0] - expected[0]).hypot(found[1] - expected[1]) < BOUND_PX,
+                "{found:?} {expected:?}"
+            );
             let ray = lens(model).unproject(expected).unwrap();
             assert!((ray[0] / ray[2] - x).hypot(ray[1] / ray[2] - y) < 1e-9);
         }

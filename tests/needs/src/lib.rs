@@ -1,28 +1,37 @@
-//! Marks tests that need what a checkout does not hold. Where it is missing when they are compiled, the test runner shows them as ignored,
-//! with the reason: a test that did not run never passes.
+//! Marks tests that need what a checkout does not hold. Where it is missing when they are compiled,
+//! the test runner shows them as ignored, with the reason: a test that did not run never passes.
 //!
-//! Clips are looked for in `DYNVOX_DATA`, an absolute path, else in `../shared/data` next to the checkout. A browser installed later is
-//! noticed when this crate is compiled again: `touch tests/needs/build.rs`.
+//! Clips are looked for in `DYNVOX_DATA`, an absolute path, else in `../shared/data` next to the
+//! checkout. A browser installed later is noticed when this crate is compiled again:
+//! `touch tests/needs/build.rs`.
 //!
-//! Time is missing too, mostly: a test that takes long runs where `DYNVOX_LONG` is set, as `.ci/run` does.
+//! Time is missing too, mostly: a test that takes long runs where `DYNVOX_LONG` is set, as
+//! `.ci/run` does.
 
 use proc_macro::{TokenStream, TokenTree};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Names of the browser, the first one found is taken.
-const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+const BROWSERS: [&str; 4] =
+    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
 /// Where the clips are for the crate that is being compiled, a folder of the repository.
 fn data() -> PathBuf {
-    let krate = || PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the crate's folder"));
+    let krate = || {
+        PathBuf::from(
+            std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo names the crate's folder"),
+        )
+    };
     std::env::var_os("DYNVOX_DATA").map_or_else(|| krate().join("../../shared/data"), PathBuf::from)
 }
 
 /// Why a test that needs these paths cannot run.
 fn missing(data: &Path, paths: &[String]) -> Option<String> {
-    let missing: Vec<&str> = paths.iter().filter(|path| !data.join(path).exists()).map(String::as_str).collect();
-    (!missing.is_empty()).then(|| format!("no {} in DYNVOX_DATA or ../shared/data", missing.join(", ")))
+    let missing: Vec<&str> =
+        paths.iter().filter(|path| !data.join(path).exists()).map(String::as_str).collect();
+    (!missing.is_empty())
+        .then(|| format!("no {} in DYNVOX_DATA or ../shared/data", missing.join(", ")))
 }
 
 /// The first of the programs that is in one of the folders.
@@ -31,13 +40,16 @@ fn program<'a>(folders: &[PathBuf], names: &[&'a str]) -> Option<&'a str> {
 }
 
 fn browser_found() -> Option<&'static str> {
-    let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    let folders: Vec<PathBuf> =
+        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
     program(&folders, &BROWSERS)
 }
 
 /// The test, ignored where there is a reason.
 fn ignored(reason: Option<String>, test: TokenStream) -> TokenStream {
-    let mut marked: TokenStream = reason.map(|reason| format!("#[ignore = {reason:?}]").parse().expect("an attribute")).unwrap_or_default();
+    let mut marked: TokenStream = reason
+        .map(|reason| format!("#[ignore = {reason:?}]").parse().expect("an attribute"))
+        .unwrap_or_default();
     marked.extend(test);
     marked
 }
@@ -51,7 +63,8 @@ fn strings(tokens: TokenStream) -> Vec<String> {
     tokens.into_iter().filter_map(literal).collect()
 }
 
-/// `#[clips("kitti-odometry/sequences/06", "...")]` above `#[test]`: the test needs all of these files and folders of the clips.
+/// `#[clips("kitti-odometry/sequences/06", "...")]` above `#[test]`: the test needs all of these
+/// files and folders of the clips.
 #[proc_macro_attribute]
 pub fn clips(paths: TokenStream, test: TokenStream) -> TokenStream {
     let paths = strings(paths);
@@ -65,14 +78,15 @@ pub fn browser(_: TokenStream, test: TokenStream) -> TokenStream {
     ignored(browser_found().is_none().then(|| "no Chromium is installed".to_owned()), test)
 }
 
-/// Why a long test does not run, for the values of `DYNVOX_LONG` and of variables that ask for more of it.
+/// Why a long test does not run, for the values of `DYNVOX_LONG` and of variables that ask for more
+/// of it.
 fn too_long(asked: &[Option<OsString>]) -> Option<String> {
     let is_asked = asked.iter().flatten().any(|value| !value.is_empty() && value != "0");
     (!is_asked).then(|| "long: .ci/run and DYNVOX_LONG=1 run it".to_owned())
 }
 
-/// `#[long]` above `#[test]`: the test takes long, and shorter ones ask most of the same. `#[long("DYNVOX_KILL_TRIALS")]`: it runs where that
-/// is set, too.
+/// `#[long]` above `#[test]`: the test takes long, and shorter ones ask most of the same.
+/// `#[long("DYNVOX_KILL_TRIALS")]`: it runs where that is set, too.
 #[proc_macro_attribute]
 pub fn long(variables: TokenStream, test: TokenStream) -> TokenStream {
     let variables = std::iter::once("DYNVOX_LONG".to_owned()).chain(strings(variables));
@@ -98,9 +112,14 @@ mod tests {
     #[test]
     fn what_is_missing_is_named_and_what_is_there_is_not() {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let of = |paths: &[&str]| missing(here, &paths.iter().map(|&path| path.to_owned()).collect::<Vec<_>>());
+        let of = |paths: &[&str]| {
+            missing(here, &paths.iter().map(|&path| path.to_owned()).collect::<Vec<_>>())
+        };
         assert_eq!(of(&["src/lib.rs", "src"]), None);
-        assert_eq!(of(&["src", "none", "neither"]).unwrap(), "no none, neither in DYNVOX_DATA or ../shared/data");
+        assert_eq!(
+            of(&["src", "none", "neither"]).unwrap(),
+            "no none, neither in DYNVOX_DATA or ../shared/data"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Programs of calls of the C interface, made of bytes: sizes, settings, poses and pointers of any kind, but for what C itself forbids (memory that
-//! is not as long as its caller says). Nothing is written outside the buffer and the outputs.
+//! Programs of calls of the C interface, made of bytes: sizes, settings, poses and pointers of any
+//! kind, but for what C itself forbids (memory that is not as long as its caller says). Nothing is
+//! written outside the buffer and the outputs.
 #![allow(unsafe_code)]
 
 use dynvox_capi::*;
@@ -50,7 +51,8 @@ impl Program<'_> {
         let len = usize::from(self.byte() % 48).min(self.0.len());
         let (text, rest) = self.0.split_at(len);
         self.0 = rest;
-        CString::new(text.iter().copied().filter(|&byte| byte != 0).collect::<Vec<_>>()).unwrap_or_default()
+        CString::new(text.iter().copied().filter(|&byte| byte != 0).collect::<Vec<_>>())
+            .unwrap_or_default()
     }
 
     fn pose(&mut self) -> DynvoxPose {
@@ -86,19 +88,32 @@ impl Caller {
 
     fn assert_guarded(&self) {
         let outside = self.memory[..self.start].iter().chain(&self.memory[self.start + self.len..]);
-        assert!(outside.into_iter().all(|&byte| byte == GUARDED), "a call wrote outside its buffer");
+        assert!(
+            outside.into_iter().all(|&byte| byte == GUARDED),
+            "a call wrote outside its buffer"
+        );
     }
 
-    /// An image: of the caller's pixels, nowhere, or in the mapper's own buffer. Its stride keeps it within the pixels, or overflows.
-    fn image(&mut self, program: &mut Program<'_>, (width, height): (usize, usize)) -> Option<DynvoxImage> {
-        let (kind, stride) = (program.byte(), if program.byte() == 0 { width } else { program.size() });
-        let needed = height.checked_sub(1).and_then(|rows| rows.checked_mul(stride)).and_then(|pixels| pixels.checked_add(width));
+    /// An image: of the caller's pixels, nowhere, or in the mapper's own buffer. Its stride keeps
+    /// it within the pixels, or overflows.
+    fn image(
+        &mut self,
+        program: &mut Program<'_>,
+        (width, height): (usize, usize),
+    ) -> Option<DynvoxImage> {
+        let (kind, stride) =
+            (program.byte(), if program.byte() == 0 { width } else { program.size() });
+        let needed = height
+            .checked_sub(1)
+            .and_then(|rows| rows.checked_mul(stride))
+            .and_then(|pixels| pixels.checked_add(width));
         let pixels = match kind % 16 {
             0 => ptr::null(),
             1 => self.buffer().cast_const(),
             _ => self.pixels.as_ptr(),
         };
-        (needed.is_none_or(|needed| needed <= PIXELS.min(self.len))).then_some(DynvoxImage { pixels, stride })
+        (needed.is_none_or(|needed| needed <= PIXELS.min(self.len)))
+            .then_some(DynvoxImage { pixels, stride })
     }
 }
 
@@ -121,7 +136,8 @@ fn config(program: &mut Program<'_>) -> Option<DynvoxConfig> {
     let [focal_px, center_u_px, center_v_px, baseline_m] = numbers;
     let rig = DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m };
     let mut config = std::mem::MaybeUninit::uninit();
-    // SAFETY: both point to values of this function's own, and the second is written when the call succeeds.
+    // SAFETY: both point to values of this function's own, and the second is written when the call
+    // succeeds.
     let mut config = unsafe {
         let made = dynvox_config_default(&raw const rig, config.as_mut_ptr());
         (made == DynvoxStatus::Ok).then(|| config.assume_init())
@@ -136,7 +152,9 @@ fn config(program: &mut Program<'_>) -> Option<DynvoxConfig> {
 
 fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMapper) -> DynvoxStatus {
     let size = if program.byte() % 4 < 3 { (64, 48) } else { (program.size(), program.size()) };
-    let [Some(left), Some(right)] = [0, 1].map(|_| caller.image(program, size)) else { return DynvoxStatus::Size };
+    let [Some(left), Some(right)] = [0, 1].map(|_| caller.image(program, size)) else {
+        return DynvoxStatus::Size;
+    };
     let (pose, time_ns) = (program.pose(), program.word());
     let given = program.byte();
     let detection = DynvoxDetection {
@@ -161,12 +179,16 @@ fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMappe
         disparity_q8: ptr::null(),
     };
     let mut report = std::mem::MaybeUninit::<DynvoxReport>::uninit();
-    // SAFETY: images are as long as they say, or are refused before they are read; the report is written when the call succeeds.
+    // SAFETY: images are as long as they say, or are refused before they are read; the report is
+    // written when the call succeeds.
     unsafe {
         let status = dynvox_step(mapper, &raw const frame, ptr::null(), report.as_mut_ptr());
         if status == DynvoxStatus::Ok {
             let pose = report.assume_init().t_world_camera;
-            assert!(pose.translation_m.iter().chain(&pose.rotation).all(|number| number.is_finite()), "{pose:?}");
+            assert!(
+                pose.translation_m.iter().chain(&pose.rotation).all(|number| number.is_finite()),
+                "{pose:?}"
+            );
         }
         status
     }
@@ -174,7 +196,9 @@ fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMappe
 
 extern "C" fn write(context: *mut c_void, bytes: *const u8, len: usize) -> bool {
     // SAFETY: the context is the vector that was given, and the bytes are the mapper's.
-    unsafe { (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len)) };
+    unsafe {
+        (*context.cast::<Vec<u8>>()).extend_from_slice(std::slice::from_raw_parts(bytes, len))
+    };
     true
 }
 
@@ -203,16 +227,30 @@ fn observe(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMa
         width: 0,
         height: 0,
     };
-    let (origin_m, direction) = ([0; 3].map(|_| program.number()), [0; 3].map(|_| program.number()));
+    let (origin_m, direction) =
+        ([0; 3].map(|_| program.number()), [0; 3].map(|_| program.number()));
     let mut way = std::mem::MaybeUninit::uninit();
-    // SAFETY: outputs are as long as they say; no track is asked for, so that their array may be null.
+    // SAFETY: outputs are as long as they say; no track is asked for, so that their array may be
+    // null.
     unsafe {
         match program.byte() % 6 {
             0 => dynvox_raycast(mapper, &raw const pose, &raw mut picture),
             1 => dynvox_tracks(mapper, ptr::null_mut(), 0, &raw mut count),
             2 => dynvox_triangles(mapper, Some(ignore), ptr::null_mut(), &raw mut triangles),
-            3 => dynvox_object_triangles(mapper, u32::from(program.byte()), Some(ignore), ptr::null_mut(), &raw mut triangles),
-            4 => dynvox_ray(mapper, origin_m.as_ptr(), direction.as_ptr(), program.number(), way.as_mut_ptr()),
+            3 => dynvox_object_triangles(
+                mapper,
+                u32::from(program.byte()),
+                Some(ignore),
+                ptr::null_mut(),
+                &raw mut triangles,
+            ),
+            4 => dynvox_ray(
+                mapper,
+                origin_m.as_ptr(),
+                direction.as_ptr(),
+                program.number(),
+                way.as_mut_ptr(),
+            ),
             _ => dynvox_moving_boxes(mapper, ptr::null_mut(), 0, &raw mut count),
         };
     }
@@ -227,8 +265,10 @@ fn restored(
 ) -> *mut DynvoxMapper {
     let mut saved = std::mem::take(&mut caller.saved);
     saved.clear();
-    let (changed, to, len, mut again) = (program.size(), program.byte(), caller.len, ptr::null_mut());
-    // SAFETY: the callbacks' contexts outlive the calls; the old mapper is destroyed before its buffer is used again.
+    let (changed, to, len, mut again) =
+        (program.size(), program.byte(), caller.len, ptr::null_mut());
+    // SAFETY: the callbacks' contexts outlive the calls; the old mapper is destroyed before its
+    // buffer is used again.
     unsafe {
         dynvox_save(mapper, Some(write), (&raw mut saved).cast());
         if let Some(byte) = saved.get_mut(changed) {
@@ -236,7 +276,15 @@ fn restored(
         }
         dynvox_destroy(mapper);
         let mut rest = saved.as_slice();
-        dynvox_restore(capacity, config, caller.buffer(), len, Some(read), (&raw mut rest).cast(), &raw mut again);
+        dynvox_restore(
+            capacity,
+            config,
+            caller.buffer(),
+            len,
+            Some(read),
+            (&raw mut rest).cast(),
+            &raw mut again,
+        );
     }
     caller.saved = saved;
     again
@@ -256,7 +304,15 @@ pub fn calls(bytes: &[u8]) -> bool {
     let mut caller = Caller::new(len);
     let (less, mut mapper, mut mapped) = (usize::from(program.byte() == 1), ptr::null_mut(), false);
     // SAFETY: the buffer is aligned and at least as long as it says.
-    let made = unsafe { dynvox_create(&raw const capacity, &raw const config, caller.buffer(), len - less, &raw mut mapper) };
+    let made = unsafe {
+        dynvox_create(
+            &raw const capacity,
+            &raw const config,
+            caller.buffer(),
+            len - less,
+            &raw mut mapper,
+        )
+    };
     assert_eq!(made == DynvoxStatus::Ok, !mapper.is_null(), "{made:?}");
     for _ in 0..CALLS {
         if mapper.is_null() || program.0.is_empty() {
@@ -284,7 +340,12 @@ pub fn programs() -> Vec<Vec<u8>> {
     let begin: &[u8] = &[0, 0, 0, 0];
     // Images, a pose of 7 numbers and a time that are not given, a detection that is not.
     let frame: &[u8] = &[&[0, 0, 2, 0, 2, 0][..], &[0; 7], &[0; 8], &[0; 7]].concat();
-    let view = |what: u8| [&[4][..], &[0; 7], &[255, 0, 12, 0, 0, 0, 0, 0, 0], &[0; 6], &[what, 0]].concat();
+    let view = |what: u8| {
+        [&[4][..], &[0; 7], &[255, 0, 12, 0, 0, 0, 0, 0, 0], &[0; 6], &[what, 0]].concat()
+    };
     let restore: &[u8] = &[6, 255, 255, 255, 255, 0, 0, 0, 0, 0, 0];
-    vec![[begin, frame, frame, &view(0), &view(2), &view(4)].concat(), [begin, frame, restore, frame, &view(1), &[7, 0]].concat()]
+    vec![
+        [begin, frame, frame, &view(0), &view(2), &view(4)].concat(),
+        [begin, frame, restore, frame, &view(1), &[7, 0]].concat(),
+    ]
 }

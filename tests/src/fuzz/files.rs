@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use dynvox::evaluate::trajectory::read_trajectory;
 use dynvox::formats::calibration::{KittiCalibration, StereoCalibration, read_rig};
 use dynvox::formats::{
-    read_numbered, read_opencv_depth, read_pfm, read_png_deep, read_png_u16, read_poses, read_stamped_names, read_times,
+    read_numbered, read_opencv_depth, read_pfm, read_png_deep, read_png_u16, read_poses,
+    read_stamped_names, read_times,
 };
 use dynvox::input::masks::{MaskChoice, attach};
 use dynvox::input::stream::netpbm::NetpbmPairs;
@@ -31,7 +32,8 @@ struct Folder(PathBuf);
 impl Folder {
     fn new() -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
-        let name = format!("dynvox-fuzz-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let name =
+            format!("dynvox-fuzz-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let path = std::env::temp_dir().join(name);
         fs::create_dir_all(&path).expect("a folder for temporary files");
         Self(path)
@@ -71,7 +73,8 @@ pub fn calibration(bytes: &[u8]) -> bool {
     let Some((ending, content)) = choose(bytes, &CALIBRATIONS) else { return false };
     let folder = Folder::new();
     let path = folder.file(&format!("calibration.{ending}"), content);
-    let raw = StereoCalibration::read(&[&path], Some(SIZE)).is_ok() | StereoCalibration::read(&[&path, &path], None).is_ok();
+    let raw = StereoCalibration::read(&[&path], Some(SIZE)).is_ok()
+        | StereoCalibration::read(&[&path, &path], None).is_ok();
     raw | KittiCalibration::read(&path).is_ok() | read_rig(&path).is_ok()
 }
 
@@ -88,7 +91,8 @@ pub fn times(bytes: &[u8]) -> bool {
 }
 
 /// The files of a recording in the layout of the tracking benchmark, by the first byte.
-const RECORDING: [&str; 4] = ["label_02/0000.txt", "velodyne/0000/000000.bin", "calib/0000.txt", "poses/0000.txt"];
+const RECORDING: [&str; 4] =
+    ["label_02/0000.txt", "velodyne/0000/000000.bin", "calib/0000.txt", "poses/0000.txt"];
 
 pub fn recording(bytes: &[u8]) -> bool {
     let Some((name, content)) = choose(bytes, &RECORDING) else { return false };
@@ -107,7 +111,8 @@ pub fn recording(bytes: &[u8]) -> bool {
         fs::create_dir_all(path.parent().unwrap_or(&folder.0)).expect("a folder");
         fs::write(path, content).expect("the temporary folder can be written to");
     }
-    open(&folder.0, &OpenOptions::default()).is_ok_and(|source| source.frame(0).is_ok() && source.lidar(0).is_ok())
+    open(&folder.0, &OpenOptions::default())
+        .is_ok_and(|source| source.frame(0).is_ok() && source.lidar(0).is_ok())
 }
 
 /// File endings of pictures, by the first byte.
@@ -117,7 +122,9 @@ pub fn pictures(bytes: &[u8]) -> bool {
     let Some((ending, content)) = choose(bytes, &PICTURES) else { return false };
     let folder = Folder::new();
     let path = folder.file(&format!("picture.{ending}"), content);
-    dynvox::formats::read_picture(&path).is_ok() | read_png_u16(&path).is_ok() | read_png_deep(&path).is_ok()
+    dynvox::formats::read_picture(&path).is_ok()
+        | read_png_u16(&path).is_ok()
+        | read_png_deep(&path).is_ok()
 }
 
 /// File endings of depth, by the first byte.
@@ -130,7 +137,8 @@ pub fn depth(bytes: &[u8]) -> bool {
     read_pfm(&path, size).is_ok() | read_opencv_depth(&path, size).is_ok()
 }
 
-/// How masks are kept, by the first byte: what is chosen on the command line, and the file the bytes become.
+/// How masks are kept, by the first byte: what is chosen on the command line, and the file the
+/// bytes become.
 const MASKS: [(&str, &str); 6] = [
     ("files:", "instances/000000.png"),
     ("coco:", "coco.json"),
@@ -153,14 +161,19 @@ pub fn masks(bytes: &[u8]) -> bool {
     fs::write(&path, content).expect("the temporary folder can be written to");
     let source = open(&folder.0, &OpenOptions::default()).expect("the images are sound");
     let from = if name.contains('/') { path.parent().unwrap_or(&path) } else { &path };
-    let Ok(choice) = format!("{choice}{}", from.display()).parse::<MaskChoice>() else { return false };
-    attach(source, &choice, NonZeroUsize::MIN).is_ok_and(|source| source.frame(0).is_ok_and(|frame| !frame.masks.instances.is_empty()))
+    let Ok(choice) = format!("{choice}{}", from.display()).parse::<MaskChoice>() else {
+        return false;
+    };
+    attach(source, &choice, NonZeroUsize::MIN)
+        .is_ok_and(|source| source.frame(0).is_ok_and(|frame| !frame.masks.instances.is_empty()))
 }
 
 pub fn store(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     let path = folder.file("map.blocks", bytes);
-    let Ok((mut file, opened)) = BlockFile::open(&path, VOXEL_M, TRUNCATION_M) else { return false };
+    let Ok((mut file, opened)) = BlockFile::open(&path, VOXEL_M, TRUNCATION_M) else {
+        return false;
+    };
     for tile in file.tiles() {
         for coord in file.blocks_of(tile) {
             file.holds(coord);
@@ -171,9 +184,14 @@ pub fn store(bytes: &[u8]) -> bool {
 }
 
 /// How images of a stream lie, by the first byte.
-const STACKINGS: [Option<Stacking>; 3] = [None, Some(Stacking::SideBySide), Some(Stacking::TopBottom)];
+const STACKINGS: [Option<Stacking>; 3] =
+    [None, Some(Stacking::SideBySide), Some(Stacking::TopBottom)];
 
 pub fn stream(bytes: &[u8]) -> bool {
     let Some((stacking, content)) = choose(bytes, &STACKINGS) else { return false };
-    NetpbmPairs::new(Cursor::new(content), stacking, None).take(FRAMES).filter(Result::is_ok).count() > 0
+    NetpbmPairs::new(Cursor::new(content), stacking, None)
+        .take(FRAMES)
+        .filter(Result::is_ok)
+        .count()
+        > 0
 }

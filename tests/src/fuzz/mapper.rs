@@ -23,19 +23,26 @@ pub const CAPACITY: Capacity = Capacity {
     crop_pixels: 500,
     ..Capacity::TINY
 };
-const RIG: StereoRig = StereoRig { focal_px: 40.0, center_u_px: 32.0, center_v_px: 24.0, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 40.0, center_u_px: 32.0, center_v_px: 24.0, baseline_m: 0.5 };
 /// Frames a mapper has seen before its snapshot.
 const FRAMES: usize = 3;
 
 /// A pair with texture, another one for each frame.
 fn pair(frame: usize) -> [Vec<u8>; 2] {
-    let image = |shift: usize| (0..64 * 48).map(|at| ((at % 64 + shift + frame) * 29 % 97 + at / 64 * 31 % 89) as u8).collect();
+    let image = |shift: usize| {
+        (0..64 * 48)
+            .map(|at| ((at % 64 + shift + frame) * 29 % 97 + at / 64 * 31 % 89) as u8)
+            .collect()
+    };
     [image(0), image(4)]
 }
 
 fn step(mapper: &mut Mapper<'_>, frame: usize) {
     let images = pair(frame);
-    let [Some(left), Some(right)] = [0, 1].map(|side| View::new(&images[side], 64, 48)) else { return };
+    let [Some(left), Some(right)] = [0, 1].map(|side| View::new(&images[side], 64, 48)) else {
+        return;
+    };
     let report = mapper.step(&StereoFrame::pair(left, right), &Serial).expect("the pair is sound");
     assert_eq!(report.internal_faults, 0, "frame {frame}");
 }
@@ -48,7 +55,8 @@ pub fn clip(bytes: &[u8]) -> bool {
 
 pub fn snapshots() -> Vec<Vec<u8>> {
     let mut slab = HeapSlab::of(&CAPACITY);
-    let mut mapper = Mapper::new(&CAPACITY, &Config::for_rig(RIG), slab.bytes()).expect("the bounds are sound");
+    let mut mapper =
+        Mapper::new(&CAPACITY, &Config::for_rig(RIG), slab.bytes()).expect("the bounds are sound");
     let save = |mapper: &mut Mapper<'_>| {
         let mut bytes = Vec::new();
         let written: Result<(), std::convert::Infallible> = mapper.save(&mut |piece: &[u8]| {
@@ -71,7 +79,10 @@ pub fn snapshot(bytes: &[u8]) -> bool {
         rest = after;
         Ok::<(), ()>(())
     };
-    let Ok(mut mapper) = Mapper::restore(&CAPACITY, &Config::for_rig(RIG), slab.bytes(), &mut read) else { return false };
+    let Ok(mut mapper) = Mapper::restore(&CAPACITY, &Config::for_rig(RIG), slab.bytes(), &mut read)
+    else {
+        return false;
+    };
     step(&mut mapper, FRAMES);
     true
 }

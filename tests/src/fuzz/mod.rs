@@ -1,8 +1,11 @@
-//! Everything that reads bytes from outside, and the C interface, as fuzz targets: each takes any bytes and may refuse them, but neither panics nor hangs nor takes
-//! memory that the bytes do not pay for.
+//! Everything that reads bytes from outside, and the C interface, as fuzz targets: each takes any
+//! bytes and may refuse them, but neither panics nor hangs nor takes memory that the bytes do not
+//! pay for.
 //!
-//! The same targets run three ways: as seeded tests (`cargo test --test fuzz`, a fixed number of mutations of valid inputs), for a given time
-//! (`DYNVOX_FUZZ_SECONDS=1800 cargo test --release --test fuzz`), and under cargo-fuzz with coverage (`tests/fuzz`).
+//! The same targets run three ways: as seeded tests (`cargo test --test fuzz`, a fixed number of
+//! mutations of valid inputs), for a given time
+//! (`DYNVOX_FUZZ_SECONDS=1800 cargo test --release --test fuzz`), and under cargo-fuzz with
+//! coverage (`tests/fuzz`).
 
 mod calls;
 mod files;

@@ -99,13 +99,20 @@ pub fn masks() -> Vec<Vec<u8>> {
 \"bbox\": [9, 8, 3, 20], \"score\": 0.5}]}";
     let yolo: &[u8] = b"2 0.2 0.3 0.7 0.3 0.7 0.8 0.2 0.8\n2 0.5 0.5 0.4 0.4\n";
     let mot: &[u8] = b"1,1,10,10,20,14,0.9,-1,-1,-1\n";
-    chosen(&[(1, coco), (2, yolo), (3, LABEL), (3, mot), (5, b"# id class score x1 y1 x2 y2\n1 car 0.9 10 10 30 24\n")])
+    chosen(&[
+        (1, coco),
+        (2, yolo),
+        (3, LABEL),
+        (3, mot),
+        (5, b"# id class score x1 y1 x2 y2\n1 car 0.9 10 10 30 24\n"),
+    ])
 }
 
 pub fn store() -> Vec<Vec<u8>> {
     let store = |blocks: i16| {
         written("map.blocks", |path| {
-            let (mut file, _) = BlockFile::open(path, VOXEL_M, TRUNCATION_M).expect("the temporary folder can be written to");
+            let (mut file, _) = BlockFile::open(path, VOXEL_M, TRUNCATION_M)
+                .expect("the temporary folder can be written to");
             for x in 0..blocks {
                 let block = EvictedBlock {
                     coord: BlockCoord { x, y: 0, z: 9 },
@@ -122,7 +129,12 @@ pub fn store() -> Vec<Vec<u8>> {
 
 pub fn stream() -> Vec<Vec<u8>> {
     let pair = pgm(SIZE).repeat(2);
-    chosen(&[(0, &pair), (1, &pgm(SIZE)), (2, &pgm(SIZE)), (0, &[b"P6\n2 2\n255\n".as_slice(), &[9; 12]].concat().repeat(2))])
+    chosen(&[
+        (0, &pair),
+        (1, &pgm(SIZE)),
+        (2, &pgm(SIZE)),
+        (0, &[b"P6\n2 2\n255\n".as_slice(), &[9; 12]].concat().repeat(2)),
+    ])
 }
 
 pub fn clip() -> Vec<Vec<u8>> {

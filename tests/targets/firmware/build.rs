@@ -11,7 +11,8 @@ fn main() {
     let target = |key: &str| env::var(format!("CARGO_CFG_TARGET_{key}")).unwrap_or_default();
     if target("ARCH") == "arm" && target("OS") == "none" {
         let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets it"));
-        fs::copy("link/mps2-an500.x", out.join("memory.x")).expect("the memory map is beside this file");
+        fs::copy("link/mps2-an500.x", out.join("memory.x"))
+            .expect("the memory map is beside this file");
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg-bins=-Tlink.x");
         println!("cargo:rustc-link-arg-bins=-Tlink/stack-sizes.x");

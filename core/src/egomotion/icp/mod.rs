@@ -1,19 +1,25 @@
-//! The camera's motion from depth alone, against what the map shows from where the camera was: the tracker that voxel-hash mappers for
-//! hand-held depth cameras come with, kept here as the baseline they are.
+//! The camera's motion from depth alone, against what the map shows from where the camera was: the
+//! tracker that voxel-hash mappers for hand-held depth cameras come with, kept here as the baseline
+//! they are.
 //!
-//! Projective data association and point-to-plane distance (Newcombe et al., *KinectFusion*, ISMAR 2011, Section 3.5), coarse to fine, as
-//! in InfiniTAM (Kähler et al., *Very High Frame Rate Volumetric Integration of Depth Images on Mobile Devices*, TVCG 2015; Prisacariu et
-//! al., *InfiniTAM v3*, 2017): a measured point is carried by the motion so far into the picture of the map, paired with the surface at the
-//! pixel it falls on, and the motion is in_previous to bring points onto their partners' planes. Every frame begins from standing still.
+//! Projective data association and point-to-plane distance (Newcombe et al., *KinectFusion*, ISMAR
+//! 2011, Section 3.5), coarse to fine, as in InfiniTAM (Kähler et al., *Very High Frame Rate
+//! Volumetric Integration of Depth Images on Mobile Devices*, TVCG 2015; Prisacariu et al.,
+//! *InfiniTAM v3*, 2017): a measured point is carried by the motion so far into the picture of the
+//! map, paired with the surface at the pixel it falls on, and the motion is in_previous to bring
+//! points onto their partners' planes. Every frame begins from standing still.
 //!
-//! On a street this is expected to fail: at 1 m a frame partners are wrong from the start, and a road between façades holds nothing along
-//! itself, so that standing still fits well. Such a motion must not pass for an estimate. KinectFusion's own tests are made (enough
-//! pairs, every direction held, a small motion); and since those do not see a slide along the street, the images' matches, which the
-//! tracker does not use, are asked whether they agree ([`IcpStatus::Contradicted`]).
+//! On a street this is expected to fail: at 1 m a frame partners are wrong from the start, and a
+//! road between façades holds nothing along itself, so that standing still fits well. Such a motion
+//! must not pass for an estimate. KinectFusion's own tests are made (enough pairs, every direction
+//! held, a small motion); and since those do not see a slide along the street, the images' matches,
+//! which the tracker does not use, are asked whether they agree ([`IcpStatus::Contradicted`]).
 //!
-//! **Memory.** None of its own: the pyramid takes a third of a depth image that is lent. **Time.** Pixels / 4 x steps, on one thread.
+//! **Memory.** None of its own: the pyramid takes a third of a depth image that is lent. **Time.**
+//! Pixels / 4 x steps, on one thread.
 //!
-//! **What can go wrong.** [`IcpStatus`] says it; a failed motion is not handed out. Sums run row by row.
+//! **What can go wrong.** [`IcpStatus`] says it; a failed motion is not handed out. Sums run row by
+//! row.
 
 mod config;
 mod pyramid;
@@ -81,7 +87,8 @@ impl IcpStatus {
 pub struct IcpReport {
     /// How it went.
     pub status: IcpStatus,
-    /// Maps previous camera coordinates to current ones; what was found, even where the status says that it is no motion to follow.
+    /// Maps previous camera coordinates to current ones; what was found, even where the status says
+    /// that it is no motion to follow.
     pub t_current_previous: Transform,
     /// Points of the finest level that fall on a surface of the map.
     pub points: u32,
@@ -103,7 +110,8 @@ impl IcpReport {
         Self { status: IcpStatus::TooFewPairs, ..Self::default() }
     }
 
-    /// Contradicts the motion where too few of the matches counted in `matches` agree with it. Without matches it stands.
+    /// Contradicts the motion where too few of the matches counted in `matches` agree with it.
+    /// Without matches it stands.
     pub(crate) fn check_matches(&mut self, config: &IcpConfig) {
         let [agreeing, all] = self.matches.map(f64::from);
         if self.status == IcpStatus::Tracked && agreeing < f64::from(config.explained_min) * all {
@@ -126,8 +134,8 @@ pub struct MapPicture<'a> {
     pub normal: View<'a, [i8; 3]>,
 }
 
-/// Tracks one frame: `disparity_q8` measured now, `map` as seen from where the camera was. `memory` is overwritten; it needs a third of the
-/// image's pixels. The matches are not checked here.
+/// Tracks one frame: `disparity_q8` measured now, `map` as seen from where the camera was. `memory`
+/// is overwritten; it needs a third of the image's pixels. The matches are not checked here.
 pub fn track(
     config: &IcpConfig,
     rig: &StereoRig,
@@ -144,7 +152,9 @@ pub fn track(
         for _ in 0..config.steps {
             report.steps += 1;
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
-            let Some(step) = sums.equations.solve().filter(|_| sums.pairs >= PAIRS_MIN) else { break };
+            let Some(step) = sums.equations.solve().filter(|_| sums.pairs >= PAIRS_MIN) else {
+                break;
+            };
             t_previous_current = t_previous_current.retract(step);
             if step.iter().all(|part| part.abs() < STEP_MIN) {
                 break;
@@ -172,7 +182,8 @@ fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
         IcpStatus::NotHeld
     } else if f64::from(report.pairs) < f64::from(config.pairs_min) * f64::from(report.points) {
         IcpStatus::OffTheMap
-    } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(config.step_max_rad)) {
+    } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(config.step_max_rad))
+    {
         IcpStatus::TooFar
     } else {
         IcpStatus::Tracked
@@ -212,12 +223,19 @@ impl<'c> Pairing<'c> {
     }
 
     /// Sums of the point-to-plane error's normal equations, row by row.
-    fn sums(&self, t_previous_current: &Transform, disparity_px: View<'_, f32>, map: &MapPicture<'_>) -> PairSums {
+    fn sums(
+        &self,
+        t_previous_current: &Transform,
+        disparity_px: View<'_, f32>,
+        map: &MapPicture<'_>,
+    ) -> PairSums {
         let rig = self.rig;
-        let mut sums = PairSums { equations: NormalEquations::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
+        let mut sums =
+            PairSums { equations: NormalEquations::ZERO, points: 0, pairs: 0, squared_m2: 0.0 };
         let middle = |at: usize| (at as f64 + 0.5) * self.stride_px - 0.5;
         for (v, row) in disparity_px.rows().enumerate() {
-            for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0) {
+            for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0)
+            {
                 let depth = rig.focal_baseline_px_m() / f64::from(disparity);
                 let point = rig.ray(middle(u), middle(v)).map(|part| part * depth);
                 let in_previous = Vector3::from(t_previous_current.transform_point(point));
@@ -234,18 +252,27 @@ impl<'c> Pairing<'c> {
                 let weight = 1.0 / (NOISE_M * NOISE_M + noise_m * noise_m);
                 sums.pairs += 1;
                 sums.squared_m2 += distance_m * distance_m;
-                sums.equations.add_row([turn.x, turn.y, turn.z, normal.x, normal.y, normal.z], distance_m, weight);
+                sums.equations.add_row(
+                    [turn.x, turn.y, turn.z, normal.x, normal.y, normal.z],
+                    distance_m,
+                    weight,
+                );
             }
         }
         sums
     }
 
     /// The map's surface at the pixel a point falls on, and its normal.
-    fn associate(&self, point: &Vector3<f64>, map: &MapPicture<'_>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    fn associate(
+        &self,
+        point: &Vector3<f64>,
+        map: &MapPicture<'_>,
+    ) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let rig = self.rig;
         let seen = rig.project((*point).into())?;
         let (u, v) = (seen.u_left_px + rig.center_u_px, seen.v_px + rig.center_v_px);
-        // Rounded down half a pixel further on: the nearest pixel. Casts hold at the ends, and a negative one is none.
+        // Rounded down half a pixel further on: the nearest pixel. Casts hold at the ends, and a
+        // negative one is none.
         if !(u >= -0.5 && v >= -0.5) {
             return None;
         }

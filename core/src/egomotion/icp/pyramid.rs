@@ -1,5 +1,5 @@
-//! The measured disparity at half, a quarter and an eighth of its size, in memory lent for the purpose. Disparities are averaged, not depths: on a
-//! plane their mean is that of the middle.
+//! The measured disparity at half, a quarter and an eighth of its size, in memory lent for the
+//! purpose. Disparities are averaged, not depths: on a plane their mean is that of the middle.
 
 use super::config::MAX_LEVELS;
 use crate::{
@@ -7,25 +7,36 @@ use crate::{
     image::{DISPARITY_ONE_PX, View},
 };
 
-/// Disparities within this of a block's first one are averaged with it, px: means never bridge an edge.
+/// Disparities within this of a block's first one are averaged with it, px: means never bridge an
+/// edge.
 const SAME_PX: f32 = 1.0;
-/// Least size of a level beyond the finest, px: on smaller ones most points lie on edges, and lead astray.
+/// Least size of a level beyond the finest, px: on smaller ones most points lie on edges, and lead
+/// astray.
 const MIN_WIDTH: usize = 64;
 /// Its least height.
 const MIN_HEIGHT: usize = 20;
 
-/// Disparity in px of the full image, finest first; 0 where it is unknown or its depth is beyond the limits.
+/// Disparity in px of the full image, finest first; 0 where it is unknown or its depth is beyond
+/// the limits.
 pub(super) struct Pyramid<'a> {
     levels: [Option<View<'a, f32>>; MAX_LEVELS as usize],
 }
 
 impl<'a> Pyramid<'a> {
-    /// Averages 2 x 2 px after 2 x 2 px. `memory` needs a third of the image's pixels; levels that do not fit are left out.
-    pub fn build(rig: &StereoRig, limits_m: [f32; 2], disparity_q8: View<'_, u16>, levels: u8, memory: &'a mut [f32]) -> Self {
+    /// Averages 2 x 2 px after 2 x 2 px. `memory` needs a third of the image's pixels; levels that
+    /// do not fit are left out.
+    pub fn build(
+        rig: &StereoRig,
+        limits_m: [f32; 2],
+        disparity_q8: View<'_, u16>,
+        levels: u8,
+        memory: &'a mut [f32],
+    ) -> Self {
         let mut pyramid = Self { levels: [None; MAX_LEVELS as usize] };
         let (mut width, mut height) = (disparity_q8.width() / 2, disparity_q8.height() / 2);
         let mut rest = memory;
-        let limits_px = [limits_m[1], limits_m[0]].map(|depth_m| (rig.focal_baseline_px_m() / f64::from(depth_m)) as f32);
+        let limits_px = [limits_m[1], limits_m[0]]
+            .map(|depth_m| (rig.focal_baseline_px_m() / f64::from(depth_m)) as f32);
         let mut finer: Option<View<'a, f32>> = None;
         for slot in pyramid.levels.iter_mut().take(usize::from(levels)) {
             let pixels = width * height;
@@ -63,7 +74,9 @@ fn halve_given(limits_px: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f3
         if px >= limits_px[0] && px <= limits_px[1] { px } else { 0.0 }
     };
     for (v, row) in level.chunks_exact_mut(width.max(1)).enumerate() {
-        for (to, four) in row.iter_mut().zip(blocks(disparity_q8.row(2 * v), disparity_q8.row(2 * v + 1))) {
+        for (to, four) in
+            row.iter_mut().zip(blocks(disparity_q8.row(2 * v), disparity_q8.row(2 * v + 1)))
+        {
             *to = mean(four.map(px));
         }
     }
@@ -88,5 +101,10 @@ fn mean(four: [f32; 4]) -> f32 {
 
 /// 2 x 2 px after 2 x 2 px of two rows.
 fn blocks<'r, T: Copy>(upper: &'r [T], lower: &'r [T]) -> impl Iterator<Item = [T; 4]> + 'r {
-    upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0).map(|([a, b], [c, d])| [*a, *b, *c, *d])
+    upper
+        .as_chunks::<2>()
+        .0
+        .iter()
+        .zip(lower.as_chunks::<2>().0)
+        .map(|([a, b], [c, d])| [*a, *b, *c, *d])
 }

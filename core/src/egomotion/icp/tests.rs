@@ -12,13 +12,19 @@ use std::{vec, vec::Vec};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 192;
-const RIG: StereoRig = StereoRig { focal_px: 360.0, center_u_px: 319.5, center_v_px: 95.5, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 360.0, center_u_px: 319.5, center_v_px: 95.5, baseline_m: 0.5 };
 const LIMITS_M: [f32; 2] = [0.5, 20.0];
 
 /// A plane: normal towards the camera, and where it cuts the axis along it.
 type Plane = ([f64; 3], f64);
 /// Floor, both walls, and a wall ahead.
-const SCENE: [Plane; 4] = [([0.0, -1.0, 0.0], 1.5), ([1.0, 0.0, 0.0], 3.0), ([-1.0, 0.0, 0.0], 4.0), ([0.0, 0.0, -1.0], 9.0)];
+const SCENE: [Plane; 4] = [
+    ([0.0, -1.0, 0.0], 1.5),
+    ([1.0, 0.0, 0.0], 3.0),
+    ([-1.0, 0.0, 0.0], 4.0),
+    ([0.0, 0.0, -1.0], 9.0),
+];
 
 /// What a camera sees of the planes.
 struct Picture {
@@ -35,17 +41,23 @@ fn render(planes: &[Plane], t_world_camera: &Transform) -> Picture {
     };
     for at in 0..WIDTH * HEIGHT {
         let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
-        let ray = Vector3::new((u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px, 1.0);
+        let ray = Vector3::new(
+            (u - RIG.center_u_px) / RIG.focal_px,
+            (v - RIG.center_v_px) / RIG.focal_px,
+            1.0,
+        );
         let (origin, direction) = (t_world_camera.translation(), t_world_camera.rotate(ray));
         let hits = planes.iter().filter_map(|(normal, away_m)| {
             let normal = Vector3::from(*normal);
             let depth = -(normal.dot(&origin) + away_m) / normal.dot(&direction);
-            (depth > 0.1 && depth < f64::from(LIMITS_M[1])).then_some((depth, t_world_camera.inverse().rotate(normal)))
+            (depth > 0.1 && depth < f64::from(LIMITS_M[1]))
+                .then_some((depth, t_world_camera.inverse().rotate(normal)))
         });
         if let Some((depth, normal)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
             picture.depth_m[at] = depth as f32;
             picture.normal[at] = [0, 1, 2].map(|axis| libm::round(127.0 * normal[axis]) as i8);
-            picture.disparity_q8[at] = libm::round(RIG.focal_baseline_px_m() / depth * f64::from(DISPARITY_ONE_PX)) as u16;
+            picture.disparity_q8[at] =
+                libm::round(RIG.focal_baseline_px_m() / depth * f64::from(DISPARITY_ONE_PX)) as u16;
         }
     }
     picture
@@ -59,7 +71,14 @@ fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpRepor
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
     };
     let mut memory = vec![7.0; WIDTH * HEIGHT];
-    track(config, &RIG, LIMITS_M, View::new(&now.disparity_q8, WIDTH, HEIGHT).unwrap(), &map, &mut memory)
+    track(
+        config,
+        &RIG,
+        LIMITS_M,
+        View::new(&now.disparity_q8, WIDTH, HEIGHT).unwrap(),
+        &map,
+        &mut memory,
+    )
 }
 
 fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
@@ -68,13 +87,20 @@ fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
 
 #[test]
 fn small_motions_are_found() {
-    for (turn, way_m) in [([0.0; 3], [0.0; 3]), ([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]), ([0.004, -0.012, 0.003], [-0.05, 0.02, 0.05])] {
+    for (turn, way_m) in [
+        ([0.0; 3], [0.0; 3]),
+        ([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]),
+        ([0.004, -0.012, 0.003], [-0.05, 0.02, 0.05]),
+    ] {
         let motion = walk(turn, way_m);
         let report = tracked(&IcpConfig::default(), &SCENE, &motion);
         assert_eq!(report.status, IcpStatus::Tracked, "{report:?}");
         let error = report.t_current_previous * motion;
         assert!(error.distance_m() < 0.005 && error.angle_rad() < 0.001, "{way_m:?}: {error:?}");
-        assert!(report.pairs > 3_000 && report.residual_rms_m < 0.02 && report.held > 0.001, "{report:?}");
+        assert!(
+            report.pairs > 3_000 && report.residual_rms_m < 0.02 && report.held > 0.001,
+            "{report:?}"
+        );
     }
 }
 
@@ -83,7 +109,10 @@ fn large_motions_are_no_estimates() {
     let turned = tracked(&IcpConfig::default(), &SCENE, &walk([0.0, 0.6, 0.0], [0.0; 3]));
     assert!(turned.status != IcpStatus::Tracked && turned.motion().is_none(), "{turned:?}");
     let config = IcpConfig { step_max_m: 0.05, ..IcpConfig::default() };
-    assert_eq!(tracked(&config, &SCENE, &walk([0.0; 3], [0.0, 0.0, 0.08])).status, IcpStatus::TooFar);
+    assert_eq!(
+        tracked(&config, &SCENE, &walk([0.0; 3], [0.0, 0.0, 0.08])).status,
+        IcpStatus::TooFar
+    );
 }
 
 #[test]
@@ -99,7 +128,8 @@ fn a_road_alone_holds_no_way_along_it_and_nothing_holds_none() {
 #[test]
 fn depth_off_the_map_is_no_estimate() {
     // The same scene, with a wall far nearer over two thirds of the picture than the map knows.
-    let (before, mut now) = (render(&SCENE, &Transform::IDENTITY), render(&SCENE, &Transform::IDENTITY));
+    let (before, mut now) =
+        (render(&SCENE, &Transform::IDENTITY), render(&SCENE, &Transform::IDENTITY));
     let mut image = ViewMut::new(&mut now.disparity_q8, WIDTH, HEIGHT).unwrap();
     for row in image.pixels_mut().chunks_mut(WIDTH) {
         row[..2 * WIDTH / 3].fill((RIG.focal_baseline_px_m() / 0.8 * 256.0) as u16);
@@ -148,7 +178,12 @@ fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
         ("icp.levels", |config, value| config.levels = value as u8, &[1.0, 4.0], &[0.0, 5.0]),
         ("icp.steps", |config, value| config.steps = value as u8, &[1.0, 50.0], &[0.0, 51.0]),
         ("icp.distance_m", |config, value| config.distance_m = value, ABOVE_0.0, ABOVE_0.1),
-        ("icp.noise_px", |config, value| config.noise_px = value, &[0.0, 9.0], &[-0.01, f32::NAN, f32::INFINITY]),
+        (
+            "icp.noise_px",
+            |config, value| config.noise_px = value,
+            &[0.0, 9.0],
+            &[-0.01, f32::NAN, f32::INFINITY],
+        ),
         ("icp.pairs_min", |config, value| config.pairs_min = value, SHARE.0, SHARE.1),
         ("icp.held_min", |config, value| config.held_min = value, SHARE.0, SHARE.1),
         ("icp.step_max_m", |config, value| config.step_max_m = value, ABOVE_0.0, ABOVE_0.1),
@@ -157,7 +192,8 @@ fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
         ("icp.explained_px", |config, value| config.explained_px = value, ABOVE_0.0, ABOVE_0.1),
     ];
     for (key, change, good, bad) in settings {
-        good.iter().for_each(|&value| assert!(problems(change, value).is_empty(), "{key} = {value}"));
+        good.iter()
+            .for_each(|&value| assert!(problems(change, value).is_empty(), "{key} = {value}"));
         bad.iter().for_each(|&value| assert_eq!(problems(change, value), [key], "{key} = {value}"));
     }
 }

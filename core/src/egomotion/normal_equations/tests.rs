@@ -3,14 +3,16 @@
 use super::*;
 use crate::random::Random;
 
-const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
 
 fn motion() -> Transform {
     Transform::new([0.02, -0.05, 0.03], [0.2, -0.1, 0.7])
 }
 
 fn points() -> [Point; 3] {
-    let point = |xyz: [f64; 3], right_v: f64| Point { xyz, left: [30.0, -12.0], right: [-25.0, right_v] };
+    let point =
+        |xyz: [f64; 3], right_v: f64| Point { xyz, left: [30.0, -12.0], right: [-25.0, right_v] };
     [point([1.0, -0.7, 6.0], -11.0), point([-3.0, 1.2, 9.0], -15.5), point([0.4, 0.9, 4.0], 3.0)]
 }
 
@@ -32,14 +34,21 @@ fn the_sums_of_points_are_those_of_their_errors_derivatives() {
         sums.add(&point, &RotationMatrix::new(&motion()), &RIG, |squared| 1.0 / (1.0 + squared));
         let errors = residual_after(&point, [0.0; N]);
         let derivative: [[f64; 4]; N] = core::array::from_fn(|by| {
-            let shifted = |sign: f64| residual_after(&point, core::array::from_fn(|at| if at == by { sign * STEP } else { 0.0 }));
+            let shifted = |sign: f64| {
+                residual_after(
+                    &point,
+                    core::array::from_fn(|at| if at == by { sign * STEP } else { 0.0 }),
+                )
+            };
             let (high, low) = (shifted(1.0), shifted(-1.0));
             core::array::from_fn(|row| (high[row] - low[row]) / (2.0 * STEP))
         });
         let squared: f64 = errors.iter().map(|error| error * error).sum();
         let weight = 1.0 / (1.0 + squared);
         for i in 0..N {
-            let product = |other: &[f64; 4]| -> f64 { (0..4).map(|row| derivative[i][row] * other[row]).sum() };
+            let product = |other: &[f64; 4]| -> f64 {
+                (0..4).map(|row| derivative[i][row] * other[row]).sum()
+            };
             expected.vector[i] += weight * product(&errors);
             (0..=i).for_each(|j| expected.matrix[i][j] += weight * product(&derivative[j]));
         }
@@ -47,7 +56,12 @@ fn the_sums_of_points_are_those_of_their_errors_derivatives() {
         expected.weight += weight;
     }
     for i in 0..N {
-        assert!(close(sums.vector[i], expected.vector[i]), "{i}: {} {}", sums.vector[i], expected.vector[i]);
+        assert!(
+            close(sums.vector[i], expected.vector[i]),
+            "{i}: {} {}",
+            sums.vector[i],
+            expected.vector[i]
+        );
         for j in 0..N {
             let (found, expected) = (sums.matrix[i][j], expected.matrix[i][j]);
             assert!(close(found, expected), "{i} {j}: {found} {expected}");
@@ -59,8 +73,16 @@ fn the_sums_of_points_are_those_of_their_errors_derivatives() {
 #[test]
 fn a_point_behind_the_camera_adds_nothing() {
     let mut sums = NormalEquations::ZERO;
-    sums.add(&Point { xyz: [0.0, 0.0, -5.0], ..points()[0] }, &RotationMatrix::new(&motion()), &RIG, |_| 1.0);
-    assert_eq!((sums.matrix, sums.vector, sums.error, sums.weight), ([[0.0; N]; N], [0.0; N], 0.0, 0.0));
+    sums.add(
+        &Point { xyz: [0.0, 0.0, -5.0], ..points()[0] },
+        &RotationMatrix::new(&motion()),
+        &RIG,
+        |_| 1.0,
+    );
+    assert_eq!(
+        (sums.matrix, sums.vector, sums.error, sums.weight),
+        ([[0.0; N]; N], [0.0; N], 0.0, 0.0)
+    );
 }
 
 #[test]
@@ -72,7 +94,11 @@ fn the_sums_of_a_row_are_its_products() {
     for i in 0..N {
         assert_eq!(sums.vector[i], 4.0 - 1.5 * row[i]);
         for j in 0..N {
-            assert_eq!(sums.matrix[i][j], if j <= i { 0.5 + 0.5 * row[i] * row[j] } else { 0.0 }, "{i} {j}");
+            assert_eq!(
+                sums.matrix[i][j],
+                if j <= i { 0.5 + 0.5 * row[i] * row[j] } else { 0.0 },
+                "{i} {j}"
+            );
         }
     }
     assert_eq!((sums.error, sums.weight), (2.0 * 16.0 + 0.5 * 9.0, 2.5));
@@ -124,10 +150,13 @@ fn too_few_rows_and_what_is_not_finite_have_no_solution() {
 
 #[test]
 fn a_pivot_decides_by_its_share_of_the_diagonal() {
-    // Two rows that differ by a little in the last unknown: the last pivot is the square of that, times the diagonal over two.
+    // Two rows that differ by a little in the last unknown: the last pivot is the square of that,
+    // times the diagonal over two.
     let sums = |little: f64| {
         let mut sums = NormalEquations::ZERO;
-        (0..N).for_each(|at| sums.add_row(core::array::from_fn(|other| f64::from(u8::from(at == other))), 1.0, 1.0));
+        (0..N).for_each(|at| {
+            sums.add_row(core::array::from_fn(|other| f64::from(u8::from(at == other))), 1.0, 1.0)
+        });
         (sums.matrix[N - 1][N - 2], sums.matrix[N - 1][N - 1]) = (1.0, 1.0 + little);
         sums
     };
@@ -158,6 +187,9 @@ fn a_rotation_matrix_carries_points_as_the_motion_does() {
     let matrix = RotationMatrix::new(&motion());
     for point in points() {
         let (found, expected) = (matrix.transform(point.xyz), motion().transform_point(point.xyz));
-        assert!((0..3).all(|axis| (found[axis] - expected[axis]).abs() < 1e-12), "{found:?} {expected:?}");
+        assert!(
+            (0..3).all(|axis| (found[axis] - expected[axis]).abs() < 1e-12),
+            "{found:?} {expected:?}"
+        );
     }
 }

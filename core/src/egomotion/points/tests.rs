@@ -4,7 +4,8 @@ use super::*;
 use crate::{memory::Slab, random::Random};
 use std::{boxed::Box, vec::Vec};
 
-const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 80.0, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 80.0, baseline_m: 0.5 };
 const MATCHES: usize = 700;
 const BYTES: usize = Points::bytes(MATCHES);
 
@@ -12,10 +13,12 @@ fn motion() -> Transform {
     Transform::new([0.01, -0.03, 0.02], [0.1, 0.05, -1.1])
 }
 
-/// Matches of points around; every third is off by up to some pixels in one of its four coordinates.
+/// Matches of points around; every third is off by up to some pixels in one of its four
+/// coordinates.
 fn matches(count: usize) -> Vec<Match> {
     let mut random = Random::new(12);
-    let mut within = |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
+    let mut within =
+        |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
     (0..count)
         .map(|index| {
             let z = within(3.0, 30.0);
@@ -23,7 +26,8 @@ fn matches(count: usize) -> Vec<Match> {
             let seen = |point: [f64; 3]| {
                 let seen = RIG.project(point).unwrap();
                 let row = RIG.center_v_px + seen.v_px;
-                [seen.u_left_px, seen.u_right_px].map(|u| [(RIG.center_u_px + u) as f32, row as f32])
+                [seen.u_left_px, seen.u_right_px]
+                    .map(|u| [(RIG.center_u_px + u) as f32, row as f32])
             };
             let ([previous_left, previous_right], [mut current_left, mut current_right]) =
                 (seen(point), seen(motion().transform_point(point)));
@@ -51,12 +55,19 @@ fn with_points(count: usize, test: impl FnOnce(&mut Points<'_>, &[Match])) {
 /// The length of a point's error under a motion, px.
 fn error_px(point: &Point, motion: &Transform) -> Option<f64> {
     let seen = RIG.project(motion.transform_point(point.xyz))?;
-    let parts = [seen.u_left_px - point.left[0], seen.v_px - point.left[1], seen.u_right_px - point.right[0], seen.v_px - point.right[1]];
+    let parts = [
+        seen.u_left_px - point.left[0],
+        seen.v_px - point.left[1],
+        seen.u_right_px - point.right[0],
+        seen.v_px - point.right[1],
+    ];
     Some(libm::sqrt(parts.iter().map(|part| part * part).sum()))
 }
 
 fn within_px(points: &Points<'_>, motion: &Transform, px: f64) -> Vec<u32> {
-    let near = |index: &usize| error_px(&points.get(*index).unwrap(), motion).is_some_and(|error| error < px);
+    let near = |index: &usize| {
+        error_px(&points.get(*index).unwrap(), motion).is_some_and(|error| error < px)
+    };
     (0..points.len()).filter(near).map(|index| index as u32).collect()
 }
 
@@ -71,12 +82,23 @@ fn a_match_is_a_point_before_and_two_observations_now() {
         for (index, m) in matches.iter().enumerate() {
             let point = points.get(index).unwrap();
             let near = |found: f64, expected: f64| (found - expected).abs() < 1e-3;
-            let [left, right] = [m.current_left, m.current_right].map(|at| [f64::from(at[0]) - 200.0, f64::from(at[1]) - 80.0]);
-            assert!((0..2).all(|axis| near(point.left[axis], left[axis]) && near(point.right[axis], right[axis])));
+            let [left, right] = [m.current_left, m.current_right]
+                .map(|at| [f64::from(at[0]) - 200.0, f64::from(at[1]) - 80.0]);
+            assert!(
+                (0..2).all(|axis| near(point.left[axis], left[axis])
+                    && near(point.right[axis], right[axis]))
+            );
             let disparity = f64::from(m.previous_left[0]) - f64::from(m.previous_right[0]);
             let z = 150.0 / disparity;
-            let expected = [(f64::from(m.previous_left[0]) - 200.0) * z / 300.0, (f64::from(m.previous_left[1]) - 80.0) * z / 300.0, z];
-            assert!((0..3).all(|axis| near(point.xyz[axis], expected[axis])), "{point:?} {expected:?}");
+            let expected = [
+                (f64::from(m.previous_left[0]) - 200.0) * z / 300.0,
+                (f64::from(m.previous_left[1]) - 80.0) * z / 300.0,
+                z,
+            ];
+            assert!(
+                (0..3).all(|axis| near(point.xyz[axis], expected[axis])),
+                "{point:?} {expected:?}"
+            );
         }
         assert!(points.get(MATCHES).is_none() && points.source(MATCHES).is_none());
     });
@@ -89,10 +111,18 @@ fn what_cannot_be_triangulated_is_left_out_and_the_others_keep_their_numbers() {
         some[0].previous_right = some[0].previous_left;
         some[2].current_left[1] = f32::NAN;
         some[3].current_right[0] = f32::INFINITY;
-        assert_eq!((points.fill(&some, &RIG), points.len()), (5, 2), "a fill forgets the one before");
+        assert_eq!(
+            (points.fill(&some, &RIG), points.len()),
+            (5, 2),
+            "a fill forgets the one before"
+        );
         assert_eq!([0, 1].map(|index| points.source(index)), [Some(1), Some(4)]);
         let many = [some[1]; MATCHES + 9];
-        assert_eq!((points.fill(&many, &RIG), points.len()), (MATCHES + 9, MATCHES), "no more than fit");
+        assert_eq!(
+            (points.fill(&many, &RIG), points.len()),
+            (MATCHES + 9, MATCHES),
+            "no more than fit"
+        );
     });
 }
 
@@ -100,14 +130,20 @@ fn what_cannot_be_triangulated_is_left_out_and_the_others_keep_their_numbers() {
 fn scores_and_selections_are_the_points_within_the_distance() {
     with_points(MATCHES, |points, _| {
         let nearly = motion() * Transform::new([0.0, 0.002, 0.0], [0.01, 0.0, 0.005]);
-        for (motion, px) in [(motion(), 0.5), (motion(), 2.0), (motion(), 4.0), (nearly, 2.0), (nearly, 4.0)] {
+        for (motion, px) in
+            [(motion(), 0.5), (motion(), 2.0), (motion(), 4.0), (nearly, 2.0), (nearly, 4.0)]
+        {
             let expected = within_px(points, &motion, px);
             assert!(expected.len() > 100 && expected.len() < MATCHES, "{}", expected.len());
             assert_eq!(points.score(&motion, &RIG, px as f32, 0), expected.len() as u32, "{px} px");
             let mut inliers = [0; MATCHES];
             let count = points.select(&motion, &RIG, px as f32, &mut inliers);
             assert_eq!(inliers[..count], expected);
-            assert_eq!(points.select(&motion, &RIG, px as f32, &mut inliers[..7]), 7, "no more than fit");
+            assert_eq!(
+                points.select(&motion, &RIG, px as f32, &mut inliers[..7]),
+                7,
+                "no more than fit"
+            );
         }
         let behind = Transform::from_translation([0.0, 0.0, -31.0]);
         assert_eq!(points.score(&behind, &RIG, 1e6, 0), 0, "points behind the camera are nowhere");
@@ -122,9 +158,16 @@ fn a_score_that_is_to_beat_another_is_exact_where_it_does_and_not_above_it_where
             assert_eq!(points.score(&motion(), &RIG, 2.0, to_beat), whole, "more than {to_beat}");
         }
         for to_beat in [whole, whole + 1, MATCHES as u32 - 1] {
-            assert!(points.score(&motion(), &RIG, 2.0, to_beat) <= to_beat, "not more than {to_beat}");
+            assert!(
+                points.score(&motion(), &RIG, 2.0, to_beat) <= to_beat,
+                "not more than {to_beat}"
+            );
         }
-        assert_eq!(points.score(&motion(), &RIG, 2.0, MATCHES as u32), 0, "not one is looked at in vain");
+        assert_eq!(
+            points.score(&motion(), &RIG, 2.0, MATCHES as u32),
+            0,
+            "not one is looked at in vain"
+        );
         // After 256 points that miss, fewer than 500 are left.
         let elsewhere = Transform::from_translation([5.0, 0.0, 0.0]);
         assert_eq!(points.score(&elsewhere, &RIG, 0.1, 500), 0);

@@ -1,4 +1,5 @@
-//! Real clips, evaluated by KITTI's odometry metric: relative errors over all segment lengths, and from frame to frame.
+//! Real clips, evaluated by KITTI's odometry metric: relative errors over all segment lengths, and
+//! from frame to frame.
 //!
 //! With `--nocapture` the figures and the mean time of a frame are printed.
 
@@ -32,7 +33,11 @@ fn root() -> PathBuf {
 }
 
 fn numbers(path: &Path) -> Vec<f64> {
-    fs::read_to_string(path).unwrap().split_whitespace().filter_map(|word| word.parse().ok()).collect()
+    fs::read_to_string(path)
+        .unwrap()
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect()
 }
 
 fn rig(path: &Path) -> StereoRig {
@@ -87,7 +92,9 @@ fn relative_errors(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors 
     let (mut translation, mut rotation, mut count) = (0.0, 0.0, 0.0);
     for segment_m in LENGTHS_M {
         for i in 0..frames {
-            let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + segment_m) else { break };
+            let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + segment_m) else {
+                break;
+            };
             translation += length(&error(i, j)) / segment_m * 100.0;
             rotation += degrees(&error(i, j)) / segment_m;
             count += 1.0;
@@ -123,21 +130,40 @@ fn run(name: &str) -> Vec<Matrix4<f64>> {
     let mut trajectory = Vec::new();
     let (mut matching_ms, mut moving_ms) = (0.0, 0.0);
     for frame in 0.. {
-        let (Some(left), Some(right)) = (grey(&folder.join("image_0"), frame), grey(&folder.join("image_1"), frame)) else { break };
-        let (left_view, right_view) = (View::new(&left.0, left.1, left.2).unwrap(), View::new(&right.0, right.1, right.2).unwrap());
+        let (Some(left), Some(right)) =
+            (grey(&folder.join("image_0"), frame), grey(&folder.join("image_1"), frame))
+        else {
+            break;
+        };
+        let (left_view, right_view) = (
+            View::new(&left.0, left.1, left.2).unwrap(),
+            View::new(&right.0, right.1, right.2).unwrap(),
+        );
         let begin = cpu_ms();
         let report = matcher.push(&SceneFlowConfig::default(), left_view, right_view, &Serial);
         let matched = cpu_ms();
-        let estimate = (frame > 0).then(|| camera.step(&EgomotionConfig::default(), &rig, 0.1, matcher.bucketed(), &mut estimator));
+        let estimate = (frame > 0).then(|| {
+            camera.step(&EgomotionConfig::default(), &rig, 0.1, matcher.bucketed(), &mut estimator)
+        });
         (matching_ms, moving_ms) = (matching_ms + matched - begin, moving_ms + cpu_ms() - matched);
         if let Some(estimate) = estimate {
-            assert_eq!(estimate.status, MotionStatus::Estimated, "{name} {frame}: {report:?} {estimate:?}");
+            assert_eq!(
+                estimate.status,
+                MotionStatus::Estimated,
+                "{name} {frame}: {report:?} {estimate:?}"
+            );
         }
         let rows = camera.t_world_camera().matrix_3x4();
-        trajectory.push(Matrix4::from_fn(|r, c| rows.get(r).map_or(f64::from(u8::from(c == 3)), |row| row[c])));
+        trajectory.push(Matrix4::from_fn(|r, c| {
+            rows.get(r).map_or(f64::from(u8::from(c == 3)), |row| row[c])
+        }));
     }
     let mean = |total: f64| total / trajectory.len() as f64;
-    println!("{name}: scene flow {:.1} ms, egomotion {:.1} ms a frame", mean(matching_ms), mean(moving_ms));
+    println!(
+        "{name}: scene flow {:.1} ms, egomotion {:.1} ms a frame",
+        mean(matching_ms),
+        mean(moving_ms)
+    );
     assert!(trajectory.len() > 1, "{name} has images");
     trajectory
 }
@@ -172,7 +198,11 @@ fn tracks_sequence_06_as_well_as_the_best_stereo_odometry_measured() {
     assert!(errors.frame_rms_m <= 0.010);
 }
 
-#[dynvox_needs::clips("kitti-odometry/sequences/r1405", "kitti-odometry/poses/r1405.txt", "kitti-odometry/poses/r1405.vo.txt")]
+#[dynvox_needs::clips(
+    "kitti-odometry/sequences/r1405",
+    "kitti-odometry/poses/r1405.txt",
+    "kitti-odometry/poses/r1405.vo.txt"
+)]
 #[test]
 fn tracks_a_residential_street() {
     let trajectory = run("r1405");
@@ -182,5 +212,9 @@ fn tracks_a_residential_street() {
     assert!(errors.translation_percent <= 1.5 && errors.rotation_deg_per_m <= 0.025);
     let errors = relative_errors(&truth("r1405.vo.txt"), &trajectory);
     print_errors("r1405 against another stereo odometry", &errors);
-    assert!(errors.translation_percent <= 0.5 && errors.rotation_deg_per_m <= 0.01 && errors.frame_rms_m <= 0.0075);
+    assert!(
+        errors.translation_percent <= 0.5
+            && errors.rotation_deg_per_m <= 0.01
+            && errors.frame_rms_m <= 0.0075
+    );
 }

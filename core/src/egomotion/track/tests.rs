@@ -49,19 +49,31 @@ fn config() -> EgomotionConfig {
 fn a_camera_accelerates_within_its_bound_and_the_noise() {
     let camera = moving();
     // In half a second at 10 m/s it comes 5 m ahead; 16 m/s² make 4 m of them more or less.
-    for (way_m, can) in [(-5.0, true), (-9.05, true), (-9.15, false), (-0.95, true), (-0.85, false)] {
+    for (way_m, can) in [(-5.0, true), (-9.05, true), (-9.15, false), (-0.95, true), (-0.85, false)]
+    {
         assert_eq!(camera.can_accelerate_to(&config(), &ahead(way_m), 0.5), can, "{way_m} m");
     }
-    assert!(camera.can_accelerate_to(&config(), &Transform::from_translation([4.05, 0.0, -5.0]), 0.5), "to the side as well");
-    assert!(!camera.can_accelerate_to(&config(), &Transform::from_translation([4.15, 0.0, -5.0]), 0.5));
-    assert!(Egomotion { motion_s: 0.0, ..moving() }.can_accelerate_to(&config(), &ahead(900.0), 0.5), "nothing is known of its motion");
+    assert!(
+        camera.can_accelerate_to(&config(), &Transform::from_translation([4.05, 0.0, -5.0]), 0.5),
+        "to the side as well"
+    );
+    assert!(!camera.can_accelerate_to(
+        &config(),
+        &Transform::from_translation([4.15, 0.0, -5.0]),
+        0.5
+    ));
+    assert!(
+        Egomotion { motion_s: 0.0, ..moving() }.can_accelerate_to(&config(), &ahead(900.0), 0.5),
+        "nothing is known of its motion"
+    );
     assert!(!camera.may_stand(&config(), 0.5) && camera.may_stand(&config(), 0.625));
 }
 
 #[test]
 fn a_motion_is_doubted_where_few_matches_agree_on_what_cannot_be() {
-    let doubt =
-        |estimate: MotionEstimate, way_m: f64| Egomotion { reference_s: 0.1, ..moving() }.doubt(&config(), &ahead(way_m), &estimate);
+    let doubt = |estimate: MotionEstimate, way_m: f64| {
+        Egomotion { reference_s: 0.1, ..moving() }.doubt(&config(), &ahead(way_m), &estimate)
+    };
     let (as_before, leap) = (-1.0, -3.0);
     assert_eq!([50, 49, 6].map(|inliers| doubt(estimated(inliers), as_before)), [None; 3]);
     assert_eq!(doubt(estimated(50), leap), None, "half of the matches agree");
@@ -71,8 +83,10 @@ fn a_motion_is_doubted_where_few_matches_agree_on_what_cannot_be() {
     assert_eq!(doubt(few(25), leap), None);
     assert_eq!(doubt(few(24), leap), Some(MotionStatus::Implausible));
     // Cameras that do not expose at the same time.
-    let late =
-        |distance_m: f64, inliers: u32| MotionEstimate { right_ahead: Some(RightAhead { distance_m, sigma_m: 0.0 }), ..estimated(inliers) };
+    let late = |distance_m: f64, inliers: u32| MotionEstimate {
+        right_ahead: Some(RightAhead { distance_m, sigma_m: 0.0 }),
+        ..estimated(inliers)
+    };
     assert_eq!(doubt(late(0.6, 90), as_before), Some(MotionStatus::Unsynchronized));
     assert_eq!(doubt(late(0.2, 90), as_before), None);
     assert_eq!(doubt(late(0.2, 40), as_before), Some(MotionStatus::Unsynchronized));
@@ -86,27 +100,46 @@ fn what_few_matches_leave_open_is_doubted_after_a_gap_alone() {
         ..estimated(40)
     };
     let doubt = |since_reference: u32| {
-        let camera = Egomotion { since_reference, reference_s: 0.1 * f64::from(since_reference + 1), ..moving() };
+        let camera = Egomotion {
+            since_reference,
+            reference_s: 0.1 * f64::from(since_reference + 1),
+            ..moving()
+        };
         camera.doubt(&config(), &ahead(-1.0), &open)
     };
-    assert_eq!([0, 1, 2].map(doubt), [None, Some(MotionStatus::Unsynchronized), Some(MotionStatus::Unsynchronized)]);
+    assert_eq!(
+        [0, 1, 2].map(doubt),
+        [None, Some(MotionStatus::Unsynchronized), Some(MotionStatus::Unsynchronized)]
+    );
 }
 
 #[test]
 fn after_a_gap_few_inliers_do_not_vouch_for_cameras_that_may_be_out_of_step() {
     let doubt = |since_reference: u32, inliers: u32| {
-        let camera = Egomotion { since_reference, reference_s: 0.1 * f64::from(since_reference + 1), ..moving() };
+        let camera = Egomotion {
+            since_reference,
+            reference_s: 0.1 * f64::from(since_reference + 1),
+            ..moving()
+        };
         let ahead_of = RightAhead { distance_m: 0.3, sigma_m: 0.1 };
-        camera.doubt(&config(), &ahead(-1.0), &MotionEstimate { right_ahead: Some(ahead_of), matches: inliers, ..estimated(inliers) })
+        camera.doubt(
+            &config(),
+            &ahead(-1.0),
+            &MotionEstimate { right_ahead: Some(ahead_of), matches: inliers, ..estimated(inliers) },
+        )
     };
     // All matches agree, but a quarter as many as before must be left.
-    assert_eq!([25, 24].map(|inliers| doubt(1, inliers)), [None, Some(MotionStatus::Unsynchronized)]);
+    assert_eq!(
+        [25, 24].map(|inliers| doubt(1, inliers)),
+        [None, Some(MotionStatus::Unsynchronized)]
+    );
     assert_eq!([25, 24].map(|inliers| doubt(0, inliers)), [None; 2]);
 }
 
 #[test]
 fn the_time_of_a_frame_is_its_share_of_the_time_since_the_reference() {
-    // Three frames in 0.3 s: each may be 1 m ahead, and 16 m/s² of a tenth of a second make 0.16 m more.
+    // Three frames in 0.3 s: each may be 1 m ahead, and 16 m/s² of a tenth of a second make 0.16 m
+    // more.
     let camera = Egomotion { since_reference: 2, reference_s: 0.3, ..moving() };
     let doubt = |way_m: f64| camera.doubt(&config(), &ahead(way_m), &estimated(10));
     assert_eq!([-1.25, -1.27].map(doubt), [None, Some(MotionStatus::Implausible)]);
@@ -124,10 +157,16 @@ fn a_held_camera_expects_the_way_since_its_reference_and_one_frame_more() {
         assert_eq!((camera.since_reference(), camera.held_frames()), (frames, frames));
         assert!((camera.reference_s - 0.1 * f64::from(frames)).abs() < 1e-6);
         let there = (0..frames).fold(Transform::IDENTITY, |way, _| way * turn.inverse());
-        assert!(is_near(camera.t_world_camera(), &there) && is_near(&camera.t_world_reference, &Transform::IDENTITY));
+        assert!(
+            is_near(camera.t_world_camera(), &there)
+                && is_near(&camera.t_world_reference, &Transform::IDENTITY)
+        );
     }
     camera.hold(0.1);
-    assert!(camera.is_lost() && is_near(&camera.expected(), &turn), "the last frame is the reference now");
+    assert!(
+        camera.is_lost() && is_near(&camera.expected(), &turn),
+        "the last frame is the reference now"
+    );
     assert_eq!((camera.since_reference(), camera.reference_s), (0, 0.0));
 }
 
@@ -137,7 +176,8 @@ fn a_given_pose_tells_the_motion_and_ends_what_was_held() {
     camera.hold(0.1);
     camera.advance(None);
     assert_eq!((camera.held_frames(), camera.since_reference()), (2, 0));
-    let (before, pose) = (*camera.t_world_camera(), Transform::new([0.0, 0.3, 0.0], [2.0, 0.0, 5.0]));
+    let (before, pose) =
+        (*camera.t_world_camera(), Transform::new([0.0, 0.3, 0.0], [2.0, 0.0, 5.0]));
     camera.set_pose(&pose);
     assert!(is_near(camera.t_world_camera(), &pose) && is_near(&camera.t_world_reference, &pose));
     assert!(is_near(&(before * camera.t_current_previous().inverse()), &pose));
@@ -147,7 +187,9 @@ fn a_given_pose_tells_the_motion_and_ends_what_was_held() {
     camera.begin_segment();
     let guessed = camera.t_world_camera().translation_m;
     assert!(
-        (guessed[1] + SEGMENT_GAP_M).abs() < 1e-9 && camera.segment() == 1 && is_near(&camera.t_world_reference, camera.t_world_camera())
+        (guessed[1] + SEGMENT_GAP_M).abs() < 1e-9
+            && camera.segment() == 1
+            && is_near(&camera.t_world_reference, camera.t_world_camera())
     );
 }
 

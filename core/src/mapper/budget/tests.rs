@@ -2,9 +2,14 @@ use super::*;
 use crate::random::Random;
 
 const MIB: usize = 1 << 20;
-const IMAGES: [(usize, usize); 6] = [(320, 96), (640, 480), (752, 480), (1_280, 384), (1_280, 720), (1_920, 1_080)];
+const IMAGES: [(usize, usize); 6] =
+    [(320, 96), (640, 480), (752, 480), (1_280, 384), (1_280, 720), (1_920, 1_080)];
 
-fn solve(bytes: usize, (width, height): (usize, usize), options: &BudgetOptions) -> Result<Capacity, BudgetError> {
+fn solve(
+    bytes: usize,
+    (width, height): (usize, usize),
+    options: &BudgetOptions,
+) -> Result<Capacity, BudgetError> {
     Capacity::for_budget(bytes, width, height, options)
 }
 
@@ -20,8 +25,11 @@ fn grown(capacity: &Capacity) -> Capacity {
 fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
     let mut solved = 0;
     for mib in [8, 16, 32, 48, 64, 100, 256, 1_024] {
-        for (image, voxel_size_m) in IMAGES.into_iter().flat_map(|image| [(image, 0.05), (image, 0.1)]) {
-            let options = BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
+        for (image, voxel_size_m) in
+            IMAGES.into_iter().flat_map(|image| [(image, 0.05), (image, 0.1)])
+        {
+            let options =
+                BudgetOptions { voxel_size_m: Some(voxel_size_m), ..BudgetOptions::default() };
             let bytes = mib * MIB;
             match solve(bytes, image, &options) {
                 Ok(capacity) => {
@@ -36,7 +44,10 @@ fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
                 }
                 Err(BudgetError::TooSmall { least }) => {
                     assert!(least > bytes && mib < 256, "{mib} MiB, {image:?}");
-                    assert!(solve(least, image, &options).is_ok() && solve(least - 1, image, &options).is_err());
+                    assert!(
+                        solve(least, image, &options).is_ok()
+                            && solve(least - 1, image, &options).is_err()
+                    );
                 }
                 Err(other) => panic!("{mib} MiB, {image:?}: {other}"),
             }
@@ -54,7 +65,10 @@ fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works
         let bytes = (1usize << exponent) + random.below(1 << exponent) as usize;
         let image = (64 + random.below(2_000) as usize, 32 + random.below(1_200) as usize);
         let options = BudgetOptions {
-            colour: [None, Some(false), Some(true)].get(random.below(3) as usize).copied().flatten(),
+            colour: [None, Some(false), Some(true)]
+                .get(random.below(3) as usize)
+                .copied()
+                .flatten(),
             objects: (random.below(2) == 0).then(|| random.below(17) as usize),
             voxel_size_m: (random.below(2) == 0).then(|| 0.01 + random.below(50) as f32 / 100.0),
             raw_image: if random.below(4) == 0 { [image.0 + 100, image.1 + 50] } else { [0, 0] },
@@ -62,16 +76,31 @@ fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works
         match solve(bytes, image, &options) {
             Ok(capacity) => {
                 assert!(capacity.bytes() <= bytes, "question {at}: {options:?}");
-                assert!(grown(&capacity).bytes() > bytes, "question {at}: one block more would fit");
+                assert!(
+                    grown(&capacity).bytes() > bytes,
+                    "question {at}: one block more would fit"
+                );
                 assert_eq!(capacity.validate(), Ok(()), "question {at}: {options:?}");
-                assert!(capacity.blocks >= MIN_BLOCKS && options.colour.is_none_or(|colour| colour == capacity.colour));
-                assert!(options.objects.is_none_or(|objects| objects == capacity.objects), "question {at}: {options:?}");
+                assert!(
+                    capacity.blocks >= MIN_BLOCKS
+                        && options.colour.is_none_or(|colour| colour == capacity.colour)
+                );
+                assert!(
+                    options.objects.is_none_or(|objects| objects == capacity.objects),
+                    "question {at}: {options:?}"
+                );
                 answered += 1;
             }
             Err(BudgetError::TooSmall { least }) => {
                 assert!(least > bytes, "question {at}");
-                assert!(solve(least, image, &options).is_ok(), "question {at}: the least named works");
-                assert!(solve(least - 1, image, &options).is_err(), "question {at}: a byte less does not");
+                assert!(
+                    solve(least, image, &options).is_ok(),
+                    "question {at}: the least named works"
+                );
+                assert!(
+                    solve(least - 1, image, &options).is_err(),
+                    "question {at}: a byte less does not"
+                );
             }
             Err(other) => panic!("question {at}: {other}"),
         }
@@ -81,9 +110,15 @@ fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works
 
 #[test]
 fn a_larger_budget_maps_at_least_as_far() {
-    let capacity_of =
-        |mib: usize| solve(mib * MIB, (640, 480), &BudgetOptions { colour: Some(false), objects: Some(2), ..BudgetOptions::default() });
-    let blocks: std::vec::Vec<usize> = (50..300).step_by(10).map(|mib| capacity_of(mib).unwrap().blocks).collect();
+    let capacity_of = |mib: usize| {
+        solve(
+            mib * MIB,
+            (640, 480),
+            &BudgetOptions { colour: Some(false), objects: Some(2), ..BudgetOptions::default() },
+        )
+    };
+    let blocks: std::vec::Vec<usize> =
+        (50..300).step_by(10).map(|mib| capacity_of(mib).unwrap().blocks).collect();
     assert!(blocks.is_sorted(), "{blocks:?}");
 }
 
@@ -99,10 +134,18 @@ fn the_profiles_are_valid_and_what_cannot_be_is_named() {
     let plain = BudgetOptions::default();
     assert_eq!(solve(MIB, (10, 10), &plain), Err(BudgetError::Image));
     assert_eq!(solve(MIB, (640, usize::MAX), &plain), Err(BudgetError::Image));
-    assert_eq!(solve(MIB, (640, 480), &BudgetOptions { objects: Some(99), ..plain }), Err(BudgetError::Objects));
-    assert_eq!(solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }), Err(BudgetError::VoxelSize));
+    assert_eq!(
+        solve(MIB, (640, 480), &BudgetOptions { objects: Some(99), ..plain }),
+        Err(BudgetError::Objects)
+    );
+    assert_eq!(
+        solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }),
+        Err(BudgetError::VoxelSize)
+    );
     assert!(matches!(solve(0, (640, 480), &plain), Err(BudgetError::TooSmall { .. })));
-    assert!(solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.validate().is_ok()));
+    assert!(
+        solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.validate().is_ok())
+    );
 }
 
 /// A bound of a capacity.
@@ -138,7 +181,10 @@ fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
             *field(&mut capacity) = 1 << shift;
             match capacity.validate() {
                 Ok(()) => assert!(capacity.bytes() <= isize::MAX as usize, "{name} 2^{shift}"),
-                Err(problem) => assert!([name, "visible_blocks"].contains(&problem.bound), "{name} 2^{shift}: {problem:?}"),
+                Err(problem) => assert!(
+                    [name, "visible_blocks"].contains(&problem.bound),
+                    "{name} 2^{shift}: {problem:?}"
+                ),
             }
         }
         // The next field beside the largest of this one.
@@ -164,22 +210,33 @@ fn no_capacity_that_is_considered_for_a_budget_of_2_gib_has_bytes_beyond_32_bits
             (64 + random.below(8_128 >> shift) as usize, 32 + random.below(8_160 >> shift) as usize)
         };
         let options = BudgetOptions {
-            colour: [None, Some(false), Some(true)].get(random.below(3) as usize).copied().flatten(),
+            colour: [None, Some(false), Some(true)]
+                .get(random.below(3) as usize)
+                .copied()
+                .flatten(),
             objects: (random.below(2) == 0).then(|| random.below(17) as usize),
             voxel_size_m: (random.below(2) == 0).then(|| 0.001 + random.below(50) as f32 / 100.0),
             raw_image: if random.below(2) == 0 { [4_096, 4_096] } else { [0, 0] },
         };
         // What a slice can hold on a machine of 32 bits.
-        let Ok(question) = Question::new(i32::MAX as usize, image.0, image.1, &options) else { continue };
+        let Ok(question) = Question::new(i32::MAX as usize, image.0, image.1, &options) else {
+            continue;
+        };
         let least = question.least();
-        let mut considered = std::vec![least, question.with_blocks(&least, question.too_many_blocks(&least))];
+        let mut considered =
+            std::vec![least, question.with_blocks(&least, question.too_many_blocks(&least))];
         for colour in [false, true] {
             let base = question.image_only(colour);
             considered.push(Capacity { crop_pixels: base.pixels() * 8 / 5, ..base });
-            for (objects, object_blocks) in [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)] {
+            for (objects, object_blocks) in
+                [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)]
+            {
                 let objects = options.objects.unwrap_or(objects);
-                let with_objects = Capacity { objects, object_blocks, crop_pixels: base.pixels() * 8 / 5, ..base };
-                considered.push(question.with_blocks(&with_objects, question.too_many_blocks(&with_objects)));
+                let with_objects =
+                    Capacity { objects, object_blocks, crop_pixels: base.pixels() * 8 / 5, ..base };
+                considered.push(
+                    question.with_blocks(&with_objects, question.too_many_blocks(&with_objects)),
+                );
             }
         }
         let most = considered.iter().map(Capacity::bytes).max().unwrap();

@@ -17,7 +17,11 @@ fn nothing_that_took_place_is_nothing_to_say() {
     }
     assert_eq!(severity_of(|report| report.prune.blocks_freed = 9), Severity::Info);
     assert_eq!(severity_of(|report| report.allocation.made = 9), Severity::Info);
-    assert_eq!(severity_of(|report| report.allocation.eviction.kept = 9), Severity::Info, "a block that was stored is not lost");
+    assert_eq!(
+        severity_of(|report| report.allocation.eviction.kept = 9),
+        Severity::Info,
+        "a block that was stored is not lost"
+    );
 }
 
 #[test]
@@ -48,7 +52,11 @@ fn everything_refused_or_lost_affects_the_map() {
         |report| &mut report.internal_faults,
     ];
     for (at, counter) in counters.iter().enumerate() {
-        assert_eq!(severity_of(|report| *counter(report) = 1), Severity::MapAffected, "counter {at}");
+        assert_eq!(
+            severity_of(|report| *counter(report) = 1),
+            Severity::MapAffected,
+            "counter {at}"
+        );
     }
     // No counter cancels another.
     let both = |one: usize, other: usize| {
@@ -85,7 +93,12 @@ fn what_was_made_good_within_the_frame_is_recovered() {
 fn a_rig_that_is_off_is_recovered_where_it_is_corrected_and_affects_the_map_where_it_is_not() {
     let severity = |known: bool, offset_px: f64, corrected: bool| {
         severity_of(|report| {
-            report.self_calibration = SelfCalibrationReport { known, offset_px, corrected, ..SelfCalibrationReport::default() }
+            report.self_calibration = SelfCalibrationReport {
+                known,
+                offset_px,
+                corrected,
+                ..SelfCalibrationReport::default()
+            }
         })
     };
     for sign in [1.0, -1.0] {
@@ -98,15 +111,24 @@ fn a_rig_that_is_off_is_recovered_where_it_is_corrected_and_affects_the_map_wher
             (1.1, true, Severity::Recovered),
             (1.1, false, Severity::MapAffected),
         ] {
-            assert_eq!(severity(true, sign * offset_px, corrected), expected, "{offset_px} px, corrected {corrected}");
-            assert_eq!(severity(false, sign * offset_px, corrected), Severity::Info, "too little is known");
+            assert_eq!(
+                severity(true, sign * offset_px, corrected),
+                expected,
+                "{offset_px} px, corrected {corrected}"
+            );
+            assert_eq!(
+                severity(false, sign * offset_px, corrected),
+                Severity::Info,
+                "too little is known"
+            );
         }
     }
 }
 
 #[test]
 fn a_dropped_feature_does_not_hide_a_refused_block() {
-    let both = severity_of(|report| (report.scene_flow.left.dropped, report.allocation.refused) = (9, 1));
+    let both =
+        severity_of(|report| (report.scene_flow.left.dropped, report.allocation.refused) = (9, 1));
     assert_eq!(both, Severity::MapAffected);
 }
 
@@ -121,7 +143,9 @@ fn the_digest_of_a_rectified_frame_holds_that_of_its_images() {
     let report = Report { digest: 7, ..Report::default() };
     let plain = report.with_input(5, None);
     assert_eq!((plain.digests.input, plain.digest, plain.rectification.is_none()), (5, 7, true));
-    let rectified = |digest: u64| report.with_input(5, Some(RectifyReport { digest, ..RectifyReport::default() }));
+    let rectified = |digest: u64| {
+        report.with_input(5, Some(RectifyReport { digest, ..RectifyReport::default() }))
+    };
     assert_eq!(rectified(1).digests.input, 5);
     assert!(rectified(1).rectification.is_some());
     let mut digests = vec![plain.digest, rectified(1).digest, rectified(2).digest];

@@ -35,8 +35,14 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
         StepError::PoseNotRotation,
         StepError::TimeNotLater,
     ]);
-    assert!(texts[1].contains("at most 641 x 193 px") && texts[2].contains("at least 64 x 32 px") && texts[4].contains("752 x 480 px"));
-    assert!(texts[5].contains("finite") && texts[6].contains("length 1") && texts[7].contains("time"));
+    assert!(
+        texts[1].contains("at most 641 x 193 px")
+            && texts[2].contains("at least 64 x 32 px")
+            && texts[4].contains("752 x 480 px")
+    );
+    assert!(
+        texts[5].contains("finite") && texts[6].contains("length 1") && texts[7].contains("time")
+    );
 }
 
 #[test]
@@ -53,9 +59,16 @@ fn a_snapshot_that_is_refused_says_why() {
     ]);
     assert_eq!(texts[0], slab.to_string());
     assert_eq!(texts[1], "the snapshot cannot be read: the disk is gone");
-    let versions = std::format!("version 1234, this mapper reads version {}", crate::mapper::snapshot::VERSION);
+    let versions = std::format!(
+        "version 1234, this mapper reads version {}",
+        crate::mapper::snapshot::VERSION
+    );
     assert!(texts[3].contains(&versions), "{}", texts[3]);
-    assert!(texts[4].contains("capacity") && texts[5].contains("configuration") && texts[6].contains("damaged"));
+    assert!(
+        texts[4].contains("capacity")
+            && texts[5].contains("configuration")
+            && texts[6].contains("damaged")
+    );
 }
 
 #[test]
@@ -85,20 +98,38 @@ fn calibrations_and_lenses_that_cannot_be_used_say_why() {
         RectifyProblem::RawSize,
         RectifyProblem::RectifiedSize,
     ]);
-    all_differ(&[LensProblem::Focal, LensProblem::Center, LensProblem::DistortionNotFinite, LensProblem::DistortionOutOfRange]);
+    all_differ(&[
+        LensProblem::Focal,
+        LensProblem::Center,
+        LensProblem::DistortionNotFinite,
+        LensProblem::DistortionOutOfRange,
+    ]);
     all_differ(&[RigProblem::Focal, RigProblem::Center, RigProblem::Baseline]);
     let texts = all_differ(&[
         RectifierError::RawTooLarge { width: 0, height: 0 },
         RectifierError::RawTooLarge { width: 752, height: 480 },
         RectifierError::RectifiedTooLarge { width: 640, height: 400 },
     ]);
-    assert!(texts[0].contains("raw_width") && texts[1].contains("752 x 480 px") && texts[2].contains("640 x 400 px"));
+    assert!(
+        texts[0].contains("raw_width")
+            && texts[1].contains("752 x 480 px")
+            && texts[2].contains("640 x 400 px")
+    );
 }
 
 #[test]
 fn bounds_views_and_settings_say_what_they_miss() {
-    let texts = all_differ(&[BudgetError::TooSmall { least: 12_345 }, BudgetError::Image, BudgetError::Objects, BudgetError::VoxelSize]);
-    assert!(texts[0].contains("12345 bytes") && texts[1].contains("64 x 32 px") && texts[2].contains("16 objects"));
+    let texts = all_differ(&[
+        BudgetError::TooSmall { least: 12_345 },
+        BudgetError::Image,
+        BudgetError::Objects,
+        BudgetError::VoxelSize,
+    ]);
+    assert!(
+        texts[0].contains("12345 bytes")
+            && texts[1].contains("64 x 32 px")
+            && texts[2].contains("16 objects")
+    );
     let problem = Capacity { tracks: 1 << 29, ..Capacity::TINY }.validate().unwrap_err();
     assert_eq!(problem, CapacityProblem { bound: "tracks", rule: "must be at most 268,435,456" });
     assert_eq!(problem.to_string(), "tracks must be at most 268,435,456");
@@ -121,5 +152,8 @@ fn what_was_digested_goes_by_its_name() {
     .iter()
     .map(|digested: &Digested| (digested as &dyn Display).to_string())
     .collect();
-    assert_eq!(names, ["input", "disparity", "matches", "egomotion", "tracks", "background", "object 17"]);
+    assert_eq!(
+        names,
+        ["input", "disparity", "matches", "egomotion", "tracks", "background", "object 17"]
+    );
 }

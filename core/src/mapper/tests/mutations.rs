@@ -1,4 +1,5 @@
-//! One bit of the state changes: the digest changes, and the first difference names the stage that the bit belongs to.
+//! One bit of the state changes: the digest changes, and the first difference names the stage that
+//! the bit belongs to.
 
 use super::*;
 use crate::mapper::Digested;
@@ -12,10 +13,18 @@ fn named(change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
     with_mapper(&walk, FRAMES, |mapper, reports| named_by(&walk, mapper, reports, change))
 }
 
-fn named_by(walk: &Walk, mapper: &mut Mapper<'_>, reports: &[Report], change: impl Fn(&mut Mapper<'_>)) -> Option<Digested> {
+fn named_by(
+    walk: &Walk,
+    mapper: &mut Mapper<'_>,
+    reports: &[Report],
+    change: impl Fn(&mut Mapper<'_>),
+) -> Option<Digested> {
     let last = reports.last().unwrap();
     let digests = |mapper: &mut Mapper<'_>| {
-        walk.with_frame(FRAMES - 1, |frame| StageDigests { input: frame.digest(), ..mapper.digests(last.egomotion.as_ref()) })
+        walk.with_frame(FRAMES - 1, |frame| StageDigests {
+            input: frame.digest(),
+            ..mapper.digests(last.egomotion.as_ref())
+        })
     };
     assert_eq!(digests(mapper), last.digests, "nothing changes by itself");
     change(mapper);
@@ -35,7 +44,11 @@ fn a_bit_of_a_voxel_of_the_background() {
         for bit in 0..24 {
             for voxel in [0, 77, 511] {
                 let flip = |mapper: &mut Mapper<'_>| mapper.background.flip(slot, voxel, bit);
-                assert_eq!(named_by(&walk, mapper, reports, flip), Some(Digested::Background), "voxel {voxel}, bit {bit}");
+                assert_eq!(
+                    named_by(&walk, mapper, reports, flip),
+                    Some(Digested::Background),
+                    "voxel {voxel}, bit {bit}"
+                );
                 flip(mapper);
             }
         }
@@ -44,7 +57,10 @@ fn a_bit_of_a_voxel_of_the_background() {
 
 #[test]
 fn a_bit_of_a_voxel_of_an_object() {
-    assert_eq!(named(|mapper| assert_eq!(mapper.objects.flip_voxel(100, 3), Some(1))), Some(Digested::Object(1)));
+    assert_eq!(
+        named(|mapper| assert_eq!(mapper.objects.flip_voxel(100, 3), Some(1))),
+        Some(Digested::Object(1))
+    );
 }
 
 #[test]
@@ -52,9 +68,15 @@ fn a_bit_of_a_match() {
     let walk = Walk::new(FRAMES);
     with_mapper(&walk, FRAMES, |mapper, reports| {
         let last = mapper.scene_flow.refined().len() - 1;
-        for (at, coordinate, bit) in (0..8).flat_map(|coordinate| [(0, coordinate, 0), (last, coordinate, 12)]) {
+        for (at, coordinate, bit) in
+            (0..8).flat_map(|coordinate| [(0, coordinate, 0), (last, coordinate, 12)])
+        {
             let flip = |mapper: &mut Mapper<'_>| mapper.scene_flow.flip(at, coordinate, bit);
-            assert_eq!(named_by(&walk, mapper, reports, flip), Some(Digested::Matches), "match {at}, coordinate {coordinate}");
+            assert_eq!(
+                named_by(&walk, mapper, reports, flip),
+                Some(Digested::Matches),
+                "match {at}, coordinate {coordinate}"
+            );
             flip(mapper);
         }
     });
@@ -63,7 +85,11 @@ fn a_bit_of_a_match() {
 #[test]
 fn a_bit_of_a_component_of_the_pose() {
     for component in 0..7 {
-        assert_eq!(named(|mapper| mapper.camera.flip(component, 0)), Some(Digested::Egomotion), "component {component}");
+        assert_eq!(
+            named(|mapper| mapper.camera.flip(component, 0)),
+            Some(Digested::Egomotion),
+            "component {component}"
+        );
     }
 }
 

@@ -1,4 +1,5 @@
-//! Maps for planners in a mapper: they change nothing else, and a resumed run plans as one that never stopped.
+//! Maps for planners in a mapper: they change nothing else, and a resumed run plans as one that
+//! never stopped.
 
 use super::{
     resume::{restored, saved},
@@ -14,7 +15,11 @@ const WITH_WINDOW: Capacity = Capacity {
     ..CAPACITY
 };
 
-fn mapped<R>(capacity: &Capacity, walk: &Walk, test: impl FnOnce(&mut Mapper<'_>, &[Report]) -> R) -> R {
+fn mapped<R>(
+    capacity: &Capacity,
+    walk: &Walk,
+    test: impl FnOnce(&mut Mapper<'_>, &[Report]) -> R,
+) -> R {
     let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab).unwrap();
     let reports: Vec<Report> = (0..FRAMES).map(|at| walk.step(at, &mut mapper)).collect();
@@ -24,7 +29,8 @@ fn mapped<R>(capacity: &Capacity, walk: &Walk, test: impl FnOnce(&mut Mapper<'_>
 #[test]
 fn a_window_changes_no_digest_and_without_one_nothing_is_planned() {
     let walk = Walk::new(FRAMES);
-    let digests = |reports: &[Report]| reports.iter().map(|report| report.digest).collect::<Vec<_>>();
+    let digests =
+        |reports: &[Report]| reports.iter().map(|report| report.digest).collect::<Vec<_>>();
     let with = mapped(&WITH_WINDOW, &walk, |mapper, reports| {
         let report = mapper.plan(0.0);
         assert!(report.occupied > 50 && report.free > 50, "{report:?}");
@@ -48,7 +54,8 @@ fn a_resumed_run_plans_as_the_one_that_never_stopped() {
         let reports = [mapper.plan(0.0), mapper.plan_ahead(1.5)];
         (reports, mapper.planning().digest())
     };
-    let (bytes, expected) = mapped(&WITH_WINDOW, &walk, |mapper, _| (saved(mapper), went_on(mapper)));
+    let (bytes, expected) =
+        mapped(&WITH_WINDOW, &walk, |mapper, _| (saved(mapper), went_on(mapper)));
     assert_eq!(restored(&WITH_WINDOW, &Walk::config(), &bytes, went_on).unwrap(), expected);
 }
 

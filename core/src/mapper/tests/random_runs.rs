@@ -34,12 +34,17 @@ const SMALL: Capacity = Capacity {
     planning_distance_3d: true,
     colour: true,
 };
-const RIG: crate::geometry::StereoRig =
-    crate::geometry::StereoRig { focal_px: 60.0, center_u_px: 48.0, center_v_px: 24.0, baseline_m: 0.5 };
+const RIG: crate::geometry::StereoRig = crate::geometry::StereoRig {
+    focal_px: 60.0,
+    center_u_px: 48.0,
+    center_v_px: 24.0,
+    baseline_m: 0.5,
+};
 
 fn config(seed: u64) -> Config {
     let mut config = Config::for_rig(RIG);
-    (config.volume.voxel_size_m, config.volume.truncation_m, config.volume.prune_lag) = (0.25, 1.0, 2);
+    (config.volume.voxel_size_m, config.volume.truncation_m, config.volume.prune_lag) =
+        (0.25, 1.0, 2);
     config.mapper.fuse_every = 1 + u32::from(seed.is_multiple_of(5));
     (config.tracking.motion.matches_min, config.tracking.motion.matches_again) = (6, 6);
     // Some of the patches are tracked only.
@@ -98,7 +103,10 @@ impl Coverage {
 
     fn least(&self) -> u32 {
         let Self { measured, objects, waiting, held, missed, tracked_only, evicted, pruned } = self;
-        *[measured, objects, waiting, held, missed, tracked_only, evicted, pruned].into_iter().min().unwrap()
+        *[measured, objects, waiting, held, missed, tracked_only, evicted, pruned]
+            .into_iter()
+            .min()
+            .unwrap()
     }
 }
 
@@ -115,7 +123,8 @@ fn a_thousand_runs_resumed_anywhere_give_the_digests_and_the_state_of_those_that
             coverage.note(&report, &mapper);
         }
         let bytes = saved(&mut mapper);
-        let expected: Vec<Report> = frames[stop..].iter().map(|frame| step(&mut mapper, frame)).collect();
+        let expected: Vec<Report> =
+            frames[stop..].iter().map(|frame| step(&mut mapper, frame)).collect();
         let end = saved(&mut mapper);
         let resumed = restored(&SMALL, &config, &bytes, |mapper| {
             for (frame, expected) in frames[stop..].iter().zip(&expected) {
@@ -131,7 +140,10 @@ fn a_thousand_runs_resumed_anywhere_give_the_digests_and_the_state_of_those_that
             }
             saved(mapper)
         });
-        assert!(resumed.unwrap() == end, "run {seed} stopped before {stop}: the states at the end differ");
+        assert!(
+            resumed.unwrap() == end,
+            "run {seed} stopped before {stop}: the states at the end differ"
+        );
     }
     println!("{RUNS} runs: {coverage:?}");
     assert!(coverage.least() >= 80, "{coverage:?}");

@@ -10,9 +10,13 @@ use nalgebra::Matrix3;
 
 const RAW: Capacity = Capacity { raw_width: WIDTH, raw_height: HEIGHT, ..CAPACITY };
 
-/// The walk's pictures taken for those of bent lenses, the right camera rolled: what they show is of no matter here.
+/// The walk's pictures taken for those of bent lenses, the right camera rolled: what they show is
+/// of no matter here.
 fn config(focal_px: Option<f64>) -> Config {
-    let model = LensModel::RadialTangential { radial: [-0.05, 0.01, 0.0, 0.0, 0.0, 0.0], tangential: [1e-4, 0.0] };
+    let model = LensModel::RadialTangential {
+        radial: [-0.05, 0.01, 0.0, 0.0, 0.0, 0.0],
+        tangential: [1e-4, 0.0],
+    };
     let lens = Lens::new([RIG.focal_px; 2], [RIG.center_u_px, RIG.center_v_px], model).unwrap();
     let camera = RawCamera { lens, width: WIDTH as u32, height: HEIGHT as u32 };
     let (sine, cosine) = (0.004f64.sin(), 0.004f64.cos());
@@ -51,9 +55,20 @@ fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
     let mut mapper = Mapper::new(&CAPACITY, &plain, &mut slab).unwrap();
     for (at, raw) in raw.iter().enumerate() {
         let report = ready.step(at, &mut mapper);
-        assert_eq!(raw.digests.first_difference(&report.digests), Some(Digested::Input), "the input alone differs");
-        assert_eq!(StageDigests { input: 0, ..raw.digests }, StageDigests { input: 0, ..report.digests });
-        assert!(raw.rectification.is_some() && report.rectification.is_none() && raw.digest != report.digest);
+        assert_eq!(
+            raw.digests.first_difference(&report.digests),
+            Some(Digested::Input),
+            "the input alone differs"
+        );
+        assert_eq!(
+            StageDigests { input: 0, ..raw.digests },
+            StageDigests { input: 0, ..report.digests }
+        );
+        assert!(
+            raw.rectification.is_some()
+                && report.rectification.is_none()
+                && raw.digest != report.digest
+        );
     }
 }
 
@@ -78,10 +93,16 @@ fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
                 valid += row.iter().filter(|disparity| **disparity != 0).count();
                 assert!(invalid.left.in_row(v).all(|u| row[u] == 0), "row {v}");
             }
-            let shows = |invalid: &InvalidPixels<'_>, at: [f32; 2]| !invalid.contains(at[0] as usize, at[1] as usize);
-            assert!(
-                mapper.scene_flow.sparse().iter().all(|m| shows(&invalid.left, m.current_left) && shows(&invalid.right, m.current_right))
-            );
+            let shows = |invalid: &InvalidPixels<'_>, at: [f32; 2]| {
+                !invalid.contains(at[0] as usize, at[1] as usize)
+            };
+            assert!(mapper.scene_flow.sparse().iter().all(|m| shows(
+                &invalid.left,
+                m.current_left
+            ) && shows(
+                &invalid.right,
+                m.current_right
+            )));
         }
         assert!(valid > WIDTH * HEIGHT / 4 && !mapper.scene_flow.sparse().is_empty());
     });
@@ -120,7 +141,10 @@ fn a_raw_mapper_goes_on_from_its_snapshot_and_refuses_other_sizes() {
     assert_eq!(refused.unwrap_err(), StepError::RawSizeDiffers { width: WIDTH, height: HEIGHT });
     let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
     let refused = Mapper::new(&CAPACITY, &config, &mut slab).unwrap_err();
-    assert_eq!(refused, NewError::Rectification(RectifierError::RawTooLarge { width: 0, height: 0 }));
+    assert_eq!(
+        refused,
+        NewError::Rectification(RectifierError::RawTooLarge { width: 0, height: 0 })
+    );
 }
 
 #[test]
@@ -129,5 +153,8 @@ fn bytes_are_those_of_the_regions() {
     let pixels = CAPACITY.pixels();
     let words = WIDTH.div_ceil(64) * HEIGHT;
     let whole = |bytes: usize| bytes.next_multiple_of(SLAB_ALIGN);
-    assert_eq!(RAW.bytes() - CAPACITY.bytes(), 2 * (whole(4 * pixels) + whole(8 * words) + whole(pixels)));
+    assert_eq!(
+        RAW.bytes() - CAPACITY.bytes(),
+        2 * (whole(4 * pixels) + whole(8 * words) + whole(pixels))
+    );
 }

@@ -1,4 +1,5 @@
-//! A stopped and resumed run equals the uninterrupted run; anything but a complete snapshot of this mapper is refused.
+//! A stopped and resumed run equals the uninterrupted run; anything but a complete snapshot of this
+//! mapper is refused.
 
 use super::*;
 use crate::mapper::snapshot;
@@ -22,7 +23,8 @@ pub(super) fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
 #[derive(Debug, PartialEq)]
 pub(super) struct Ended;
 
-/// Restores a mapper and hands it to `go_on`; a slab full of another's leavings serves as well as a new one.
+/// Restores a mapper and hands it to `go_on`; a slab full of another's leavings serves as well as a
+/// new one.
 pub(super) fn restored<R>(
     capacity: &Capacity,
     config: &Config,
@@ -43,7 +45,11 @@ pub(super) fn restored<R>(
     Ok(go_on(&mut mapper))
 }
 
-fn uninterrupted(walk: &Walk, capacity: &Capacity, stop: impl Fn(usize) -> bool) -> (Vec<Report>, Vec<(usize, Vec<u8>)>) {
+fn uninterrupted(
+    walk: &Walk,
+    capacity: &Capacity,
+    stop: impl Fn(usize) -> bool,
+) -> (Vec<Report>, Vec<(usize, Vec<u8>)>) {
     let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab[start..]).unwrap();
@@ -64,28 +70,59 @@ fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
         let (reports, snapshots) = uninterrupted(&walk, &capacity, |_| true);
         let last = reports.last().unwrap();
         assert!(last.instances.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
-        let left: u32 = reports.iter().map(|report| report.allocation.eviction.lost + report.allocation.refused).sum();
-        assert_eq!(left > 0, capacity.blocks == CROWDED.blocks, "the pool is too small where it should be: {:?}", last.blocks);
+        let left: u32 = reports
+            .iter()
+            .map(|report| report.allocation.eviction.lost + report.allocation.refused)
+            .sum();
+        assert_eq!(
+            left > 0,
+            capacity.blocks == CROWDED.blocks,
+            "the pool is too small where it should be: {:?}",
+            last.blocks
+        );
         for (at, bytes) in &snapshots {
-            let went_on: Vec<Report> =
-                restored(&capacity, &Walk::config(), bytes, |mapper| (*at..FRAMES).map(|at| walk.step(at, mapper)).collect()).unwrap();
+            let went_on: Vec<Report> = restored(&capacity, &Walk::config(), bytes, |mapper| {
+                (*at..FRAMES).map(|at| walk.step(at, mapper)).collect()
+            })
+            .unwrap();
             for (report, expected) in went_on.iter().zip(&reports[*at..]) {
-                assert_eq!(report.digests.first_difference(&expected.digests), None, "frame {} after stopping before {at}", report.frame);
-                assert_eq!((report.digest, report.frame, report.blocks), (expected.digest, expected.frame, expected.blocks));
-                assert_eq!((report.allocation, report.prune), (expected.allocation, expected.prune));
+                assert_eq!(
+                    report.digests.first_difference(&expected.digests),
+                    None,
+                    "frame {} after stopping before {at}",
+                    report.frame
+                );
+                assert_eq!(
+                    (report.digest, report.frame, report.blocks),
+                    (expected.digest, expected.frame, expected.blocks)
+                );
+                assert_eq!(
+                    (report.allocation, report.prune),
+                    (expected.allocation, expected.prune)
+                );
             }
         }
     }
 }
 
 #[test]
-fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_detector_misses_it() {
+fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_detector_misses_it()
+{
     const SEEN: usize = 3;
     let walk = Walk::new(SEEN + 2);
-    let small = Detection { left: 250, top: 60, width: 10, height: 10, mask: &[1; 100], ..walk.detection() };
+    let small = Detection {
+        left: 250,
+        top: 60,
+        width: 10,
+        height: 10,
+        mask: &[1; 100],
+        ..walk.detection()
+    };
     let step = |at: usize, mapper: &mut Mapper<'_>| {
         let detections: &[Detection<'_>] = if at < SEEN { &[small] } else { &[] };
-        walk.with_frame(at, |frame| mapper.step(&StereoFrame { detections, ..*frame }, &Serial).unwrap())
+        walk.with_frame(at, |frame| {
+            mapper.step(&StereoFrame { detections, ..*frame }, &Serial).unwrap()
+        })
     };
     let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
@@ -93,11 +130,23 @@ fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_
     let seen: Vec<Report> = (0..SEEN).map(|at| step(at, &mut mapper)).collect();
     assert_eq!(seen[SEEN - 1].instances.detections.tracked_only, 1);
     let bytes = saved(&mut mapper);
-    let missed = |mapper: &mut Mapper<'_>| -> Vec<Report> { (SEEN..SEEN + 2).map(|at| step(at, mapper)).collect() };
-    let (went_on, resumed) = (missed(&mut mapper), restored(&CAPACITY, &Walk::config(), &bytes, missed).unwrap());
+    let missed = |mapper: &mut Mapper<'_>| -> Vec<Report> {
+        (SEEN..SEEN + 2).map(|at| step(at, mapper)).collect()
+    };
+    let (went_on, resumed) =
+        (missed(&mut mapper), restored(&CAPACITY, &Walk::config(), &bytes, missed).unwrap());
     for (report, expected) in resumed.iter().zip(&went_on) {
-        assert_eq!(report.instances.pixels_masked, expected.instances.pixels_masked, "frame {}", report.frame);
-        assert_eq!(report.digests.first_difference(&expected.digests), None, "frame {}", report.frame);
+        assert_eq!(
+            report.instances.pixels_masked, expected.instances.pixels_masked,
+            "frame {}",
+            report.frame
+        );
+        assert_eq!(
+            report.digests.first_difference(&expected.digests),
+            None,
+            "frame {}",
+            report.frame
+        );
     }
 }
 
@@ -115,7 +164,9 @@ fn a_restored_mapper_saves_the_bytes_it_was_restored_from_and_saving_changes_not
 fn the_end_of_a_resumed_drive_prunes_and_hands_over_the_same() {
     let walk = Walk::new(FRAMES);
     let (_, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 8);
-    let finish = |mapper: &mut Mapper<'_>| (mapper.finish(), mapper.background().digest(), mapper.background().pool().len());
+    let finish = |mapper: &mut Mapper<'_>| {
+        (mapper.finish(), mapper.background().digest(), mapper.background().pool().len())
+    };
     let resumed = restored(&CAPACITY, &Walk::config(), &snapshots[0].1, finish).unwrap();
     assert_eq!(with_mapper(&walk, 8, |mapper, _| finish(mapper)), resumed);
     assert!(resumed.0.visited > 0);
@@ -128,7 +179,11 @@ fn frames_of_another_size_are_refused_after_resuming_as_before() {
     let small = vec![0u8; 64 * 64];
     let refused = restored(&CAPACITY, &Walk::config(), &bytes, |mapper| {
         let view = View::new(&small, 64, 64).unwrap();
-        walk.with_frame(0, |frame| mapper.step(&StereoFrame { left: view, right: view, ..*frame }, &Serial).map(|report| report.frame))
+        walk.with_frame(0, |frame| {
+            mapper
+                .step(&StereoFrame { left: view, right: view, ..*frame }, &Serial)
+                .map(|report| report.frame)
+        })
     });
     assert_eq!(refused.unwrap(), Err(StepError::SizeChanged));
 }
@@ -137,7 +192,9 @@ fn frames_of_another_size_are_refused_after_resuming_as_before() {
 fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
     let walk = Walk::new(3);
     let bytes = with_mapper(&walk, 3, |mapper, _| saved(mapper));
-    let refusal = |capacity: &Capacity, config: &Config, bytes: &[u8]| restored(capacity, config, bytes, |_| ()).unwrap_err();
+    let refusal = |capacity: &Capacity, config: &Config, bytes: &[u8]| {
+        restored(capacity, config, bytes, |_| ()).unwrap_err()
+    };
     let with = |at: usize, byte: u8| {
         let mut changed = bytes.clone();
         changed[at] = byte;
@@ -146,20 +203,32 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
     assert_eq!(with(0, b'x'), RestoreError::Foreign);
     let previous = snapshot::VERSION - 1;
     assert_eq!(with(8, previous as u8), RestoreError::Version(previous));
-    assert_eq!(refusal(&Capacity { tracks: 15, ..CAPACITY }, &Walk::config(), &bytes), RestoreError::Capacity);
+    assert_eq!(
+        refusal(&Capacity { tracks: 15, ..CAPACITY }, &Walk::config(), &bytes),
+        RestoreError::Capacity
+    );
     let mut other = Walk::config();
     other.egomotion.confidence = f64::from_bits(other.egomotion.confidence.to_bits() + 1);
-    assert_eq!(refusal(&CAPACITY, &other, &bytes), RestoreError::Config, "one last bit of one setting");
+    assert_eq!(
+        refusal(&CAPACITY, &other, &bytes),
+        RestoreError::Config,
+        "one last bit of one setting"
+    );
     assert_eq!(refusal(&CAPACITY, &Walk::config(), &[]), RestoreError::Source(Ended));
     for len in [7, 20, 40, bytes.len() / 2, bytes.len() - 1] {
-        assert_eq!(refusal(&CAPACITY, &Walk::config(), &bytes[..len]), RestoreError::Source(Ended), "cut to {len} bytes");
+        assert_eq!(
+            refusal(&CAPACITY, &Walk::config(), &bytes[..len]),
+            RestoreError::Source(Ended),
+            "cut to {len} bytes"
+        );
     }
     let mut invalid = Walk::config();
     invalid.volume.voxel_size_m = -1.0;
     assert!(matches!(refusal(&CAPACITY, &invalid, &bytes), RestoreError::New(NewError::Config(_))));
 }
 
-/// A window of the walk's images, so that a snapshot is small enough to try all of it; the camera is told where it is.
+/// A window of the walk's images, so that a snapshot is small enough to try all of it; the camera
+/// is told where it is.
 struct Window;
 
 impl Window {
@@ -210,10 +279,23 @@ impl Window {
         let mut mapper = Mapper::new(&Self::CAPACITY, &Self::config(), &mut slab[start..]).unwrap();
         let mut step = |at: usize| {
             let [left, right] = walk.pairs[at].each_ref().map(|pixels| of(pixels));
-            let [left, right] = [&left, &right].map(|pixels| View::new(pixels, width, height).unwrap());
-            let pose = Transform::new(Vector3::new(0.0, 0.01 * at as f64, 0.0), Vector3::new(0.02, 0.0, 0.15) * at as f64);
+            let [left, right] =
+                [&left, &right].map(|pixels| View::new(pixels, width, height).unwrap());
+            let pose = Transform::new(
+                Vector3::new(0.0, 0.01 * at as f64, 0.0),
+                Vector3::new(0.02, 0.0, 0.15) * at as f64,
+            );
             let given = walk.with_frame(at, |frame| {
-                mapper.step(&StereoFrame { left, right, t_world_camera: Some(pose), detections: &[seen], ..*frame }, &Serial)
+                mapper.step(
+                    &StereoFrame {
+                        left,
+                        right,
+                        t_world_camera: Some(pose),
+                        detections: &[seen],
+                        ..*frame
+                    },
+                    &Serial,
+                )
             });
             given.unwrap()
         };

@@ -1,20 +1,26 @@
 //! A pair whose rows do not agree, as a calibration leaves it.
 
 use super::*;
-use crate::{geometry::scalar::clamp_f32, image::View, rectify::self_calibration::SelfCalibrationMode};
+use crate::{
+    geometry::scalar::clamp_f32, image::View, rectify::self_calibration::SelfCalibrationMode,
+};
 
 const FRAMES: usize = 8;
 
 /// An image turned about its middle by a small angle.
 fn turned(image: &[u8], angle_rad: f32) -> Vec<u8> {
-    let pixel = |row: usize, column: usize| f32::from(image[row.min(HEIGHT - 1) * WIDTH + column.min(WIDTH - 1)]);
+    let pixel = |row: usize, column: usize| {
+        f32::from(image[row.min(HEIGHT - 1) * WIDTH + column.min(WIDTH - 1)])
+    };
     let between = |a: f32, b: f32, share: f32| a + (b - a) * share;
     let [middle_u, middle_v] = [WIDTH, HEIGHT].map(|side| side as f32 / 2.0);
     let source = |at: usize| {
         let (u, v) = ((at % WIDTH) as f32, (at / WIDTH) as f32);
         let column = clamp_f32(u - angle_rad * (v - middle_v), 0.0, (WIDTH - 1) as f32);
         let row = clamp_f32(v + angle_rad * (u - middle_u), 0.0, (HEIGHT - 1) as f32);
-        let along = |row: usize| between(pixel(row, column as usize), pixel(row, column as usize + 1), column.fract());
+        let along = |row: usize| {
+            between(pixel(row, column as usize), pixel(row, column as usize + 1), column.fract())
+        };
         between(along(row as usize), along(row as usize + 1), row.fract()).round() as u8
     };
     (0..WIDTH * HEIGHT).map(source).collect()
@@ -37,8 +43,10 @@ fn driven(config: &Config, angle_rad: f32) -> (Report, Vec<u16>) {
 
 /// Share of the pixels with both disparities in which these are within a quarter of a pixel.
 fn agreement(a: &[u16], b: &[u16]) -> f64 {
-    let differences: Vec<u16> = a.iter().zip(b).filter(|(a, b)| **a > 0 && **b > 0).map(|(a, b)| a.abs_diff(*b)).collect();
-    differences.iter().filter(|&&difference| difference <= 64).count() as f64 / differences.len() as f64
+    let differences: Vec<u16> =
+        a.iter().zip(b).filter(|(a, b)| **a > 0 && **b > 0).map(|(a, b)| a.abs_diff(*b)).collect();
+    differences.iter().filter(|&&difference| difference <= 64).count() as f64
+        / differences.len() as f64
 }
 
 #[test]
@@ -50,7 +58,11 @@ fn rows_that_a_calibration_left_apart_are_aligned() {
     let (sound, exact) = driven(&Walk::config(), 0.0);
     assert!(sound.self_calibration.rows.largest_px() < 0.1, "{:?}", sound.self_calibration);
     let (aligned, close) = driven(&Walk::config(), roll_rad);
-    assert!((1.2..2.2).contains(&aligned.self_calibration.rows.largest_px()), "{:?}", aligned.self_calibration);
+    assert!(
+        (1.2..2.2).contains(&aligned.self_calibration.rows.largest_px()),
+        "{:?}",
+        aligned.self_calibration
+    );
     let (apart, far) = driven(&off, roll_rad);
     assert_eq!(apart.self_calibration.rows.largest_px(), 0.0);
     let [close, far] = [&close, &far].map(|disparities| agreement(&exact, disparities));

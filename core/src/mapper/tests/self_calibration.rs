@@ -25,7 +25,9 @@ type Grey = (Vec<u8>, usize, usize);
 
 fn grey(camera: &str, frame: usize) -> Grey {
     let sequence = Path::new(dynvox_needs::data_folder!()).join("kitti-odometry/sequences/06");
-    let picture = image::open(sequence.join(camera).join(std::format!("{frame:06}.png"))).unwrap().into_luma8();
+    let picture = image::open(sequence.join(camera).join(std::format!("{frame:06}.png")))
+        .unwrap()
+        .into_luma8();
     let (width, height) = picture.dimensions();
     (picture.into_raw(), width as usize, height as usize)
 }
@@ -42,7 +44,9 @@ fn shifted((pixels, width, height): Grey, by_px: f64) -> Grey {
     ];
     let moved = |at: usize| {
         let (row, column) = (at / width, (at % width) as i64 + whole as i64 - 1);
-        let pixel = |k: i64| f64::from(pixels[row * width + (column + k).clamp(0, width as i64 - 1) as usize]);
+        let pixel = |k: i64| {
+            f64::from(pixels[row * width + (column + k).clamp(0, width as i64 - 1) as usize])
+        };
         let sum: f64 = (0..4).zip(weights).map(|(k, weight)| weight * pixel(k)).sum();
         sum.round() as u8
     };
@@ -55,18 +59,28 @@ fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
     let mut slab = vec![0; bytes + SLAB_ALIGN];
     let mut carver = Carver::new(&mut slab, bytes).unwrap();
-    let (mut matcher, mut estimator) = (FlowMatcher::new_in(&capacity, &mut carver), Estimator::new_in(&capacity, &mut carver));
-    let (mut camera, mut calibration) = (Egomotion::default(), SelfCalibration::new(&RigConfig::default()));
+    let (mut matcher, mut estimator) =
+        (FlowMatcher::new_in(&capacity, &mut carver), Estimator::new_in(&capacity, &mut carver));
+    let (mut camera, mut calibration) =
+        (Egomotion::default(), SelfCalibration::new(&RigConfig::default()));
     for frame in 0..FRAMES {
         let (left, right) = (grey("image_0", frame), shifted(grey("image_1", frame), by_px));
-        let images = [&left, &right].map(|(pixels, width, height)| View::new(pixels, *width, *height).unwrap());
+        let images = [&left, &right]
+            .map(|(pixels, width, height)| View::new(pixels, *width, *height).unwrap());
         matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
         matcher.correct(calibration.pixel_correction(&RIG).unwrap_or_default());
         if frame > 0 {
-            let estimate = camera.step(&EgomotionConfig::default(), &RIG, 0.1, matcher.bucketed(), &mut estimator);
-            let observations = matcher
-                .bucketed()
-                .map(|m| [(m.previous_left, m.previous_right), (m.current_left, m.current_right)].map(|(l, r)| RIG.observation(l, r)));
+            let estimate = camera.step(
+                &EgomotionConfig::default(),
+                &RIG,
+                0.1,
+                matcher.bucketed(),
+                &mut estimator,
+            );
+            let observations = matcher.bucketed().map(|m| {
+                [(m.previous_left, m.previous_right), (m.current_left, m.current_right)]
+                    .map(|(l, r)| RIG.observation(l, r))
+            });
             calibration.update(&RIG, observations, &estimate.t_current_previous.unwrap());
         }
     }
@@ -81,8 +95,14 @@ fn an_offset_planted_in_real_pictures_is_found_and_the_way_keeps_its_length() {
     for planted in [-0.7, 0.7] {
         let (found, planted_way_m) = driven(planted);
         println!("{planted}: {found:?}; {planted_way_m} m for {way_m} m");
-        assert!((found.offset_px - own.offset_px - planted).abs() < 0.05, "{planted}: {found:?}, {own:?}");
+        assert!(
+            (found.offset_px - own.offset_px - planted).abs() < 0.05,
+            "{planted}: {found:?}, {own:?}"
+        );
         assert!((found.applied_offset_px - found.offset_px).abs() < 0.01);
-        assert!((planted_way_m / way_m - 1.0).abs() < 0.01, "{planted_way_m} m for {way_m} m: 3 per cent without correction");
+        assert!(
+            (planted_way_m / way_m - 1.0).abs() < 0.01,
+            "{planted_way_m} m for {way_m} m: 3 per cent without correction"
+        );
     }
 }

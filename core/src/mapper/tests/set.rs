@@ -1,4 +1,5 @@
-//! Every setting by its key: the keys are read off the configuration's own `Debug` text, so none can be forgotten.
+//! Every setting by its key: the keys are read off the configuration's own `Debug` text, so none
+//! can be forgotten.
 
 use super::*;
 use crate::{SetError, problem::MAX_PROBLEMS, volume::CLASS_COUNT};
@@ -38,13 +39,18 @@ fn fields(config: &Config) -> Vec<Field> {
 fn differences(one: &Config, other: &Config) -> Vec<usize> {
     let [one, other] = [one, other].map(|config| format!("{config:#?}"));
     assert_eq!(one.lines().count(), other.lines().count());
-    one.lines().zip(other.lines()).enumerate().filter(|(_, (one, other))| one != other).map(|(line, _)| line).collect()
+    one.lines()
+        .zip(other.lines())
+        .enumerate()
+        .filter(|(_, (one, other))| one != other)
+        .map(|(line, _)| line)
+        .collect()
 }
 
 /// Names of all choices.
 const CHOICES: [&str; 16] = [
-    "stereo", "icp", "mask", "box", "surface", "farther", "ray", "normal", "one", "depth", "band", "evict", "refuse", "apply", "report",
-    "off",
+    "stereo", "icp", "mask", "box", "surface", "farther", "ray", "normal", "one", "depth", "band",
+    "evict", "refuse", "apply", "report", "off",
 ];
 
 #[test]
@@ -58,7 +64,9 @@ fn every_setting_is_set_by_its_key_and_nothing_else_is() {
             "true" => vec![" false "],
             "false" => vec!["true"],
             "[" => vec![weights.as_str()],
-            number if number.parse::<f64>().is_ok() => vec![if number.parse() == Ok(7.0) { "9" } else { "7" }],
+            number if number.parse::<f64>().is_ok() => {
+                vec![if number.parse() == Ok(7.0) { "9" } else { "7" }]
+            }
             _ => CHOICES.to_vec(),
         };
         let changed: Vec<Vec<usize>> = texts
@@ -73,14 +81,19 @@ fn every_setting_is_set_by_its_key_and_nothing_else_is() {
         for lines in changed {
             // An array's numbers stand in the lines behind its name.
             let own = if value == "[" { line + 1..line + 1 + CLASS_COUNT } else { line..line + 1 };
-            assert!(lines.iter().all(|line| own.contains(line)), "{key} changed the lines {lines:?}, not {line}");
+            assert!(
+                lines.iter().all(|line| own.contains(line)),
+                "{key} changed the lines {lines:?}, not {line}"
+            );
         }
     }
 }
 
 #[test]
 fn a_choice_takes_each_of_its_names_and_no_other() {
-    let accepted = |key: &str| -> Vec<&str> { CHOICES.into_iter().filter(|name| Walk::config().set(key, name).is_ok()).collect() };
+    let accepted = |key: &str| -> Vec<&str> {
+        CHOICES.into_iter().filter(|name| Walk::config().set(key, name).is_ok()).collect()
+    };
     for (key, names) in [
         ("mapper.egomotion", &["stereo", "icp"][..]),
         ("tracking.overlap", &["mask", "box"]),
@@ -129,9 +142,14 @@ fn what_is_no_key_or_no_value_changes_nothing() {
             assert_eq!(refusal(&key, text), SetError::Value, "{key} = {text} (now {value})");
         }
     }
-    for (count, last) in
-        [(2, "1"), (CLASS_COUNT - 1, "1"), (CLASS_COUNT + 1, "1"), (CLASS_COUNT, "256"), (CLASS_COUNT, "-1"), (CLASS_COUNT, "")]
-    {
+    for (count, last) in [
+        (2, "1"),
+        (CLASS_COUNT - 1, "1"),
+        (CLASS_COUNT + 1, "1"),
+        (CLASS_COUNT, "256"),
+        (CLASS_COUNT, "-1"),
+        (CLASS_COUNT, ""),
+    ] {
         let numbers = "1,".repeat(count - 1) + last;
         assert_eq!(refusal("volume.class_weight", &numbers), SetError::Value, "{numbers}");
     }
@@ -142,14 +160,19 @@ fn no_setting_may_be_less_than_nothing_or_no_number() {
     let base = Walk::config();
     assert!(base.validate().is_empty());
     let mut checked = 0;
-    for Field { key, value, .. } in fields(&base).into_iter().filter(|field| field.value.parse::<f64>().is_ok()) {
+    for Field { key, value, .. } in
+        fields(&base).into_iter().filter(|field| field.value.parse::<f64>().is_ok())
+    {
         let mut config = base;
         if config.set(&key, "NaN").is_ok() {
             checked += 1;
             let problems = config.validate();
             assert!(!problems.is_empty(), "{key} = {value} may be NaN");
             let section = key.split('.').next().unwrap();
-            assert!(problems.iter().all(|problem| problem.key.starts_with(section)), "{key}: {problems:?}");
+            assert!(
+                problems.iter().all(|problem| problem.key.starts_with(section)),
+                "{key}: {problems:?}"
+            );
         }
     }
     assert!(checked > 60, "{checked} settings");
@@ -166,5 +189,9 @@ fn problems_beyond_the_list_are_dropped_and_the_first_ones_kept() {
     }
     let problems = config.validate();
     assert_eq!(problems.len(), MAX_PROBLEMS);
-    assert!(problems.iter().all(|problem| problem.to_string() == format!("{} {}", problem.key, problem.rule)));
+    assert!(
+        problems
+            .iter()
+            .all(|problem| problem.to_string() == format!("{} {}", problem.key, problem.rule))
+    );
 }

@@ -6,11 +6,17 @@ fn pixels(left: i32, top: i32, width: i32, height: i32) -> PixelBox {
     PixelBox { left, top, width, height }
 }
 
-fn accepted_of(config: &TrackingConfig, size: [usize; 2], detections: &[Detection<'_>]) -> (DetectionCount, Vec<f32>, u64) {
-    let capacity = Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
+fn accepted_of(
+    config: &TrackingConfig,
+    size: [usize; 2],
+    detections: &[Detection<'_>],
+) -> (DetectionCount, Vec<f32>, u64) {
+    let capacity =
+        Capacity { image_width: 1242, image_height: 375, mask_words: 20_000, ..CAPACITY };
     with(&capacity, config, |instances, _| {
         instances.ingest(0, detections, size);
-        let scores = instances.tracker.test_instances().iter().map(|instance| instance.score).collect();
+        let scores =
+            instances.tracker.test_instances().iter().map(|instance| instance.score).collect();
         (instances.report().detections, scores, instances.digest())
     })
 }
@@ -73,7 +79,12 @@ fn of_ten_thousand_the_best_are_accepted_in_any_order() {
     let mut all: Vec<_> = (0..10_000)
         .map(|_| {
             let (left, top) = (random.below(300) as i32, random.below(50) as i32);
-            detection(Class::Car, random.below(1000) as f32 / 1000.0, &pixels(left, top, 60, 60), &mask)
+            detection(
+                Class::Car,
+                random.below(1000) as f32 / 1000.0,
+                &pixels(left, top, 60, 60),
+                &mask,
+            )
         })
         .collect();
     let (count, scores, digest) = accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
@@ -83,14 +94,19 @@ fn of_ten_thousand_the_best_are_accepted_in_any_order() {
     for i in (1..all.len()).rev() {
         all.swap(i, random.below(i as u32 + 1) as usize);
     }
-    assert_eq!(accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all), (count, scores, digest));
+    assert_eq!(
+        accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all),
+        (count, scores, digest)
+    );
 }
 
 #[test]
 fn where_masks_overlap_the_higher_score_is_on_top() {
     let mask = vec![1; 3600];
-    let (low, high) =
-        (detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &mask), detection(Class::Van, 0.8, &pixels(40, 10, 60, 60), &mask));
+    let (low, high) = (
+        detection(Class::Car, 0.5, &pixels(10, 10, 60, 60), &mask),
+        detection(Class::Van, 0.8, &pixels(40, 10, 60, 60), &mask),
+    );
     let hidden = detection(Class::Car, 0.1, &pixels(15, 12, 50, 50), &mask);
     for order in [[low, high, hidden], [hidden, high, low]] {
         with(&CAPACITY, &any_size(), |instances, _| {
@@ -117,7 +133,9 @@ fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
         instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
         for (at, &depth) in depth.iter().enumerate() {
             let (u, v) = ((at % WIDTH) as i32, (at / WIDTH) as i32);
-            let under = [pixels(300, 30, 60, 60), pixels(20, 30, 60, 60)].iter().any(|pixels| pixels.scaled(1200).contains(u, v));
+            let under = [pixels(300, 30, 60, 60), pixels(20, 30, 60, 60)]
+                .iter()
+                .any(|pixels| pixels.scaled(1200).contains(u, v));
             assert_eq!(depth == 0.0, under, "({u}, {v})");
         }
         assert_eq!(instances.report().pixels_masked, 2 * 72 * 72);
@@ -140,8 +158,11 @@ fn without_dynamic_everything_is_background() {
 fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left() {
     let mask = vec![1; 3600];
     let config = TrackingConfig::default();
-    let car = |score, pixels: &PixelBox| detection(Class::Car, score, pixels, &mask[..pixels.area() as usize]);
-    let [least, most] = [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
+    let car = |score, pixels: &PixelBox| {
+        detection(Class::Car, score, pixels, &mask[..pixels.area() as usize])
+    };
+    let [least, most] =
+        [(30, 30), (31, 30)].map(|(width, height)| car(0.9, &pixels(200, 10, width, height)));
     let count = |all: &[Detection<'_>]| accepted_of(&config, [1242, 375], all).0;
     let counted = |accepted, too_small, tracked_only, over_capacity, given| DetectionCount {
         given,
@@ -153,7 +174,8 @@ fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left(
     };
     assert_eq!(count(&[least]), counted(0, 1, 0, 0, 1));
     assert_eq!(count(&[most]), counted(0, 1, 1, 0, 1));
-    // A table of four: the one that is tracked only leaves first, despite its score, and is counted as such.
+    // A table of four: the one that is tracked only leaves first, despite its score, and is counted
+    // as such.
     let large: Vec<_> = (0..5).map(|n| pixels(300 + 70 * n, 10, 60, 60)).collect();
     let mut all: Vec<_> = large.iter().map(|pixels| car(0.3, pixels)).collect();
     all.insert(0, most);
@@ -168,7 +190,8 @@ fn what_is_too_small_to_be_reconstructed_is_tracked_with_the_space_that_is_left(
 fn of_more_equals_than_fit_the_same_are_accepted_in_any_order() {
     let mask = vec![1; 3600];
     let boxes: Vec<_> = (0..7).map(|n| pixels(10 + 40 * n, 10, 60, 60)).collect();
-    let mut all: Vec<_> = boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
+    let mut all: Vec<_> =
+        boxes.iter().map(|pixels| detection(Class::Car, 0.5, pixels, &mask)).collect();
     let first = accepted_of(&TrackingConfig::default(), [WIDTH, HEIGHT], &all);
     for _ in 0..7 {
         all.rotate_left(1);
@@ -197,10 +220,18 @@ fn of_a_box_half_beside_the_image_the_half_within_counts() {
     let mask = vec![1; 3600];
     for (left, within) in [(-30, 0), (370, 370)] {
         with(&CAPACITY, &any_size(), |instances, _| {
-            instances.ingest(0, &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)], [WIDTH, HEIGHT]);
+            instances.ingest(
+                0,
+                &[detection(Class::Car, 0.9, &pixels(left, 100, 60, 60), &mask)],
+                [WIDTH, HEIGHT],
+            );
             let retired = instances.tracker.test_instances()[0];
             assert_eq!(retired.mask.pixels, pixels(within, 100, 30, 20));
-            assert_eq!(instances.tracker.masks().area(&retired.mask), 30 * 20, "and no pixel beside it");
+            assert_eq!(
+                instances.tracker.masks().area(&retired.mask),
+                30 * 20,
+                "and no pixel beside it"
+            );
         });
     }
 }
@@ -211,13 +242,17 @@ fn a_score_below_the_least_is_ignored() {
     let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
     let config = TrackingConfig { score_min: 0.4, ..any_size() };
     let count = |score| accepted_of(&config, [WIDTH, HEIGHT], &[car(score)]).0;
-    assert_eq!([count(0.39), count(0.4)].map(|count| (count.accepted, count.ignored)), [(0, 1), (1, 0)]);
+    assert_eq!(
+        [count(0.39), count(0.4)].map(|count| (count.accepted, count.ignored)),
+        [(0, 1), (1, 0)]
+    );
 }
 
 #[test]
 fn a_score_of_minus_nothing_is_nothing() {
     let mask = vec![1; 3600];
-    let cars = [-0.0, 0.5].map(|score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask));
+    let cars =
+        [-0.0, 0.5].map(|score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask));
     let (count, scores, _) = accepted_of(&any_size(), [WIDTH, HEIGHT], &cars);
     assert_eq!((count.covered, scores), (1, vec![0.5]), "the better one is on top");
 }
@@ -237,11 +272,18 @@ fn of_two_alike_but_for_class_box_or_mask_the_same_is_on_top_in_either_order() {
         let seen = |order: [Detection<'_>; 2]| {
             with(&CAPACITY, &any_size(), |instances, _| {
                 instances.ingest(0, &order, [WIDTH, HEIGHT]);
-                let (masks, retired) = (instances.tracker.masks(), instances.tracker.test_instances());
-                retired.iter().map(|retired| (retired.class(), retired.mask.pixels, masks.area(&retired.mask))).collect::<Vec<_>>()
+                let (masks, retired) =
+                    (instances.tracker.masks(), instances.tracker.test_instances());
+                retired
+                    .iter()
+                    .map(|retired| {
+                        (retired.class(), retired.mask.pixels, masks.area(&retired.mask))
+                    })
+                    .collect::<Vec<_>>()
             })
         };
-        let digest = |order: [Detection<'_>; 2]| accepted_of(&any_size(), [WIDTH, HEIGHT], &order).2;
+        let digest =
+            |order: [Detection<'_>; 2]| accepted_of(&any_size(), [WIDTH, HEIGHT], &order).2;
         assert_eq!(seen([a, b]), seen([b, a]));
         assert_eq!(digest([a, b]), digest([b, a]));
     }

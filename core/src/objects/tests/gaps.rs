@@ -13,7 +13,12 @@ fn parked(frame: u32) -> [Transform; 2] {
 }
 
 /// Shows a car in the frames `shown` selects and calls `inspect` after each.
-fn run(frames: u32, poses: fn(u32) -> [Transform; 2], shown: impl Fn(u32) -> bool, mut inspect: impl FnMut(u32, &Run<'_, '_, '_>)) {
+fn run(
+    frames: u32,
+    poses: fn(u32) -> [Transform; 2],
+    shown: impl Fn(u32) -> bool,
+    mut inspect: impl FnMut(u32, &Run<'_, '_, '_>),
+) {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         for frame in 0..frames {
@@ -26,7 +31,10 @@ fn run(frames: u32, poses: fn(u32) -> [Transform; 2], shown: impl Fn(u32) -> boo
 
 #[test]
 fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_five() {
-    for (poses, state, most) in [(ahead as fn(u32) -> [Transform; 2], MotionState::Dynamic, 3), (parked, MotionState::Static, 5)] {
+    for (poses, state, most) in [
+        (ahead as fn(u32) -> [Transform; 2], MotionState::Dynamic, 3),
+        (parked, MotionState::Static, 5),
+    ] {
         let mut states = Vec::new();
         let mut depths_m = Vec::new();
         run(
@@ -36,11 +44,17 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
             |_, run| {
                 let track = run.track(1).unwrap();
                 states.push(track.state);
-                depths_m.push(track.t_world_object.map(|t_world_object| t_world_object.translation().z));
+                depths_m.push(
+                    track.t_world_object.map(|t_world_object| t_world_object.translation().z),
+                );
             },
         );
         let lost = 6 + most;
-        assert!(states[5..lost].iter().all(|now| *now == state) && states[lost] == MotionState::Uncertain, "{states:?}");
+        assert!(
+            states[5..lost].iter().all(|now| *now == state)
+                && states[lost] == MotionState::Uncertain,
+            "{states:?}"
+        );
         let step_m = if state == MotionState::Dynamic { 0.8 } else { 0.0 };
         for frame in 6..lost {
             let moved = depths_m[frame].unwrap() - depths_m[frame - 1].unwrap();
@@ -53,7 +67,12 @@ fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_f
 #[test]
 fn the_middle_of_a_car_unseen_goes_on_with_it() {
     let mut middles = Vec::new();
-    run(8, ahead, |frame| frame < 6, |_, run| middles.push(run.track(1).unwrap().center_world_m[2]));
+    run(
+        8,
+        ahead,
+        |frame| frame < 6,
+        |_, run| middles.push(run.track(1).unwrap().center_world_m[2]),
+    );
     // In a frame with a motion it is the middle before that motion.
     let steps = [middles[6] - middles[5], middles[7] - middles[6]];
     assert!(steps.iter().all(|step| (step - 0.8).abs() < 0.05), "{steps:?}");
@@ -66,7 +85,11 @@ fn what_waits_of_a_car_of_unknown_motion_goes_when_it_is_lost() {
         ahead,
         |frame| frame < 3,
         |frame, run| {
-            assert_eq!(run.instances.objects.crops.len(), [1, 2, 3, 0][frame as usize], "frame {frame}");
+            assert_eq!(
+                run.instances.objects.crops.len(),
+                [1, 2, 3, 0][frame as usize],
+                "frame {frame}"
+            );
         },
     );
 }
@@ -76,7 +99,10 @@ fn a_car_that_stops_stays_where_it_stopped() {
     // 8 m/s until frame 8, then braking by 8 m/s within ten frames.
     let poses = |frame: u32| {
         let speed = |n: u32| if n <= 8 { 8.0 } else { f64::from(18u32.saturating_sub(n)) * 0.8 };
-        [Transform::IDENTITY, shift(0.5, 0.3, 7.0 + (1..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())]
+        [
+            Transform::IDENTITY,
+            shift(0.5, 0.3, 7.0 + (1..=frame).map(|n| 0.1 * speed(n)).sum::<f64>()),
+        ]
     };
     let mut last = None;
     run(30, poses, |_| true, |_, run| last = run.track(1));
@@ -112,7 +138,11 @@ fn nothing_is_kept_for_a_volume_while_the_camera_is_lost() {
             run.known = frame >= 6;
             let [camera, car] = ahead(frame);
             let report = run.step(camera, &[(&Board::CAR, Some(car))]).objects;
-            assert_eq!((run.instances.objects.crops.len(), report.fused), (0, u32::from(frame >= 6)), "frame {frame}");
+            assert_eq!(
+                (run.instances.objects.crops.len(), report.fused),
+                (0, u32::from(frame >= 6)),
+                "frame {frame}"
+            );
         }
     });
 }
@@ -126,7 +156,8 @@ fn a_motion_that_comes_too_late_after_a_gap_restarts_the_volume_and_in_time_does
             ahead,
             |frame| !(6..6 + missed).contains(&frame),
             |_, run| {
-                segments = run.instances.objects().next().map_or(0, |(summary, _)| summary.segment_id);
+                segments =
+                    run.instances.objects().next().map_or(0, |(summary, _)| summary.segment_id);
             },
         );
         segments

@@ -13,8 +13,8 @@ fn capacity() -> Capacity {
     Capacity { image_width: test_scene::WIDTH, image_height: test_scene::HEIGHT, ..CAPACITY }
 }
 
-/// Drives towards the wall at 3 m/s, says that the camera did `camera_m_s`, and looks on the piece with or without images. No match of the scene
-/// flow is handed over.
+/// Drives towards the wall at 3 m/s, says that the camera did `camera_m_s`, and looks on the piece
+/// with or without images. No match of the scene flow is handed over.
 fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
     let capacity = capacity();
     let mut slab = vec![0u8; FlowMatcher::bytes(&capacity) + SLAB_ALIGN];
@@ -31,30 +31,46 @@ fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
         height: PIECE.height as u32,
         mask: &mask,
     };
-    with(&capacity, &TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() }, |instances, estimator| {
-        (0..6)
-            .map(|frame| {
-                let at_m = 0.3 * f64::from(frame);
-                let images = test_scene::see(&shift(0.0, 0.0, at_m));
-                let [left, right] = [0, 1].map(|side| View::new(&images[side], test_scene::WIDTH, test_scene::HEIGHT).unwrap());
-                matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
-                let q8 = (test_scene::RIG.focal_px * test_scene::RIG.baseline_m / (WALL_M - at_m) * 256.0) as u16;
-                let disparity = vec![q8; test_scene::WIDTH * test_scene::HEIGHT];
-                let disparity = View::new(&disparity, test_scene::WIDTH, test_scene::HEIGHT).unwrap();
-                instances.ingest(frame, &[detection], SIZE);
-                instances.assign_matches(&[], &[]);
-                let camera = CameraMotion {
-                    t_world_camera: shift(0.0, 0.0, 0.1 * camera_m_s * f64::from(frame)),
-                    t_current_previous: (frame > 0).then(|| shift(0.0, 0.0, -0.1 * camera_m_s)),
-                };
-                let search = with_images.then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
-                let none = FrameMatches { refined: &[], sparse: &[] };
-                instances.tracker.test_estimate_motions(&test_scene::RIG, &camera, none, search, estimator);
-                instances.reconstruct(None, &mut NoSink);
-                instances.tracks().next().unwrap()
-            })
-            .collect()
-    })
+    with(
+        &capacity,
+        &TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() },
+        |instances, estimator| {
+            (0..6)
+                .map(|frame| {
+                    let at_m = 0.3 * f64::from(frame);
+                    let images = test_scene::see(&shift(0.0, 0.0, at_m));
+                    let [left, right] = [0, 1].map(|side| {
+                        View::new(&images[side], test_scene::WIDTH, test_scene::HEIGHT).unwrap()
+                    });
+                    matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
+                    let q8 = (test_scene::RIG.focal_px * test_scene::RIG.baseline_m
+                        / (WALL_M - at_m)
+                        * 256.0) as u16;
+                    let disparity = vec![q8; test_scene::WIDTH * test_scene::HEIGHT];
+                    let disparity =
+                        View::new(&disparity, test_scene::WIDTH, test_scene::HEIGHT).unwrap();
+                    instances.ingest(frame, &[detection], SIZE);
+                    instances.assign_matches(&[], &[]);
+                    let camera = CameraMotion {
+                        t_world_camera: shift(0.0, 0.0, 0.1 * camera_m_s * f64::from(frame)),
+                        t_current_previous: (frame > 0).then(|| shift(0.0, 0.0, -0.1 * camera_m_s)),
+                    };
+                    let search = with_images
+                        .then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
+                    let none = FrameMatches { refined: &[], sparse: &[] };
+                    instances.tracker.test_estimate_motions(
+                        &test_scene::RIG,
+                        &camera,
+                        none,
+                        search,
+                        estimator,
+                    );
+                    instances.reconstruct(None, &mut NoSink);
+                    instances.tracks().next().unwrap()
+                })
+                .collect()
+        },
+    )
 }
 
 #[test]
@@ -82,7 +98,13 @@ fn the_grid_is_no_finer_than_three_pixels_and_holds_at_most_its_capacity() {
     for [width, height] in [[20, 30], [48, 48], [120, 90], [1242, 375]] {
         let step = step_px(width, height);
         let points = (width / step) * (height / step);
-        assert!(step >= 3 && points <= GUIDED_MATCHES_MAX as i32, "{width} x {height}: {step}, {points}");
-        assert!(step == 3 || points * 3 > GUIDED_MATCHES_MAX as i32, "{width} x {height}: {step}, {points}");
+        assert!(
+            step >= 3 && points <= GUIDED_MATCHES_MAX as i32,
+            "{width} x {height}: {step}, {points}"
+        );
+        assert!(
+            step == 3 || points * 3 > GUIDED_MATCHES_MAX as i32,
+            "{width} x {height}: {step}, {points}"
+        );
     }
 }

@@ -8,13 +8,21 @@ fn car(left: i32, score: f32) -> Detection<'static> {
     detection(Class::Car, score, &PixelBox { left, top: 30, width: 60, height: 60 }, &MASK)
 }
 
-/// Points of an object that moves away from a standing camera by 0.2 m, seen in a band of the box of `car(left, _)`, no two within 5 px.
+/// Points of an object that moves away from a standing camera by 0.2 m, seen in a band of the box
+/// of `car(left, _)`, no two within 5 px.
 fn points(count: u32, left: i32, top: i32, depth_m: f64) -> Vec<Match> {
     let seen = |n: u32| {
-        let pixel = [f64::from(left) + 5.0 + f64::from(7 * n % 50), f64::from(top) + f64::from(13 * n % 20)];
+        let pixel = [
+            f64::from(left) + 5.0 + f64::from(7 * n % 50),
+            f64::from(top) + f64::from(13 * n % 20),
+        ];
         let z = depth_m * (1.0 + 0.01 * f64::from(n % 5));
         let per_px = z / RIG.focal_px;
-        let point = Point3::new((pixel[0] - RIG.center_u_px) * per_px, (pixel[1] - RIG.center_v_px) * per_px, z);
+        let point = Point3::new(
+            (pixel[0] - RIG.center_u_px) * per_px,
+            (pixel[1] - RIG.center_v_px) * per_px,
+            z,
+        );
         let ([previous_left, previous_right], [current_left, current_right]) =
             (project(&point), project(&(point + Vector3::new(0.0, 0.0, 0.2))));
         Match { previous_left, previous_right, current_left, current_right }
@@ -35,7 +43,9 @@ fn counted(refined: &[Match], sparse: &[Match]) -> u32 {
 fn a_match_that_leaves_the_mask_or_enters_it_is_not_counted() {
     let stays = points(20, 100, 35, 10.0);
     let aside = |[u, v]: [f32; 2]| [u + 100.0, v];
-    let leaves = points(5, 100, 65, 10.0).into_iter().map(|m| Match { current_left: aside(m.current_left), ..m });
+    let leaves = points(5, 100, 65, 10.0)
+        .into_iter()
+        .map(|m| Match { current_left: aside(m.current_left), ..m });
     let entering = points(5, 100, 65, 10.0).into_iter().map(|m| Match {
         previous_left: aside(m.previous_left),
         previous_right: aside(m.previous_right),
@@ -49,8 +59,10 @@ fn a_match_that_leaves_the_mask_or_enters_it_is_not_counted() {
 fn sparse_matches_fill_up_where_refined_ones_are_few_and_none_is_counted_twice() {
     let (few, sparse) = (points(20, 100, 35, 10.0), points(30, 100, 65, 10.0));
     assert_eq!(counted(&few, &sparse), 50);
-    let again = |m: &Match| Match { current_left: [m.current_left[0] + 0.5, m.current_left[1]], ..*m };
-    let with_doubles: Vec<Match> = sparse.iter().copied().chain(few.iter().take(5).map(again)).collect();
+    let again =
+        |m: &Match| Match { current_left: [m.current_left[0] + 0.5, m.current_left[1]], ..*m };
+    let with_doubles: Vec<Match> =
+        sparse.iter().copied().chain(few.iter().take(5).map(again)).collect();
     assert_eq!(counted(&few, &with_doubles), 50, "the same feature says nothing new");
     assert_eq!(counted(&points(60, 100, 35, 10.0), &sparse), 60, "enough are enough");
 }
@@ -71,7 +83,8 @@ fn an_object_seen_for_the_first_time_has_no_matches() {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         take_frame(instances, estimator, 0, &[car(100, 0.9)], [&[], &[]]);
         take_frame(instances, estimator, 1, &[car(250, 0.9)], [&points(30, 250, 35, 10.0), &[]]);
-        let matches: Vec<(u32, u32)> = instances.tracks().map(|track| (track.id, track.matches)).collect();
+        let matches: Vec<(u32, u32)> =
+            instances.tracks().map(|track| (track.id, track.matches)).collect();
         assert_eq!(matches, [(1, 0), (2, 0)]);
     });
 }
@@ -95,14 +108,21 @@ fn after(config: &TrackingConfig, boards: &[Board]) -> TrackReport {
 
 #[test]
 fn nine_matches_do_once_there_is_a_motion_to_go_by_and_eight_do_not() {
-    let measured = |points| after(&any_size(), &[Board::CAR, Board::CAR, Board::CAR, Board { points, ..Board::CAR }]).measured;
+    let measured = |points| {
+        after(&any_size(), &[Board::CAR, Board::CAR, Board::CAR, Board { points, ..Board::CAR }])
+            .measured
+    };
     assert_eq!([measured(8), measured(9)], [false, true]);
 }
 
 #[test]
 fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
-    // One draw only, and two thirds of what is under the mask stands: three points of the car are drawn once in 27 times.
-    let config = TrackingConfig { motion: MotionConfig { samples: 1, ..MotionConfig::default() }, ..any_size() };
+    // One draw only, and two thirds of what is under the mask stands: three points of the car are
+    // drawn once in 27 times.
+    let config = TrackingConfig {
+        motion: MotionConfig { samples: 1, ..MotionConfig::default() },
+        ..any_size()
+    };
     let hidden = Board { background: 40, ..Board::CAR };
     let track = after(&config, &[Board::CAR, Board::CAR, Board::CAR, hidden]);
     assert!(track.measured && (15..=25).contains(&track.inliers), "{} inliers", track.inliers);
@@ -115,7 +135,11 @@ fn matches_of_one_object_share_their_error_so_four_times_as_many_do_not_halve_si
         motion: MotionConfig { camera_rad: 0.0, ..MotionConfig::default() },
         ..any_size()
     };
-    let sigma = |points| after(&config, &[Board { points, ..Board::CAR }, Board { points, ..Board::CAR }]).speed_m_s.unwrap()[1];
+    let sigma = |points| {
+        after(&config, &[Board { points, ..Board::CAR }, Board { points, ..Board::CAR }])
+            .speed_m_s
+            .unwrap()[1]
+    };
     let [few, many] = [60, 240].map(sigma);
     assert!((many / few - 1.0).abs() < 0.2, "{few} and {many} m/s");
 }
@@ -127,16 +151,22 @@ fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_s
             let mut run = Run::new(instances, estimator);
             for frame in 0..8 {
                 let t = 0.1 * f64::from(frame);
-                run.step(shift(0.0, 0.0, 6.0 * t), &[(&Board::CAR, Some(shift(3.5, 0.3, 14.0 + 3.0 * t)))]);
+                run.step(
+                    shift(0.0, 0.0, 6.0 * t),
+                    &[(&Board::CAR, Some(shift(3.5, 0.3, 14.0 + 3.0 * t)))],
+                );
             }
             run.track(1).unwrap().state
         })
     };
-    let exact = MotionConfig { bias_px: 0.0, lens_px: 0.0, camera_rad: 0.0, ..MotionConfig::default() };
+    let exact =
+        MotionConfig { bias_px: 0.0, lens_px: 0.0, camera_rad: 0.0, ..MotionConfig::default() };
     assert_eq!(state(exact), MotionState::Dynamic);
-    for poor in
-        [MotionConfig { bias_px: 5.0, ..exact }, MotionConfig { lens_px: 200.0, ..exact }, MotionConfig { camera_rad: 0.02, ..exact }]
-    {
+    for poor in [
+        MotionConfig { bias_px: 5.0, ..exact },
+        MotionConfig { lens_px: 200.0, ..exact },
+        MotionConfig { camera_rad: 0.02, ..exact },
+    ] {
         assert_eq!(state(poor), MotionState::Uncertain, "{poor:?}");
     }
 }
@@ -162,7 +192,11 @@ fn seen_at(speed_m_s: f32) -> Option<MotionEvidence> {
 
 #[test]
 fn a_small_object_takes_its_neighbours_matches_only_once_it_moves() {
-    let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
+    let config = TrackingConfig {
+        area_min_px: 1_000_000,
+        track_area_min_px: 0,
+        ..TrackingConfig::default()
+    };
     with(&CAPACITY, &config, |instances, _| {
         instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
         instances.assign_matches(&[at(97.0)], &[]);
@@ -198,7 +232,14 @@ fn a_motion_is_not_made_of_two_points() {
     let retired = |count: usize| {
         let mut filter = MotionFilter::default();
         filter.predict(&config, 0.1);
-        filter.update(&config, &RIG, &Transform::IDENTITY, 0.1, 0.3, [0.0, 1.0, 0.5].into_iter().take(count).map(sighting))
+        filter.update(
+            &config,
+            &RIG,
+            &Transform::IDENTITY,
+            0.1,
+            0.3,
+            [0.0, 1.0, 0.5].into_iter().take(count).map(sighting),
+        )
     };
     assert_eq!([retired(2), retired(3)], [false, true]);
 }

@@ -23,8 +23,9 @@ use crate::{
     random::Random,
     scene_flow::Match,
     tracking::{
-        CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt, MotionConfig, MotionEvidence,
-        MotionState, Overlap, StateConfig, TrackCount, TrackReport, Tracker, TrackingConfig,
+        CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt,
+        MotionConfig, MotionEvidence, MotionState, Overlap, StateConfig, TrackCount, TrackReport,
+        Tracker, TrackingConfig,
         tests::{GUIDED_MATCHES_MAX, MatchOwner, step_px},
     },
 };
@@ -33,7 +34,8 @@ use std::{vec, vec::Vec};
 
 pub(super) const WIDTH: usize = 400;
 pub(super) const HEIGHT: usize = 120;
-pub(super) const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 60.0, baseline_m: 0.5 };
+pub(super) const RIG: StereoRig =
+    StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 60.0, baseline_m: 0.5 };
 pub(super) const CAPACITY: Capacity = Capacity {
     image_width: WIDTH,
     image_height: HEIGHT,
@@ -78,7 +80,13 @@ impl<'s> Instances<'s> {
         self.ingest_with(frame, detections, size, [&[], &[]]);
     }
 
-    pub fn ingest_with(&mut self, frame: u32, detections: &[Detection<'_>], size: [usize; 2], [refined, sparse]: [&[Match]; 2]) {
+    pub fn ingest_with(
+        &mut self,
+        frame: u32,
+        detections: &[Detection<'_>],
+        size: [usize; 2],
+        [refined, sparse]: [&[Match]; 2],
+    ) {
         self.tracker.test_ingest(frame, detections, size, FrameMatches { refined, sparse });
     }
 
@@ -91,7 +99,11 @@ impl<'s> Instances<'s> {
     }
 
     /// Reconstructs and ends the frame.
-    pub fn reconstruct(&mut self, frame: Option<&ObjectFrame<'_>>, sink: &mut impl ObjectSink) -> InstancesReport {
+    pub fn reconstruct(
+        &mut self,
+        frame: Option<&ObjectFrame<'_>>,
+        sink: &mut impl ObjectSink,
+    ) -> InstancesReport {
         let tracked = self.tracker.test_tracked();
         self.objects.reconstruct(&tracked, frame, &Serial, sink);
         InstancesReport::of(&tracked.commit(), self.objects.report(), 0)
@@ -130,13 +142,21 @@ impl<'s> Instances<'s> {
 }
 
 /// Calls `run` with instances and an estimator in a slab.
-pub(super) fn with<R>(capacity: &Capacity, config: &TrackingConfig, run: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R) -> R {
+pub(super) fn with<R>(
+    capacity: &Capacity,
+    config: &TrackingConfig,
+    run: impl FnOnce(&mut Instances<'_>, &mut Estimator<'_>) -> R,
+) -> R {
     let bytes = Instances::bytes(capacity) + Estimator::bytes(capacity);
     let mut slab = vec![0u8; bytes + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut slab[start..start + bytes], bytes).unwrap();
     let mut instances = Instances::new_in(capacity, config, &mut carver);
-    assert_eq!(carver.footprint().bytes(), Instances::bytes(capacity), "the formula is what is allocated");
+    assert_eq!(
+        carver.footprint().bytes(),
+        Instances::bytes(capacity),
+        "the formula is what is allocated"
+    );
     let mut estimator = Estimator::new_in(capacity, &mut carver);
     run(&mut instances, &mut estimator)
 }
@@ -153,7 +173,8 @@ pub(super) struct Board {
 }
 
 impl Board {
-    pub const CAR: Self = Self { class: Class::Car, score: 0.9, half_m: [1.5, 0.75], points: 60, background: 0 };
+    pub const CAR: Self =
+        Self { class: Class::Car, score: 0.9, half_m: [1.5, 0.75], points: 60, background: 0 };
 }
 
 pub(super) fn shift(x: f64, y: f64, z: f64) -> Transform {
@@ -192,7 +213,11 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
     }
 
     /// Takes a frame: the camera's pose, and that of each board (`None`: not seen).
-    pub fn step(&mut self, t_world_camera: Transform, boards: &[(&Board, Option<Transform>)]) -> InstancesReport {
+    pub fn step(
+        &mut self,
+        t_world_camera: Transform,
+        boards: &[(&Board, Option<Transform>)],
+    ) -> InstancesReport {
         self.step_behind(t_world_camera, boards, &[])
     }
 
@@ -212,13 +237,20 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
             let Some(now) = now else { continue };
             let camera_board = t_world_camera.inverse() * now;
             let [half_x, half_y] = board.half_m;
-            let corner = |x: f64, y: f64| project(&camera_board.transform_point(Point3::new(x, y, 0.0)))[0];
+            let corner =
+                |x: f64, y: f64| project(&camera_board.transform_point(Point3::new(x, y, 0.0)))[0];
             let ([l, t], [r, b]) = (corner(-half_x, -half_y), corner(half_x, half_y));
-            let pixels = PixelBox { left: l as i32, top: t as i32, width: (r - l) as i32, height: (b - t) as i32 };
+            let pixels = PixelBox {
+                left: l as i32,
+                top: t as i32,
+                width: (r - l) as i32,
+                height: (b - t) as i32,
+            };
             let depth = camera_board.translation().z;
             for v in pixels.top.max(0)..(pixels.top + pixels.height).min(HEIGHT as i32) {
                 for u in pixels.left.max(0)..(pixels.left + pixels.width).min(WIDTH as i32) {
-                    disparity[v as usize * WIDTH + u as usize] = (RIG.focal_px * RIG.baseline_m / depth * 256.0) as u16;
+                    disparity[v as usize * WIDTH + u as usize] =
+                        (RIG.focal_px * RIG.baseline_m / depth * 256.0) as u16;
                 }
             }
             if index < seen.len() {
@@ -227,16 +259,26 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
             let Some(before) = before else { continue };
             let mut random = Random::new(9);
             for n in 0..board.points {
-                let mut along = |half: f64| (f64::from(random.below(1001)) / 500.0 - 1.0) * half * 0.9;
+                let mut along =
+                    |half: f64| (f64::from(random.below(1001)) / 500.0 - 1.0) * half * 0.9;
                 // Not all in one plane.
                 let point = Point3::new(along(half_x), along(half_y), along(0.8));
-                let after = if n < board.background { before.transform_point(point) } else { now.transform_point(point) };
-                let [previous_left, previous_right] = project(&(self.t_world_camera.inverse() * before).transform_point(point));
-                let [current_left, current_right] = project(&t_world_camera.inverse().transform_point(after));
+                let after = if n < board.background {
+                    before.transform_point(point)
+                } else {
+                    now.transform_point(point)
+                };
+                let [previous_left, previous_right] =
+                    project(&(self.t_world_camera.inverse() * before).transform_point(point));
+                let [current_left, current_right] =
+                    project(&t_world_camera.inverse().transform_point(after));
                 matches.push(Match { previous_left, previous_right, current_left, current_right });
             }
         }
-        let detections: Vec<_> = owned.iter().map(|(class, score, pixels, mask)| detection(*class, *score, pixels, mask)).collect();
+        let detections: Vec<_> = owned
+            .iter()
+            .map(|(class, score, pixels, mask)| detection(*class, *score, pixels, mask))
+            .collect();
         let camera = CameraMotion {
             t_world_camera,
             t_current_previous: (self.frame > 0).then_some(t_current_previous),
@@ -248,7 +290,12 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
         let grey = vec![128u8; WIDTH * HEIGHT];
         let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
-        let shown = ObjectFrame { rig: &RIG, t_world_camera: &t_world_camera, picture, disparity_q8: disparity };
+        let shown = ObjectFrame {
+            rig: &RIG,
+            t_world_camera: &t_world_camera,
+            picture,
+            disparity_q8: disparity,
+        };
         self.instances.reconstruct(self.known.then_some(&shown), &mut self.sink);
         self.frame += 1;
         self.t_world_camera = t_world_camera;
@@ -261,7 +308,12 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
     }
 }
 
-pub(super) fn detection<'a>(class: Class, score: f32, pixels: &PixelBox, mask: &'a [u8]) -> Detection<'a> {
+pub(super) fn detection<'a>(
+    class: Class,
+    score: f32,
+    pixels: &PixelBox,
+    mask: &'a [u8],
+) -> Detection<'a> {
     let &PixelBox { left, top, width, height } = pixels;
     Detection { class, score, left, top, width: width as u32, height: height as u32, mask }
 }
@@ -280,11 +332,18 @@ pub(super) fn take_frame(
     };
     instances.ingest_with(frame, detections, [WIDTH, HEIGHT], [refined, sparse]);
     instances.assign_matches(refined, sparse);
-    instances.tracker.test_estimate_motions(&RIG, &camera, FrameMatches { refined, sparse }, None, estimator);
+    instances.tracker.test_estimate_motions(
+        &RIG,
+        &camera,
+        FrameMatches { refined, sparse },
+        None,
+        estimator,
+    );
     let (grey, nothing) = (vec![128u8; WIDTH * HEIGHT], vec![0u16; WIDTH * HEIGHT]);
     let picture = Picture { grey: View::new(&grey, WIDTH, HEIGHT).unwrap(), colour: None };
     let disparity_q8 = View::new(&nothing, WIDTH, HEIGHT).unwrap();
-    let shown = ObjectFrame { rig: &RIG, t_world_camera: &camera.t_world_camera, picture, disparity_q8 };
+    let shown =
+        ObjectFrame { rig: &RIG, t_world_camera: &camera.t_world_camera, picture, disparity_q8 };
     instances.reconstruct(Some(&shown), &mut NoSink);
 }
 

@@ -34,16 +34,22 @@ fn a_moving_cars_motion_is_its_own_and_not_the_cameras() {
     let states: Vec<MotionState> = tracks.iter().map(|track| track.state).collect();
     assert_eq!(states[..3], [MotionState::Uncertain; 3]);
     assert_eq!(states[3..], [MotionState::Dynamic; 5]);
-    let at = tracks[7].t_world_object.unwrap().translation() - tracks[3].t_world_object.unwrap().translation();
+    let at = tracks[7].t_world_object.unwrap().translation()
+        - tracks[3].t_world_object.unwrap().translation();
     assert!((at - Vector3::new(0.0, 0.0, 3.2)).norm() < 0.05, "{at}");
 }
 
 #[test]
 fn a_parked_car_follows_the_camera_and_stays_where_it_is_in_the_world() {
-    let tracks = run(&Board::CAR, 8, |frame| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]);
+    let tracks = run(&Board::CAR, 8, |frame| {
+        [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 12.0)]
+    });
     assert_eq!(tracks[7].state, MotionState::Static);
     assert_eq!(tracks[7].motion_world, Transform::IDENTITY);
-    assert_eq!(tracks[7].t_world_object, tracks[0].t_world_object, "seen from the moving camera it moves, in the world it does not");
+    assert_eq!(
+        tracks[7].t_world_object, tracks[0].t_world_object,
+        "seen from the moving camera it moves, in the world it does not"
+    );
 }
 
 #[test]
@@ -71,19 +77,30 @@ fn a_match_counts_only_from_mask_to_mask() {
         let delete = pixels.scaled(1200);
         let at = |u: i32, v: i32| Match { current_left: [u as f32, v as f32], ..Match::default() };
         let (last, beyond) = (delete.left, delete.left - 1);
-        run.instances.assign_matches(&[at(last, pixels.top + 5), at(beyond, pixels.top + 5), at(pixels.left + 5, pixels.top + 5)], &[]);
+        run.instances.assign_matches(
+            &[
+                at(last, pixels.top + 5),
+                at(beyond, pixels.top + 5),
+                at(pixels.left + 5, pixels.top + 5),
+            ],
+            &[],
+        );
         assert_eq!(
             [0, 1, 2].map(|at| run.instances.tracker.test_match_owner(at)),
             [MatchOwner::Instance(0), MatchOwner::None, MatchOwner::Instance(0)]
         );
-        run.instances.assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
+        run.instances
+            .assign_matches(&[Match { current_left: [f32::NAN, 5.0], ..Match::default() }], &[]);
         assert_eq!(run.instances.tracker.test_match_owner(0), MatchOwner::None);
     });
 }
 
 #[test]
 fn egomotion_excludes_moving_cars_and_large_ones_of_unknown_state() {
-    let included = |config: &TrackingConfig, frames: u32, poses: &dyn Fn(u32) -> [Transform; 2], board: &Board| {
+    let included = |config: &TrackingConfig,
+                    frames: u32,
+                    poses: &dyn Fn(u32) -> [Transform; 2],
+                    board: &Board| {
         with(&CAPACITY, config, |instances, estimator| {
             let mut run = Run::new(instances, estimator);
             for frame in 0..frames {
@@ -91,8 +108,10 @@ fn egomotion_excludes_moving_cars_and_large_ones_of_unknown_state() {
                 run.step(camera, &[(board, Some(car))]);
             }
             let pixels = run.track(1).unwrap().pixels;
-            let middle = [pixels.left + pixels.width / 2, pixels.top + pixels.height / 2].map(|px| px as f32);
-            run.instances.assign_matches(&[Match { current_left: middle, ..Match::default() }], &[]);
+            let middle = [pixels.left + pixels.width / 2, pixels.top + pixels.height / 2]
+                .map(|px| px as f32);
+            run.instances
+                .assign_matches(&[Match { current_left: middle, ..Match::default() }], &[]);
             run.instances.tracker.test_egomotion_includes(0)
         })
     };
@@ -116,17 +135,31 @@ fn starting_and_stopping_show_within_five_frames() {
         29..=38 => 0.5 * f64::from(38 - frame),
         _ => 0.0,
     };
-    let poses =
-        |frame: u32| [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>())];
-    let states: Vec<MotionState> = run(&Board::CAR, 50, poses).iter().map(|track| track.state).collect();
-    let is = |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
-    assert!(is(MotionState::Static, 4..9) && is(MotionState::Dynamic, 13..38) && is(MotionState::Static, 43..50), "{states:?}");
+    let poses = |frame: u32| {
+        [
+            shift(0.0, 0.0, 0.3 * f64::from(frame)),
+            shift(1.0, 0.3, 10.0 + (0..=frame).map(|n| 0.1 * speed(n)).sum::<f64>()),
+        ]
+    };
+    let states: Vec<MotionState> =
+        run(&Board::CAR, 50, poses).iter().map(|track| track.state).collect();
+    let is =
+        |state, range: core::ops::Range<usize>| range.clone().all(|frame| states[frame] == state);
+    assert!(
+        is(MotionState::Static, 4..9)
+            && is(MotionState::Dynamic, 13..38)
+            && is(MotionState::Static, 43..50),
+        "{states:?}"
+    );
 }
 
 #[test]
 fn matches_on_the_silhouette_between_two_cars_are_ambiguous() {
     let mask = [1; 3600];
-    let boxes = [PixelBox { left: 40, top: 30, width: 60, height: 60 }, PixelBox { left: 100, top: 30, width: 60, height: 60 }];
+    let boxes = [
+        PixelBox { left: 40, top: 30, width: 60, height: 60 },
+        PixelBox { left: 100, top: 30, width: 60, height: 60 },
+    ];
     with(&CAPACITY, &any_size(), |instances, _| {
         let cars = boxes.map(|pixels| detection(Class::Car, 0.5, &pixels, &mask));
         instances.ingest(0, &cars, [WIDTH, HEIGHT]);
@@ -149,7 +182,11 @@ fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
 
 #[test]
 fn a_small_object_is_reported_once_its_motion_is_measured_and_masked_once_it_moves() {
-    let config = TrackingConfig { area_min_px: 1_000_000, track_area_min_px: 0, ..TrackingConfig::default() };
+    let config = TrackingConfig {
+        area_min_px: 1_000_000,
+        track_area_min_px: 0,
+        ..TrackingConfig::default()
+    };
     for (speed_m_s, state) in [(8.0, MotionState::Dynamic), (0.0, MotionState::Static)] {
         with(&CAPACITY, &config, |instances, estimator| {
             let mut run = Run::new(instances, estimator);
@@ -158,7 +195,8 @@ fn a_small_object_is_reported_once_its_motion_is_measured_and_masked_once_it_mov
                 run.step(camera, &[(&Board::CAR, Some(car))]);
                 assert_eq!(run.track(1).is_some(), frame > 0, "frame {frame}");
                 let mut depth_m = vec![5.0; WIDTH * HEIGHT];
-                run.instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
+                run.instances
+                    .mask_dynamic_depth(&mut ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap());
                 let moves = run.track(1).is_some_and(|track| track.state == MotionState::Dynamic);
                 assert_eq!(depth_m.contains(&0.0), moves, "frame {frame}");
             }
@@ -170,7 +208,8 @@ fn a_small_object_is_reported_once_its_motion_is_measured_and_masked_once_it_mov
 
 #[test]
 fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
-    // A post much nearer than the car, in front of it, standing; its matches count the square of sixteen times as much each.
+    // A post much nearer than the car, in front of it, standing; its matches count the square of
+    // sixteen times as much each.
     let board = Board { points: 40, ..Board::CAR };
     let post = Board { half_m: [0.04, 0.1], points: 6, ..Board::CAR };
     let speed = |with_post: bool| {
@@ -178,9 +217,17 @@ fn a_few_matches_on_what_hides_a_car_do_not_outweigh_its_own() {
             let mut run = Run::new(instances, estimator);
             for frame in 0..5 {
                 let t = f64::from(frame) * 0.1;
-                let (camera, car, t_world_post) = (shift(0.0, 0.0, 2.0 * t), shift(0.3, 0.2, 28.0 + 8.0 * t), shift(0.04, 0.03, 4.0));
+                let (camera, car, t_world_post) = (
+                    shift(0.0, 0.0, 2.0 * t),
+                    shift(0.3, 0.2, 28.0 + 8.0 * t),
+                    shift(0.04, 0.03, 4.0),
+                );
                 let posts = [(&post, Some(t_world_post))];
-                run.step_behind(camera, &[(&board, Some(car))], if with_post { &posts } else { &[] });
+                run.step_behind(
+                    camera,
+                    &[(&board, Some(car))],
+                    if with_post { &posts } else { &[] },
+                );
             }
             run.track(1).unwrap().speed_m_s.unwrap()[0]
         })

@@ -22,9 +22,14 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
         assert_eq!((reports[3].caught_up, reports[3].fused, reports[4].fused), (3, 1, 1));
         let (summary, object) = run.instances.objects().next().unwrap();
         assert_eq!((summary.frames, summary.state), (2, MotionState::Dynamic));
-        // A board square to the camera: its blocks lie in one layer, however far it drove meanwhile.
+        // A board square to the camera: its blocks lie in one layer, however far it drove
+        // meanwhile.
         let volume = object.volume();
-        let layers = volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).map(|coord| coord.z);
+        let layers = volume
+            .pool()
+            .live()
+            .filter_map(|slot| volume.blocks().coord(slot))
+            .map(|coord| coord.z);
         let (first, last) = (layers.clone().min().unwrap(), layers.max().unwrap());
         assert!(last - first <= 2, "{first} to {last}");
     });
@@ -34,7 +39,10 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
 fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
     // The frame in which it is found again has no motion either.
     for (dynamic_frames, missed, restarts) in [(1, 0, 0), (1, 1, 1), (2, 1, 0), (2, 2, 1)] {
-        let config = TrackingConfig { state: StateConfig { dynamic_frames, ..StateConfig::default() }, ..any_size() };
+        let config = TrackingConfig {
+            state: StateConfig { dynamic_frames, ..StateConfig::default() },
+            ..any_size()
+        };
         with(&CAPACITY, &config, |instances, estimator| {
             let mut run = Run::new(instances, estimator);
             for frame in 0..16 {
@@ -60,7 +68,11 @@ fn full_volumes_are_handed_over_for_new_objects_but_not_in_the_frame_they_grow()
         for frame in 0..8 {
             let boards = [(&near, parked(-3.5)), (&near, parked(0.0)), (&near, parked(3.5))];
             let report = run.step(camera(frame), &boards);
-            assert_eq!(report.objects.refused, u32::from(frame >= 2), "three stand, two have volumes");
+            assert_eq!(
+                report.objects.refused,
+                u32::from(frame >= 2),
+                "three stand, two have volumes"
+            );
         }
         // One of the two goes out of sight: its volume goes to the third.
         let id = run.instances.objects().next().unwrap().0.id;
@@ -88,7 +100,9 @@ fn the_forgotten_and_the_last_are_handed_over_too() {
             let [camera, car] = at(frame);
             run.step(camera, &[(&Board::CAR, (!(5..=10).contains(&frame)).then_some(car))]);
         }
-        let reasons = |sink: &Retired| sink.0.iter().map(|retired| (retired.0.id, retired.1)).collect::<Vec<_>>();
+        let reasons = |sink: &Retired| {
+            sink.0.iter().map(|retired| (retired.0.id, retired.1)).collect::<Vec<_>>()
+        };
         assert_eq!(reasons(&run.sink), [(1, Retirement::Forgotten)]);
         let mut sink = Retired::default();
         assert_eq!(run.instances.finish(&mut sink), 1);
@@ -144,7 +158,9 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
 #[test]
 fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
-    for (poses, state) in [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)] {
+    for (poses, state) in
+        [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)]
+    {
         with(&CAPACITY, &any_size(), |instances, estimator| {
             let mut run = Run::new(instances, estimator);
             let mut last = None;

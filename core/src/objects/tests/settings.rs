@@ -13,7 +13,10 @@ fn each_setting_out_of_its_range_is_named() {
         spoil(&mut config);
         let mut problems = Problems::new();
         config.validate(&mut problems);
-        problems.iter().map(|problem| problem.key.strip_prefix("tracking.").unwrap()).collect::<Vec<_>>()
+        problems
+            .iter()
+            .map(|problem| problem.key.strip_prefix("tracking.").unwrap())
+            .collect::<Vec<_>>()
     };
     assert_eq!(named(|_| {}), [""; 0]);
     let spoilt: [(Spoil, &str); 34] = [

@@ -19,7 +19,11 @@ fn two_cars_that_pass_each_other_keep_their_numbers() {
     with(&CAPACITY, &any_size(), |instances, _| {
         for frame in 0..5 {
             let step = 20 * frame as i32;
-            assert_eq!(take(instances, frame, &[car(20 + step), car(280 - step)]), [1, 2], "frame {frame}");
+            assert_eq!(
+                take(instances, frame, &[car(20 + step), car(280 - step)]),
+                [1, 2],
+                "frame {frame}"
+            );
         }
         let lefts: Vec<i32> = instances.tracks().map(|track| track.pixels.left).collect();
         assert_eq!(lefts, [100, 200]);
@@ -30,7 +34,8 @@ fn two_cars_that_pass_each_other_keep_their_numbers() {
 fn the_best_pair_is_associated_first_in_any_order() {
     with(&CAPACITY, &any_size(), |instances, _| {
         take(instances, 0, &[car(100)]);
-        // The nearer one is the old one, though the other has the higher score and overlaps as well.
+        // The nearer one is the old one, though the other has the higher score and overlaps as
+        // well.
         let other = Detection { score: 1.0, ..car(135) };
         take(instances, 1, &[other, car(102)]);
         let nearest = instances.tracks().find(|track| track.id == 1).unwrap();
@@ -45,7 +50,11 @@ fn frames_missed_cost_a_half_then_three_quarters() {
     let score = 48.0 / 72.0 * 0.9;
     for (gap, discount) in [(1, 1.0), (2, 0.5), (3, 0.25), (9, 0.25)] {
         for (margin, expected) in [(0.99, 1), (1.01, 2)] {
-            let config = TrackingConfig { association_min: score * discount * margin, extent_frames: 0, ..any_size() };
+            let config = TrackingConfig {
+                association_min: score * discount * margin,
+                extent_frames: 0,
+                ..any_size()
+            };
             with(&CAPACITY, &config, |instances, _| {
                 take(instances, 0, &[car(100)]);
                 assert_eq!(take(instances, gap, &[car(112)]), [expected], "gap {gap}");
@@ -58,7 +67,9 @@ fn frames_missed_cost_a_half_then_three_quarters() {
 fn a_car_may_be_called_a_truck_for_a_while_but_never_a_person() {
     with(&CAPACITY, &any_size(), |instances, _| {
         let called = |class| Detection { class, ..car(100) };
-        for (frame, class) in [Class::Car, Class::Car, Class::Truck, Class::Van, Class::Car].into_iter().enumerate() {
+        for (frame, class) in
+            [Class::Car, Class::Car, Class::Truck, Class::Van, Class::Car].into_iter().enumerate()
+        {
             assert_eq!(take(instances, frame as u32, &[called(class)]), [1]);
         }
         assert_eq!(instances.tracks().next().unwrap().class, Class::Car);
@@ -98,7 +109,9 @@ fn a_full_table_evicts_the_track_unseen_for_longest_and_none_seen_lately() {
 #[test]
 fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
     // Two diagonal halves of one box: full overlap as boxes, almost none as masks.
-    let half = |upper: bool| -> Vec<u8> { (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect() };
+    let half = |upper: bool| -> Vec<u8> {
+        (0..3600).map(|i| u8::from((i % 60 > i / 60) == upper)).collect()
+    };
     let (upper, lower) = (half(true), half(false));
     for (overlap, id) in [(any_size().overlap, 2), (Overlap::Box, 1)] {
         with(&CAPACITY, &TrackingConfig { overlap, ..any_size() }, |instances, _| {
@@ -112,7 +125,11 @@ fn a_mask_that_stops_filling_its_box_still_overlaps_by_what_it_fills() {
 fn a_car_that_speeds_up_is_looked_for_where_it_goes() {
     with(&CAPACITY, &any_size(), |instances, _| {
         for (frame, left) in [(0, 20), (1, 40), (2, 80), (3, 130), (4, 180)] {
-            assert_eq!(take(instances, frame, &[car(left)]), [1], "{left} px: the last two steps are nearly the car's width");
+            assert_eq!(
+                take(instances, frame, &[car(left)]),
+                [1],
+                "{left} px: the last two steps are nearly the car's width"
+            );
         }
     });
 }
@@ -173,8 +190,18 @@ fn a_class_holds_until_others_were_seen_more_often() {
 
 #[test]
 fn a_small_object_that_grows_is_reported_though_no_motion_was_measured() {
-    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
-    let grown = detection(Class::Car, 0.9, &PixelBox { left: 98, top: 28, width: 16, height: 16 }, &MASK[..256]);
+    let small = detection(
+        Class::Car,
+        0.9,
+        &PixelBox { left: 100, top: 30, width: 12, height: 12 },
+        &MASK[..144],
+    );
+    let grown = detection(
+        Class::Car,
+        0.9,
+        &PixelBox { left: 98, top: 28, width: 16, height: 16 },
+        &MASK[..256],
+    );
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         assert_eq!([take(instances, 0, &[small]), take(instances, 1, &[grown])], [vec![], vec![1]]);
     });
@@ -186,18 +213,31 @@ fn a_pixel_shows_the_best_instance_whose_mask_contains_it() {
         let half: Vec<u8> = (0..3600).map(|i| u8::from(i % 60 < 30)).collect();
         let walker = Detection { class: Class::Person, score: 0.5, ..car(100) };
         take(instances, 0, &[walker, Detection { mask: &half, ..car(100) }]);
-        let shown = |u| instances.instance_at(u, 50).map(|instance| (instance.class, instance.track));
-        assert_eq!([shown(110), shown(140), shown(99)], [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]);
+        let shown =
+            |u| instances.instance_at(u, 50).map(|instance| (instance.class, instance.track));
+        assert_eq!(
+            [shown(110), shown(140), shown(99)],
+            [Some((Class::Car, Some(1))), Some((Class::Person, None)), None]
+        );
     });
 }
 
 /// The box cleared of depth in a frame, and how many pixels of it.
-fn cleared(instances: &mut Instances<'_>, frame: u32, detections: &[Detection<'_>]) -> Option<(PixelBox, u32)> {
+fn cleared(
+    instances: &mut Instances<'_>,
+    frame: u32,
+    detections: &[Detection<'_>],
+) -> Option<(PixelBox, u32)> {
     instances.ingest(frame, detections, [WIDTH, HEIGHT]);
     let mut depth = vec![5.0f32; WIDTH * HEIGHT];
     instances.mask_dynamic_depth(&mut ViewMut::new(&mut depth, WIDTH, HEIGHT).unwrap());
     instances.tracker.test_tracked().commit();
-    let pixels = || (0..).zip(&depth).filter(|(_, depth)| **depth == 0.0).map(|(at, _)| (at % WIDTH as i32, at / WIDTH as i32));
+    let pixels = || {
+        (0..)
+            .zip(&depth)
+            .filter(|(_, depth)| **depth == 0.0)
+            .map(|(at, _)| (at % WIDTH as i32, at / WIDTH as i32))
+    };
     let (left, right) = (pixels().map(|(u, _)| u).min()?, pixels().map(|(u, _)| u).max()?);
     let (top, bottom) = (pixels().map(|(_, v)| v).min()?, pixels().map(|(_, v)| v).max()?);
     let pixels = PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top };
@@ -215,8 +255,15 @@ fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_i
         }
         assert_eq!(cleared(instances, 5, &[]), None, "it may be anywhere");
         let found = PixelBox { left: 150, top: 30, width: 60, height: 60 }.scaled(1200);
-        assert_eq!(cleared(instances, 6, &[car(150)]), Some((found, 72 * 72)), "found again: nowhere else");
-        assert_eq!(instances.tracks().next().map(|track| (track.id, track.detected)), Some((1, true)));
+        assert_eq!(
+            cleared(instances, 6, &[car(150)]),
+            Some((found, 72 * 72)),
+            "found again: nowhere else"
+        );
+        assert_eq!(
+            instances.tracks().next().map(|track| (track.id, track.detected)),
+            Some((1, true))
+        );
     });
 }
 
@@ -226,7 +273,12 @@ fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_sma
         take(instances, 0, &[car(100)]);
         assert_eq!(cleared(instances, 1, &[]), None, "a ghost");
     });
-    let small = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 12, height: 12 }, &MASK[..144]);
+    let small = detection(
+        Class::Car,
+        0.9,
+        &PixelBox { left: 100, top: 30, width: 12, height: 12 },
+        &MASK[..144],
+    );
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         (0..3).for_each(|frame| drop(take(instances, frame, &[small])));
         assert_eq!(cleared(instances, 3, &[]), None);
@@ -251,7 +303,11 @@ fn a_car_is_looked_for_where_its_matches_went() {
             let matches: Vec<Match> = (0..count).map(|n| moving_right(100, n, 58.0)).collect();
             instances.ingest_with(1, &[car(158)], [WIDTH, HEIGHT], [&matches, &[]]);
             instances.tracker.test_tracked().commit();
-            instances.tracks().filter(|track| track.detected).map(|track| track.id).collect::<Vec<_>>()
+            instances
+                .tracks()
+                .filter(|track| track.detected)
+                .map(|track| track.id)
+                .collect::<Vec<_>>()
         })
     };
     assert_eq!([found(5), found(4)], [vec![1], vec![2]], "its box alone lies beside the last one");
@@ -259,11 +315,21 @@ fn a_car_is_looked_for_where_its_matches_went() {
 
 #[test]
 fn a_car_that_something_passes_in_front_of_stays_one_track() {
-    let seen =
-        |left: i32, width: i32| detection(Class::Car, 0.9, &PixelBox { left, top: 30, width, height: 60 }, &MASK[..(60 * width) as usize]);
+    let seen = |left: i32, width: i32| {
+        detection(
+            Class::Car,
+            0.9,
+            &PixelBox { left, top: 30, width, height: 60 },
+            &MASK[..(60 * width) as usize],
+        )
+    };
     with(&CAPACITY, &any_size(), |instances, _| {
         // Seen whole, cut on the right, not at all, cut on the left, whole.
-        for (frame, detections) in [vec![car(100)], vec![seen(100, 15)], vec![], vec![seen(145, 15)], vec![car(100)]].iter().enumerate() {
+        for (frame, detections) in
+            [vec![car(100)], vec![seen(100, 15)], vec![], vec![seen(145, 15)], vec![car(100)]]
+                .iter()
+                .enumerate()
+        {
             let tracks = take(instances, frame as u32, detections);
             assert_eq!(tracks, vec![1; detections.len()], "frame {frame}");
         }

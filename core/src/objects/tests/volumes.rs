@@ -16,7 +16,8 @@ fn content(instances: &Instances<'_>) -> (Vec<BlockCoord>, u8) {
     (slots().filter_map(|slot| blocks.coord(slot)).collect(), heaviest.unwrap_or(0))
 }
 
-/// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the sink gets in the end.
+/// Shows a parked car, too wide in the frames `wide` says; the blocks after each frame and what the
+/// sink gets in the end.
 fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize) {
     with(&CAPACITY, &known_in_the_fourth_frame(), |instances, estimator| {
         let mut run = Run::new(instances, estimator);
@@ -83,28 +84,46 @@ fn a_volume_lies_where_the_object_is() {
         for _ in 0..4 {
             run.step(Transform::IDENTITY, &[(&SMALL, Some(shift(2.0, -0.6, 9.0)))]);
         }
-        // 1.2 to 2.8 m to the right, -1.1 to -0.1 m down, 9 m ahead and 20 cm to either side; in blocks of 40 cm, the nearest lattice point's.
+        // 1.2 to 2.8 m to the right, -1.1 to -0.1 m down, 9 m ahead and 20 cm to either side; in
+        // blocks of 40 cm, the nearest lattice point's.
         let blocks = content(run.instances).0;
-        let range = |of: fn(&BlockCoord) -> i16| (blocks.iter().map(of).min().unwrap(), blocks.iter().map(of).max().unwrap());
-        assert_eq!((range(|at| at.x), range(|at| at.y), range(|at| at.z)), ((2, 7), (-3, -1), (22, 23)));
+        let range = |of: fn(&BlockCoord) -> i16| {
+            (blocks.iter().map(of).min().unwrap(), blocks.iter().map(of).max().unwrap())
+        };
+        assert_eq!(
+            (range(|at| at.x), range(|at| at.y), range(|at| at.z)),
+            ((2, 7), (-3, -1), (22, 23))
+        );
     });
 }
 
 #[test]
 fn a_static_object_is_fused_where_it_was_seen_in_the_world() {
     // With these bounds every motion counts as static.
-    let state = StateConfig { dynamic_m_s: 50.0, static_m_s: 50.0, slow_m_s: 50.0, ..StateConfig::default() };
-    with(&Capacity { object_blocks: 2000, ..CAPACITY }, &TrackingConfig { state, ..any_size() }, |instances, estimator| {
-        let mut run = Run::new(instances, estimator);
-        for frame in 0..4 {
-            run.step(Transform::IDENTITY, &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))]);
-        }
-        assert_eq!(run.track(1).unwrap().state, MotionState::Static);
-        let mut layers: Vec<i16> = content(run.instances).0.iter().map(|at| at.z).collect();
-        layers.sort_unstable();
-        layers.dedup();
-        assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four positions 80 cm apart");
-    });
+    let state = StateConfig {
+        dynamic_m_s: 50.0,
+        static_m_s: 50.0,
+        slow_m_s: 50.0,
+        ..StateConfig::default()
+    };
+    with(
+        &Capacity { object_blocks: 2000, ..CAPACITY },
+        &TrackingConfig { state, ..any_size() },
+        |instances, estimator| {
+            let mut run = Run::new(instances, estimator);
+            for frame in 0..4 {
+                run.step(
+                    Transform::IDENTITY,
+                    &[(&SMALL, Some(shift(0.0, 0.0, 8.0 + 0.8 * f64::from(frame))))],
+                );
+            }
+            assert_eq!(run.track(1).unwrap().state, MotionState::Static);
+            let mut layers: Vec<i16> = content(run.instances).0.iter().map(|at| at.z).collect();
+            layers.sort_unstable();
+            layers.dedup();
+            assert_eq!(layers, (19..=26).collect::<Vec<_>>(), "four positions 80 cm apart");
+        },
+    );
 }
 
 #[test]
@@ -129,14 +148,19 @@ fn a_post_before_a_car_is_no_part_of_it() {
         let mut run = Run::new(instances, estimator);
         let post = Board { half_m: [0.05, 0.2], points: 0, ..Board::CAR };
         for _ in 0..5 {
-            run.step_behind(Transform::IDENTITY, &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))], &[(&post, Some(shift(0.0, 0.0, 4.0)))]);
+            run.step_behind(
+                Transform::IDENTITY,
+                &[(&Board::CAR, Some(shift(0.0, 0.0, 10.0)))],
+                &[(&post, Some(shift(0.0, 0.0, 4.0)))],
+            );
         }
         let nearest = content(run.instances).0.iter().map(|at| at.z).min();
         assert_eq!(nearest, Some(24), "9.6 m");
     });
 }
 
-/// The columns that are left of a crop 60 px wide whose mask is its left 54, of a picture with these disparities, px, in each row.
+/// The columns that are left of a crop 60 px wide whose mask is its left 54, of a picture with
+/// these disparities, px, in each row.
 fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let pixels = PixelBox { left: 20, top: 10, width: 60, height: 30 };
     let mut words = vec![0; 1000];
@@ -146,7 +170,15 @@ fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
     let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
-    let kept = crop::crop(&RIG, 5.0, View::new(&disparity, WIDTH, HEIGHT).unwrap(), &store, &mask, &mut crop, Vectors::detect());
+    let kept = crop::crop(
+        &RIG,
+        5.0,
+        View::new(&disparity, WIDTH, HEIGHT).unwrap(),
+        &store,
+        &mask,
+        &mut crop,
+        Vectors::detect(),
+    );
     let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
     let first = columns(&crop[..60]);
     assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
@@ -172,32 +204,60 @@ fn a_crop_is_what_lies_under_the_mask_and_near_the_middle_depth() {
 #[test]
 fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() {
     // 1.6 px from surface to surface, then 1.4.
-    let step = |height_px: f64| cropped(|u| if (20..40).contains(&u) { 15.0 + height_px } else { 15.0 });
+    let step =
+        |height_px: f64| cropped(|u| if (20..40).contains(&u) { 15.0 + height_px } else { 15.0 });
     assert_eq!(step(1.6), (0..17).chain(20..40).chain(43..54).collect::<Vec<_>>());
     assert_eq!(step(1.4), (0..54).collect::<Vec<_>>());
-    assert_eq!(cropped(|u| 14.0 + 0.3 * f64::from(u)), (0..54).collect::<Vec<_>>(), "the side of a car seen from behind");
+    assert_eq!(
+        cropped(|u| 14.0 + 0.3 * f64::from(u)),
+        (0..54).collect::<Vec<_>>(),
+        "the side of a car seen from behind"
+    );
 }
 
 /// A crop the obvious way: pixel by pixel.
-fn plain_crop(extent_m: f64, disparity: View<'_, u16>, is_set: impl Fn(i32, i32) -> bool, pixels: &PixelBox) -> Vec<u16> {
-    let at = |u: i32, v: i32| usize::try_from(u).ok().zip(usize::try_from(v).ok()).and_then(|(u, v)| disparity.get(u, v)).unwrap_or(0);
-    let pixels_of_box = (0..pixels.area() as i32).map(|i| (pixels.left + i % pixels.width, pixels.top + i / pixels.width));
-    let masked: Vec<_> = pixels_of_box.map(|(u, v)| (u, v, if is_set(u, v) { at(u, v) } else { 0 })).collect();
-    let mut known: Vec<u16> =
-        masked.iter().map(|pixel| pixel.2 / 128).zip(&masked).filter(|(_, pixel)| pixel.2 > 0).map(|(bin, _)| bin).collect();
+fn plain_crop(
+    extent_m: f64,
+    disparity: View<'_, u16>,
+    is_set: impl Fn(i32, i32) -> bool,
+    pixels: &PixelBox,
+) -> Vec<u16> {
+    let at = |u: i32, v: i32| {
+        usize::try_from(u)
+            .ok()
+            .zip(usize::try_from(v).ok())
+            .and_then(|(u, v)| disparity.get(u, v))
+            .unwrap_or(0)
+    };
+    let pixels_of_box = (0..pixels.area() as i32)
+        .map(|i| (pixels.left + i % pixels.width, pixels.top + i / pixels.width));
+    let masked: Vec<_> =
+        pixels_of_box.map(|(u, v)| (u, v, if is_set(u, v) { at(u, v) } else { 0 })).collect();
+    let mut known: Vec<u16> = masked
+        .iter()
+        .map(|pixel| pixel.2 / 128)
+        .zip(&masked)
+        .filter(|(_, pixel)| pixel.2 > 0)
+        .map(|(bin, _)| bin)
+        .collect();
     known.sort_unstable();
     let bin = if known.is_empty() { 0 } else { known[known.len() / 2] };
     let depth_m = RIG.focal_baseline_px_m() / ((f64::from(bin) + 0.5) * 0.5);
     let is_near = |disparity: u16| {
         let disparity = f64::from(disparity);
         let of = |depth_m: f64| RIG.focal_baseline_px_m() / depth_m * 256.0;
-        disparity >= of(depth_m + extent_m).floor() && (depth_m <= extent_m || disparity <= of(depth_m - extent_m).floor())
+        disparity >= of(depth_m + extent_m).floor()
+            && (depth_m <= extent_m || disparity <= of(depth_m - extent_m).floor())
     };
     let is_behind_edge = |u: i32, v: i32, disparity: u16| {
         let nearer = |u: i32, v: i32| i32::from(at(u, v)) > i32::from(disparity) + 384;
-        (1..=3).any(|px| nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px))
+        (1..=3).any(|px| {
+            nearer(u - px, v) || nearer(u + px, v) || nearer(u, v - px) || nearer(u, v + px)
+        })
     };
-    let kept = |&(u, v, disparity): &(i32, i32, u16)| if is_near(disparity) && !is_behind_edge(u, v, disparity) { disparity } else { 0 };
+    let kept = |&(u, v, disparity): &(i32, i32, u16)| {
+        if is_near(disparity) && !is_behind_edge(u, v, disparity) { disparity } else { 0 }
+    };
     masked.iter().map(kept).collect()
 }
 
@@ -209,15 +269,27 @@ fn crops_equal_those_cut_pixel_by_pixel() {
         let mut level = 0;
         let disparity: Vec<u16> = (0..WIDTH * HEIGHT)
             .map(|_| {
-                level = if random.below(12) == 0 { 1_000 + random.below(1 + round * 15) } else { level };
+                level = if random.below(12) == 0 {
+                    1_000 + random.below(1 + round * 15)
+                } else {
+                    level
+                };
                 if random.below(30) == 0 { 0 } else { (level + random.below(200)) as u16 }
             })
             .collect();
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
         let mut span = |size: usize| {
             let first = random.below(size as u32 / 2);
-            let last = if random.below(3) == 0 { size as u32 } else { first + 1 + random.below(size as u32 / 2) };
-            [first as i32, (last - if random.below(3) == 0 { 0 } else { first }).min(size as u32 - first) as i32]
+            let last = if random.below(3) == 0 {
+                size as u32
+            } else {
+                first + 1 + random.below(size as u32 / 2)
+            };
+            [
+                first as i32,
+                (last - if random.below(3) == 0 { 0 } else { first }).min(size as u32 - first)
+                    as i32,
+            ]
         };
         let ([left, width], [top, height]) = (span(WIDTH), span(HEIGHT));
         let pixels = PixelBox { left, top, width, height };
@@ -226,13 +298,19 @@ fn crops_equal_those_cut_pixel_by_pixel() {
         let boxed = round % 4 == 0;
         let mask = if boxed { MaskHandle::full(pixels) } else { store.alloc(pixels).unwrap() };
         if !boxed {
-            let bits: Vec<u8> = (0..WIDTH * HEIGHT).map(|_| u8::from(random.below(8) > 0)).collect();
-            (0..HEIGHT).for_each(|v| store.set_row(&mask, v as i32, 0, &bits[v * WIDTH..][..WIDTH]));
+            let bits: Vec<u8> =
+                (0..WIDTH * HEIGHT).map(|_| u8::from(random.below(8) > 0)).collect();
+            (0..HEIGHT)
+                .for_each(|v| store.set_row(&mask, v as i32, 0, &bits[v * WIDTH..][..WIDTH]));
         }
         for vectors in Vectors::available() {
             let mut crop = vec![7u16; pixels.area() as usize];
             let count = crop::crop(&RIG, 3.0, disparity, &store, &mask, &mut crop, vectors);
-            assert_eq!(crop, plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels), "round {round}");
+            assert_eq!(
+                crop,
+                plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels),
+                "round {round}"
+            );
             assert_eq!(count as usize, crop.iter().filter(|disparity| **disparity > 0).count());
             kept += count;
         }
@@ -243,7 +321,8 @@ fn crops_equal_those_cut_pixel_by_pixel() {
 #[test]
 fn an_object_without_depth_leaves_no_crop() {
     let mask = [1; 3600];
-    let car = detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 60, height: 60 }, &mask);
+    let car =
+        detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 60, height: 60 }, &mask);
     with(&CAPACITY, &any_size(), |instances, estimator| {
         take_frame(instances, estimator, 0, &[car], [&[], &[]]);
         assert_eq!((instances.tracks().count(), instances.objects.crops.len()), (1, 0));

@@ -19,7 +19,8 @@ use std::{boxed::Box, vec, vec::Vec};
 
 pub(super) const WIDTH: usize = 160;
 pub(super) const HEIGHT: usize = 96;
-pub(super) const RIG: StereoRig = StereoRig { focal_px: 100.0, center_u_px: 79.5, center_v_px: 47.5, baseline_m: 0.5 };
+pub(super) const RIG: StereoRig =
+    StereoRig { focal_px: 100.0, center_u_px: 79.5, center_v_px: 47.5, baseline_m: 0.5 };
 pub(super) const CAPACITY: Capacity = Capacity {
     blocks: 12_000,
     visible_blocks: 12_000,
@@ -29,11 +30,19 @@ pub(super) const CAPACITY: Capacity = Capacity {
     planning_distance_3d: true,
     ..Capacity::TINY
 };
-pub(super) const VOLUME: fn() -> VolumeConfig =
-    || VolumeConfig { voxel_size_m: 0.1, truncation_m: 0.4, far_m: 30.0, ..VolumeConfig::default() };
+pub(super) const VOLUME: fn() -> VolumeConfig = || VolumeConfig {
+    voxel_size_m: 0.1,
+    truncation_m: 0.4,
+    far_m: 30.0,
+    ..VolumeConfig::default()
+};
 /// Cells of 0.2 m.
-pub(super) const CONFIG: fn() -> PlanningConfig =
-    || PlanningConfig { cell_voxels: 2, min_weight: 1, camera_height_m: 1.5, ..PlanningConfig::default() };
+pub(super) const CONFIG: fn() -> PlanningConfig = || PlanningConfig {
+    cell_voxels: 2,
+    min_weight: 1,
+    camera_height_m: 1.5,
+    ..PlanningConfig::default()
+};
 
 /// Memory for `bytes`, for the test's lifetime.
 pub(super) fn carver(bytes: usize) -> Carver<'static> {
@@ -63,17 +72,31 @@ impl Scene {
         }
     }
 
-    /// Looks from a pose at what `depth_at` says of a ray's direction at depth 1: the depth of its first surface, or none.
-    pub fn observe(&mut self, t_world_camera: Transform, depth_at: impl Fn([f64; 3], [f64; 3]) -> Option<f64>) {
+    /// Looks from a pose at what `depth_at` says of a ray's direction at depth 1: the depth of its
+    /// first surface, or none.
+    pub fn observe(
+        &mut self,
+        t_world_camera: Transform,
+        depth_at: impl Fn([f64; 3], [f64; 3]) -> Option<f64>,
+    ) {
         let camera = t_world_camera.translation_m;
         let depth = |u: usize, v: usize| {
-            let ray = [(u as f64 - RIG.center_u_px) / RIG.focal_px, (v as f64 - RIG.center_v_px) / RIG.focal_px, 1.0];
+            let ray = [
+                (u as f64 - RIG.center_u_px) / RIG.focal_px,
+                (v as f64 - RIG.center_v_px) / RIG.focal_px,
+                1.0,
+            ];
             depth_at(camera, t_world_camera.rotate(ray)).filter(|depth| (0.5..40.0).contains(depth))
         };
-        let pixels: Vec<Option<f64>> = (0..WIDTH * HEIGHT).map(|at| depth(at % WIDTH, at / WIDTH)).collect();
+        let pixels: Vec<Option<f64>> =
+            (0..WIDTH * HEIGHT).map(|at| depth(at % WIDTH, at / WIDTH)).collect();
         let depth_m: Vec<f32> = pixels.iter().map(|depth| depth.unwrap_or(0.0) as f32).collect();
-        let disparity_q8: Vec<u16> =
-            pixels.iter().map(|depth| depth.map_or(0, |depth| (256.0 * RIG.focal_baseline_px_m() / depth + 0.5) as u16)).collect();
+        let disparity_q8: Vec<u16> = pixels
+            .iter()
+            .map(|depth| {
+                depth.map_or(0, |depth| (256.0 * RIG.focal_baseline_px_m() / depth + 0.5) as u16)
+            })
+            .collect();
         let grey = vec![100u8; WIDTH * HEIGHT];
         let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera };
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
@@ -116,7 +139,9 @@ impl MinOf for f64 {
 pub(super) fn ground(below: f64, rise: f64) -> impl Fn([f64; 3], [f64; 3]) -> Option<f64> {
     move |camera, ray| {
         let slope = ray[1] - rise * ray[2];
-        (libm::fabs(slope) > 1e-9).then(|| (below + rise * camera[2] - camera[1]) / slope).filter(|depth| *depth > 0.0)
+        (libm::fabs(slope) > 1e-9)
+            .then(|| (below + rise * camera[2] - camera[1]) / slope)
+            .filter(|depth| *depth > 0.0)
     }
 }
 
@@ -127,7 +152,10 @@ pub(super) fn solid(low: [f64; 3], high: [f64; 3]) -> impl Fn([f64; 3], [f64; 3]
         for axis in 0..3 {
             let [a, b] = [low[axis], high[axis]].map(|side| (side - camera[axis]) / ray[axis]);
             let (first, last) = if a < b { (a, b) } else { (b, a) };
-            (begins, leaves) = (if first > begins { first } else { begins }, if last < leaves { last } else { leaves });
+            (begins, leaves) = (
+                if first > begins { first } else { begins },
+                if last < leaves { last } else { leaves },
+            );
         }
         (begins < leaves && begins > 0.0).then_some(begins)
     }

@@ -23,14 +23,20 @@ fn scene() -> Scene {
 #[test]
 fn a_ray_ends_at_the_first_surface_or_where_nothing_was_seen() {
     let scene = scene();
-    let ray = |from: [f64; 3], direction: [f64; 3], far_m: f64| scene.planning.ray(&scene.volume, from, direction, far_m);
+    let ray = |from: [f64; 3], direction: [f64; 3], far_m: f64| {
+        scene.planning.ray(&scene.volume, from, direction, far_m)
+    };
     let wall = ray([-1.0, 0.0, 2.0], [0.0, 0.0, 3.0], 20.0);
     assert_eq!(wall.end, WayEnd::Surface);
     assert!((wall.free_m - 6.0).abs() < 0.05, "{wall:?}");
     assert_eq!(ray([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0], 3.0), Way { end: WayEnd::Free, free_m: 3.0 });
     let down = ray([0.0, 0.0, 4.0], [0.0, 1.0, 0.0], 20.0);
     assert!(down.end == WayEnd::Surface && (down.free_m - 1.5).abs() < 0.05, "{down:?}");
-    assert_eq!(ray([0.0, 0.0, 12.0], [0.0, 0.0, 1.0], 5.0), Way { end: WayEnd::Unknown, free_m: 0.0 }, "behind the wall");
+    assert_eq!(
+        ray([0.0, 0.0, 12.0], [0.0, 0.0, 1.0], 5.0),
+        Way { end: WayEnd::Unknown, free_m: 0.0 },
+        "behind the wall"
+    );
     assert_eq!(ray([0.0, 0.0, 3.0], [0.0; 3], 5.0).end, WayEnd::Unknown, "no direction");
     assert_eq!(ray([f64::NAN; 3], [0.0, 0.0, 1.0], 5.0).end, WayEnd::Unknown);
 }
@@ -42,16 +48,30 @@ fn a_path_is_free_until_the_robots_rim_touches() {
     let sweep = |path: &[[f64; 3]], robot: &Sweep| scene.planning.sweep(&scene.volume, path, robot);
     let ground = |x: f64, z: f64| [x, 1.5, z];
     let straight = sweep(&[ground(-1.0, 3.0), ground(-1.0, 12.0)], &robot);
-    assert!(straight.end == WayEnd::Surface && (straight.free_m - 4.6).abs() < 0.06, "a wall at 8, less the radius: {straight:?}");
+    assert!(
+        straight.end == WayEnd::Surface && (straight.free_m - 4.6).abs() < 0.06,
+        "a wall at 8, less the radius: {straight:?}"
+    );
     let bar = sweep(&[ground(1.0, 2.0), ground(1.0, 3.0), ground(1.0, 7.0)], &robot);
-    assert!(bar.end == WayEnd::Surface && (bar.free_m - 2.6).abs() < 0.06, "a bar at 5, less the radius: {bar:?}");
-    assert_eq!(sweep(&[ground(1.0, 2.0), ground(1.0, 4.5), ground(-0.6, 4.5), ground(-0.6, 7.0)], &robot).end, WayEnd::Free, "around it");
+    assert!(
+        bar.end == WayEnd::Surface && (bar.free_m - 2.6).abs() < 0.06,
+        "a bar at 5, less the radius: {bar:?}"
+    );
+    assert_eq!(
+        sweep(&[ground(1.0, 2.0), ground(1.0, 4.5), ground(-0.6, 4.5), ground(-0.6, 7.0)], &robot)
+            .end,
+        WayEnd::Free,
+        "around it"
+    );
     let over = Sweep { low_m: 0.8, ..robot };
     assert_eq!(sweep(&[ground(1.0, 2.0), ground(1.0, 7.0)], &over).end, WayEnd::Free, "over it");
     let unknown = Sweep { unknown_ends: true, ..robot };
     assert_eq!(sweep(&[ground(-1.0, 4.0), ground(-1.0, 7.0)], &unknown).end, WayEnd::Free);
     let back = sweep(&[ground(0.0, 4.0), ground(0.0, -4.0)], &unknown);
-    assert!(back.end == WayEnd::Unknown && back.free_m > 1.0 && back.free_m < 4.5, "behind the camera nothing is known: {back:?}");
+    assert!(
+        back.end == WayEnd::Unknown && back.free_m > 1.0 && back.free_m < 4.5,
+        "behind the camera nothing is known: {back:?}"
+    );
     assert_eq!(sweep(&[], &robot), Way { end: WayEnd::Free, free_m: 0.0 });
 }
 
@@ -68,20 +88,28 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
     let mut random = crate::random::Random::new(8);
     let mut touched = 0;
     for _ in 0..50 {
-        let mut random_point = || [0.1 * f64::from(random.below(60)) - 3.0, 1.5, 2.0 + 0.1 * f64::from(random.below(70))];
+        let mut random_point = || {
+            [0.1 * f64::from(random.below(60)) - 3.0, 1.5, 2.0 + 0.1 * f64::from(random.below(70))]
+        };
         let (from, to) = (random_point(), random_point());
         let way = scene.planning.sweep(&scene.volume, &[from, to], &robot);
         let (dx, dz) = (to[0] - from[0], to[2] - from[2]);
         let length = libm::hypot(dx, dz);
         let touches = |s: f64| {
             let (x, z) = (from[0] + dx * s, from[2] + dz * s);
-            points.iter().any(|[px, py, pz]| libm::hypot(px - x, pz - z) < robot.radius_m && (0.2..1.2).contains(&(1.5 - py)))
+            points.iter().any(|[px, py, pz]| {
+                libm::hypot(px - x, pz - z) < robot.radius_m && (0.2..1.2).contains(&(1.5 - py))
+            })
         };
         let first = (0..=1_000).map(|n| f64::from(n) / 1_000.0).find(|s| touches(*s));
         assert_eq!(way.end == WayEnd::Surface, first.is_some(), "{from:?} to {to:?}");
         if let Some(first) = first {
             touched += 1;
-            assert!(libm::fabs(way.free_m - first * length) < 0.02, "{way:?}, {} m by steps", first * length);
+            assert!(
+                libm::fabs(way.free_m - first * length) < 0.02,
+                "{way:?}, {} m by steps",
+                first * length
+            );
         }
     }
     assert!(touched > 10);

@@ -27,9 +27,16 @@ fn no_side_costs_no_byte_and_a_window_what_its_formula_says() {
         assert_eq!(capacity.footprint().region("planning").unwrap().bytes, bytes);
         let (cells, columns, longest) = (100 * 90 * 20, 100 * 90, 100);
         let boxes = capacity.tracks * size_of::<MovingBox>() + 2 * capacity.pixels() / 3;
-        let formula = 6 * cells + (32 + 2 + 8) * columns + 16 * longest + boxes + if distance_3d { 9 * cells + 16 * longest } else { 0 };
+        let formula = 6 * cells
+            + (32 + 2 + 8) * columns
+            + 16 * longest
+            + boxes
+            + if distance_3d { 9 * cells + 16 * longest } else { 0 };
         // Regions are rounded up to a cache line.
-        assert!(bytes >= formula && bytes < formula + 40 * SLAB_ALIGN, "{bytes} for a formula of {formula}");
+        assert!(
+            bytes >= formula && bytes < formula + 40 * SLAB_ALIGN,
+            "{bytes} for a formula of {formula}"
+        );
     }
 }
 
@@ -62,7 +69,11 @@ fn ages_count_frames_since_the_last_look() {
     for _ in 0..3 {
         scene.observe(at(0.0, 0.0), |_, _| None);
     }
-    assert_eq!(scene.planning.cell(scene.cell_of(ahead)), (CellState::Free, Some(3)), "a picture of nothing tells nothing");
+    assert_eq!(
+        scene.planning.cell(scene.cell_of(ahead)),
+        (CellState::Free, Some(3)),
+        "a picture of nothing tells nothing"
+    );
     scene.observe(at(0.0, 0.0), wall_and_pole);
     assert_eq!(scene.planning.cell(scene.cell_of(ahead)).1, Some(0));
 }
@@ -80,7 +91,11 @@ fn ages_stay_exact_when_stamps_are_lowered() {
     for _ in 0..40_000 {
         cells.advance();
     }
-    assert_eq!(cells.age(cells.observed_at[8]), 40_000.min(cells.age(1)), "an age too large for its stamp is the largest there is");
+    assert_eq!(
+        cells.age(cells.observed_at[8]),
+        40_000.min(cells.age(1)),
+        "an age too large for its stamp is the largest there is"
+    );
     assert!(cells.age(cells.observed_at[7]) >= 32_500 && cells.observed_at[9] == 0);
 }
 
@@ -103,8 +118,16 @@ fn moving_keeps_what_stays_and_forgets_what_leaves() {
             cells.bits[position] = FREE;
             model.insert([0, 1, 2].map(|axis| cells.origin[axis] + local[axis] as i32), FREE);
         }
-        assert_eq!(cells.bits.iter().filter(|bits| **bits == FREE).count(), model.len(), "step {step}");
-        assert!(model.keys().all(|cell| cells.bits[cells.position(cells.local(*cell).unwrap()).unwrap()] == FREE));
+        assert_eq!(
+            cells.bits.iter().filter(|bits| **bits == FREE).count(),
+            model.len(),
+            "step {step}"
+        );
+        assert!(
+            model.keys().all(|cell| cells.bits
+                [cells.position(cells.local(*cell).unwrap()).unwrap()]
+                == FREE)
+        );
     }
 }
 
@@ -149,10 +172,15 @@ fn unknown_is_an_obstacle_only_if_asked() {
 fn a_tilted_window_lies_upright() {
     // Up leans by 0.1 rad: the camera looks down.
     let tilt = 0.1f64;
-    let config = PlanningConfig { up_y: -libm::cos(tilt) as f32, up_z: libm::sin(tilt) as f32, ..CONFIG() };
+    let config =
+        PlanningConfig { up_y: -libm::cos(tilt) as f32, up_z: libm::sin(tilt) as f32, ..CONFIG() };
     let grid = Grid::new(&config, 0.1);
     let up = grid.of_world([0.0, -libm::cos(tilt), libm::sin(tilt)]);
-    assert!(libm::fabs(up[2] * grid.cell_m() - 1.0) < 1e-4 && libm::fabs(up[0]) + libm::fabs(up[1]) < 1e-3, "{up:?}");
+    assert!(
+        libm::fabs(up[2] * grid.cell_m() - 1.0) < 1e-4
+            && libm::fabs(up[0]) + libm::fabs(up[1]) < 1e-3,
+        "{up:?}"
+    );
     let back = grid.to_world(grid.of_world([3.0, -2.0, 7.0]));
     assert!(back.iter().zip([3.0, -2.0, 7.0]).all(|(a, b)| libm::fabs(a - b) < 1e-3), "{back:?}");
 }

@@ -7,7 +7,11 @@ use crate::{
 
 /// What is done with the disparity error found while driving.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum SelfCalibrationMode {
     /// It is found, reported and taken out.
     #[default]
@@ -20,18 +24,23 @@ pub enum SelfCalibrationMode {
 
 /// Settings of the rig in addition to its calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct RigConfig {
     /// What is done with the disparity error found while driving; `apply`.
     pub self_calibration: SelfCalibrationMode,
     /// Factor on the calibrated baseline; in 0.5..=2; 1. No picture shows the baseline, so nothing
-    /// checks it: compare with a distance known from elsewhere. KITTI's 0.5372 m are 0.54 m in truth.
+    /// checks it: compare with a distance known from elsewhere. KITTI's 0.5372 m are 0.54 m in
+    /// truth.
     pub baseline_scale: f64,
     /// What is added to disparities from the first frame on, as another run found it; each of the
     /// four within 5 px; all 0. With self-calibration the search begins there.
     pub disparity_correction: DisparityCorrection,
-    /// What is added to the right image's rows from the first frame on, as another run found it; each of
-    /// the six within 5 px; all 0. With self-calibration the search begins there.
+    /// What is added to the right image's rows from the first frame on, as another run found it;
+    /// each of the six within 5 px; all 0. With self-calibration the search begins there.
     pub row_correction: RowCorrection,
 }
 
@@ -52,8 +61,14 @@ impl RigConfig {
 
     /// Notes what is wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        require(problems, (0.5..=2.0).contains(&self.baseline_scale), "rig.baseline_scale", "must be in 0.5..=2");
-        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } = self.disparity_correction;
+        require(
+            problems,
+            (0.5..=2.0).contains(&self.baseline_scale),
+            "rig.baseline_scale",
+            "must be in 0.5..=2",
+        );
+        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } =
+            self.disparity_correction;
         let rows = self.row_correction;
         for (key, part) in [
             ("rig.disparity_correction.offset_px", offset_px),

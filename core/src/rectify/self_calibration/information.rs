@@ -22,7 +22,11 @@ pub(super) struct FrameInformation<const P: usize> {
     pub vector: [f64; P],
 }
 
-#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
+#[expect(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    reason = "all indices run below P, the length of all rows"
+)]
 impl<const P: usize> FrameInformation<P> {
     pub(super) const ZERO: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
 
@@ -32,7 +36,9 @@ impl<const P: usize> FrameInformation<P> {
 
     /// What the parameters should be, multiplied by the matrix, of errors that were taken at `at`.
     fn target(&self, at: [f64; P]) -> [f64; P] {
-        core::array::from_fn(|i| (0..P).fold(-self.vector[i], |sum, j| sum + self.matrix[i][j] * at[j]))
+        core::array::from_fn(|i| {
+            (0..P).fold(-self.vector[i], |sum, j| sum + self.matrix[i][j] * at[j])
+        })
     }
 
     /// Adds a row of derivatives and its error.
@@ -48,7 +54,11 @@ impl<const P: usize> FrameInformation<P> {
     }
 }
 
-#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below C or P, the lengths of all rows")]
+#[expect(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    reason = "all indices run below C or P, the lengths of all rows"
+)]
 impl<const C: usize> Sums<C> {
     pub(super) const ZERO: Self = Self([[0.0; C]; C]);
 
@@ -80,7 +90,9 @@ impl<const C: usize> Sums<C> {
                 }
             }
         }
-        let at = |i: usize, j: usize| if i > j { lower[MOTION + i][MOTION + j] } else { lower[MOTION + j][MOTION + i] };
+        let at = |i: usize, j: usize| {
+            if i > j { lower[MOTION + i][MOTION + j] } else { lower[MOTION + j][MOTION + i] }
+        };
         let matrix = core::array::from_fn(|i| core::array::from_fn(|j| at(i, j)));
         let vector = core::array::from_fn(|i| lower[C - 1][MOTION + i]);
         let frame = FrameInformation { matrix, vector };
@@ -106,21 +118,34 @@ pub(super) struct Prior<const P: usize> {
     pub frame_sigma: [f64; P],
 }
 
-#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
+#[expect(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    reason = "all indices run below P, the length of all rows"
+)]
 impl<const P: usize> Information<P> {
     pub(super) const NONE: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
 
-    /// Takes a frame in, linearised at `at`. With `F` the variances a frame may be off by, it counts
-    /// as `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no inverse of `S`.
+    /// Takes a frame in, linearised at `at`. With `F` the variances a frame may be off by, it
+    /// counts as `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no
+    /// inverse of `S`.
     // Never inlined, as all that has many callers here: it is unrolled, and large.
     #[inline(never)]
-    pub(super) fn take(&mut self, prior: &Prior<P>, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
+    pub(super) fn take(
+        &mut self,
+        prior: &Prior<P>,
+        frame: &FrameInformation<P>,
+        at: [f64; P],
+    ) -> Option<()> {
         let (s, d) = (&frame.matrix, prior.frame_sigma);
-        let damped: [[f64; P]; P] =
-            core::array::from_fn(|i| core::array::from_fn(|j| d[i] * s[i][j] * d[j] + if i == j { 1.0 } else { 0.0 }));
+        let damped: [[f64; P]; P] = core::array::from_fn(|i| {
+            core::array::from_fn(|j| d[i] * s[i][j] * d[j] + if i == j { 1.0 } else { 0.0 })
+        });
         let reduce = |right: [f64; P]| -> Option<[f64; P]> {
             let inner = solve(&damped, core::array::from_fn(|i| d[i] * right[i]))?;
-            Some(core::array::from_fn(|i| right[i] - (0..P).fold(0.0, |sum, j| sum + s[i][j] * d[j] * inner[j])))
+            Some(core::array::from_fn(|i| {
+                right[i] - (0..P).fold(0.0, |sum, j| sum + s[i][j] * d[j] * inner[j])
+            }))
         };
         let mut matrix = [[0.0; P]; P];
         for (j, column) in matrix.iter_mut().enumerate() {
@@ -144,7 +169,8 @@ impl<const P: usize> Information<P> {
         for i in 0..P {
             self.vector[i] = MEMORY * self.vector[i] + vector[i];
             for j in 0..P {
-                self.matrix[i][j] = MEMORY * self.matrix[i][j] + 0.5 * (matrix[i][j] + matrix[j][i]);
+                self.matrix[i][j] =
+                    MEMORY * self.matrix[i][j] + 0.5 * (matrix[i][j] + matrix[j][i]);
             }
         }
     }
@@ -153,9 +179,11 @@ impl<const P: usize> Information<P> {
     #[inline(never)]
     pub(super) fn estimate(&self, prior: &Prior<P>) -> Option<([f64; P], f64)> {
         let weight = |i: usize| 1.0 / (prior.sigma[i] * prior.sigma[i]);
-        let matrix: [[f64; P]; P] =
-            core::array::from_fn(|i| core::array::from_fn(|j| self.matrix[i][j] + if i == j { weight(i) } else { 0.0 }));
-        let parameters = solve(&matrix, core::array::from_fn(|i| self.vector[i] + weight(i) * prior.mean[i]))?;
+        let matrix: [[f64; P]; P] = core::array::from_fn(|i| {
+            core::array::from_fn(|j| self.matrix[i][j] + if i == j { weight(i) } else { 0.0 })
+        });
+        let parameters =
+            solve(&matrix, core::array::from_fn(|i| self.vector[i] + weight(i) * prior.mean[i]))?;
         let variance = solve(&matrix, core::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))?;
         Some((parameters, libm::sqrt(variance[0])))
     }
@@ -169,7 +197,11 @@ impl<const P: usize> Information<P> {
 }
 
 /// What a positive definite matrix turns into `right`; `None` where it is not positive definite.
-#[expect(clippy::indexing_slicing, clippy::needless_range_loop, reason = "all indices run below P, the length of all rows")]
+#[expect(
+    clippy::indexing_slicing,
+    clippy::needless_range_loop,
+    reason = "all indices run below P, the length of all rows"
+)]
 #[inline(never)]
 fn solve<const P: usize>(matrix: &[[f64; P]; P], right: [f64; P]) -> Option<[f64; P]> {
     let (mut upper, mut solution) = (*matrix, right);
@@ -202,7 +234,8 @@ mod tests {
     #[test]
     fn a_positive_definite_matrix_is_solved_and_another_refused() {
         let matrix = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.2], [0.5, -0.2, 2.0]];
-        let [x, y, z] = solve(&matrix, [4.0 + 2.0 + 1.5, 1.0 + 6.0 - 0.6, 0.5 - 0.4 + 6.0]).unwrap();
+        let [x, y, z] =
+            solve(&matrix, [4.0 + 2.0 + 1.5, 1.0 + 6.0 - 0.6, 0.5 - 0.4 + 6.0]).unwrap();
         assert!((x - 1.0).abs() < 1e-12 && (y - 2.0).abs() < 1e-12 && (z - 3.0).abs() < 1e-12);
         assert_eq!(solve(&[[1.0, 2.0], [2.0, 1.0]], [1.0, 1.0]), None);
         assert_eq!(solve(&[[f64::NAN]], [1.0]), None);
@@ -218,7 +251,11 @@ mod tests {
         let ([found], sigma) = information.estimate(&prior).unwrap();
         assert!((sigma - 0.098).abs() < 1e-3 && (found - 0.4).abs() < 0.02, "{found} {sigma}");
         let start = Prior { mean: [0.7], ..prior };
-        assert_eq!(Information::NONE.estimate(&start).unwrap(), ([0.7], 0.5), "before the first frame the prior is all there is");
+        assert_eq!(
+            Information::NONE.estimate(&start).unwrap(),
+            ([0.7], 0.5),
+            "before the first frame the prior is all there is"
+        );
     }
 
     #[test]

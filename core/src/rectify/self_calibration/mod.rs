@@ -8,17 +8,17 @@
 //!
 //! Two filters run over the same matches. One has a constant and weighs the middle of the image; it
 //! gives the offset. The other has a constant, a slope and a fourth power over the columns and a
-//! square over the rows; it gives what the lenses left at the sides, the top and the bottom. Krešo and Šegvić (*Improving the
-//! Egomotion Estimation by Correcting the Calibration Bias*, VISAPP 2015) correct the same error by
-//! a field learned beforehand.
+//! square over the rows; it gives what the lenses left at the sides, the top and the bottom. Krešo
+//! and Šegvić (*Improving the Egomotion Estimation by Correcting the Calibration Bias*, VISAPP
+//! 2015) correct the same error by a field learned beforehand.
 //!
-//! **What is applied.** What the lenses left once five frames have said something and the offset is known to
-//! .06 px; the offset while it is above .1 px (and until it falls below .06 px), or after two frames
-//! when it is four sigmas large. Changes are spread over frames, so that surfaces in the map do not
-//! jump.
+//! **What is applied.** What the lenses left once five frames have said something and the offset is
+//! known to .06 px; the offset while it is above .1 px (and until it falls below .06 px), or after
+//! two frames when it is four sigmas large. Changes are spread over frames, so that surfaces in the
+//! map do not jump.
 //!
-//! **Rows.** Where both cameras see the same in different rows, the right image is moved before it is
-//! matched, by a polynomial of second degree over the image.
+//! **Rows.** Where both cameras see the same in different rows, the right image is moved before it
+//! is matched, by a polynomial of second degree over the image.
 //!
 //! **What it cannot see.** The baseline: a wrong one scales everything. Standing still, turning on
 //! the spot and far points say nothing; the filter waits. Cameras that expose at different times
@@ -36,7 +36,10 @@ mod tests;
 pub use config::{RigConfig, SelfCalibrationMode};
 
 use crate::{
-    geometry::{DisparityCorrection, PixelCorrection, RowCorrection, RowShift, StereoObservation, StereoRig, Transform},
+    geometry::{
+        DisparityCorrection, PixelCorrection, RowCorrection, RowShift, StereoObservation,
+        StereoRig, Transform,
+    },
     state::Visitor,
 };
 use information::{Information, Prior, Sums};
@@ -85,8 +88,8 @@ pub struct SelfCalibrationReport {
     pub quartic_px: f64,
     /// Growth with the square of the distance from the middle row, px from there to the first row.
     pub row_quadratic_px: f64,
-    /// What must be added to the right image's rows, so that both cameras see the same in the same row; what is already added included. All
-    /// 0 while that is not known.
+    /// What must be added to the right image's rows, so that both cameras see the same in the same
+    /// row; what is already added included. All 0 while that is not known.
     pub rows: RowCorrection,
     /// Offset added in this frame, px.
     pub applied_offset_px: f64,
@@ -183,9 +186,14 @@ impl SelfCalibration {
         (error.largest_px() > 0.0).then(|| error.for_rig(rig))
     }
 
-    /// Learns from a frame's matches: where the right camera sees each, and how far below that the left one does, px, with images moved as
+    /// Learns from a frame's matches: where the right camera sees each, and how far below that the
+    /// left one does, px, with images moved as
     /// [`SelfCalibration::row_shift`] says. The camera need not move.
-    pub(crate) fn update_rows(&mut self, rig: &StereoRig, matches: impl Iterator<Item = ([f64; 2], f64)> + Clone) {
+    pub(crate) fn update_rows(
+        &mut self,
+        rig: &StereoRig,
+        matches: impl Iterator<Item = ([f64; 2], f64)> + Clone,
+    ) {
         if self.mode == SelfCalibrationMode::Off {
             return;
         }
@@ -195,7 +203,8 @@ impl SelfCalibration {
         }
     }
 
-    /// What is to be added to disparities of images moved as [`SelfCalibration::row_shift`] says, by the pixel; `None` where that is nothing.
+    /// What is to be added to disparities of images moved as [`SelfCalibration::row_shift`] says,
+    /// by the pixel; `None` where that is nothing.
     pub(crate) fn pixel_correction(&self, rig: &StereoRig) -> Option<PixelCorrection> {
         let roll_rad = self.rows.applied().roll_rad(rig);
         let changes = !self.applied.is_zero() || roll_rad != 0.0;
@@ -205,8 +214,12 @@ impl SelfCalibration {
     /// Learns from a frame: what both cameras saw before and see now, corrected as
     /// [`SelfCalibration::pixel_correction`] says, in a stated order, and the motion in between as found
     /// from them. Observations no motion explains may be among them.
-    pub(crate) fn update<O>(&mut self, rig: &StereoRig, observations: O, t_current_previous: &Transform)
-    where
+    pub(crate) fn update<O>(
+        &mut self,
+        rig: &StereoRig,
+        observations: O,
+        t_current_previous: &Transform,
+    ) where
         O: IntoIterator<Item = [StereoObservation; 2]>,
     {
         if self.mode == SelfCalibrationMode::Off {
@@ -236,7 +249,11 @@ impl SelfCalibration {
                 sides.add(&[a, b, c, d, e, f, constant, slope, quartic, quadratic, error], wide);
             }
         }
-        let (Some(offset), Some(sides)) = (offset.without_motion::<1>(), sides.without_motion::<4>()) else { return };
+        let (Some(offset), Some(sides)) =
+            (offset.without_motion::<1>(), sides.without_motion::<4>())
+        else {
+            return;
+        };
         let [[information]] = offset.matrix;
         if information < INFORMATION_MIN {
             return;
@@ -257,11 +274,16 @@ impl SelfCalibration {
             return;
         }
         let offset = libm::fabs(report.offset_px);
-        self.offset_applies = offset > if self.offset_applies { APPLY_UNTIL_PX } else { APPLY_ABOVE_PX };
+        self.offset_applies =
+            offset > if self.offset_applies { APPLY_UNTIL_PX } else { APPLY_ABOVE_PX };
         let offset_px = if self.offset_applies { report.offset_px } else { 0.0 };
         let toward = |now: f64, target: f64| {
             let change = target - now;
-            if libm::fabs(change) <= CHANGE_MAX_PX { target } else { now + libm::copysign(CHANGE_MAX_PX, change) }
+            if libm::fabs(change) <= CHANGE_MAX_PX {
+                target
+            } else {
+                now + libm::copysign(CHANGE_MAX_PX, change)
+            }
         };
         self.applied = DisparityCorrection {
             offset_px: toward(self.applied.offset_px, offset_px),
@@ -274,12 +296,18 @@ impl SelfCalibration {
     /// What is known.
     pub(crate) fn report(&self) -> SelfCalibrationReport {
         if self.mode == SelfCalibrationMode::Off {
-            return SelfCalibrationReport { applied_offset_px: self.applied.offset_px, ..SelfCalibrationReport::default() };
+            return SelfCalibrationReport {
+                applied_offset_px: self.applied.offset_px,
+                ..SelfCalibrationReport::default()
+            };
         }
-        let ([offset_px], offset_sigma_px) = self.offset.estimate(&self.offset_prior()).unwrap_or_default();
-        let ([_, slope_px, quartic_px, row_quadratic_px], _) = self.sides.estimate(&self.sides_prior()).unwrap_or_default();
+        let ([offset_px], offset_sigma_px) =
+            self.offset.estimate(&self.offset_prior()).unwrap_or_default();
+        let ([_, slope_px, quartic_px, row_quadratic_px], _) =
+            self.sides.estimate(&self.sides_prior()).unwrap_or_default();
         let is_certain = self.frames >= FRAMES_MIN && offset_sigma_px < SIGMA_MAX_PX;
-        let obvious = self.frames >= OBVIOUS_FRAMES_MIN && libm::fabs(offset_px) > OBVIOUS_SIGMAS * offset_sigma_px;
+        let obvious = self.frames >= OBVIOUS_FRAMES_MIN
+            && libm::fabs(offset_px) > OBVIOUS_SIGMAS * offset_sigma_px;
         SelfCalibrationReport {
             offset_px,
             offset_sigma_px,

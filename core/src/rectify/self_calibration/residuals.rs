@@ -1,7 +1,9 @@
 //! A match's reprojection errors, whitened by the noise of both frames, and their derivatives by
 //! the motion and by the disparity error.
 
-use crate::geometry::{DisparityCorrection, ROW_SQUARE_MEAN, Shares, StereoObservation, StereoRig, Transform};
+use crate::geometry::{
+    DisparityCorrection, ROW_SQUARE_MEAN, Shares, StereoObservation, StereoRig, Transform,
+};
 
 /// Noise of a column, px; a row's, the mean of two, has half the variance.
 const NOISE_PX: f64 = 0.2;
@@ -12,7 +14,8 @@ const DISPARITY_MIN_PX: f64 = 1.0;
 /// Nearest depth of a point after the motion, m.
 const DEPTH_MIN_M: f64 = 0.5;
 
-/// Columns: rotation and translation, then constant, slope, fourth power and quadratic, then the error.
+/// Columns: rotation and translation, then constant, slope, fourth power and quadratic, then the
+/// error.
 pub(super) type Row = [f64; 11];
 
 /// The rows of one match.
@@ -68,21 +71,36 @@ impl<'r> Residuals<'r> {
     }
 
     /// The rows of a match; `None` where it is too far, too near or not finite.
-    pub(super) fn of(&self, previous: &StereoObservation, current: &StereoObservation) -> Option<MatchRows> {
+    pub(super) fn of(
+        &self,
+        previous: &StereoObservation,
+        current: &StereoObservation,
+    ) -> Option<MatchRows> {
         let (previous, current) = (&self.ahead(previous), &self.ahead(current));
         // False for NaN as well.
-        if !(previous.disparity_px() > DISPARITY_MIN_PX && current.disparity_px() > DISPARITY_MIN_PX) {
+        if !(previous.disparity_px() > DISPARITY_MIN_PX
+            && current.disparity_px() > DISPARITY_MIN_PX)
+        {
             return None;
         }
         let before = self.rig.triangulate(previous)?;
         let [x, y, z] = self.t_current_previous.transform_point(before);
         let predicted = self.rig.project([x, y, z]).filter(|_| z > DEPTH_MIN_M)?;
         let by_point = self.rig.project_jacobian([x, y, z]);
-        let by_previous = product(&product(&by_point, &self.rotation), &self.rig.triangulate_jacobian(previous));
-        let errors = [predicted.u_left_px - current.u_left_px, predicted.v_px - current.v_px, predicted.u_right_px - current.u_right_px];
+        let by_previous =
+            product(&product(&by_point, &self.rotation), &self.rig.triangulate_jacobian(previous));
+        let errors = [
+            predicted.u_left_px - current.u_left_px,
+            predicted.v_px - current.v_px,
+            predicted.u_right_px - current.u_right_px,
+        ];
         let (before, now) = (self.basis(previous), self.basis(current));
-        let [mut left, mut row, mut right] = by_point.map(|[a, b, c]| [c * y - b * z, a * z - c * x, b * x - a * y, a, b, c]).map(rows_of);
-        for (derivatives, [.., by_right]) in [&mut left, &mut row, &mut right].into_iter().zip(by_previous) {
+        let [mut left, mut row, mut right] = by_point
+            .map(|[a, b, c]| [c * y - b * z, a * z - c * x, b * x - a * y, a, b, c])
+            .map(rows_of);
+        for (derivatives, [.., by_right]) in
+            [&mut left, &mut row, &mut right].into_iter().zip(by_previous)
+        {
             let [.., constant, slope, quartic, quadratic, _] = derivatives;
             // The correction moves the previous right column to the left ...
             for (entry, part) in [constant, slope, quartic, quadratic].into_iter().zip(before) {
@@ -100,12 +118,17 @@ impl<'r> Residuals<'r> {
         }
         let rows = whitened([left, row, right], &covariance(&by_previous))?;
         let squared = rows.iter().fold(0.0, |sum, [.., error]| sum + error * error);
-        squared.is_finite().then_some(MatchRows { rows, squared, share: current.u_left_px * self.per_px[0] })
+        squared.is_finite().then_some(MatchRows {
+            rows,
+            squared,
+            share: current.u_left_px * self.per_px[0],
+        })
     }
 
     /// An observation as the correction it is linearised at would leave it.
     fn ahead(&self, seen: &StereoObservation) -> StereoObservation {
-        let ([constant, slope, quartic, quadratic], [a, b, c, d]) = (self.basis(seen), self.ahead_px);
+        let ([constant, slope, quartic, quadratic], [a, b, c, d]) =
+            (self.basis(seen), self.ahead_px);
         StereoObservation {
             u_right_px: seen.u_right_px - (a * constant + b * slope + c * quartic + d * quadratic),
             ..*seen
@@ -136,7 +159,8 @@ fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
 fn covariance(by_previous: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     core::array::from_fn(|i| {
         core::array::from_fn(|j| {
-            let carried = (0..3).fold(0.0, |sum, k| sum + by_previous[i][k] * VARIANCES[k] * by_previous[j][k]);
+            let carried = (0..3)
+                .fold(0.0, |sum, k| sum + by_previous[i][k] * VARIANCES[k] * by_previous[j][k]);
             NOISE_PX * NOISE_PX * (carried + if i == j { VARIANCES[i] } else { 0.0 })
         })
     })

@@ -1,8 +1,9 @@
 //! Rows that do not agree: how far below the right image's row the left one sees the same point.
 //!
-//! A calibration that leaves a pixel there costs a matcher that compares along rows both estimates and precision, most where the
-//! error is largest, in the corners. Every match shows it, moving or not, so that one frame tells: a polynomial of second
-//! degree over the image is fitted to the differences of rows, by weighted least squares whose weights narrow from pass to pass.
+//! A calibration that leaves a pixel there costs a matcher that compares along rows both estimates
+//! and precision, most where the error is largest, in the corners. Every match shows it, moving or
+//! not, so that one frame tells: a polynomial of second degree over the image is fitted to the
+//! differences of rows, by weighted least squares whose weights narrow from pass to pass.
 
 use super::{
     APPLY_ABOVE_PX, APPLY_UNTIL_PX,
@@ -22,7 +23,8 @@ const PASSES_PX: [f64; 3] = [1.0, 0.5, 0.25];
 const MATCHES_MIN: usize = 100;
 /// Frames that must have said something before rows are moved.
 const FRAMES_MIN: u32 = 2;
-/// Least change of what rows are moved by, px: a smaller one is worth less than images of a camera that hangs being equal.
+/// Least change of what rows are moved by, px: a smaller one is worth less than images of a camera
+/// that hangs being equal.
 const CHANGE_MIN_PX: f64 = 0.05;
 /// Before the first frame, every term is what it begins with within this, px.
 const SIGMA_PX: f64 = 2.0;
@@ -58,13 +60,19 @@ impl RowCalibration {
         Prior { mean: self.start.terms(), sigma: [SIGMA_PX; TERMS], frame_sigma: [0.0; TERMS] }
     }
 
-    /// Learns from a frame's matches: where the right camera sees each, and how far below that the left one does, after what is
+    /// Learns from a frame's matches: where the right camera sees each, and how far below that the
+    /// left one does, after what is
     /// [`RowCalibration::applied`] was taken out.
     // Never inlined: its matrices must not stay in the frame of a step.
     #[inline(never)]
-    pub(super) fn update(&mut self, rig: &StereoRig, matches: impl Iterator<Item = ([f64; 2], f64)> + Clone) {
+    pub(super) fn update(
+        &mut self,
+        rig: &StereoRig,
+        matches: impl Iterator<Item = ([f64; 2], f64)> + Clone,
+    ) {
         let [across, down] = Shares::per_px(rig);
-        let shares = |[u, v]: [f64; 2]| [(u - rig.center_u_px) * across, (v - rig.center_v_px) * down];
+        let shares =
+            |[u, v]: [f64; 2]| [(u - rig.center_u_px) * across, (v - rig.center_v_px) * down];
         let (prior, mut found) = (self.prior(), self.information);
         for scale_px in PASSES_PX {
             let Some((terms, _)) = found.estimate(&prior) else { return };
@@ -75,7 +83,11 @@ impl RowCalibration {
                 let at = shares(at);
                 let error = difference_px + self.applied.at(at) - expected.at(at);
                 let share = 1.0 / (1.0 + error * error / (scale_px * scale_px));
-                frame.add(&RowCorrection::powers(at), -error, share * share / (NOISE_PX * NOISE_PX));
+                frame.add(
+                    &RowCorrection::powers(at),
+                    -error,
+                    share * share / (NOISE_PX * NOISE_PX),
+                );
                 count += 1;
             }
             found = self.information;
@@ -90,7 +102,8 @@ impl RowCalibration {
     /// Moves what is taken out to what is known, where it is worth it.
     pub(super) fn apply(&mut self) {
         let Some(known) = self.known() else { return };
-        let least_px = if self.applied.largest_px() > 0.0 { APPLY_UNTIL_PX } else { APPLY_ABOVE_PX };
+        let least_px =
+            if self.applied.largest_px() > 0.0 { APPLY_UNTIL_PX } else { APPLY_ABOVE_PX };
         let target = if known.largest_px() > least_px { known } else { RowCorrection::default() };
         if target.largest_from_px(&self.applied) > CHANGE_MIN_PX {
             self.applied = target;
@@ -114,8 +127,10 @@ mod tests {
     use crate::random::Random;
     use std::vec::Vec;
 
-    const RIG: StereoRig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
-    /// As KITTI's grey cameras have it: 1.5 px in the corners, and the other way in the ones beside them.
+    const RIG: StereoRig =
+        StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+    /// As KITTI's grey cameras have it: 1.5 px in the corners, and the other way in the ones beside
+    /// them.
     const KITTI: RowCorrection = RowCorrection {
         constant_px: 0.2,
         column_px: 0.05,
@@ -125,22 +140,33 @@ mod tests {
         row_quadratic_px: 0.1,
     };
 
-    /// Matches all over the image, a tenth of them wrong, as both cameras of a rig with these errors see them after the right image was
-    /// moved by what is applied.
-    fn matches(error: &RowCorrection, applied: &RowCorrection, count: usize, random: &mut Random) -> Vec<([f64; 2], f64)> {
+    /// Matches all over the image, a tenth of them wrong, as both cameras of a rig with these
+    /// errors see them after the right image was moved by what is applied.
+    fn matches(
+        error: &RowCorrection,
+        applied: &RowCorrection,
+        count: usize,
+        random: &mut Random,
+    ) -> Vec<([f64; 2], f64)> {
         let mut uniform = move || f64::from(random.next_u32()) / f64::from(u32::MAX);
         (0..count)
             .map(|at| {
                 let shares = [uniform() * 2.0 - 1.0, uniform() * 2.0 - 1.0];
-                let noise = if at % 10 == 0 { uniform() * 4.0 - 2.0 } else { (uniform() + uniform() - 1.0) * 0.3 };
-                let pixel = [RIG.center_u_px * (1.0 + shares[0]), RIG.center_v_px * (1.0 + shares[1])];
+                let noise = if at % 10 == 0 {
+                    uniform() * 4.0 - 2.0
+                } else {
+                    (uniform() + uniform() - 1.0) * 0.3
+                };
+                let pixel =
+                    [RIG.center_u_px * (1.0 + shares[0]), RIG.center_v_px * (1.0 + shares[1])];
                 (pixel, error.at(shares) - applied.at(shares) + noise)
             })
             .collect()
     }
 
     fn driven(error: &RowCorrection, count: usize, frames: usize) -> RowCalibration {
-        let (mut random, mut rows) = (Random::new(3), RowCalibration::new(RowCorrection::default()));
+        let (mut random, mut rows) =
+            (Random::new(3), RowCalibration::new(RowCorrection::default()));
         for _ in 0..frames {
             let applied = *rows.applied();
             rows.update(&RIG, matches(error, &applied, count, &mut random).into_iter());

@@ -1,20 +1,28 @@
-//! A camera that drives past points seen with noise, through a rig whose disparities are off by what
-//! the tests choose.
+//! A camera that drives past points seen with noise, through a rig whose disparities are off by
+//! what the tests choose.
 
 use super::*;
 use crate::{random::Random, state::Hasher};
 use std::vec::Vec;
 
-const RIG: StereoRig = StereoRig { focal_px: 720.0, center_u_px: 610.0, center_v_px: 175.0, baseline_m: 0.54 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 720.0, center_u_px: 610.0, center_v_px: 175.0, baseline_m: 0.54 };
 /// Forward a little less than a metre, turning a little.
 const DRIVING: ([f64; 3], [f64; 3]) = ([0.001, 0.01, -0.002], [0.02, -0.01, -0.9]);
 const NOISE_PX: f64 = 0.2;
 const FAR_M: f64 = 40.0;
 
-/// Points of a street at most `far_m` away, none nearer than 5 m or, of a far scene, 200 m, seen before and after a motion by a rig to whose
-/// disparities `error` must be added.
-fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &mut Random) -> Vec<[StereoObservation; 2]> {
-    let mut uniform = move |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX);
+/// Points of a street at most `far_m` away, none nearer than 5 m or, of a far scene, 200 m, seen
+/// before and after a motion by a rig to whose disparities `error` must be added.
+fn street(
+    error: &DisparityCorrection,
+    motion: &Transform,
+    far_m: f64,
+    random: &mut Random,
+) -> Vec<[StereoObservation; 2]> {
+    let mut uniform = move |low: f64, high: f64| {
+        low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX)
+    };
     let error = error.for_rig(&RIG);
     (0..1_500)
         .filter_map(|_| {
@@ -22,7 +30,9 @@ fn street(error: &DisparityCorrection, motion: &Transform, far_m: f64, random: &
             let [x, y, _] = [uniform(-0.8, 0.8) * z, uniform(-0.2, 0.2) * z, z];
             let seen = [[x, y, z], motion.transform_point([x, y, z])].map(|point| {
                 // The sum of three uniform numbers: nearly normal, and bounded.
-                let mut noise = |sigma: f64| sigma * (uniform(-1.0, 1.0) + uniform(-1.0, 1.0) + uniform(-1.0, 1.0));
+                let mut noise = |sigma: f64| {
+                    sigma * (uniform(-1.0, 1.0) + uniform(-1.0, 1.0) + uniform(-1.0, 1.0))
+                };
                 let exact = RIG.project(point)?;
                 let [column, _] = error.uncorrected(pixel(&exact));
                 Some(StereoObservation {
@@ -42,7 +52,13 @@ fn pixel(seen: &StereoObservation) -> [f32; 2] {
 }
 
 /// The filter after `frames` frames.
-fn driven(config: &RigConfig, error: &DisparityCorrection, motion: ([f64; 3], [f64; 3]), far_m: f64, frames: usize) -> SelfCalibration {
+fn driven(
+    config: &RigConfig,
+    error: &DisparityCorrection,
+    motion: ([f64; 3], [f64; 3]),
+    far_m: f64,
+    frames: usize,
+) -> SelfCalibration {
     let (mut random, mut calibration) = (Random::new(11), SelfCalibration::new(config));
     let motion = Transform::new(motion.0, motion.1);
     for _ in 0..frames {
@@ -51,7 +67,8 @@ fn driven(config: &RigConfig, error: &DisparityCorrection, motion: ([f64; 3], [f
             let [column, _] = correction.corrected(pixel(&seen));
             StereoObservation { u_right_px: f64::from(column) - RIG.center_u_px, ..seen }
         };
-        let observations = street(error, &motion, far_m, &mut random).into_iter().map(|pair| pair.map(corrected));
+        let observations =
+            street(error, &motion, far_m, &mut random).into_iter().map(|pair| pair.map(corrected));
         calibration.update(&RIG, observations, &motion);
     }
     calibration
@@ -67,7 +84,10 @@ fn an_offset_is_found_and_taken_out() {
         let calibration = driven(&RigConfig::default(), &offset(planted), DRIVING, FAR_M, 30);
         let report = calibration.report();
         assert!(report.known && (report.offset_px - planted).abs() < 0.05, "{planted}: {report:?}");
-        assert!((report.offset_px - planted).abs() < 4.0 * report.offset_sigma_px, "{planted}: {report:?}");
+        assert!(
+            (report.offset_px - planted).abs() < 4.0 * report.offset_sigma_px,
+            "{planted}: {report:?}"
+        );
         assert!((report.applied_offset_px - planted).abs() < 0.05, "{planted}: {report:?}");
         assert_eq!(report.found().unwrap().offset_px, report.offset_px);
     }
@@ -75,22 +95,35 @@ fn an_offset_is_found_and_taken_out() {
 
 #[test]
 fn what_the_lenses_left_is_found() {
-    let error = DisparityCorrection { offset_px: 0.2, slope_px: 0.4, quartic_px: 1.2, row_quadratic_px: -0.4 };
+    let error = DisparityCorrection {
+        offset_px: 0.2,
+        slope_px: 0.4,
+        quartic_px: 1.2,
+        row_quadratic_px: -0.4,
+    };
     let found = driven(&RigConfig::default(), &error, DRIVING, FAR_M, 60).report().found().unwrap();
     assert!((found.row_quadratic_px + 0.4).abs() < 0.1, "{found:?}");
-    assert!((found.slope_px - 0.4).abs() < 0.15 && (found.quartic_px - 1.2).abs() < 0.3, "{found:?}");
+    assert!(
+        (found.slope_px - 0.4).abs() < 0.15 && (found.quartic_px - 1.2).abs() < 0.3,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn a_sound_rig_is_left_alone() {
     let report = driven(&RigConfig::default(), &offset(0.0), DRIVING, FAR_M, 60).report();
-    assert!(report.known && report.offset_px.abs() < 0.05 && report.applied_offset_px == 0.0, "{report:?}");
+    assert!(
+        report.known && report.offset_px.abs() < 0.05 && report.applied_offset_px == 0.0,
+        "{report:?}"
+    );
     assert_eq!(report.state(), CalibrationState::Sound);
 }
 
 #[test]
 fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
-    for (motion, far_m) in [(([0.0; 3], [0.0; 3]), FAR_M), (([0.0, 0.05, 0.0], [0.0; 3]), FAR_M), (DRIVING, 4_000.0)] {
+    for (motion, far_m) in
+        [(([0.0; 3], [0.0; 3]), FAR_M), (([0.0, 0.05, 0.0], [0.0; 3]), FAR_M), (DRIVING, 4_000.0)]
+    {
         let calibration = driven(&RigConfig::default(), &offset(0.7), motion, far_m, 40);
         let report = calibration.report();
         assert!(!report.known && calibration.applied.is_zero(), "{motion:?}: {report:?}");
@@ -101,12 +134,16 @@ fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
 #[test]
 fn the_correction_changes_gently() {
     let mut random = Random::new(11);
-    let (mut calibration, motion) = (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.0, DRIVING.1));
+    let (mut calibration, motion) =
+        (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.0, DRIVING.1));
     for _ in 0..20 {
         let before = calibration.applied;
         calibration.update(&RIG, street(&offset(1.0), &motion, FAR_M, &mut random), &motion);
         let now = calibration.applied;
-        assert!((now.offset_px - before.offset_px).abs() <= CHANGE_MAX_PX + 1e-12, "{before:?} {now:?}");
+        assert!(
+            (now.offset_px - before.offset_px).abs() <= CHANGE_MAX_PX + 1e-12,
+            "{before:?} {now:?}"
+        );
     }
 }
 
@@ -122,7 +159,8 @@ fn what_is_only_to_be_reported_is_not_applied_and_what_is_off_not_sought() {
 
 #[test]
 fn a_run_begins_where_another_ended() {
-    let start = driven(&RigConfig::default(), &offset(0.7), DRIVING, FAR_M, 30).report().found().unwrap();
+    let start =
+        driven(&RigConfig::default(), &offset(0.7), DRIVING, FAR_M, 30).report().found().unwrap();
     let config = RigConfig { disparity_correction: start, ..RigConfig::default() };
     let again = SelfCalibration::new(&config);
     assert_eq!(again.applied, start);
@@ -161,9 +199,24 @@ fn settings_out_of_range_are_named() {
     let mut problems = crate::problem::Problems::new();
     RigConfig::default().validate(&mut problems);
     assert!(problems.is_empty());
-    let wrong = DisparityCorrection { offset_px: 6.0, slope_px: f64::NAN, quartic_px: -9.0, row_quadratic_px: 5.1 };
-    RigConfig { baseline_scale: 0.0, disparity_correction: wrong, ..RigConfig::default() }.validate(&mut problems);
+    let wrong = DisparityCorrection {
+        offset_px: 6.0,
+        slope_px: f64::NAN,
+        quartic_px: -9.0,
+        row_quadratic_px: 5.1,
+    };
+    RigConfig { baseline_scale: 0.0, disparity_correction: wrong, ..RigConfig::default() }
+        .validate(&mut problems);
     let keys: Vec<_> = problems.iter().map(|problem| problem.key).collect();
     let part = |name: &str| std::format!("rig.disparity_correction.{name}_px");
-    assert_eq!(keys, ["rig.baseline_scale", &part("offset"), &part("slope"), &part("quartic"), &part("row_quadratic")]);
+    assert_eq!(
+        keys,
+        [
+            "rig.baseline_scale",
+            &part("offset"),
+            &part("slope"),
+            &part("quartic"),
+            &part("row_quadratic")
+        ]
+    );
 }

@@ -1,9 +1,10 @@
 //! Neighbours of a row matched at a time: one disparity after the other, for all of them.
 //!
-//! Sixteen share their cell's list of disparities, for how long that is no processor foresees; about its own plane each of eight has
-//! disparities of its own, which are as many for all. A candidate's key has the energy above and the disparity below, so that the least key
-//! is the least energy and, of equal ones, the smallest disparity. Borders, where not all can have the same candidates, go another and slower
-//! way.
+//! Sixteen share their cell's list of disparities, for how long that is no processor foresees;
+//! about its own plane each of eight has disparities of its own, which are as many for all. A
+//! candidate's key has the energy above and the disparity below, so that the least key is the least
+//! energy and, of equal ones, the smallest disparity. Borders, where not all can have the same
+//! candidates, go another and slower way.
 
 use super::load;
 use crate::{
@@ -52,7 +53,12 @@ struct Group {
 
 impl<'a, const LEFT: bool> Row<'a, LEFT> {
     #[inline(always)]
-    pub fn new(config: &StereoConfig, cost: &'a PlaneCost, here: &'a [Descriptor], other: &'a [Descriptor]) -> Self {
+    pub fn new(
+        config: &StereoConfig,
+        cost: &'a PlaneCost,
+        here: &'a [Descriptor],
+        other: &'a [Descriptor],
+    ) -> Self {
         Self {
             here,
             other,
@@ -63,18 +69,36 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         }
     }
 
-    /// Replaces the planes of a row's pixels `u..`, sixteen or `count`, by disparities in px, or [`NO_PLANE`] where no plane lies, the image
-    /// is without texture or no disparity can be.
+    /// Replaces the planes of a row's pixels `u..`, sixteen or `count`, by disparities in px, or
+    /// [`NO_PLANE`] where no plane lies, the image is without texture or no disparity can be.
     #[inline(always)]
-    pub fn match_sixteen(&mut self, u: usize, count: usize, listed: &[u32], row: &mut [i16], kernels: &impl Kernels) {
-        let groups = [self.group(u, count, row, kernels), self.group(u + LANES, count.saturating_sub(LANES), row, kernels)];
+    pub fn match_sixteen(
+        &mut self,
+        u: usize,
+        count: usize,
+        listed: &[u32],
+        row: &mut [i16],
+        kernels: &impl Kernels,
+    ) {
+        let groups = [
+            self.group(u, count, row, kernels),
+            self.group(u + LANES, count.saturating_sub(LANES), row, kernels),
+        ];
         let mut best = [[BARRED; LANES]; 2];
         if groups.iter().any(|group| !group.is_empty()) {
             best = consider::<LEFT>(&groups, self.other, listed, &mut self.spare, kernels);
         }
         for (group, mut best) in groups.iter().zip(best) {
             if !group.is_empty() {
-                best = lesser(best, group.least_about_planes::<LEFT>(self.other, self.cost, &mut self.spare, kernels));
+                best = lesser(
+                    best,
+                    group.least_about_planes::<LEFT>(
+                        self.other,
+                        self.cost,
+                        &mut self.spare,
+                        kernels,
+                    ),
+                );
             }
             group.write(best, row);
         }
@@ -97,13 +121,15 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
             let columns = if LEFT { at - MARGIN as i32 } else { columns - MARGIN as i32 - 1 - at };
             *reach = if columns < self.most { columns } else { self.most };
         }
-        let (reach_min, reach_max) = if LEFT { (reach[0], reach[LANES - 1]) } else { (reach[LANES - 1], reach[0]) };
+        let (reach_min, reach_max) =
+            if LEFT { (reach[0], reach[LANES - 1]) } else { (reach[LANES - 1], reach[0]) };
         Group { points, u, count, planes, reach, reach_min, reach_max }
     }
 }
 
-/// The least keys of candidates, each told by what its distance is added to for its key, in ascending order of disparity: those of two
-/// groups side by side. [`BARRED`] where a pixel has none.
+/// The least keys of candidates, each told by what its distance is added to for its key, in
+/// ascending order of disparity: those of two groups side by side. [`BARRED`] where a pixel has
+/// none.
 #[inline(always)]
 fn consider<const LEFT: bool>(
     groups: &[Group; 2],
@@ -116,11 +142,17 @@ fn consider<const LEFT: bool>(
     let reach_min = *reach_min.min(&second.reach_min);
     // Away from the images' borders all pixels can have all disparities.
     let is_whole = |base: &u32| (base & 255) as i32 <= reach_min;
-    let whole = if bases.last().is_none_or(is_whole) { bases.len() } else { bases.partition_point(is_whole) };
+    let whole = if bases.last().is_none_or(is_whole) {
+        bases.len()
+    } else {
+        bases.partition_point(is_whole)
+    };
     let mut keys = [[BARRED; LANES]; 2];
     let mut border = whole;
     for (i, &base) in part(bases, ..whole).iter().enumerate() {
-        let others = other.get(matched::<LEFT>(*first, base)..).and_then(|row| row.as_chunks().0.first_chunk::<2>());
+        let others = other
+            .get(matched::<LEFT>(*first, base)..)
+            .and_then(|row| row.as_chunks().0.first_chunk::<2>());
         let Some(others) = others else {
             border = i;
             break;
@@ -152,7 +184,8 @@ impl Group {
         self.planes == [NOTHING; LANES]
     }
 
-    /// As [`consider`], of candidates that not all pixels can have; `best` has the least keys of those before them.
+    /// As [`consider`], of candidates that not all pixels can have; `best` has the least keys of
+    /// those before them.
     #[cold]
     #[inline(never)]
     fn consider_at_border<const LEFT: bool>(
@@ -169,7 +202,8 @@ impl Group {
                 break;
             }
             let others = eight(other, matched::<LEFT>(self.u, base), spare);
-            let keys = kernels.ordered(kernels.least([BARRED; LANES], [&self.points, others], base));
+            let keys =
+                kernels.ordered(kernels.least([BARRED; LANES], [&self.points, others], base));
             for ((best, key), &reach) in best.iter_mut().zip(keys).zip(&self.reach) {
                 *best = if d > reach { *best } else { key.min(*best) };
             }
@@ -205,9 +239,13 @@ impl Group {
         }
     }
 
-    /// The least keys about each pixel's own plane; `None` where some are at a border, or a pixel's least or greatest disparity.
+    /// The least keys about each pixel's own plane; `None` where some are at a border, or a pixel's
+    /// least or greatest disparity.
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "lanes are below eight, steps below the width of a table")]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "lanes are below eight, steps below the width of a table"
+    )]
     fn least_about_inner_planes<const LEFT: bool>(
         &self,
         other: &[Descriptor],
@@ -229,21 +267,28 @@ impl Group {
             return None;
         }
         let last = 2 * cost.radius;
-        // Columns of the row are below 2^13. Four bytes wide, they are found side by side, and no end of a range can wrap.
+        // Columns of the row are below 2^13. Four bytes wide, they are found side by side, and no
+        // end of a range can wrap.
         let mut starts = [0; LANES];
         for (start, (u, &first)) in starts.iter_mut().zip((self.u as u32..).zip(&firsts)) {
-            *start = if LEFT { u.wrapping_sub(first as u32 + last as u32) } else { u + first as u32 };
+            *start =
+                if LEFT { u.wrapping_sub(first as u32 + last as u32) } else { u + first as u32 };
         }
         let mut rows = [&[Descriptor::UNTEXTURED; PLANE_WIDTH]; LANES];
         for (row, start) in rows.iter_mut().zip(starts.map(|start| start as usize)) {
             *row = other.get(start..start + PLANE_WIDTH)?.first_chunk()?;
         }
-        // What a candidate's distance is added to; about a steep plane, which is not preferred, all cost the same.
+        // What a candidate's distance is added to; about a steep plane, which is not preferred, all
+        // cost the same.
         let lowered = |mut best: Eight<u32>, sums: Eight<u32>, step: usize, about: u32| {
             let d = if LEFT { last - step } else { step } as u32;
             let more = (cost.elsewhere - about) << 8;
             for lane in 0..LANES {
-                let key = (sums[lane] << KEY_SCALE_BITS) + (about << 8) + d + firsts[lane] as u32 + (steep[lane] & more);
+                let key = (sums[lane] << KEY_SCALE_BITS)
+                    + (about << 8)
+                    + d
+                    + firsts[lane] as u32
+                    + (steep[lane] & more);
                 best[lane] = if key < best[lane] { key } else { best[lane] };
             }
             best
@@ -266,7 +311,12 @@ impl Group {
         for lane in 0..LANES {
             lasts[lane] = rows[lane].get(last)?;
         }
-        Some(lowered(best, kernels.sums_of(&self.points, lasts), last, *cost.about_plane.get(last)?))
+        Some(lowered(
+            best,
+            kernels.sums_of(&self.points, lasts),
+            last,
+            *cost.about_plane.get(last)?,
+        ))
     }
 
     /// The same of planes wherever they are.
@@ -285,7 +335,8 @@ impl Group {
             let run = self.planes.iter().skip(start).take_while(|other| **other == plane).count();
             if plane != NOTHING {
                 let first = (plane & 255) - cost.radius as i32;
-                let costs = if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
+                let costs =
+                    if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
                 let costs = part(costs, ..2 * cost.radius + 1);
                 let outside = usize::try_from(-first).unwrap_or_default();
                 // A key holds no greater disparity.
@@ -297,7 +348,13 @@ impl Group {
                     count += 1;
                 }
                 let mut keys = [BARRED; LANES];
-                self.consider_at_border::<LEFT>(other, part(&bases, ..count), &mut keys, spare, kernels);
+                self.consider_at_border::<LEFT>(
+                    other,
+                    part(&bases, ..count),
+                    &mut keys,
+                    spare,
+                    kernels,
+                );
                 best.iter_mut().zip(keys).skip(start).take(run).for_each(|(best, key)| *best = key);
             }
             start += run;

@@ -1,5 +1,5 @@
-//! Fractions of a pixel: where between the disparities beside it the distance has its least value, if it falls and rises with the same
-//! slope.
+//! Fractions of a pixel: where between the disparities beside it the distance has its least value,
+//! if it falls and rises with the same slope.
 
 use super::{NONE, WORKING_ONE_PX, load};
 use crate::{
@@ -19,23 +19,37 @@ const MOST: i32 = WORKING_ONE_PX as i32 / 2 - 1;
 /// Turns a left row of disparities in px, or [`NO_PLANE`], into working units, or [`NONE`].
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "lanes are below eight")]
-pub(super) fn refine_row(config: &StereoConfig, here: &[Descriptor], other: &[Descriptor], row: &mut [i16], kernels: &impl Kernels) {
+pub(super) fn refine_row(
+    config: &StereoConfig,
+    here: &[Descriptor],
+    other: &[Descriptor],
+    row: &mut [i16],
+    kernels: &impl Kernels,
+) {
     let mut spare = UNTEXTURED;
     for u in (0..row.len()).step_by(LANES) {
         let mut disparities = load(row, u);
         let mut fractions = [0; LANES];
         if config.subpixel && disparities != [NO_PLANE; LANES] {
-            fractions = find_fractions(config, eight(here, u, &mut spare), other, (u, disparities), kernels);
+            fractions = find_fractions(
+                config,
+                eight(here, u, &mut spare),
+                other,
+                (u, disparities),
+                kernels,
+            );
         }
         for lane in 0..LANES {
             let px = disparities[lane];
-            disparities[lane] = if px == NO_PLANE { NONE } else { px * WORKING_ONE_PX + fractions[lane] as i16 };
+            disparities[lane] =
+                if px == NO_PLANE { NONE } else { px * WORKING_ONE_PX + fractions[lane] as i16 };
         }
         store(row, u, disparities);
     }
 }
 
-/// The fractions of eight pixels from column `u` on, in working units; 0 for those whose disparity has no neighbours to compare it with.
+/// The fractions of eight pixels from column `u` on, in working units; 0 for those whose disparity
+/// has no neighbours to compare it with.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "steps are below three, lanes below eight")]
 fn find_fractions(
@@ -53,7 +67,8 @@ fn find_fractions(
             *window = three;
         }
     }
-    let (mut twos, mut lasts) = ([&[Descriptor::UNTEXTURED; 2]; LANES], [&Descriptor::UNTEXTURED; LANES]);
+    let (mut twos, mut lasts) =
+        ([&[Descriptor::UNTEXTURED; 2]; LANES], [&Descriptor::UNTEXTURED; LANES]);
     for lane in 0..LANES {
         if let Some((two, [last])) = windows[lane].split_first_chunk() {
             (twos[lane], lasts[lane]) = (two, last);
@@ -62,10 +77,16 @@ fn find_fractions(
     let ([after, at], before) = (kernels.sums_of_two(points, twos), kernels.sums_of(points, lasts));
     let (mut dividends, mut divisors, mut counts) = ([0; LANES], [1; LANES], [false; LANES]);
     for lane in 0..LANES {
-        let (before, at, after, d) = (before[lane] as i32, at[lane] as i32, after[lane] as i32, i32::from(px[lane]));
+        let (before, at, after, d) =
+            (before[lane] as i32, at[lane] as i32, after[lane] as i32, i32::from(px[lane]));
         let reach = (u + lane) as i32 - MARGIN as i32;
-        let reach = if reach < i32::from(config.disparity_max) { reach } else { i32::from(config.disparity_max) };
-        let (least, rise) = if before < after { (before, after - at) } else { (after, before - at) };
+        let reach = if reach < i32::from(config.disparity_max) {
+            reach
+        } else {
+            i32::from(config.disparity_max)
+        };
+        let (least, rise) =
+            if before < after { (before, after - at) } else { (after, before - at) };
         // Below 2^17.
         dividends[lane] = MOST * (before - after);
         divisors[lane] = if rise > 1 { rise } else { 1 };

@@ -9,7 +9,8 @@ use crate::{
 };
 use std::{vec, vec::Vec};
 
-/// An image pair's gradients, planes and grid priors, without any sense but with everything that may happen.
+/// An image pair's gradients, planes and grid priors, without any sense but with everything that
+/// may happen.
 struct Scene {
     config: StereoConfig,
     width: usize,
@@ -24,15 +25,24 @@ impl Scene {
     fn random(random: &mut Random, width: usize, config: StereoConfig) -> Self {
         let height = 2 * MARGIN + 5;
         // Few values, so that distances are often equal, and stretches without texture.
-        let mut gradients = || (0..width * height).map(|i| if i % width < 9 { 128 } else { 110 + 12 * random.below(4) as u8 }).collect();
+        let mut gradients = || {
+            (0..width * height)
+                .map(|i| if i % width < 9 { 128 } else { 110 + 12 * random.below(4) as u8 })
+                .collect()
+        };
         let gradients = [(); 4].map(|()| gradients());
         let mut planes = || {
             let mut plane = NO_PLANE;
             let mut next = |random: &mut Random| {
                 if random.below(5) == 0 {
                     let disparity =
-                        [random.below(60), u32::from(config.disparity_max - 8) + random.below(9)][usize::from(random.below(4) == 0)];
-                    plane = if random.below(6) == 0 { NO_PLANE } else { disparity as i16 + [0, STEEP][random.below(2) as usize] };
+                        [random.below(60), u32::from(config.disparity_max - 8) + random.below(9)]
+                            [usize::from(random.below(4) == 0)];
+                    plane = if random.below(6) == 0 {
+                        NO_PLANE
+                    } else {
+                        disparity as i16 + [0, STEEP][random.below(2) as usize]
+                    };
                 }
                 plane
             };
@@ -61,7 +71,10 @@ impl Scene {
         DenseMatching {
             config: &self.config,
             gradients: [gradients(left_du, left_dv), gradients(right_du, right_dv)],
-            cells: self.cells.each_ref().map(|cells| CellGrid { cells, columns: prior_cells(self.width, &self.config) }),
+            cells: self
+                .cells
+                .each_ref()
+                .map(|cells| CellGrid { cells, columns: prior_cells(self.width, &self.config) }),
             cost: PlaneCost::new(&self.config),
         }
     }
@@ -91,12 +104,26 @@ impl Scene {
             for (gradients, row) in matching.gradients.iter().zip(&mut rows) {
                 assert!(gradients.describe_row(v, row));
             }
-            let best = |left: bool, u: usize| self.best(&matching, [&rows[usize::from(!left)], &rows[usize::from(left)]], left, u, v);
+            let best = |left: bool, u: usize| {
+                self.best(
+                    &matching,
+                    [&rows[usize::from(!left)], &rows[usize::from(left)]],
+                    left,
+                    u,
+                    v,
+                )
+            };
             for u in 0..self.width {
                 let Some(d) = best(true, u) else { continue };
                 counts[0] += 1;
-                if best(false, u - d).is_some_and(|back| back.abs_diff(d) <= usize::from(self.config.consistency_threshold)) {
-                    let fraction = if self.config.subpixel { self.fraction(&rows[0], &rows[1], u, d) } else { 0 };
+                if best(false, u - d).is_some_and(|back| {
+                    back.abs_diff(d) <= usize::from(self.config.consistency_threshold)
+                }) {
+                    let fraction = if self.config.subpixel {
+                        self.fraction(&rows[0], &rows[1], u, d)
+                    } else {
+                        0
+                    };
                     disparities[v * self.width + u] = d as i16 * WORKING_ONE_PX + fraction;
                 } else {
                     counts[1] += 1;
@@ -107,24 +134,39 @@ impl Scene {
     }
 
     /// The disparity of least energy of a pixel; of equal ones the smallest.
-    fn best(&self, matching: &DenseMatching<'_>, [here, other]: [&[Descriptor]; 2], left: bool, u: usize, v: usize) -> Option<usize> {
+    fn best(
+        &self,
+        matching: &DenseMatching<'_>,
+        [here, other]: [&[Descriptor]; 2],
+        left: bool,
+        u: usize,
+        v: usize,
+    ) -> Option<usize> {
         let side = usize::from(!left);
         let plane = self.planes[side][v * self.width + u];
         let inside = (MARGIN..self.width - MARGIN).contains(&u);
-        if plane == NO_PLANE || !inside || distance(&here[u], &Descriptor::UNTEXTURED) < u32::from(self.config.match_texture) {
+        if plane == NO_PLANE
+            || !inside
+            || distance(&here[u], &Descriptor::UNTEXTURED) < u32::from(self.config.match_texture)
+        {
             return None;
         }
         let cost = &matching.cost;
         let size = self.config.grid_size;
         let set = self.cells[side][v / size * prior_cells(self.width, &self.config) + u / size];
         let costs = if plane >= STEEP { &cost.about_steep } else { &cost.about_plane };
-        let reach = if left { u - MARGIN } else { self.width - MARGIN - 1 - u }.min(usize::from(self.config.disparity_max));
+        let reach = if left { u - MARGIN } else { self.width - MARGIN - 1 - u }
+            .min(usize::from(self.config.disparity_max));
         let energy = |d: usize| {
             let off = d as i32 - i32::from(plane & 255) + cost.radius as i32;
             let near = (0..=2 * cost.radius as i32).contains(&off).then(|| costs[off as usize]);
             let listed = (set[d / 64] >> (d % 64) & 1 == 1).then_some(cost.elsewhere);
             let column = if left { u - d } else { u + d };
-            [near, listed].into_iter().flatten().min().map(|cost| 16 * distance(&here[u], &other[column]) + cost)
+            [near, listed]
+                .into_iter()
+                .flatten()
+                .min()
+                .map(|cost| 16 * distance(&here[u], &other[column]) + cost)
         };
         (0..=reach).filter_map(|d| energy(d).map(|energy| (energy, d))).min().map(|(_, d)| d)
     }
@@ -133,9 +175,14 @@ impl Scene {
         if d == 0 || d >= (u - MARGIN).min(usize::from(self.config.disparity_max)) {
             return 0;
         }
-        let [before, here, after] = [d - 1, d, d + 1].map(|d| distance(&left[u], &right[u - d]) as i32);
+        let [before, here, after] =
+            [d - 1, d, d + 1].map(|d| distance(&left[u], &right[u - d]) as i32);
         let rise = before.max(after) - here;
-        if before.min(after) < here || rise == 0 { 0 } else { (31 * (before - after) / rise) as i16 }
+        if before.min(after) < here || rise == 0 {
+            0
+        } else {
+            (31 * (before - after) / rise) as i16
+        }
     }
 }
 
@@ -150,9 +197,15 @@ fn every_level_of_vector_instructions_gives_what_one_pixel_at_a_time_gives() {
     let configs = [
         preset,
         StereoConfig { grid_size: 11, subpixel: false, match_texture: 0, ..preset },
-        StereoConfig { plane_radius_sigmas: 6.0, disparity_max: 255, consistency_threshold: 0, ..preset },
+        StereoConfig {
+            plane_radius_sigmas: 6.0,
+            disparity_max: 255,
+            consistency_threshold: 0,
+            ..preset
+        },
     ];
-    for (width, config) in [16, 61, 96, 130, 301, 330].into_iter().zip(configs.into_iter().cycle()) {
+    for (width, config) in [16, 61, 96, 130, 301, 330].into_iter().zip(configs.into_iter().cycle())
+    {
         for _ in 0..4 {
             let scene = Scene::random(&mut random, width, config);
             let (plain, counts) = scene.plain();

@@ -33,11 +33,17 @@ impl StereoMatcher<'_> {
         executor: &E,
     ) {
         let (width, bands) = (self.width, Bands::of(self.height));
-        let [left_du, left_dv, right_du, right_dv] = split_planes(self.gradients, width * self.height);
-        let [left_invalid, right_invalid] = [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
-        for (image, invalid, du, dv) in [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)] {
+        let [left_du, left_dv, right_du, right_dv] =
+            split_planes(self.gradients, width * self.height);
+        let [left_invalid, right_invalid] =
+            [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+        for (image, invalid, du, dv) in
+            [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)]
+        {
             let jobs = zip3(bands.first(), bands.split_mut(du, width), bands.split_mut(dv, width));
-            each(executor, jobs, |(first, du, dv)| executor.vectors().run(GradientRows { image, first, du, dv }));
+            each(executor, jobs, |(first, du, dv)| {
+                executor.vectors().run(GradientRows { image, first, du, dv })
+            });
             if let Some(invalid) = invalid {
                 invalid::flatten(invalid, width, du);
                 invalid::flatten(invalid, width, dv);
@@ -45,22 +51,41 @@ impl StereoMatcher<'_> {
         }
     }
 
-    pub(super) fn match_support<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn match_support<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         let [left, right] = gradients(self.gradients, self.width, self.height);
-        let (columns, rows) =
-            (support::candidates(self.width, config.candidate_step), support::candidates(self.height, config.candidate_step));
+        let (columns, rows) = (
+            support::candidates(self.width, config.candidate_step),
+            support::candidates(self.height, config.candidate_step),
+        );
         let bands = Bands::of(rows);
         let matching = SupportMatching { config, left, right };
-        let jobs = zip3(bands.first(), bands.split_mut(self.support, columns), Bands::of(BANDS).split_mut(self.rows, ROWS * self.width));
-        each(executor, jobs, |(first, grid, scratch)| compare(executor.vectors(), MatchRows { matching, first, grid, scratch }));
+        let jobs = zip3(
+            bands.first(),
+            bands.split_mut(self.support, columns),
+            Bands::of(BANDS).split_mut(self.rows, ROWS * self.width),
+        );
+        each(executor, jobs, |(first, grid, scratch)| {
+            compare(executor.vectors(), MatchRows { matching, first, grid, scratch })
+        });
         let grid = part(self.support, ..columns * rows);
         report.candidates = grid.len() as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
 
-    pub(super) fn filter_support_points<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn filter_support_points<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         let step = config.candidate_step;
-        let (columns, rows) = (support::candidates(self.width, step), support::candidates(self.height, step));
+        let (columns, rows) =
+            (support::candidates(self.width, step), support::candidates(self.height, step));
         let Some(grid) = self.support.get_mut(..columns * rows) else { return };
         let filter = FilterSupport { config, grid, columns, scratch: self.support_scratch };
         [report.implausible, report.redundant] = executor.vectors().run(filter);
@@ -70,35 +95,56 @@ impl StereoMatcher<'_> {
             for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
                 let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
                 self.left_mesh.add(SupportPoint { u, v, disparity });
-                report.occluded_right += u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
+                report.occluded_right +=
+                    u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
             }
         }
         report.support_points = self.left_mesh.points().len() as u32;
     }
 
-    pub(super) fn triangulate<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn triangulate<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         let columns = prior::cells(self.width, config.grid_size);
         let cells = columns * prior::cells(self.height, config.grid_size);
         let prepare = |mesh: &mut Triangulation<'_>, sets: &mut [DisparitySet]| {
             mesh.triangulate();
             prior::mark_cells(config, mesh.points(), columns, part_mut(sets, ..cells));
         };
-        executor.join(|| prepare(&mut self.left_mesh, self.left_cells), || prepare(&mut self.right_mesh, self.right_cells));
+        executor.join(
+            || prepare(&mut self.left_mesh, self.left_cells),
+            || prepare(&mut self.right_mesh, self.right_cells),
+        );
         report.triangles_left = self.left_mesh.triangle_count() as u32;
         report.triangles_right = self.right_mesh.triangle_count() as u32;
     }
 
-    pub(super) fn match_densely<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn match_densely<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         let (width, bands) = (self.width, Bands::of(self.height));
         let columns = prior::cells(width, config.grid_size);
         let matching = DenseMatching {
             config,
             gradients: gradients(self.gradients, width, self.height),
-            cells: [CellGrid { cells: self.left_cells, columns }, CellGrid { cells: self.right_cells, columns }],
+            cells: [
+                CellGrid { cells: self.left_cells, columns },
+                CellGrid { cells: self.right_cells, columns },
+            ],
             cost: PlaneCost::new(config),
         };
         let disparity: &mut [i16] = bytemuck::cast_slice_mut(self.disparity);
-        let images = zip3(bands.first(), bands.split_mut(disparity, width), bands.split_mut(self.other, width));
+        let images = zip3(
+            bands.first(),
+            bands.split_mut(disparity, width),
+            bands.split_mut(self.other, width),
+        );
         let scratch = Bands::of(BANDS).split_mut(self.rows, ROWS * width);
         let mut jobs = [(); BANDS].map(|()| None);
         for ((job, (first, left, right)), scratch) in jobs.iter_mut().zip(images).zip(scratch) {
@@ -108,7 +154,13 @@ impl StereoMatcher<'_> {
         each(executor, jobs.each_mut(), |band| {
             if let Some(band) = band {
                 for (mesh, out) in [(left_mesh, &mut *band.left), (right_mesh, &mut *band.right)] {
-                    executor.vectors().run(RasterisePlanes { mesh, slope_max: config.plane_slope_max, first: band.first, width, out });
+                    executor.vectors().run(RasterisePlanes {
+                        mesh,
+                        slope_max: config.plane_slope_max,
+                        first: band.first,
+                        width,
+                        out,
+                    });
                 }
                 compare(executor.vectors(), MatchBand { matching: &matching, band });
             }
@@ -119,7 +171,12 @@ impl StereoMatcher<'_> {
         }
     }
 
-    pub(super) fn remove_speckles<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn remove_speckles<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         report.speckles = self.remove_segments(config, config.speckle_size, executor).measured;
         let lone_size = (config.lone_share * (self.width * self.height) as f32) as u32;
         if lone_size > 1 {
@@ -135,7 +192,12 @@ impl StereoMatcher<'_> {
         }
     }
 
-    pub(super) fn fill_gaps<E: Executor>(&mut self, config: &StereoConfig, executor: &E, report: &mut StereoReport) {
+    pub(super) fn fill_gaps<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
         let filling = Filling {
             width: config.gap_width,
             discontinuity: working(config.gap_discontinuity) as u16,
@@ -145,7 +207,12 @@ impl StereoMatcher<'_> {
     }
 
     /// Removes segments of fewer than `smallest` pixels.
-    fn remove_segments<E: Executor>(&mut self, config: &StereoConfig, smallest: u32, executor: &E) -> Blanked {
+    fn remove_segments<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        smallest: u32,
+        executor: &E,
+    ) -> Blanked {
         let scratch = Scratch {
             runs: bytemuck::cast_slice_mut(self.gradients),
             ends: bytemuck::cast_slice_mut(self.other),
@@ -153,7 +220,13 @@ impl StereoMatcher<'_> {
         };
         let disparity = image_of(self.disparity, self.width * self.height);
         let similarity = working(config.speckle_similarity);
-        executor.vectors().run(RemoveSpeckles { disparity, width: self.width, similarity, smallest, scratch })
+        executor.vectors().run(RemoveSpeckles {
+            disparity,
+            width: self.width,
+            similarity,
+            smallest,
+            scratch,
+        })
     }
 
     /// Fills gaps along rows, then along columns; returns the pixels filled.
@@ -162,10 +235,15 @@ impl StereoMatcher<'_> {
         let image = image_of(self.disparity, width * self.height);
         let edges = Bands::of(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
         let bands = zip2(Bands::of(self.height).split_mut(image, width), edges);
-        let along_rows = each(executor, bands, |(rows, edges)| vectors.run(FillRows { rows, width, filling, edges }));
-        let (ends, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns).split_at_mut_checked(width).unwrap_or_default();
+        let along_rows = each(executor, bands, |(rows, edges)| {
+            vectors.run(FillRows { rows, width, filling, edges })
+        });
+        let (ends, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns)
+            .split_at_mut_checked(width)
+            .unwrap_or_default();
         let ends = bytemuck::cast_slice_mut(ends);
-        along_rows.iter().sum::<u32>() + vectors.run(FillColumns { image, width, filling, last_row, ends })
+        along_rows.iter().sum::<u32>()
+            + vectors.run(FillColumns { image, width, filling, last_row, ends })
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
@@ -174,7 +252,9 @@ impl StereoMatcher<'_> {
         let other = part_mut(self.other, ..pixels);
         let smooth = |from: &[i16], along, to: &mut [i16]| {
             let rows = zip2(bands.first(), bands.split_mut(to, width));
-            each(executor, rows, |(first, to)| executor.vectors().run(Smooth { from, width, along, first, to }));
+            each(executor, rows, |(first, to)| {
+                executor.vectors().run(Smooth { from, width, along, first, to })
+            });
         };
         for _ in 0..config.adaptive_mean {
             smooth(image, Along::Rows, other);
@@ -193,7 +273,11 @@ impl StereoMatcher<'_> {
         for disparity in disparities.iter_mut() {
             let working = *disparity as i16;
             // Smoothed values stay between those they come from: 0..=255 px.
-            let (px, filled) = if working == NONE { (0, false) } else { (working & !FILLED, working & FILLED != 0) };
+            let (px, filled) = if working == NONE {
+                (0, false)
+            } else {
+                (working & !FILLED, working & FILLED != 0)
+            };
             let value = px as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16);
             *disparity = if filled && value > 0 { value | DISPARITY_FILLED } else { value };
         }
@@ -214,7 +298,8 @@ fn image_of(disparity: &mut [u16], pixels: usize) -> &mut [i16] {
     bytemuck::cast_slice_mut(disparity).get_mut(..pixels).unwrap_or(&mut [])
 }
 
-/// The gradient region as four images: horizontal and vertical gradient of the left image, then of the right one.
+/// The gradient region as four images: horizontal and vertical gradient of the left image, then of
+/// the right one.
 fn split_planes(gradients: &mut [u32], pixels: usize) -> [&mut [u8]; 4] {
     let mut planes = bytemuck::cast_slice_mut::<u32, u8>(gradients).chunks_exact_mut(pixels.max(1));
     [(); 4].map(|()| planes.next().unwrap_or(&mut []))

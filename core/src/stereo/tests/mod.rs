@@ -1,4 +1,5 @@
-//! Whole pairs through the matcher: analytic scenes with closed answers, input that must not be believed, and real clips.
+//! Whole pairs through the matcher: analytic scenes with closed answers, input that must not be
+//! believed, and real clips.
 
 mod clips;
 mod scenes;
@@ -40,7 +41,10 @@ pub(super) fn capacity(image_width: usize, image_height: usize) -> Capacity {
 }
 
 /// Runs `work` on a matcher in a slab of exactly its size.
-pub(super) fn with_matcher<R>(capacity: &Capacity, work: impl FnOnce(&mut StereoMatcher<'_>) -> R) -> R {
+pub(super) fn with_matcher<R>(
+    capacity: &Capacity,
+    work: impl FnOnce(&mut StereoMatcher<'_>) -> R,
+) -> R {
     let bytes = StereoMatcher::bytes(capacity);
     let mut memory: Box<[u8]> = vec![0xA5; bytes + SLAB_ALIGN].into_boxed_slice();
     let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
@@ -51,7 +55,12 @@ pub(super) fn with_matcher<R>(capacity: &Capacity, work: impl FnOnce(&mut Stereo
 }
 
 /// The report and the disparities of one pair, 1/256 px.
-pub(super) fn disparity<E: Executor>(config: &StereoConfig, left: &Grey, right: &Grey, executor: &E) -> (StereoReport, Vec<u16>) {
+pub(super) fn disparity<E: Executor>(
+    config: &StereoConfig,
+    left: &Grey,
+    right: &Grey,
+    executor: &E,
+) -> (StereoReport, Vec<u16>) {
     with_matcher(&capacity(left.width, left.height), |matcher| {
         let report = matcher.compute(config, left.view(), right.view(), executor);
         let view = matcher.disparity_q8();

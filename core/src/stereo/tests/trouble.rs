@@ -1,4 +1,5 @@
-//! Input without an answer, input that fits nothing, and configurations at their limits: values, never panics.
+//! Input without an answer, input that fits nothing, and configurations at their limits: values,
+//! never panics.
 
 use super::{scenes::surface, *};
 use crate::{parallel::TwoThreads, problem::Problems, random::Random};
@@ -28,17 +29,26 @@ fn threads_change_nothing() {
 #[test]
 fn a_matcher_remembers_nothing_of_the_pair_before() {
     let (left, right) = surface(200, 80, 7, |_, _| 12.0);
-    let (config, fresh) = (StereoConfig::default(), disparity(&StereoConfig::default(), &left, &right, &Serial));
+    let (config, fresh) =
+        (StereoConfig::default(), disparity(&StereoConfig::default(), &left, &right, &Serial));
     with_matcher(&capacity(333, 100), |matcher| {
         for seed in 0..2 {
-            matcher.compute(&config, noise(333, 100, seed).view(), noise(333, 100, seed).view(), &Serial);
+            matcher.compute(
+                &config,
+                noise(333, 100, seed).view(),
+                noise(333, 100, seed).view(),
+                &Serial,
+            );
             let report = matcher.compute(&config, left.view(), right.view(), &Serial);
             let disparity: Vec<u16> = matcher.disparity_q8().rows().flatten().copied().collect();
             assert!((report, disparity) == fresh, "a larger buffer and another pair before");
             for unlike in [flat(200, 80, 0), flat(199, 80, 0)] {
                 matcher.compute(&config, left.view(), right.view(), &Serial);
                 matcher.compute(&config, left.view(), unlike.view(), &Serial);
-                assert!(matcher.disparity_q8().rows().flatten().all(|&d| d == 0), "without an answer nothing of it is left");
+                assert!(
+                    matcher.disparity_q8().rows().flatten().all(|&d| d == 0),
+                    "without an answer nothing of it is left"
+                );
             }
         }
     });
@@ -47,18 +57,31 @@ fn a_matcher_remembers_nothing_of_the_pair_before() {
 #[test]
 fn a_black_pair_has_no_support_and_no_disparity() {
     for grey in [0, 255] {
-        let (report, disparity) = disparity(&StereoConfig::default(), &flat(320, 96, grey), &flat(320, 96, grey), &Serial);
-        assert_eq!((report.status, report.support_points, report.valid), (StereoStatus::TooFewSupportPoints, 0, 0));
+        let (report, disparity) = disparity(
+            &StereoConfig::default(),
+            &flat(320, 96, grey),
+            &flat(320, 96, grey),
+            &Serial,
+        );
+        assert_eq!(
+            (report.status, report.support_points, report.valid),
+            (StereoStatus::TooFewSupportPoints, 0, 0)
+        );
         assert!(disparity.iter().all(|&d| d == 0));
     }
-    let (report, _) = disparity(&StereoConfig::default(), &noise(320, 96, 1), &flat(320, 96, 0), &Serial);
+    let (report, _) =
+        disparity(&StereoConfig::default(), &noise(320, 96, 1), &flat(320, 96, 0), &Serial);
     assert_eq!(report.status, StereoStatus::TooFewSupportPoints);
 }
 
 #[test]
 fn refused_pairs_are_named_and_leave_no_disparity() {
     with_matcher(&capacity(100, 50), |matcher| {
-        assert_eq!(matcher.disparity_q8().rows().flatten().count(), 1, "before the first pair there is one pixel, without disparity");
+        assert_eq!(
+            matcher.disparity_q8().rows().flatten().count(),
+            1,
+            "before the first pair there is one pixel, without disparity"
+        );
         let config = StereoConfig::default();
         let mut status = |config: &StereoConfig, left: Grey, right: Grey| {
             let report = matcher.compute(config, left.view(), right.view(), &Serial);
@@ -70,9 +93,15 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
         assert_eq!(status(&config, noise(100, 51, 1), noise(100, 51, 1)), StereoStatus::TooLarge);
         assert_eq!(status(&config, noise(15, 50, 1), noise(15, 50, 1)), StereoStatus::TooSmall);
         let step = StereoConfig { candidate_step: 4, ..config };
-        assert_eq!(status(&step, noise(100, 50, 1), noise(100, 50, 1)), StereoStatus::ConfigRefused);
+        assert_eq!(
+            status(&step, noise(100, 50, 1), noise(100, 50, 1)),
+            StereoStatus::ConfigRefused
+        );
         let beta = StereoConfig { beta: f32::NAN, ..config };
-        assert_eq!(status(&beta, noise(100, 50, 1), noise(100, 50, 1)), StereoStatus::ConfigRefused);
+        assert_eq!(
+            status(&beta, noise(100, 50, 1), noise(100, 50, 1)),
+            StereoStatus::ConfigRefused
+        );
         assert_ne!(status(&config, noise(16, 16, 1), noise(16, 16, 1)), StereoStatus::TooSmall);
     });
 }
@@ -81,7 +110,12 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
 fn a_buffer_without_width_or_height_refuses_every_pair() {
     for (width, height) in [(0, 0), (40, 0), (0, 40)] {
         with_matcher(&capacity(width, height), |matcher| {
-            let report = matcher.compute(&StereoConfig::default(), noise(40, 40, 1).view(), noise(40, 40, 1).view(), &Serial);
+            let report = matcher.compute(
+                &StereoConfig::default(),
+                noise(40, 40, 1).view(),
+                noise(40, 40, 1).view(),
+                &Serial,
+            );
             assert_eq!((report.status, report.valid), (StereoStatus::TooLarge, 0));
             assert!(matcher.disparity_q8().rows().flatten().all(|&d| d == 0));
         });
@@ -90,7 +124,12 @@ fn a_buffer_without_width_or_height_refuses_every_pair() {
 
 /// Configurations at the limits of what `validate` lets pass.
 fn extremes() -> Vec<StereoConfig> {
-    let base = StereoConfig { support_texture: 0, match_texture: 0, median: true, ..StereoConfig::default() };
+    let base = StereoConfig {
+        support_texture: 0,
+        match_texture: 0,
+        median: true,
+        ..StereoConfig::default()
+    };
     vec![
         base,
         StereoConfig { disparity_max: 10, gap_width: 4_096, gap_discontinuity: u16::MAX, ..base },
@@ -133,7 +172,13 @@ fn extremes() -> Vec<StereoConfig> {
             ..base
         },
         StereoConfig { speckle_size: u32::MAX, ..base },
-        StereoConfig { lone_share: 1.0, lone_gap: 4_096, gap_width: 4_096, adaptive_mean: 4, ..base },
+        StereoConfig {
+            lone_share: 1.0,
+            lone_gap: 4_096,
+            gap_width: 4_096,
+            adaptive_mean: 4,
+            ..base
+        },
         StereoConfig { speckle_size: 0, gap_width: 0, adaptive_mean: 0, ..base },
     ]
 }

@@ -2,9 +2,14 @@
 
 use crate::problem::{Problems, require};
 
-/// How moving objects are found by their motion. Off by default: it adds to detections, or stands in for them.
+/// How moving objects are found by their motion. Off by default: it adds to detections, or stands
+/// in for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct SegmentationConfig {
     /// Whether moving objects are searched for.
     pub enabled: bool,
@@ -16,8 +21,8 @@ pub struct SegmentationConfig {
     pub camera_m: f32,
     /// Error of the camera's rotation in a frame, one sigma, rad; at least 0; 0.0005.
     pub camera_rad: f32,
-    /// Squared Mahalanobis distance from the static prediction beyond which a match is a candidate; above 0; 16.27 (chi-square, 3 degrees
-    /// of freedom, 0.1 %).
+    /// Squared Mahalanobis distance from the static prediction beyond which a match is a candidate;
+    /// above 0; 16.27 (chi-square, 3 degrees of freedom, 0.1 %).
     pub candidate_chi_square: f32,
     /// Farthest depth searched, m; above 0; 45.
     pub far_m: f32,
@@ -29,13 +34,16 @@ pub struct SegmentationConfig {
     pub sparse_from_m: f32,
     /// Least share of candidates among all matches within a group's box; 0 to 1; 0.85.
     pub candidate_share_min: f32,
-    /// Least motion of a group in a frame, m; at least 0; 0.1. 0.0008 m for each square metre of squared depth comes on top.
+    /// Least motion of a group in a frame, m; at least 0; 0.1. 0.0008 m for each square metre of
+    /// squared depth comes on top.
     pub motion_min_m: f32,
-    /// Of the last three frames, in how many a group's motion must agree before it is an object; 1 to 3; 2.
+    /// Of the last three frames, in how many a group's motion must agree before it is an object; 1
+    /// to 3; 2.
     pub confirm_frames: u8,
     /// Frames without a group over which an object's mask is predicted; 0 to 10; 3.
     pub predict_frames: u8,
-    /// Frames before an object was known to move, over which what it left in the static map is erased; 0 to 30, 0 is off; 8.
+    /// Frames before an object was known to move, over which what it left in the static map is
+    /// erased; 0 to 30, 0 is off; 8.
     pub erase_frames: u8,
 }
 
@@ -66,21 +74,59 @@ impl SegmentationConfig {
     pub(in crate::tracking) fn validate(&self, problems: &mut Problems) {
         let positive = |value: f32| value.is_finite() && value > 0.0;
         let not_negative = |value: f32| value.is_finite() && value >= 0.0;
-        let mut check = |holds: bool, key: &'static str, rule: &'static str| require(problems, holds, key, rule);
+        let mut check = |holds: bool, key: &'static str, rule: &'static str| {
+            require(problems, holds, key, rule)
+        };
         check(positive(self.noise_px), "tracking.segmentation.noise_px", "must be above 0");
-        check(positive(self.disparity_noise_px), "tracking.segmentation.disparity_noise_px", "must be above 0");
+        check(
+            positive(self.disparity_noise_px),
+            "tracking.segmentation.disparity_noise_px",
+            "must be above 0",
+        );
         check(not_negative(self.camera_m), "tracking.segmentation.camera_m", "must be at least 0");
-        check(not_negative(self.camera_rad), "tracking.segmentation.camera_rad", "must be at least 0");
-        check(positive(self.candidate_chi_square), "tracking.segmentation.candidate_chi_square", "must be above 0");
+        check(
+            not_negative(self.camera_rad),
+            "tracking.segmentation.camera_rad",
+            "must be at least 0",
+        );
+        check(
+            positive(self.candidate_chi_square),
+            "tracking.segmentation.candidate_chi_square",
+            "must be above 0",
+        );
         check(positive(self.far_m), "tracking.segmentation.far_m", "must be above 0");
-        check((3..=1000).contains(&self.members_min), "tracking.segmentation.members_min", "must be in 3..=1000");
-        check((3..=1000).contains(&self.far_members_min), "tracking.segmentation.far_members_min", "must be in 3..=1000");
-        check(not_negative(self.sparse_from_m), "tracking.segmentation.sparse_from_m", "must be at least 0");
+        check(
+            (3..=1000).contains(&self.members_min),
+            "tracking.segmentation.members_min",
+            "must be in 3..=1000",
+        );
+        check(
+            (3..=1000).contains(&self.far_members_min),
+            "tracking.segmentation.far_members_min",
+            "must be in 3..=1000",
+        );
+        check(
+            not_negative(self.sparse_from_m),
+            "tracking.segmentation.sparse_from_m",
+            "must be at least 0",
+        );
         let share = (0.0..=1.0).contains(&self.candidate_share_min);
         check(share, "tracking.segmentation.candidate_share_min", "must be from 0 to 1");
-        check(not_negative(self.motion_min_m), "tracking.segmentation.motion_min_m", "must be at least 0");
-        check((1..=3).contains(&self.confirm_frames), "tracking.segmentation.confirm_frames", "must be in 1..=3");
-        check(self.predict_frames <= 10, "tracking.segmentation.predict_frames", "must be at most 10");
+        check(
+            not_negative(self.motion_min_m),
+            "tracking.segmentation.motion_min_m",
+            "must be at least 0",
+        );
+        check(
+            (1..=3).contains(&self.confirm_frames),
+            "tracking.segmentation.confirm_frames",
+            "must be in 1..=3",
+        );
+        check(
+            self.predict_frames <= 10,
+            "tracking.segmentation.predict_frames",
+            "must be at most 10",
+        );
         check(self.erase_frames <= 30, "tracking.segmentation.erase_frames", "must be at most 30");
     }
 }

@@ -1,7 +1,8 @@
 //! The ground plane, so that an object's mask ends where it stands.
 //!
-//! `y = height + slope z` in the camera's axes, without roll: of a few slopes the one whose heights agree best, by votes of lattice
-//! points below the horizon. Integer votes: the order of points does not matter.
+//! `y = height + slope z` in the camera's axes, without roll: of a few slopes the one whose heights
+//! agree best, by votes of lattice points below the horizon. Integer votes: the order of points
+//! does not matter.
 
 use super::lattice::Lattice;
 use crate::{geometry::StereoRig, image::View};
@@ -64,7 +65,10 @@ impl Ground {
             let pairs = counts.iter().zip(counts.iter().skip(1)).map(|(a, b)| a + b);
             for (bin, count) in (1..).zip(pairs) {
                 if count >= VOTES_MIN && best.is_none_or(|(most, _)| count > most) {
-                    best = Some((count, Self { height_m: HEIGHT_MIN_M + HEIGHT_STEP_M * f64::from(bin), slope }));
+                    best = Some((
+                        count,
+                        Self { height_m: HEIGHT_MIN_M + HEIGHT_STEP_M * f64::from(bin), slope },
+                    ));
                 }
             }
         }

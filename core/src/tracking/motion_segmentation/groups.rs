@@ -25,7 +25,8 @@ const MOTION_M: f64 = 0.15;
 const MOTION_PER_DEPTH: f64 = 0.02;
 /// A group's motion beyond the least one, m for each m^2 of squared depth.
 const MOTION_PER_SQUARED_DEPTH: f64 = 0.0008;
-/// Up to this depth groups are small as well, m: what passes the camera is blurred, cut by the image's border, and fast.
+/// Up to this depth groups are small as well, m: what passes the camera is blurred, cut by the
+/// image's border, and fast.
 const SPARSE_UP_TO_M: f64 = 10.0;
 /// Those are at least so wide or long, m: of bollards in a row one is taken for the next.
 const WIDTH_MIN_M: f64 = 0.5;
@@ -35,7 +36,8 @@ const EXTENT_MAX_M: [f64; 3] = [8.0, 5.0, 12.0];
 const MERGE_MOTION_M: f64 = 0.2;
 const MERGE_DISTANCE_M: f64 = 4.0;
 
-/// A match that contradicts the static prediction. The position in the image is of the current left frame.
+/// A match that contradicts the static prediction. The position in the image is of the current left
+/// frame.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(in crate::tracking) struct Candidate {
@@ -88,7 +90,8 @@ impl Candidate {
     fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
         let depth_m = f64::from(self.point_m[2]);
         let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
-        let disparity_px = max_f64(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
+        let disparity_px =
+            max_f64(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
         if apart(self.u, other.u) > reach_px
             || apart(self.v, other.v) > reach_px
             || apart(self.disparity_px, other.disparity_px) > disparity_px
@@ -167,20 +170,26 @@ impl Group {
     /// Whether it moves, and is not too large for an object.
     pub fn is_plausible(&self, config: &SegmentationConfig) -> bool {
         let Extent { low, high } = &self.extent;
-        let is_small = low.iter().zip(high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
-        is_small && self.motion_m.norm() > f64::from(config.motion_min_m) + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
+        let is_small =
+            low.iter().zip(high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
+        is_small
+            && self.motion_m.norm()
+                > f64::from(config.motion_min_m)
+                    + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
     }
 
     /// Whether another group is on the same object: of one motion and close by.
     fn is_same(&self, other: &Self) -> bool {
-        (other.motion_m - self.motion_m).norm() < MERGE_MOTION_M && other.extent.gap(&self.extent) < MERGE_DISTANCE_M
+        (other.motion_m - self.motion_m).norm() < MERGE_MOTION_M
+            && other.extent.gap(&self.extent) < MERGE_DISTANCE_M
     }
 
     /// Whether it has members enough as well.
     pub fn passes(&self, config: &SegmentationConfig) -> bool {
         let Extent { low: [left, _, near], high: [right, _, far] } = self.extent;
         let is_wide = max_f64(right - left, far - near) > WIDTH_MIN_M;
-        let is_sparse = self.depth_m > f64::from(config.sparse_from_m) || self.depth_m < SPARSE_UP_TO_M && is_wide;
+        let is_sparse = self.depth_m > f64::from(config.sparse_from_m)
+            || self.depth_m < SPARSE_UP_TO_M && is_wide;
         let least = if is_sparse { config.far_members_min } else { config.members_min };
         self.members >= u32::from(least) && self.is_plausible(config)
     }
@@ -191,13 +200,19 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
     for later in 1..candidates.len() {
         let Some((earlier, rest)) = candidates.split_at_mut_checked(later) else { return };
         let Some(candidate) = rest.first().copied() else { return };
-        let reach_px = max_f64(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
+        let reach_px =
+            max_f64(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
         for index in 0..earlier.len() {
-            let is_neighbour = earlier.get(index).is_some_and(|other| candidate.is_neighbour(other, reach_px));
+            let is_neighbour =
+                earlier.get(index).is_some_and(|other| candidate.is_neighbour(other, reach_px));
             if is_neighbour {
                 let (a, b) = (root(earlier, rest, later as u32), root(earlier, rest, index as u32));
                 let (first, second) = if a < b { (a, b) } else { (b, a) };
-                let slot = if (second as usize) < later { earlier.get_mut(second as usize) } else { rest.first_mut() };
+                let slot = if (second as usize) < later {
+                    earlier.get_mut(second as usize)
+                } else {
+                    rest.first_mut()
+                };
                 slot.into_iter().for_each(|slot| slot.parent = first);
             }
         }
@@ -212,7 +227,10 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
 fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
     loop {
         let index = at as usize;
-        let parent = earlier.get(index).or_else(|| rest.get(index.checked_sub(earlier.len())?)).map_or(at, |candidate| candidate.parent);
+        let parent = earlier
+            .get(index)
+            .or_else(|| rest.get(index.checked_sub(earlier.len())?))
+            .map_or(at, |candidate| candidate.parent);
         if parent >= at {
             return at;
         }
@@ -220,7 +238,8 @@ fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
     }
 }
 
-/// Sets `groups` to those that pass the gates; those on one object are merged. `refused` counts groups beyond [`GROUPS_MAX`].
+/// Sets `groups` to those that pass the gates; those on one object are merged. `refused` counts
+/// groups beyond [`GROUPS_MAX`].
 pub(super) fn select<'m>(
     model: &StaticModel<'_>,
     candidates: &[Candidate],
@@ -234,7 +253,11 @@ pub(super) fn select<'m>(
         if candidate.parent != first {
             continue;
         }
-        let Some(group) = measure(candidates, first, values).filter(|group| group.passes(model.config)) else { continue };
+        let Some(group) =
+            measure(candidates, first, values).filter(|group| group.passes(model.config))
+        else {
+            continue;
+        };
         *refused += u32::from(groups.push(group).is_err());
     }
     let mut counts = [[0u32; 2]; GROUPS_MAX];
@@ -266,8 +289,8 @@ struct Members<'m> {
 }
 
 impl Members<'_> {
-    /// The value that so many of a thousand members do not exceed, in the order of `f32::total_cmp`. Selected bit by
-    /// bit: sorting would recurse.
+    /// The value that so many of a thousand members do not exceed, in the order of
+    /// `f32::total_cmp`. Selected bit by bit: sorting would recurse.
     fn percentile(&mut self, permille: usize, of: impl Fn(&Candidate) -> f32) -> Option<f64> {
         let values = self.values.get_mut(..self.count)?;
         let members = self.candidates.iter().filter(|candidate| candidate.parent == self.first);
@@ -295,7 +318,8 @@ fn from_ordered(bits: u32) -> f32 {
     f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
 }
 
-/// The median motion and the extent of a group that `first` is the first member of, if it has three members.
+/// The median motion and the extent of a group that `first` is the first member of, if it has three
+/// members.
 pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
     let count = candidates.iter().filter(|candidate| candidate.parent == first).count();
     if count < 3 {
@@ -322,7 +346,12 @@ fn merge(groups: &mut Vec<Group, GROUPS_MAX>) {
     // The largest first, by a key that no two groups share; in place, for the stack.
     let key = |group: &Group| (u32::MAX - group.members, group.first);
     for at in 0..groups.len() {
-        let next = groups.iter().enumerate().skip(at).min_by_key(|(_, group)| key(group)).map(|(index, _)| index);
+        let next = groups
+            .iter()
+            .enumerate()
+            .skip(at)
+            .min_by_key(|(_, group)| key(group))
+            .map(|(index, _)| index);
         if let Some(Ok([slot, next])) = next.map(|next| groups.get_disjoint_mut([at, next])) {
             core::mem::swap(slot, next);
         }
@@ -341,14 +370,16 @@ fn merge(groups: &mut Vec<Group, GROUPS_MAX>) {
     groups.truncate(merged);
 }
 
-/// Adds the groups of sparse matches: each widens the one on the same object, or is a new one where none lies, if it has `members_min`
-/// members. Returns how many there is no space for.
+/// Adds the groups of sparse matches: each widens the one on the same object, or is a new one where
+/// none lies, if it has `members_min` members. Returns how many there is no space for.
 pub(super) fn add(groups: &mut Vec<Group, GROUPS_MAX>, more: &[Group], members_min: u16) -> u32 {
     let mut refused = 0;
     for group in more {
         if let Some(known) = groups.iter_mut().find(|known| known.is_same(group)) {
             known.extent = known.extent.union(&group.extent);
-        } else if group.members >= u32::from(members_min) && groups.iter().all(|known| known.extent.gap(&group.extent) > 0.0) {
+        } else if group.members >= u32::from(members_min)
+            && groups.iter().all(|known| known.extent.gap(&group.extent) > 0.0)
+        {
             refused += u32::from(groups.push(*group).is_err());
         }
     }
@@ -375,8 +406,12 @@ mod tests {
     #[test]
     fn a_near_group_may_be_small_where_it_is_wide_enough_for_more_than_a_bollard() {
         let config = SegmentationConfig::default();
-        assert!(group(0.0, 0.6, 5.0, 5).passes(&config) && !group(0.0, 0.4, 5.0, 5).passes(&config));
-        assert!(group(0.0, 0.4, 5.0, 8).passes(&config) && !group(0.0, 0.6, 15.0, 5).passes(&config));
+        assert!(
+            group(0.0, 0.6, 5.0, 5).passes(&config) && !group(0.0, 0.4, 5.0, 5).passes(&config)
+        );
+        assert!(
+            group(0.0, 0.4, 5.0, 8).passes(&config) && !group(0.0, 0.6, 15.0, 5).passes(&config)
+        );
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Far matches, tested together with their neighbours.
 //!
-//! What keeps its distance to the camera moves by less, in the image, than one match errs by. The mean residual of n neighbours errs by
-//! less: with the neighbours' own variance V, the camera's part Q of the covariance, which all of them share, and half of them
-//! independent, `r' (2 V / n + Q + F)^-1 r` is compared with the same bound as that of one match. F is what no number of matches
-//! averages out: whole patterns are matched with a common error.
+//! What keeps its distance to the camera moves by less, in the image, than one match errs by. The
+//! mean residual of n neighbours errs by less: with the neighbours' own variance V, the camera's
+//! part Q of the covariance, which all of them share, and half of them independent,
+//! `r' (2 V / n + Q + F)^-1 r` is compared with the same bound as that of one match. F is what no
+//! number of matches averages out: whole patterns are matched with a common error.
 //!
 //! Time: a comparison for each pair of at most [`JOINT_MAX`] matches.
 
@@ -72,10 +73,18 @@ impl<'m> FarMatches<'m> {
     }
 
     /// Adds a match that is far, and not the ground's; beyond the bound none is added.
-    pub fn add(&mut self, m: &Match, index: usize, residual: &Residual, candidate: bool, ground: Option<&Ground>) {
+    pub fn add(
+        &mut self,
+        m: &Match,
+        index: usize,
+        residual: &Residual,
+        candidate: bool,
+        ground: Option<&Ground>,
+    ) {
         let depth_m = residual.point_m.z;
         let above_m = ground.map(|ground| ground.above_m(residual.point_m.into()));
-        let is_tested = depth_m > FROM_M && above_m.is_none_or(|above_m| above_m > ABOVE_MIN_M && above_m < ABOVE_MAX_M);
+        let is_tested = depth_m > FROM_M
+            && above_m.is_none_or(|above_m| above_m > ABOVE_MIN_M && above_m < ABOVE_MAX_M);
         if let Some(slot) = self.slots.get_mut(self.len).filter(|_| is_tested) {
             let numbers = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
             *slot = FarMatch {
@@ -95,15 +104,24 @@ impl<'m> FarMatches<'m> {
         self.len
     }
 
-    /// The position among the matches of the far match at `at`, and its residual as its neighbours together have it, if it is a candidate only
-    /// by these.
-    pub fn candidate(&self, model: &StaticModel<'_>, matches: &[Match], at: usize) -> Option<(usize, Residual)> {
+    /// The position among the matches of the far match at `at`, and its residual as its neighbours
+    /// together have it, if it is a candidate only by these.
+    pub fn candidate(
+        &self,
+        model: &StaticModel<'_>,
+        matches: &[Match],
+        at: usize,
+    ) -> Option<(usize, Residual)> {
         let own = self.slots.get(at).filter(|own| own.candidate == 0)?;
         let m = matches.get(own.index as usize)?;
         let reach_px = REACH_M * model.rig.focal_px / f64::from(own.depth_m);
         let reach_px = (if reach_px > REACH_MIN_PX { reach_px } else { REACH_MIN_PX }) as f32;
         let mut sums = Sums::default();
-        self.slots.iter().take(self.len).filter(|other| own.is_neighbour(other, reach_px)).for_each(|other| sums.add(other));
+        self.slots
+            .iter()
+            .take(self.len)
+            .filter(|other| own.is_neighbour(other, reach_px))
+            .for_each(|other| sums.add(other));
         if sums.count < NEIGHBOURS_MIN {
             return None;
         }
@@ -116,7 +134,8 @@ impl<'m> FarMatches<'m> {
         let (residual, shared) = model.residual_and_shared(m)?;
         let covariance = Matrix3::from_diagonal(&variance) + shared;
         let chi_square = mean.dot(&Cholesky::new(covariance).map(|factor| factor.solve(&mean))?);
-        let depth_sigma_m = libm::sqrt(covariance.m33) * f64::from(own.depth_m) / f64::from(own.at[2]);
+        let depth_sigma_m =
+            libm::sqrt(covariance.m33) * f64::from(own.depth_m) / f64::from(own.at[2]);
         let joint = Residual {
             chi_square,
             residual_px: mean,
@@ -124,7 +143,8 @@ impl<'m> FarMatches<'m> {
             depth_sigma_m,
             ..residual
         };
-        (chi_square > f64::from(model.config.candidate_chi_square)).then_some((own.index as usize, joint))
+        (chi_square > f64::from(model.config.candidate_chi_square))
+            .then_some((own.index as usize, joint))
     }
 }
 
@@ -138,7 +158,10 @@ impl FarMatch {
         let share_px = DISPARITY_SHARE * f64::from(d);
         let disparity_px = if share_px > DISPARITY_MIN_PX { share_px } else { DISPARITY_MIN_PX };
         let residuals = self.residual_px.iter().zip(other.residual_px).zip(RESIDUAL_PX);
-        f64::from(apart(d, d2)) < disparity_px && residuals.into_iter().all(|((own, other), most)| f64::from(apart(*own, other)) < most)
+        f64::from(apart(d, d2)) < disparity_px
+            && residuals
+                .into_iter()
+                .all(|((own, other), most)| f64::from(apart(*own, other)) < most)
     }
 }
 

@@ -13,20 +13,26 @@ const GROWN: u8 = 1;
 const FILLED: u8 = 2;
 /// Side of a lattice cell, px.
 pub(super) const CELL_PX: usize = 4;
-/// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below, along the depth.
+/// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below,
+/// along the depth.
 const MARGIN_M: [f64; 3] = [0.9, 0.9, 1.6];
-/// Less of it far away, m by metre of depth, and at least: there the disparities of an object reach beyond it.
+/// Less of it far away, m by metre of depth, and at least: there the disparities of an object reach
+/// beyond it.
 const MARGIN_PER_DEPTH: f64 = 0.02;
 const MARGIN_MIN_M: f64 = 0.45;
-/// How long an object is along the depth at least, m: of a car that comes, the members are on its front.
+/// How long an object is along the depth at least, m: of a car that comes, the members are on its
+/// front.
 const LENGTH_M: f64 = 4.5;
-/// An object further to the side than this share of its depth shows its side, and its members may be on either end of it.
+/// An object further to the side than this share of its depth shows its side, and its members may
+/// be on either end of it.
 const BESIDE: f64 = 0.25;
-/// Disparities of neighbouring cells of one object differ by less, px: those of the side of a car 2 m beside the camera by 1.1.
+/// Disparities of neighbouring cells of one object differ by less, px: those of the side of a car 2
+/// m beside the camera by 1.1.
 const STEP_PX: f64 = 0.4;
 /// The same as a share of the disparity.
 const STEP_SHARE: f64 = 0.04;
-/// How much wider than the disparity the part of the image is at most that the right camera does not see, px: matching needs some pixels about each.
+/// How much wider than the disparity the part of the image is at most that the right camera does
+/// not see, px: matching needs some pixels about each.
 const BORDER_PX: f64 = 16.0;
 /// A match decides on cells whose disparity differs from its own by less, as a share and px.
 const BLOCK_SHARE: f64 = 0.06;
@@ -46,13 +52,15 @@ pub(super) struct Lattice<'a> {
 
 impl<'a> Lattice<'a> {
     pub fn new(rig: &'a StereoRig, disparity_q8: View<'a, u16>) -> Self {
-        let (columns, rows) = (disparity_q8.width().div_ceil(CELL_PX), disparity_q8.height().div_ceil(CELL_PX));
+        let (columns, rows) =
+            (disparity_q8.width().div_ceil(CELL_PX), disparity_q8.height().div_ceil(CELL_PX));
         Self { rig, disparity_q8, columns, rows }
     }
 
     /// The pixel of a cell: its middle, within the image.
     fn pixel(&self, column: usize, row: usize) -> [usize; 2] {
-        let within = |cell: usize, size: usize| (cell * CELL_PX + CELL_PX / 2).min(size.saturating_sub(1));
+        let within =
+            |cell: usize, size: usize| (cell * CELL_PX + CELL_PX / 2).min(size.saturating_sub(1));
         [within(column, self.disparity_q8.width()), within(row, self.disparity_q8.height())]
     }
 
@@ -65,11 +73,19 @@ impl<'a> Lattice<'a> {
     /// The pixels in the middle of the marked cells.
     pub fn marked(&self, cells: &[u8], pixels: &PixelBox) -> impl Iterator<Item = [usize; 2]> {
         let cell = |px: i32| usize::try_from(px).unwrap_or(0) / CELL_PX;
-        let (columns, rows) =
-            (cell(pixels.left)..cell(pixels.left + pixels.width - 1) + 1, cell(pixels.top)..cell(pixels.top + pixels.height - 1) + 1);
-        let is_marked = move |row: usize, column: usize| cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0);
-        let in_row =
-            move |row: usize| columns.clone().filter(move |column| is_marked(row, *column)).map(move |column| self.pixel(column, row));
+        let (columns, rows) = (
+            cell(pixels.left)..cell(pixels.left + pixels.width - 1) + 1,
+            cell(pixels.top)..cell(pixels.top + pixels.height - 1) + 1,
+        );
+        let is_marked = move |row: usize, column: usize| {
+            cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0)
+        };
+        let in_row = move |row: usize| {
+            columns
+                .clone()
+                .filter(move |column| is_marked(row, *column))
+                .map(move |column| self.pixel(column, row))
+        };
         rows.flat_map(in_row)
     }
 
@@ -87,14 +103,26 @@ impl<'a> Lattice<'a> {
 
     /// The points of every second cell of every second row below the horizon.
     pub fn points_below_horizon(&self) -> impl Iterator<Item = [f64; 3]> {
-        let rows = (0..self.rows).step_by(2).filter(|&row| self.pixel(0, row)[1] as f64 > self.rig.center_v_px);
-        rows.flat_map(move |row| (0..self.columns).step_by(2).filter_map(move |column| self.point(column, row)))
+        let rows = (0..self.rows)
+            .step_by(2)
+            .filter(|&row| self.pixel(0, row)[1] as f64 > self.rig.center_v_px);
+        rows.flat_map(move |row| {
+            (0..self.columns).step_by(2).filter_map(move |column| self.point(column, row))
+        })
     }
 
-    /// Marks the cells of an object, from those within its extent on, connected through cells that can be its own, and fills gaps between
-    /// them. The marks are `cells`, row by row of the lattice; those that `blocked` marks belong to something else. Returns the pixels they
-    /// lie in.
-    pub fn grow(&self, extent: &Extent, ground: Option<&Ground>, blocked: &[u8], cells: &mut [u8], queue: &mut [u32]) -> Option<PixelBox> {
+    /// Marks the cells of an object, from those within its extent on, connected through cells that
+    /// can be its own, and fills gaps between them. The marks are `cells`, row by row of the
+    /// lattice; those that `blocked` marks belong to something else. Returns the pixels they lie
+    /// in.
+    pub fn grow(
+        &self,
+        extent: &Extent,
+        ground: Option<&Ground>,
+        blocked: &[u8],
+        cells: &mut [u8],
+        queue: &mut [u32],
+    ) -> Option<PixelBox> {
         let reach = widened(extent);
         let bounds = self.bounds(&reach)?;
         let can_be_own = |column: usize, row: usize, within: &Extent| {
@@ -102,7 +130,9 @@ impl<'a> Lattice<'a> {
                 return false;
             }
             let point = self.point(column, row).filter(|point| within.contains(&(*point).into()));
-            point.is_some_and(|point| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M))
+            point.is_some_and(|point| {
+                ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
+            })
         };
         let cells = cells.get_mut(..self.columns * self.rows)?;
         cells.fill(0);
@@ -112,7 +142,8 @@ impl<'a> Lattice<'a> {
         let mut queued = 0;
         for (column, row) in bounds.cells() {
             if can_be_own(column, row, start) {
-                let (cell, slot) = (cells.get_mut(row * self.columns + column)?, queue.get_mut(queued)?);
+                let (cell, slot) =
+                    (cells.get_mut(row * self.columns + column)?, queue.get_mut(queued)?);
                 (*cell, *slot) = (GROWN, (row * self.columns + column) as u32);
                 queued += 1;
             }
@@ -125,10 +156,18 @@ impl<'a> Lattice<'a> {
             let disparity_px = self.disparity_px(self.pixel(column, row))?;
             let step_px = step_px(disparity_px);
             let is_next = |column: usize, row: usize| {
-                self.disparity_px(self.pixel(column, row)).is_some_and(|other_px| libm::fabs(other_px - disparity_px) < step_px)
+                self.disparity_px(self.pixel(column, row))
+                    .is_some_and(|other_px| libm::fabs(other_px - disparity_px) < step_px)
             };
-            let around = [(column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
-            for (column, row) in around.into_iter().filter(|&(column, row)| bounds.contains(column, row)) {
+            let around = [
+                (column.wrapping_sub(1), row),
+                (column + 1, row),
+                (column, row.wrapping_sub(1)),
+                (column, row + 1),
+            ];
+            for (column, row) in
+                around.into_iter().filter(|&(column, row)| bounds.contains(column, row))
+            {
                 let cell = cells.get_mut(row * self.columns + column)?;
                 if *cell == 0 && is_next(column, row) && can_be_own(column, row, &reach) {
                     *cell = GROWN;
@@ -143,7 +182,8 @@ impl<'a> Lattice<'a> {
         self.pixels(&bounds, cells)
     }
 
-    /// Blocks the cell of a match that does not move, or frees that of one that does, where the disparity is the match's.
+    /// Blocks the cell of a match that does not move, or frees that of one that does, where the
+    /// disparity is the match's.
     pub fn block(&self, [u, v, disparity_px]: [f32; 3], moves: bool, blocked: &mut [u8]) {
         let cell = |px: f32| if px > 0.0 { px as usize / CELL_PX } else { 0 };
         let (column, row, disparity_px) = (cell(u), cell(v), f64::from(disparity_px));
@@ -153,7 +193,9 @@ impl<'a> Lattice<'a> {
         let reach_px = max_f64(BLOCK_SHARE * disparity_px, BLOCK_PX);
         let is_same = |other_px: f64| libm::fabs(other_px - disparity_px) < reach_px;
         let slot = blocked.get_mut(row * self.columns + column);
-        if let Some(slot) = slot.filter(|_| self.disparity_px(self.pixel(column, row)).is_some_and(is_same)) {
+        if let Some(slot) =
+            slot.filter(|_| self.disparity_px(self.pixel(column, row)).is_some_and(is_same))
+        {
             *slot = u8::from(!moves);
         }
     }
@@ -185,22 +227,28 @@ impl<'a> Lattice<'a> {
             bounds.contains(column, row) && cells.get(row * self.columns + column) == Some(&GROWN)
         };
         for (column, row) in bounds.cells() {
-            let is_between = (is_marked(cells, column.wrapping_sub(1), row) && is_marked(cells, column + 1, row))
-                || (is_marked(cells, column, row.wrapping_sub(1)) && is_marked(cells, column, row + 1));
-            if let Some(cell) = cells.get_mut(row * self.columns + column).filter(|cell| is_between && **cell == 0) {
+            let is_between = (is_marked(cells, column.wrapping_sub(1), row)
+                && is_marked(cells, column + 1, row))
+                || (is_marked(cells, column, row.wrapping_sub(1))
+                    && is_marked(cells, column, row + 1));
+            if let Some(cell) =
+                cells.get_mut(row * self.columns + column).filter(|cell| is_between && **cell == 0)
+            {
                 *cell = FILLED;
             }
         }
     }
 
-    /// Fills the cells between a mask and the left border where none has a disparity: the right camera does not see what is there.
+    /// Fills the cells between a mask and the left border where none has a disparity: the right
+    /// camera does not see what is there.
     fn reach_border(&self, bounds: &Bounds, cells: &mut [u8]) {
         for row in bounds.top..bounds.bottom {
             let at = |column: usize| row * self.columns + column;
             let is_marked = |column: &usize| cells.get(at(*column)).is_some_and(|cell| *cell > 0);
             let Some(first) = (bounds.left..bounds.right).find(is_marked) else { continue };
             let own_px = self.disparity_px(self.pixel(first, row)).unwrap_or_default();
-            let is_unseen = (0..first).all(|column| self.disparity_px(self.pixel(column, row)).is_none());
+            let is_unseen =
+                (0..first).all(|column| self.disparity_px(self.pixel(column, row)).is_none());
             if is_unseen && ((first * CELL_PX) as f64) < own_px + BORDER_PX {
                 let unseen = cells.get_mut(at(bounds.left)..at(first)).unwrap_or_default();
                 unseen.fill(FILLED);
@@ -210,10 +258,18 @@ impl<'a> Lattice<'a> {
 
     /// The pixels of the marked cells.
     fn pixels(&self, bounds: &Bounds, cells: &[u8]) -> Option<PixelBox> {
-        let marked = || bounds.cells().filter(|(column, row)| cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0));
-        let (left, right) = (marked().map(|(column, _)| column).min()?, marked().map(|(column, _)| column).max()?);
-        let (top, bottom) = (marked().map(|(_, row)| row).min()?, marked().map(|(_, row)| row).max()?);
-        let side = |first: usize, last: usize, size: usize| ((last + 1) * CELL_PX).min(size) - first * CELL_PX;
+        let marked = || {
+            bounds.cells().filter(|(column, row)| {
+                cells.get(row * self.columns + column).is_some_and(|cell| *cell > 0)
+            })
+        };
+        let (left, right) =
+            (marked().map(|(column, _)| column).min()?, marked().map(|(column, _)| column).max()?);
+        let (top, bottom) =
+            (marked().map(|(_, row)| row).min()?, marked().map(|(_, row)| row).max()?);
+        let side = |first: usize, last: usize, size: usize| {
+            ((last + 1) * CELL_PX).min(size) - first * CELL_PX
+        };
         Some(PixelBox {
             left: (left * CELL_PX) as i32,
             top: (top * CELL_PX) as i32,
@@ -222,14 +278,22 @@ impl<'a> Lattice<'a> {
         })
     }
 
-    /// Whether a pixel belongs to the marked cells: it lies in one, has the disparity of that or of one beside it, and is above the ground. One
-    /// without a disparity belongs to the cell it lies in.
+    /// Whether a pixel belongs to the marked cells: it lies in one, has the disparity of that or of
+    /// one beside it, and is above the ground. One without a disparity belongs to the cell it lies
+    /// in.
     pub fn is_own(&self, ground: Option<&Ground>, cells: &[u8], u: i32, v: i32) -> bool {
-        let Some(at) = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| [u, v]) else { return false };
+        let Some(at) = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| [u, v])
+        else {
+            return false;
+        };
         let [column, row] = at.map(|px| px / CELL_PX);
         let mark = |column: usize, row: usize| {
             let is_within = column < self.columns && row < self.rows;
-            cells.get(row * self.columns + column).copied().filter(|_| is_within).unwrap_or_default()
+            cells
+                .get(row * self.columns + column)
+                .copied()
+                .filter(|_| is_within)
+                .unwrap_or_default()
         };
         let own = mark(column, row);
         // A cell that fills a gap has no disparity of the object's.
@@ -239,11 +303,20 @@ impl<'a> Lattice<'a> {
         let Some(disparity_px) = self.disparity_px(at) else { return true };
         let is_like = |column: usize, row: usize| {
             let like = |cell_px: f64| libm::fabs(cell_px - disparity_px) < step_px(cell_px);
-            mark(column, row) == GROWN && self.disparity_px(self.pixel(column, row)).is_some_and(like)
+            mark(column, row) == GROWN
+                && self.disparity_px(self.pixel(column, row)).is_some_and(like)
         };
-        let near = [(column, row), (column.wrapping_sub(1), row), (column + 1, row), (column, row.wrapping_sub(1)), (column, row + 1)];
-        let is_above = |point: [f64; 3]| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M);
-        near.into_iter().any(|(column, row)| is_like(column, row)) && self.point_at(at).is_some_and(is_above)
+        let near = [
+            (column, row),
+            (column.wrapping_sub(1), row),
+            (column + 1, row),
+            (column, row.wrapping_sub(1)),
+            (column, row + 1),
+        ];
+        let is_above =
+            |point: [f64; 3]| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M);
+        near.into_iter().any(|(column, row)| is_like(column, row))
+            && self.point_at(at).is_some_and(is_above)
     }
 }
 
@@ -267,7 +340,8 @@ impl Bounds {
     }
 
     fn cells(self) -> impl Iterator<Item = (usize, usize)> {
-        (self.top..self.bottom).flat_map(move |row| (self.left..self.right).map(move |column| (column, row)))
+        (self.top..self.bottom)
+            .flat_map(move |row| (self.left..self.right).map(move |column| (column, row)))
     }
 }
 
@@ -277,13 +351,19 @@ fn widened(extent: &Extent) -> Extent {
     let length_m = extent.high[2] - extent.low[2];
     let is_beside = libm::fabs(extent.center().x) > BESIDE * depth_m;
     let mut reach = *extent;
-    for (axis, ((low, high), margin_m)) in reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate() {
+    for (axis, ((low, high), margin_m)) in
+        reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate()
+    {
         let margin_m = if axis == 2 {
             margin_m + DEPTH_MARGIN * depth_m * depth_m
         } else {
             max_f64(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
         };
-        let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M { LENGTH_M - length_m } else { margin_m };
+        let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M {
+            LENGTH_M - length_m
+        } else {
+            margin_m
+        };
         let before_m = if is_beside { behind_m } else { margin_m };
         (*low, *high) = (*low - before_m, *high + behind_m);
     }

@@ -1,29 +1,39 @@
-//! Moving objects without a detector: matches that contradict a static world, grouped and grown to masks.
+//! Moving objects without a detector: matches that contradict a static world, grouped and grown to
+//! masks.
 //!
-//! The statistics are those of Zhou, Frémont, Quost, Dai, Li, *Moving object detection and segmentation in urban environments from a
-//! moving platform* (IVC 68, 2017), on sparse matches over two stereo pairs in place of dense flow:
+//! The statistics are those of Zhou, Frémont, Quost, Dai, Li, *Moving object detection and
+//! segmentation in urban environments from a moving platform* (IVC 68, 2017), on sparse matches
+//! over two stereo pairs in place of dense flow:
 //!
-//! 1. matches whose residual against the camera's motion is too large for its covariance are *candidates* (`residual`);
-//! 2. so are far matches that contradict it only together with their neighbours (`joint`): what keeps its distance to the camera;
-//! 3. candidates that lie together and move alike form groups; a group must have enough members and motion, and nearly all matches
-//!    within its box must be candidates (`groups`): of wrong matches and of poorly known depth that is not so;
-//! 4. where candidates are few, and where an object of the frames before must be, patches are searched for by projection; a near group whose
-//!    patches are found as well where static points would be is one of a row of posts or the like, and no moving object (`patches`);
-//! 5. a group that agrees with one of the frames before is an object, and is predicted over frames without one (`hypotheses`);
+//! 1. matches whose residual against the camera's motion is too large for its covariance are
+//!    *candidates* (`residual`);
+//! 2. so are far matches that contradict it only together with their neighbours (`joint`): what
+//!    keeps its distance to the camera;
+//! 3. candidates that lie together and move alike form groups; a group must have enough members and
+//!    motion, and nearly all matches within its box must be candidates (`groups`): of wrong matches
+//!    and of poorly known depth that is not so;
+//! 4. where candidates are few, and where an object of the frames before must be, patches are
+//!    searched for by projection; a near group whose patches are found as well where static points
+//!    would be is one of a row of posts or the like, and no moving object (`patches`);
+//! 5. a group that agrees with one of the frames before is an object, and is predicted over frames
+//!    without one (`hypotheses`);
 //! 6. what it left in the static map before that is erased (`trail`);
-//! 7. its mask grows from its extent over the disparity image, above the ground, but not over matches that do not move (`lattice`, `ground`).
+//! 7. its mask grows from its extent over the disparity image, above the ground, but not over
+//!    matches that do not move (`lattice`, `ground`).
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
-//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match, 6 bytes for each 4 x 4 px of the image, 96
-//! bytes for each of 64 hypotheses, 80 for each of 32 supposed objects. Time: a triangulation and projection a match, a comparison for each pair
-//! of candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
+//! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match,
+//! 6 bytes for each 4 x 4 px of the image, 96 bytes for each of 64 hypotheses, 80 for each of 32
+//! supposed objects. Time: a triangulation and projection a match, a comparison for each pair of
+//! candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
 //!
 //! # What can go wrong
 //!
-//! Objects with fewer matches than a group needs are not found, nor are those that move less than depth errs by. What moves along the line
-//! of sight in the camera's own direction and speed has no residual in the image, but in disparity. A wrong camera motion makes
-//! everything a candidate: groups are then too large, and refused.
+//! Objects with fewer matches than a group needs are not found, nor are those that move less than
+//! depth errs by. What moves along the line of sight in the camera's own direction and speed has no
+//! residual in the image, but in disparity. A wrong camera motion makes everything a candidate:
+//! groups are then too large, and refused.
 
 mod collect;
 mod config;
@@ -42,7 +52,9 @@ pub use config::SegmentationConfig;
 pub use ground::Ground;
 pub(crate) use trail::Trail;
 
-use super::{CameraMotion, Class, FrameMatches, GuidedMatching, Tracker, match_assignment::OwnerCode};
+use super::{
+    CameraMotion, Class, FrameMatches, GuidedMatching, Tracker, match_assignment::OwnerCode,
+};
 use crate::{
     geometry::{StereoRig, Transform},
     image::View,
@@ -164,8 +176,9 @@ impl<'s> MotionSegmenter<'s> {
         self.hypotheses.take_trails(t_world_camera, visit);
     }
 
-    /// Groups what contradicts the static model and continues the hypotheses. With `search`, the places that have too few matches are searched
-    /// for more. `match_owners` are those of the refined and of the sparse matches.
+    /// Groups what contradicts the static model and continues the hypotheses. With `search`, the
+    /// places that have too few matches are searched for more. `match_owners` are those of the
+    /// refined and of the sparse matches.
     fn observe(
         &mut self,
         model: &StaticModel<'_>,
@@ -178,7 +191,8 @@ impl<'s> MotionSegmenter<'s> {
         let mut report = SegmentationReport::default();
         let [match_owner, sparse_owner] = match_owners;
         let len = self.collect(model, matches.refined, match_owner, 1.0, &mut report);
-        let len = self.collect_joint(model, matches.refined, match_owner, shape.ground.as_ref(), len);
+        let len =
+            self.collect_joint(model, matches.refined, match_owner, shape.ground.as_ref(), len);
         self.block_static(&shape.lattice, matches.refined, match_owner);
         let Some(candidates) = self.candidates.get_mut(..len) else { return report };
         groups::join(candidates, model.rig.focal_px);
@@ -190,8 +204,21 @@ impl<'s> MotionSegmenter<'s> {
             self.seed_count = 0;
             self.seed_predicted(camera);
             self.seed_small_groups(model.config, len);
-            let len = self.collect(model, matches.sparse, sparse_owner, SPARSE_VARIANCE, &mut SegmentationReport::default());
-            self.add_sparse(model, (matches.sparse, sparse_owner), len, &mut search, &mut groups, &mut report);
+            let len = self.collect(
+                model,
+                matches.sparse,
+                sparse_owner,
+                SPARSE_VARIANCE,
+                &mut SegmentationReport::default(),
+            );
+            self.add_sparse(
+                model,
+                (matches.sparse, sparse_owner),
+                len,
+                &mut search,
+                &mut groups,
+                &mut report,
+            );
             self.seed_small_groups(model.config, len);
             self.verify(model, search, &mut groups, &mut report);
         }
@@ -200,8 +227,8 @@ impl<'s> MotionSegmenter<'s> {
         report
     }
 
-    /// Widens the groups by those among the first `len` candidates, of sparse matches: the sides of a near object are too steep for refined
-    /// ones, whose neighbours must have like disparities.
+    /// Widens the groups by those among the first `len` candidates, of sparse matches: the sides of
+    /// a near object are too steep for refined ones, whose neighbours must have like disparities.
     // Never inlined, so that its groups are off the stack when patches are searched for.
     #[inline(never)]
     fn add_sparse(
@@ -246,7 +273,8 @@ impl<'s> MotionSegmenter<'s> {
             if candidates.get(first).is_none_or(|candidate| !candidate.is_first(first)) {
                 continue;
             }
-            let group = groups::measure(candidates, first as u32, self.values).filter(|group| group.is_plausible(config));
+            let group = groups::measure(candidates, first as u32, self.values)
+                .filter(|group| group.is_plausible(config));
             if let Some(group) = group {
                 self.seed(Seed::new(&group.extent, group.motion_m));
             }
@@ -268,15 +296,25 @@ impl<'s> MotionSegmenter<'s> {
                 continue;
             }
             if let Some(group) = search.verify(model, seed, &mut memory) {
-                search.unblock(memory.members.get(..group.members as usize).unwrap_or_default(), blocked);
+                search.unblock(
+                    memory.members.get(..group.members as usize).unwrap_or_default(),
+                    blocked,
+                );
                 report.refused += u32::from(groups.push(group).is_err());
             }
         }
     }
 
     /// Grows the mask of the confirmed hypothesis at that position; the pixels it lies in.
-    fn grow(&mut self, config: &SegmentationConfig, index: usize, shape: &Shape<'_>, camera: &CameraMotion) -> Option<PixelBox> {
-        let hypothesis = self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_shown(config))?;
+    fn grow(
+        &mut self,
+        config: &SegmentationConfig,
+        index: usize,
+        shape: &Shape<'_>,
+        camera: &CameraMotion,
+    ) -> Option<PixelBox> {
+        let hypothesis =
+            self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_shown(config))?;
         let extent = hypothesis.extent(&camera.t_world_camera);
         // Of what was not found again, far matches say nothing.
         let is_decided = hypothesis.is_observed() || extent.center().z < joint::FROM_M;
@@ -286,8 +324,8 @@ impl<'s> MotionSegmenter<'s> {
 }
 
 impl Tracker<'_> {
-    /// Adds instances of class [`Class::MovingObject`] for what moves in this frame, associates them with tracks and assigns their
-    /// matches to them.
+    /// Adds instances of class [`Class::MovingObject`] for what moves in this frame, associates
+    /// them with tracks and assigns their matches to them.
     pub(super) fn segment_motion(
         &mut self,
         rig: &StereoRig,
@@ -297,14 +335,19 @@ impl Tracker<'_> {
         search: Option<GuidedMatching<'_, '_>>,
     ) {
         let config = self.config;
-        let Some(t_current_previous) = camera.t_current_previous.filter(|_| config.dynamic && config.segmentation.enabled) else { return };
+        let Some(t_current_previous) =
+            camera.t_current_previous.filter(|_| config.dynamic && config.segmentation.enabled)
+        else {
+            return;
+        };
         let bias_px = [config.motion.bias_px, config.motion.lens_px].map(f64::from);
         let model = StaticModel::new(&config.segmentation, rig, &t_current_previous, bias_px);
         let lattice = Lattice::new(rig, disparity_q8);
         let shape = Shape { ground: Ground::find(&lattice), lattice };
         let search = search.map(|search| PatchSearch::new(search, &t_current_previous, &shape));
         let match_owners = [&*self.refined_owner, &*self.sparse_owner];
-        let mut report = self.segmenter.observe(&model, camera, matches, match_owners, &shape, search);
+        let mut report =
+            self.segmenter.observe(&model, camera, matches, match_owners, &shape, search);
         let first = self.instances.all().len();
         let mut index = 0;
         while index < self.segmenter.hypotheses.all().len() {
@@ -327,7 +370,14 @@ impl Tracker<'_> {
         self.report.segmentation = report;
         if self.instances.all().len() > first {
             let masks = &self.masks;
-            self.tracks.associate_from(first, &config, self.frame, self.instances.all_mut(), masks, &mut self.report.tracks);
+            self.tracks.associate_from(
+                first,
+                &config,
+                self.frame,
+                self.instances.all_mut(),
+                masks,
+                &mut self.report.tracks,
+            );
             self.assign_from(first, matches);
         }
     }

@@ -1,9 +1,11 @@
-//! More matches where candidates are few: patches of the mask that an object would have, searched for where its motion projects them.
+//! More matches where candidates are few: patches of the mask that an object would have, searched
+//! for where its motion projects them.
 //!
-//! A small or fast object has too few features for a group. Of a few candidates that move alike, and of an object of the frame before, the
-//! mask grows first. Its cells are then searched for in the other images: from where the supposed motion projects them and, where
-//! they are not found or move otherwise, from where a static point would be. The gates for the group of those that move as supposed are
-//! the same as for features: enough members, and few static patches among them.
+//! A small or fast object has too few features for a group. Of a few candidates that move alike,
+//! and of an object of the frame before, the mask grows first. Its cells are then searched for in
+//! the other images: from where the supposed motion projects them and, where they are not found or
+//! move otherwise, from where a static point would be. The gates for the group of those that move
+//! as supposed are the same as for features: enough members, and few static patches among them.
 //!
 //! Time: at most [`SEARCHES_MAX`] patches a frame, each searched for once or twice.
 
@@ -36,7 +38,8 @@ const KNOWN_SHARE_MIN: f64 = 0.7;
 /// What a motion to the side errs by, one sigma, by metre of depth.
 const SIDE_PER_DEPTH: f64 = 0.002;
 
-/// An object that is supposed to be there: its extent in the current camera, and its motion against the static prediction.
+/// An object that is supposed to be there: its extent in the current camera, and its motion against
+/// the static prediction.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(in crate::tracking) struct Seed {
@@ -105,7 +108,11 @@ pub(super) struct PatchMemory<'m> {
 }
 
 impl<'a, 's> PatchSearch<'a, 's> {
-    pub fn new(images: GuidedMatching<'a, 's>, t_current_previous: &Transform, shape: &'a Shape<'a>) -> Self {
+    pub fn new(
+        images: GuidedMatching<'a, 's>,
+        t_current_previous: &Transform,
+        shape: &'a Shape<'a>,
+    ) -> Self {
         Self {
             images,
             t_previous_current: t_current_previous.inverse(),
@@ -115,12 +122,28 @@ impl<'a, 's> PatchSearch<'a, 's> {
     }
 
     /// The group of a supposed object's patches, if it passes the gates.
-    pub fn verify(&mut self, model: &StaticModel<'_>, seed: &Seed, memory: &mut PatchMemory<'_>) -> Option<Group> {
+    pub fn verify(
+        &mut self,
+        model: &StaticModel<'_>,
+        seed: &Seed,
+        memory: &mut PatchMemory<'_>,
+    ) -> Option<Group> {
         let PatchMemory { cells, queue, members, values } = memory;
-        let pixels = self.shape.lattice.grow(&seed.extent(), self.shape.ground.as_ref(), &[], cells, queue)?;
+        let pixels = self.shape.lattice.grow(
+            &seed.extent(),
+            self.shape.ground.as_ref(),
+            &[],
+            cells,
+            queue,
+        )?;
         let every = self.shape.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
         let (mut moving, mut still) = (0usize, 0usize);
-        let marked = self.shape.lattice.marked(cells, &pixels).enumerate().filter(|(index, _)| index.is_multiple_of(every));
+        let marked = self
+            .shape
+            .lattice
+            .marked(cells, &pixels)
+            .enumerate()
+            .filter(|(index, _)| index.is_multiple_of(every));
         for (_, at) in marked {
             self.left = self.left.checked_sub(1)?;
             match self.search_patch(model, at, seed) {
@@ -132,7 +155,11 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 None => {}
             }
         }
-        let share = if seed.known > 0 { KNOWN_SHARE_MIN } else { f64::from(model.config.candidate_share_min) };
+        let share = if seed.known > 0 {
+            KNOWN_SHARE_MIN
+        } else {
+            f64::from(model.config.candidate_share_min)
+        };
         let is_moving = moving as f64 >= share * (moving + still) as f64;
         let group = measure(members.get(..moving)?, 0, values).filter(|_| is_moving)?;
         group.passes(model.config).then_some(group)
@@ -140,7 +167,9 @@ impl<'a, 's> PatchSearch<'a, 's> {
 
     /// Frees the cells around the patches of an object.
     pub fn unblock(&self, members: &[Candidate], blocked: &mut [u8]) {
-        members.iter().for_each(|member| self.shape.lattice.block(member.position(), true, blocked));
+        members
+            .iter()
+            .for_each(|member| self.shape.lattice.block(member.position(), true, blocked));
     }
 
     /// Searches for the patch at a pixel.
@@ -149,7 +178,12 @@ impl<'a, 's> PatchSearch<'a, 's> {
         let disparity_px = self.shape.lattice.disparity_px(at)?;
         let pixel = at.map(|at| at as i32);
         let found = |t_previous_current: &Transform| {
-            let m = self.images.matcher.find(&expected(model.rig, pixel, disparity_px, t_previous_current)?)?;
+            let m = self.images.matcher.find(&expected(
+                model.rig,
+                pixel,
+                disparity_px,
+                t_previous_current,
+            )?)?;
             Some((m, model.residual(&m)?))
         };
         let is_static = |chi_square: f64| chi_square <= f64::from(config.candidate_chi_square);
@@ -158,8 +192,9 @@ impl<'a, 's> PatchSearch<'a, 's> {
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
             let side_m = motion_tolerance_m(residual.point_m.z);
             let off = residual.motion_m - motion_m;
-            let is_as_supposed =
-                libm::fabs(off.x) < side_m && libm::fabs(off.y) < side_m && libm::fabs(off.z) < side_m + 2.0 * residual.depth_sigma_m;
+            let is_as_supposed = libm::fabs(off.x) < side_m
+                && libm::fabs(off.y) < side_m
+                && libm::fabs(off.z) < side_m + 2.0 * residual.depth_sigma_m;
             // Of what is known to move, the nearer of both motions decides.
             let is_static = if seed.known > 0 {
                 scaled(&residual.motion_m, &residual) < scaled(&off, &residual)
@@ -170,7 +205,9 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 return Some(Patch::Static);
             }
             // In a row of posts the next one is found as well as the post itself.
-            let is_unsure = seed.known == 0 && residual.point_m.z < FROM_M && self.is_static_at(model, pixel, disparity_px);
+            let is_unsure = seed.known == 0
+                && residual.point_m.z < FROM_M
+                && self.is_static_at(model, pixel, disparity_px);
             if is_as_supposed && !is_unsure {
                 return Some(Patch::Moving(Candidate::new(&m, &residual, 0)));
             }
@@ -181,23 +218,37 @@ impl<'a, 's> PatchSearch<'a, 's> {
     /// Whether a patch is found where a static point would be.
     fn is_static_at(&self, model: &StaticModel<'_>, pixel: [i32; 2], disparity_px: f64) -> bool {
         let expected = expected(model.rig, pixel, disparity_px, &self.t_previous_current);
-        let found = expected.and_then(|expected| self.images.matcher.find(&expected)).and_then(|m| model.residual(&m));
-        found.is_some_and(|residual| residual.chi_square <= f64::from(model.config.candidate_chi_square))
+        let found = expected
+            .and_then(|expected| self.images.matcher.find(&expected))
+            .and_then(|m| model.residual(&m));
+        found.is_some_and(|residual| {
+            residual.chi_square <= f64::from(model.config.candidate_chi_square)
+        })
     }
 
-    /// Whether a near group is one of a row of posts or the like, each taken for the next: more than a third of its members are found where static
-    /// points would be.
-    pub fn is_repeated(&mut self, model: &StaticModel<'_>, candidates: &[Candidate], group: &Group) -> bool {
+    /// Whether a near group is one of a row of posts or the like, each taken for the next: more
+    /// than a third of its members are found where static points would be.
+    pub fn is_repeated(
+        &mut self,
+        model: &StaticModel<'_>,
+        candidates: &[Candidate],
+        group: &Group,
+    ) -> bool {
         if group.depth_m >= FROM_M {
             return false;
         }
         let (mut still, mut searched) = (0u32, 0u32);
-        for member in candidates.iter().filter(|member| member.is_of(group.first)).take(PATCHES_MAX) {
+        for member in candidates.iter().filter(|member| member.is_of(group.first)).take(PATCHES_MAX)
+        {
             let Some(left) = self.left.checked_sub(1) else { break };
             self.left = left;
             let [u, v, disparity_px] = member.position();
             searched += 1;
-            still += u32::from(self.is_static_at(model, [u, v].map(|at| libm::roundf(at) as i32), f64::from(disparity_px)));
+            still += u32::from(self.is_static_at(
+                model,
+                [u, v].map(|at| libm::roundf(at) as i32),
+                f64::from(disparity_px),
+            ));
         }
         3 * still > searched
     }

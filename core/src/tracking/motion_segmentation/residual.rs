@@ -1,13 +1,14 @@
 //! How far a match lies from where a static point would be, in sigmas.
 //!
-//! A point triangulated in the previous frame is moved by the camera's motion and projected: the prediction `p` of (u, v, disparity).
-//! The residual `r` has the covariance
+//! A point triangulated in the previous frame is moved by the camera's motion and projected: the
+//! prediction `p` of (u, v, disparity). The residual `r` has the covariance
 //!
 //! `C = S + J S J' + A Q A' + w w'`
 //!
-//! where S is that of a match in one frame, J the derivative of p by the match before, A that of the projection by the point, Q what the
-//! camera's motion errs by at the point (translation and rotation), and w what a disparity error common to both frames (offset and lens)
-//! does to r. `r' C^-1 r` is chi-square distributed with 3 degrees of freedom for static points.
+//! where S is that of a match in one frame, J the derivative of p by the match before, A that of
+//! the projection by the point, Q what the camera's motion errs by at the point (translation and
+//! rotation), and w what a disparity error common to both frames (offset and lens) does to r.
+//! `r' C^-1 r` is chi-square distributed with 3 degrees of freedom for static points.
 
 use super::SegmentationConfig;
 use crate::{
@@ -25,7 +26,8 @@ const DEPTH_MIN_M: f64 = 1.0;
 pub(super) struct StaticModel<'a> {
     pub config: &'a SegmentationConfig,
     pub rig: &'a StereoRig,
-    /// Disparity errors common to both frames, px: the offset and, at the image's left and right edge, the lens.
+    /// Disparity errors common to both frames, px: the offset and, at the image's left and right
+    /// edge, the lens.
     pub bias_px: [f64; 2],
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
@@ -36,7 +38,8 @@ pub(super) struct StaticModel<'a> {
 /// A match whose point is known in both frames.
 #[derive(Clone, Copy)]
 pub(super) struct Residual {
-    /// Squared Mahalanobis distance from the static prediction; an upper bound of it where the bound suffices.
+    /// Squared Mahalanobis distance from the static prediction; an upper bound of it where the
+    /// bound suffices.
     pub chi_square: f64,
     /// How far it is from the prediction: u, v and disparity, px.
     pub residual_px: Vector3<f64>,
@@ -49,7 +52,12 @@ pub(super) struct Residual {
 }
 
 impl<'a> StaticModel<'a> {
-    pub fn new(config: &'a SegmentationConfig, rig: &'a StereoRig, t_current_previous: &Transform, bias_px: [f64; 2]) -> Self {
+    pub fn new(
+        config: &'a SegmentationConfig,
+        rig: &'a StereoRig,
+        t_current_previous: &Transform,
+        bias_px: [f64; 2],
+    ) -> Self {
         let square = |sigma: f32| f64::from(sigma) * f64::from(sigma);
         Self {
             config,
@@ -57,14 +65,22 @@ impl<'a> StaticModel<'a> {
             bias_px,
             rotation: t_current_previous.quaternion().to_rotation_matrix().into_inner(),
             translation: t_current_previous.translation(),
-            noise: Vector3::new(square(config.noise_px), square(config.noise_px), square(config.disparity_noise_px)),
+            noise: Vector3::new(
+                square(config.noise_px),
+                square(config.noise_px),
+                square(config.disparity_noise_px),
+            ),
         }
     }
 
     /// A match from the centre of the image: u, v and disparity, px.
     fn centered(&self, left: [f32; 2], right: [f32; 2]) -> Option<Vector3<f64>> {
         let disparity = f64::from(left[0]) - f64::from(right[0]);
-        let at = Vector3::new(f64::from(left[0]) - self.rig.center_u_px, f64::from(left[1]) - self.rig.center_v_px, disparity);
+        let at = Vector3::new(
+            f64::from(left[0]) - self.rig.center_u_px,
+            f64::from(left[1]) - self.rig.center_v_px,
+            disparity,
+        );
         // False for NaN as well.
         (disparity >= DISPARITY_MIN_PX && at.x.is_finite() && at.y.is_finite()).then_some(at)
     }
@@ -86,7 +102,8 @@ impl<'a> StaticModel<'a> {
         let previous = self.point(&before);
         let predicted = self.predicted(&previous)?;
         let per_m = self.rig.focal_px / predicted.z;
-        let projected = Vector3::new(predicted.x * per_m, predicted.y * per_m, self.rig.baseline_m * per_m);
+        let projected =
+            Vector3::new(predicted.x * per_m, predicted.y * per_m, self.rig.baseline_m * per_m);
         let r = now - projected;
         let point_m = self.point(&now);
         // The other terms only add to the covariance: what lies within these bounds needs no more.
@@ -109,8 +126,8 @@ impl<'a> StaticModel<'a> {
         })
     }
 
-    /// The residual of a match, and the part of its covariance that it shares with the matches beside it: what the camera's motion and both
-    /// disparities err by.
+    /// The residual of a match, and the part of its covariance that it shares with the matches
+    /// beside it: what the camera's motion and both disparities err by.
     pub fn residual_and_shared(&self, m: &Match) -> Option<(Residual, Matrix3<f64>)> {
         let before = self.centered(m.previous_left, m.previous_right)?;
         let previous = self.point(&before);
@@ -124,11 +141,26 @@ impl<'a> StaticModel<'a> {
         (predicted.z > DEPTH_MIN_M).then_some(predicted)
     }
 
-    /// The covariance of a residual: the match's own part, and the part shared with the matches beside it.
-    fn covariance(&self, before: &Vector3<f64>, previous: &Vector3<f64>, predicted: &Vector3<f64>) -> [Matrix3<f64>; 2] {
+    /// The covariance of a residual: the match's own part, and the part shared with the matches
+    /// beside it.
+    fn covariance(
+        &self,
+        before: &Vector3<f64>,
+        previous: &Vector3<f64>,
+        predicted: &Vector3<f64>,
+    ) -> [Matrix3<f64>; 2] {
         let (focal, per_px) = (self.rig.focal_px, self.rig.baseline_m / before.z);
-        let by_match =
-            Matrix3::new(per_px, 0.0, -previous.x / before.z, 0.0, per_px, -previous.y / before.z, 0.0, 0.0, -previous.z / before.z);
+        let by_match = Matrix3::new(
+            per_px,
+            0.0,
+            -previous.x / before.z,
+            0.0,
+            per_px,
+            -previous.y / before.z,
+            0.0,
+            0.0,
+            -previous.z / before.z,
+        );
         let (per_m, z) = (focal / predicted.z, predicted.z);
         let by_point = Matrix3::new(
             per_m,
@@ -144,11 +176,14 @@ impl<'a> StaticModel<'a> {
         let noise = Matrix3::from_diagonal(&self.noise);
         let jacobian = by_point * self.rotation * by_match;
         let square = |sigma: f32| f64::from(sigma) * f64::from(sigma);
-        let rotated = Matrix3::identity() * predicted.norm_squared() - predicted * predicted.transpose();
-        let camera = Matrix3::identity() * square(self.config.camera_m) + rotated * square(self.config.camera_rad);
+        let rotated =
+            Matrix3::identity() * predicted.norm_squared() - predicted * predicted.transpose();
+        let camera = Matrix3::identity() * square(self.config.camera_m)
+            + rotated * square(self.config.camera_rad);
         let side = before.x / self.rig.center_u_px;
         let [offset_px, lens_px] = self.bias_px;
-        let bias = (jacobian.column(2) - Vector3::z()) * (offset_px + lens_px * side * side * side * side);
+        let bias =
+            (jacobian.column(2) - Vector3::z()) * (offset_px + lens_px * side * side * side * side);
         let own = noise + jacobian * noise * jacobian.transpose();
         [own, by_point * camera * by_point.transpose() + bias * bias.transpose()]
     }

@@ -14,7 +14,8 @@ use std::{vec, vec::Vec};
 
 const WIDTH: usize = 400;
 const HEIGHT: usize = 120;
-const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 50.0, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 300.0, center_u_px: 200.0, center_v_px: 50.0, baseline_m: 0.5 };
 const CAPACITY: Capacity = Capacity { image_width: WIDTH, image_height: HEIGHT, ..Capacity::TINY };
 /// Height of the camera above the ground, m.
 const GROUND_M: f64 = 1.6;
@@ -89,7 +90,8 @@ impl World {
         for (number, car) in (1..).zip(&self.cars) {
             let [car_x, car_z] = car.at_frame(frame);
             let z = car_z - self.camera_z(frame);
-            let inside = (right_m + x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
+            let inside =
+                (right_m + x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
             if z > 1.0 && inside && z < best.0 {
                 best = (z, number);
             }
@@ -98,7 +100,9 @@ impl World {
     }
 
     fn disparity(&self, frame: u32) -> Vec<u16> {
-        let of = |at: usize| (RIG.focal_baseline_px_m() / self.cast(frame, at % WIDTH, at / WIDTH).0 * 256.0) as u16;
+        let of = |at: usize| {
+            (RIG.focal_baseline_px_m() / self.cast(frame, at % WIDTH, at / WIDTH).0 * 256.0) as u16
+        };
         (0..WIDTH * HEIGHT).map(of).collect()
     }
 
@@ -106,14 +110,22 @@ impl World {
     fn matches(&self, frame: u32) -> Vec<Match> {
         let mut random = Random::new(u64::from(frame));
         let mut matches = Vec::new();
-        for (u, v) in (4..HEIGHT).step_by(5).flat_map(|v| (4..WIDTH).step_by(6).map(move |u| (u, v))) {
+        for (u, v) in
+            (4..HEIGHT).step_by(5).flat_map(|v| (4..WIDTH).step_by(6).map(move |u| (u, v)))
+        {
             let (z, number) = self.cast(frame, u, v);
-            let now = [(u as f64 - RIG.center_u_px) * z / RIG.focal_px, (v as f64 - RIG.center_v_px) * z / RIG.focal_px, z];
+            let now = [
+                (u as f64 - RIG.center_u_px) * z / RIG.focal_px,
+                (v as f64 - RIG.center_v_px) * z / RIG.focal_px,
+                z,
+            ];
             let motion = number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].motion);
             let before = [now[0] - motion[0], now[1], z - motion[1] + self.step_m];
             let mut noise = || (random.below(2001) as f32 / 1000.0 - 1.0) * self.noise_px;
-            let [current_left, current_right] = project(now).map(|[u, v]| [u + noise(), v + noise()]);
-            let [previous_left, previous_right] = project(before).map(|[u, v]| [u + noise(), v + noise()]);
+            let [current_left, current_right] =
+                project(now).map(|[u, v]| [u + noise(), v + noise()]);
+            let [previous_left, previous_right] =
+                project(before).map(|[u, v]| [u + noise(), v + noise()]);
             matches.push(Match { previous_left, previous_right, current_left, current_right });
         }
         matches
@@ -122,12 +134,18 @@ impl World {
     fn camera(&self, frame: u32) -> CameraMotion {
         CameraMotion {
             t_world_camera: Transform::from_translation([0.0, 0.0, self.camera_z(frame)]),
-            t_current_previous: (frame > 0).then(|| Transform::from_translation([0.0, 0.0, -self.step_m])),
+            t_current_previous: (frame > 0)
+                .then(|| Transform::from_translation([0.0, 0.0, -self.step_m])),
         }
     }
 
-    /// Runs `frames` frames, with the detections `detect` returns, and shows the tracks and the report of each.
-    fn run(&self, frames: u32, detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
+    /// Runs `frames` frames, with the detections `detect` returns, and shows the tracks and the
+    /// report of each.
+    fn run(
+        &self,
+        frames: u32,
+        detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
+    ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
         self.run_with(WorldInput { matches_on_car: usize::MAX, images: None }, frames, detect)
     }
 
@@ -150,7 +168,10 @@ impl World {
         let mut estimator = crate::egomotion::Estimator::new_in(&CAPACITY, &mut carver);
         (0..frames)
             .map(|frame| {
-                let (mut matches, disparity) = (if frame > 0 { self.matches(frame) } else { Vec::new() }, self.disparity(frame));
+                let (mut matches, disparity) = (
+                    if frame > 0 { self.matches(frame) } else { Vec::new() },
+                    self.disparity(frame),
+                );
                 input.thin(self, frame, &mut matches);
                 if let Some(images) = &mut input.images {
                     self.push(frame, images);
@@ -171,10 +192,16 @@ impl World {
                     .collect();
                 let camera = self.camera(frame);
                 let matches = FrameMatches { refined: &matches, sparse: &[] };
-                let assigned = tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
-                let search = input.images.as_deref().filter(|_| frame > 0).map(|matcher| GuidedMatching { matcher, disparity_q8 });
-                let tracked =
-                    assigned.segment_motion(&RIG, &camera, disparity_q8, search).estimate_motions(&RIG, &camera, None, &mut estimator);
+                let assigned =
+                    tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
+                let search = input
+                    .images
+                    .as_deref()
+                    .filter(|_| frame > 0)
+                    .map(|matcher| GuidedMatching { matcher, disparity_q8 });
+                let tracked = assigned
+                    .segment_motion(&RIG, &camera, disparity_q8, search)
+                    .estimate_motions(&RIG, &camera, None, &mut estimator);
                 let report = tracked.commit().segmentation;
                 (tracker.tracks().collect(), report)
             })
@@ -184,10 +211,19 @@ impl World {
     /// The mask of the first car, in its box.
     fn mask(&self, frame: u32) -> (PixelBox, Vec<u8>) {
         let on_car = |u: i32, v: i32| self.cast(frame, u as usize, v as usize).1 == 1;
-        let pixels = || (0..HEIGHT as i32).flat_map(|v| (0..WIDTH as i32).map(move |u| (u, v))).filter(|&(u, v)| on_car(u, v));
-        let (left, right) = (pixels().map(|(u, _)| u).min().unwrap(), pixels().map(|(u, _)| u).max().unwrap());
-        let (top, bottom) = (pixels().map(|(_, v)| v).min().unwrap(), pixels().map(|(_, v)| v).max().unwrap());
-        let mask = (top..=bottom).flat_map(|v| (left..=right).map(move |u| (u, v))).map(|(u, v)| u8::from(on_car(u, v))).collect();
+        let pixels = || {
+            (0..HEIGHT as i32)
+                .flat_map(|v| (0..WIDTH as i32).map(move |u| (u, v)))
+                .filter(|&(u, v)| on_car(u, v))
+        };
+        let (left, right) =
+            (pixels().map(|(u, _)| u).min().unwrap(), pixels().map(|(u, _)| u).max().unwrap());
+        let (top, bottom) =
+            (pixels().map(|(_, v)| v).min().unwrap(), pixels().map(|(_, v)| v).max().unwrap());
+        let mask = (top..=bottom)
+            .flat_map(|v| (left..=right).map(move |u| (u, v)))
+            .map(|(u, v)| u8::from(on_car(u, v)))
+            .collect();
         (PixelBox { left, top, width: right + 1 - left, height: bottom + 1 - top }, mask)
     }
 
@@ -228,16 +264,22 @@ fn an_overtaking_car_is_found_by_its_motion_in_the_third_frame_and_a_parked_one_
 #[test]
 fn where_nothing_moves_nothing_is_found() {
     for step_m in [0.0, 0.4, 1.2] {
-        let world = World { cars: vec![PARKED, Car { at: [2.0, 12.0], ..PARKED }], step_m, noise_px: 0.3 };
+        let world =
+            World { cars: vec![PARKED, Car { at: [2.0, 12.0], ..PARKED }], step_m, noise_px: 0.3 };
         for (frame, (tracks, report)) in world.run(8, nothing).iter().enumerate() {
-            assert_eq!((tracks.len(), report.groups), (0, 0), "frame {frame} at {step_m} m: {report:?}");
+            assert_eq!(
+                (tracks.len(), report.groups),
+                (0, 0),
+                "frame {frame} at {step_m} m: {report:?}"
+            );
         }
     }
 }
 
 #[test]
 fn a_car_that_keeps_its_distance_is_found_by_its_matches_together_and_a_parked_one_is_not() {
-    // In the image it moves by two thirds of a pixel of disparity a frame, as much as one match errs by.
+    // In the image it moves by two thirds of a pixel of disparity a frame, as much as one match
+    // errs by.
     let leader = Car { at: [0.5, 18.0], motion: [0.0, 1.4] };
     let world = World {
         cars: vec![leader, Car { at: [-3.5, 26.0], ..PARKED }],
@@ -247,7 +289,11 @@ fn a_car_that_keeps_its_distance_is_found_by_its_matches_together_and_a_parked_o
     for (frame, (tracks, report)) in world.run(8, nothing).iter().enumerate() {
         assert_eq!(tracks.len(), usize::from(frame > 1), "frame {frame}: {report:?}");
         for track in tracks {
-            assert!(world.overlap(frame as u32, &track.pixels) > 0.5, "frame {frame}: {:?}", track.pixels);
+            assert!(
+                world.overlap(frame as u32, &track.pixels) > 0.5,
+                "frame {frame}: {:?}",
+                track.pixels
+            );
         }
     }
 }
@@ -261,7 +307,8 @@ fn a_mask_does_not_grow_over_matches_that_do_not_move() {
         step_m: 0.0,
         noise_px: 0.0,
     };
-    let (disparity, [middle, beside]) = (world.disparity(0), [2.5, 5.3].map(|x| project([x, 1.0, 14.0])[0]));
+    let (disparity, [middle, beside]) =
+        (world.disparity(0), [2.5, 5.3].map(|x| project([x, 1.0, 14.0])[0]));
     let lattice = Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap());
     let (mut cells, mut blocked, mut queue) = (vec![0; 3000], vec![0; 3000], vec![0; 3000]);
     let extent = groups::Extent { low: [1.7, 0.3, 13.9], high: [5.4, 1.5, 14.1] };
@@ -270,8 +317,15 @@ fn a_mask_does_not_grow_over_matches_that_do_not_move() {
         [middle, beside].map(|[u, v]| lattice.is_own(None, &cells, u as i32, v as i32))
     };
     assert_eq!(is_marked(&blocked), [true, true]);
-    for at in (40..HEIGHT).flat_map(|v| (0..WIDTH).map(move |u| [u as f32, v as f32])).filter(|[u, _]| *u > 285.0) {
-        lattice.block([at[0], at[1], (RIG.focal_baseline_px_m() / 14.0) as f32], false, &mut blocked);
+    for at in (40..HEIGHT)
+        .flat_map(|v| (0..WIDTH).map(move |u| [u as f32, v as f32]))
+        .filter(|[u, _]| *u > 285.0)
+    {
+        lattice.block(
+            [at[0], at[1], (RIG.focal_baseline_px_m() / 14.0) as f32],
+            false,
+            &mut blocked,
+        );
     }
     assert_eq!(is_marked(&blocked), [true, false]);
     // A match that moves frees its cell again, one of another disparity does not.
@@ -284,7 +338,8 @@ fn a_mask_does_not_grow_over_matches_that_do_not_move() {
 
 #[test]
 fn a_mask_reaches_the_left_border_where_only_the_left_camera_sees() {
-    // A car 8 m ahead, cut by the border; so near the border that its disparity of 18.75 px is missing, and farther from it than that explains.
+    // A car 8 m ahead, cut by the border; so near the border that its disparity of 18.75 px is
+    // missing, and farther from it than that explains.
     for (unseen, left) in [(24, 0), (60, 60)] {
         let disparity = |at: usize| match (at % WIDTH, at / WIDTH) {
             (u, _) if u < unseen => 0,
@@ -315,17 +370,23 @@ fn a_detector_that_comes_later_takes_the_track_over() {
     let mask = |frame: u32| if frame < 5 { Vec::new() } else { vec![world.mask(frame)] };
     let frames = world.run(8, mask);
     let (tracks, report) = &frames[7];
-    assert_eq!((tracks.len(), tracks[0].id, tracks[0].class, report.instances), (1, 1, Class::Car, 0));
+    assert_eq!(
+        (tracks.len(), tracks[0].id, tracks[0].class, report.instances),
+        (1, 1, Class::Car, 0)
+    );
 }
 
 #[test]
 fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
     let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
-    let static_world = World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
+    let static_world =
+        World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
     let mut storage = vec![Hypothesis::default(); HYPOTHESES_MAX];
     let mut hypotheses = Hypotheses::new(&mut storage);
     let config = SegmentationConfig::default();
-    let model = |camera: &CameraMotion| StaticModel::new(&config, &RIG, &camera.t_current_previous.unwrap(), [0.25, 0.0]);
+    let model = |camera: &CameraMotion| {
+        StaticModel::new(&config, &RIG, &camera.t_current_previous.unwrap(), [0.25, 0.0])
+    };
     let bytes = MotionSegmenter::bytes(&CAPACITY);
     let mut slab = vec![0u8; bytes + SLAB_ALIGN];
     let mut carver = Carver::new(&mut slab, bytes).unwrap();
@@ -341,8 +402,22 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
             lattice: Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap()),
             ground: None,
         };
-        segmenter.observe(&model(&camera), &camera, &FrameMatches { refined: &matches, sparse: &[] }, [&codes, &[]], &shape, None);
-        confirmed.push(segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_shown(&config)).count());
+        segmenter.observe(
+            &model(&camera),
+            &camera,
+            &FrameMatches { refined: &matches, sparse: &[] },
+            [&codes, &[]],
+            &shape,
+            None,
+        );
+        confirmed.push(
+            segmenter
+                .hypotheses
+                .all()
+                .iter()
+                .filter(|hypothesis| hypothesis.is_shown(&config))
+                .count(),
+        );
     }
     assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);
 }

@@ -1,12 +1,15 @@
 //! Which triangles cut a cell, for each of the 256 ways its corners can lie inside or outside.
 //!
-//! The table is worked out at compile time from one rule on faces, not typed in. On each face, every run of neighbouring inside corners
-//! is cut off by one segment: so where two inside corners face each other diagonally, each is cut off alone. The rule looks at the four
-//! corners of the face and at nothing else, so the two cells that share a face draw the same segments on it, and the surface has no
-//! cracks by construction (the holes of Lorensen and Cline's original table come from breaking exactly this; Nielson, Hamann, *The
-//! Asymptotic Decider*, 1991). Each cut edge begins one segment and ends one, hence segments close to loops; a loop becomes a fan.
+//! The table is worked out at compile time from one rule on faces, not typed in. On each face,
+//! every run of neighbouring inside corners is cut off by one segment: so where two inside corners
+//! face each other diagonally, each is cut off alone. The rule looks at the four corners of the
+//! face and at nothing else, so the two cells that share a face draw the same segments on it, and
+//! the surface has no cracks by construction (the holes of Lorensen and Cline's original table come
+//! from breaking exactly this; Nielson, Hamann, *The Asymptotic Decider*, 1991). Each cut edge
+//! begins one segment and ends one, hence segments close to loops; a loop becomes a fan.
 //!
-//! Corner `x + 2 y + 4 z` of a cell is the lattice point (x, y, z) steps from its base; edge `4 axis + k` runs along `axis`.
+//! Corner `x + 2 y + 4 z` of a cell is the lattice point (x, y, z) steps from its base; edge
+//! `4 axis + k` runs along `axis`.
 
 /// Edges of a cell.
 pub const EDGE_COUNT: usize = 12;
@@ -26,7 +29,8 @@ pub const fn edge_axis(edge: usize) -> usize {
 pub struct Case {
     /// Bit `e`: edge `e` is cut.
     pub edges: u16,
-    /// Triangles, the first `count` of them, as edges, counter-clockwise seen from the outside corners.
+    /// Triangles, the first `count` of them, as edges, counter-clockwise seen from the outside
+    /// corners.
     pub triangles: [[u8; 3]; MAX_TRIANGLES],
     /// How many triangles there are.
     pub count: u8,
@@ -35,7 +39,10 @@ pub struct Case {
 /// By inside corners: bit `c` is set where corner `c` lies inside.
 pub static CASES: [Case; 256] = all_cases();
 
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn all_cases() -> [Case; 256] {
     let mut cases = [Case { edges: 0, triangles: [[0; 3]; MAX_TRIANGLES], count: 0 }; 256];
     let mut inside = 0;
@@ -47,7 +54,10 @@ const fn all_cases() -> [Case; 256] {
 }
 
 /// The edge between two neighbouring corners.
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn edge_between(a: usize, b: usize) -> usize {
     let start = a & b;
     let mut edge = 0;
@@ -61,11 +71,18 @@ const fn edge_between(a: usize, b: usize) -> usize {
 const fn face_corners(axis: usize, side: usize) -> [usize; 4] {
     let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
     let base = side << axis;
-    if side == 1 { [base, base + u, base + u + v, base + v] } else { [base, base + v, base + u + v, base + u] }
+    if side == 1 {
+        [base, base + u, base + u + v, base + v]
+    } else {
+        [base, base + v, base + u + v, base + u]
+    }
 }
 
 /// From each cut edge, the edge at which the segment that begins there ends.
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn segments(inside: usize) -> [usize; EDGE_COUNT] {
     let mut next = [EDGE_COUNT; EDGE_COUNT];
     let mut face = 0;
@@ -90,7 +107,10 @@ const fn segments(inside: usize) -> [usize; EDGE_COUNT] {
     next
 }
 
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn case(inside: usize) -> Case {
     let next = segments(inside);
     let mut case = Case { edges: 0, triangles: [[0; 3]; MAX_TRIANGLES], count: 0 };
@@ -109,7 +129,11 @@ const fn case(inside: usize) -> Case {
             let apex = best_apex(&ring, len);
             let mut i = 1;
             while i + 1 < len {
-                case.triangles[case.count as usize] = [ring[apex] as u8, ring[(apex + i) % len] as u8, ring[(apex + i + 1) % len] as u8];
+                case.triangles[case.count as usize] = [
+                    ring[apex] as u8,
+                    ring[(apex + i) % len] as u8,
+                    ring[(apex + i + 1) % len] as u8,
+                ];
                 case.count += 1;
                 i += 1;
             }
@@ -120,11 +144,17 @@ const fn case(inside: usize) -> Case {
 }
 
 /// Whether two edges lie on one face.
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn share_a_face(a: usize, b: usize) -> bool {
     let mut axis = 0;
     while axis < 3 {
-        if edge_axis(a) != axis && edge_axis(b) != axis && (EDGE_START[a] ^ EDGE_START[b]) >> axis & 1 == 0 {
+        if edge_axis(a) != axis
+            && edge_axis(b) != axis
+            && (EDGE_START[a] ^ EDGE_START[b]) >> axis & 1 == 0
+        {
             return true;
         }
         axis += 1;
@@ -132,8 +162,12 @@ const fn share_a_face(a: usize, b: usize) -> bool {
     false
 }
 
-/// The corner of a loop from which a fan has the fewest diagonals within a face, where the neighbouring cell might draw the same one.
-#[expect(clippy::indexing_slicing, reason = "evaluated at compile time, where a wrong index does not compile")]
+/// The corner of a loop from which a fan has the fewest diagonals within a face, where the
+/// neighbouring cell might draw the same one.
+#[expect(
+    clippy::indexing_slicing,
+    reason = "evaluated at compile time, where a wrong index does not compile"
+)]
 const fn best_apex(ring: &[usize; EDGE_COUNT], len: usize) -> usize {
     let (mut best, mut fewest) = (0, EDGE_COUNT);
     let mut apex = 0;
@@ -166,7 +200,10 @@ mod tests {
             for i in 0..3 {
                 let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
                 if sides.remove(&(b, a)).is_none() {
-                    assert!(sides.insert((a, b), ()).is_none(), "a side is drawn once in each direction");
+                    assert!(
+                        sides.insert((a, b), ()).is_none(),
+                        "a side is drawn once in each direction"
+                    );
                 }
             }
         }
@@ -181,10 +218,18 @@ mod tests {
     fn every_cut_edge_has_a_vertex_and_no_other_has() {
         for (inside, case) in CASES.iter().enumerate() {
             let mut used = 0u16;
-            case.triangles[..usize::from(case.count)].iter().flatten().for_each(|&edge| used |= 1 << edge);
+            case.triangles[..usize::from(case.count)]
+                .iter()
+                .flatten()
+                .for_each(|&edge| used |= 1 << edge);
             for (edge, &start) in EDGE_START.iter().enumerate() {
-                let is_cut = (inside >> start ^ inside >> (start + (1 << edge_axis(edge)))) & 1 == 1;
-                assert_eq!((used >> edge & 1 == 1, case.edges >> edge & 1 == 1), (is_cut, is_cut), "case {inside:08b}, edge {edge}");
+                let is_cut =
+                    (inside >> start ^ inside >> (start + (1 << edge_axis(edge)))) & 1 == 1;
+                assert_eq!(
+                    (used >> edge & 1 == 1, case.edges >> edge & 1 == 1),
+                    (is_cut, is_cut),
+                    "case {inside:08b}, edge {edge}"
+                );
             }
         }
     }
@@ -196,17 +241,27 @@ mod tests {
             for (inside, case) in CASES.iter().enumerate() {
                 for side in 0..2 {
                     let corners = face_corners(axis, 1).map(|corner| corner & !(1 << axis));
-                    let signs = corners.iter().enumerate().fold(0, |signs, (i, c)| signs | (inside >> (c | side << axis) & 1) << i);
-                    // Name edges by their place on the face, whichever side it is on, and turn one side's segments round.
+                    let signs = corners
+                        .iter()
+                        .enumerate()
+                        .fold(0, |signs, (i, c)| signs | (inside >> (c | side << axis) & 1) << i);
+                    // Name edges by their place on the face, whichever side it is on, and turn one
+                    // side's segments round.
                     let name = |edge: u8| edge_between_faces(edge, axis);
                     let mut rim: Vec<_> = rim(case)
                         .into_iter()
                         .filter(|&(a, b)| on_face(a, axis, side) && on_face(b, axis, side))
-                        .map(|(a, b)| if side == 0 { (name(a), name(b)) } else { (name(b), name(a)) })
+                        .map(
+                            |(a, b)| {
+                                if side == 0 { (name(a), name(b)) } else { (name(b), name(a)) }
+                            },
+                        )
                         .collect();
                     rim.sort_unstable();
                     match by_signs.get(&(axis, signs)) {
-                        Some(other) => assert_eq!(&rim, other, "case {inside:08b}, axis {axis}, side {side}"),
+                        Some(other) => {
+                            assert_eq!(&rim, other, "case {inside:08b}, axis {axis}, side {side}")
+                        }
                         None => drop(by_signs.insert((axis, signs), rim)),
                     }
                 }
@@ -227,7 +282,10 @@ mod tests {
             for triangle in &case.triangles[..usize::from(case.count)] {
                 for i in 0..3 {
                     let (a, b) = (usize::from(triangle[i]), usize::from(triangle[(i + 1) % 3]));
-                    assert!(next[a] == b || next[b] == a || !share_a_face(a, b), "case {inside:08b}: {a} {b}");
+                    assert!(
+                        next[a] == b || next[b] == a || !share_a_face(a, b),
+                        "case {inside:08b}: {a} {b}"
+                    );
                 }
             }
         }

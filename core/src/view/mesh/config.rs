@@ -4,9 +4,14 @@ use crate::problem::{Problems, require};
 
 /// Parameters of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct MeshConfig {
-    /// Observations a lattice point needs to count as seen, 1 to 255; 1 (the original meshes all it has).
+    /// Observations a lattice point needs to count as seen, 1 to 255; 1 (the original meshes all it
+    /// has).
     pub min_weight: u8,
 }
 

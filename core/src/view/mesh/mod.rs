@@ -1,13 +1,17 @@
-//! The map as triangles, handed out one by one: marching cubes (Lorensen, Cline, 1987) with a table that cannot crack.
+//! The map as triangles, handed out one by one: marching cubes (Lorensen, Cline, 1987) with a table
+//! that cannot crack.
 //!
-//! A cell spans eight neighbouring lattice points. A cell with a corner that was never observed gives nothing: the mesh ends where knowledge
-//! ends. A lattice point with a distance of 0 or below lies inside. A vertex lies on the edge between an inside and an outside point, where
-//! the distance between them is 0 if it runs straight; it is computed from the edge alone, always from the lower point to the upper, so
-//! that all cells and blocks around an edge give the same bits. Triangles with two equal corners, as distances of exactly 0 make them, are
-//! left out: their other two sides coincide, so no crack opens.
+//! A cell spans eight neighbouring lattice points. A cell with a corner that was never observed
+//! gives nothing: the mesh ends where knowledge ends. A lattice point with a distance of 0 or below
+//! lies inside. A vertex lies on the edge between an inside and an outside point, where the
+//! distance between them is 0 if it runs straight; it is computed from the edge alone, always from
+//! the lower point to the upper, so that all cells and blocks around an edge give the same bits.
+//! Triangles with two equal corners, as distances of exactly 0 make them, are left out: their other
+//! two sides coincide, so no crack opens.
 //!
-//! Memory: none of the slab; about 3 KiB of stack, and 512 names of the sink. Time: linear in live blocks; triangles cost extra. Order:
-//! blocks by slot, cells by z, y, x, triangles by table, vertices by the first triangle that has them.
+//! Memory: none of the slab; about 3 KiB of stack, and 512 names of the sink. Time: linear in live
+//! blocks; triangles cost extra. Order: blocks by slot, cells by z, y, x, triangles by table,
+//! vertices by the first triangle that has them.
 
 mod cases;
 mod config;
@@ -34,15 +38,23 @@ impl Volume<'_> {
         self.mesh(config, |_| true, sink)
     }
 
-    /// Hands the surface in the blocks that `is_selected` picks to `sink` and returns how many triangles it has; the other blocks only lend their
-    /// points. So a map can be drawn piece by piece: a block's triangles need the blocks after it on each axis, and no more.
-    pub fn mesh(&self, config: &MeshConfig, is_selected: impl Fn(BlockCoord) -> bool, sink: &mut impl MeshSink) -> u64 {
+    /// Hands the surface in the blocks that `is_selected` picks to `sink` and returns how many
+    /// triangles it has; the other blocks only lend their points. So a map can be drawn piece by
+    /// piece: a block's triangles need the blocks after it on each axis, and no more.
+    pub fn mesh(
+        &self,
+        config: &MeshConfig,
+        is_selected: impl Fn(BlockCoord) -> bool,
+        sink: &mut impl MeshSink,
+    ) -> u64 {
         let (mut count, mut names) = (0, VertexNames::new());
         for slot in self.pool().live() {
             if let Some(coord) = self.blocks().coord(slot).filter(|&coord| is_selected(coord)) {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
                 names.clear();
-                patch.cells(|cell, inside| count += patch.polygonise(cell, inside, &mut names, sink));
+                patch.cells(|cell, inside| {
+                    count += patch.polygonise(cell, inside, &mut names, sink)
+                });
             }
         }
         count
@@ -89,15 +101,24 @@ impl<'v, 's> Patch<'v, 's> {
     /// Copies what belongs to the patch from block `n` of `slots`.
     fn copy(&mut self, n: usize, min_weight: u8) {
         let Some(slot) = self.slots.get(n).copied().flatten() else { return };
-        let (Some(sdf), Some(weight)) = (self.blocks.sdf(slot), self.blocks.weight(slot)) else { return };
+        let (Some(sdf), Some(weight)) = (self.blocks.sdf(slot), self.blocks.weight(slot)) else {
+            return;
+        };
         let span = |axis: usize| if n >> axis & 1 == 1 { BLOCK_SIDE..SIDE } else { 0..BLOCK_SIDE };
         let columns = span(0);
         for z in span(2) {
             for y in span(1) {
-                let from = (y % BLOCK_SIDE) * BLOCK_SIDE + (z % BLOCK_SIDE) * BLOCK_SIDE * BLOCK_SIDE;
+                let from =
+                    (y % BLOCK_SIDE) * BLOCK_SIDE + (z % BLOCK_SIDE) * BLOCK_SIDE * BLOCK_SIDE;
                 let to = (y + z * SIDE) * SIDE;
-                let Some(to) = self.sdf.get_mut(to + columns.start..to + columns.end) else { return };
-                let (Some(sdf), Some(weight)) = (sdf.get(from..from + to.len()), weight.get(from..from + to.len())) else { return };
+                let Some(to) = self.sdf.get_mut(to + columns.start..to + columns.end) else {
+                    return;
+                };
+                let (Some(sdf), Some(weight)) =
+                    (sdf.get(from..from + to.len()), weight.get(from..from + to.len()))
+                else {
+                    return;
+                };
                 for ((to, &sdf), &weight) in to.iter_mut().zip(sdf).zip(weight) {
                     *to = if weight >= min_weight { sdf } else { UNSEEN };
                 }
@@ -106,12 +127,17 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// Visits the cells the surface runs through: their base and the bits of their inside corners.
-    #[expect(clippy::indexing_slicing, reason = "y and z stay below 8, so the rows beside them below 81")]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "y and z stay below 8, so the rows beside them below 81"
+    )]
     fn cells(&self, mut visit: impl FnMut([usize; 3], usize)) {
         // Bit x of a row: the point was seen; it lies inside.
         let mut observed = [0u16; SIDE * SIDE];
         let mut inside = [0u16; SIDE * SIDE];
-        for ((row, observed), inside) in self.sdf.as_chunks::<SIDE>().0.iter().zip(&mut observed).zip(&mut inside) {
+        for ((row, observed), inside) in
+            self.sdf.as_chunks::<SIDE>().0.iter().zip(&mut observed).zip(&mut inside)
+        {
             for (x, &sdf) in row.iter().enumerate() {
                 *observed |= u16::from(sdf != UNSEEN) << x;
                 *inside |= u16::from(sdf <= 0) << x;
@@ -120,16 +146,22 @@ impl<'v, 's> Patch<'v, 's> {
         for z in 0..BLOCK_SIDE {
             for y in 0..BLOCK_SIDE {
                 let row = y + z * SIDE;
-                let four = |bits: &[u16; SIDE * SIDE]| [bits[row], bits[row + 1], bits[row + SIDE], bits[row + SIDE + 1]];
+                let four = |bits: &[u16; SIDE * SIDE]| {
+                    [bits[row], bits[row + 1], bits[row + SIDE], bits[row + SIDE + 1]]
+                };
                 let rows = four(&inside);
                 let all_observed = four(&observed).iter().fold(u16::MAX, |all, bits| all & bits);
                 let any = rows.iter().fold(0, |any, bits| any | bits);
                 let all = rows.iter().fold(u16::MAX, |all, bits| all & bits);
-                let mut crossed = all_observed & all_observed >> 1 & (any | any >> 1) & !(all & all >> 1) & 0xFF;
+                let mut crossed =
+                    all_observed & all_observed >> 1 & (any | any >> 1) & !(all & all >> 1) & 0xFF;
                 while crossed != 0 {
                     let x = crossed.trailing_zeros() as usize;
                     crossed &= crossed - 1;
-                    let corners = (0usize..).step_by(2).zip(rows).fold(0, |corners, (at, bits)| corners | usize::from(bits >> x & 3) << at);
+                    let corners = (0usize..)
+                        .step_by(2)
+                        .zip(rows)
+                        .fold(0, |corners, (at, bits)| corners | usize::from(bits >> x & 3) << at);
                     visit([x, y, z], corners);
                 }
             }
@@ -138,7 +170,13 @@ impl<'v, 's> Patch<'v, 's> {
 
     /// Hands the triangles of a cell to `sink` and returns their number.
     #[expect(clippy::indexing_slicing, reason = "masks keep edges below 16 and cases below 256")]
-    fn polygonise<S: MeshSink>(&self, cell: [usize; 3], inside: usize, names: &mut VertexNames<S::Name>, sink: &mut S) -> u64 {
+    fn polygonise<S: MeshSink>(
+        &self,
+        cell: [usize; 3],
+        inside: usize,
+        names: &mut VertexNames<S::Name>,
+        sink: &mut S,
+    ) -> u64 {
         let case = &CASES[inside & 0xFF];
         // As many as an edge's four bits can say.
         let mut vertices = [Vertex::default(); 16];
@@ -149,13 +187,17 @@ impl<'v, 's> Patch<'v, 's> {
             vertices[edge & 15] = self.vertex(CellEdge::new(cell, edge));
         }
         let mut count = 0;
-        for edges in case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from)) {
+        for edges in
+            case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from))
+        {
             let triangle = Triangle { vertices: edges.map(|edge| vertices[edge & 15]) };
             let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
             if a != b && b != c && c != a {
                 let names = edges.map(|edge| {
                     let (vertex, edge) = (&vertices[edge & 15], CellEdge::new(cell, edge));
-                    names.name(edge, || sink.vertex(vertex, edge.is_at_border() || self.is_on_point(edge)))
+                    names.name(edge, || {
+                        sink.vertex(vertex, edge.is_at_border() || self.is_on_point(edge))
+                    })
                 });
                 sink.triangle(&triangle, names);
                 count += 1;
@@ -183,7 +225,8 @@ impl<'v, 's> Patch<'v, 's> {
         }
     }
 
-    /// Whether the surface meets an edge at one of its ends, where other edges have the same vertex.
+    /// Whether the surface meets an edge at one of its ends, where other edges have the same
+    /// vertex.
     fn is_on_point(&self, edge: CellEdge) -> bool {
         edge.ends().iter().any(|point| self.sdf(*point) == 0)
     }
@@ -195,7 +238,8 @@ impl<'v, 's> Patch<'v, 's> {
     }
 
     /// What is known of a point of the patch.
-    // Never inlined: both ends of an edge ask for it, and two copies are 256 bytes of a Cortex-M7's code.
+    // Never inlined: both ends of an edge ask for it, and two copies are 256 bytes of a Cortex-M7's
+    // code.
     #[inline(never)]
     #[expect(clippy::indexing_slicing, reason = "voxels are below 512")]
     fn point(&self, at: [usize; 3]) -> LatticePoint {
@@ -209,7 +253,11 @@ impl<'v, 's> Patch<'v, 's> {
         LatticePoint {
             sdf,
             weight: self.blocks.weight(slot).map_or(0, |weight| weight[voxel]),
-            colour: self.blocks.colour(slot).map(|planes| planes.each_ref().map(|plane| plane[voxel])).filter(|colour| *colour != [0; 3]),
+            colour: self
+                .blocks
+                .colour(slot)
+                .map(|planes| planes.each_ref().map(|plane| plane[voxel]))
+                .filter(|colour| *colour != [0; 3]),
         }
     }
 }

@@ -6,7 +6,8 @@ use super::{
 };
 use crate::volume::BLOCK_SIDE;
 
-/// Entries for the edges that begin in two layers of points: as many as there are, or a few more, so that a mask keeps an index in bounds.
+/// Entries for the edges that begin in two layers of points: as many as there are, or a few more,
+/// so that a mask keeps an index in bounds.
 const ENTRIES: usize = (2 * 3 * SIDE * SIDE).next_power_of_two();
 
 /// An edge between two lattice points of a block and of those after it.
@@ -50,7 +51,8 @@ impl CellEdge {
     }
 }
 
-/// Names of vertices on the edges of two layers of points: a layer of cells has edges that begin in the two around it.
+/// Names of vertices on the edges of two layers of points: a layer of cells has edges that begin in
+/// the two around it.
 pub(super) struct VertexNames<N> {
     /// The layer in which the edge begins that a name belongs to, plus 1; 0 is none.
     layer: [u8; ENTRIES],

@@ -18,13 +18,15 @@ pub struct Triangle {
     pub vertices: [Vertex; 3],
 }
 
-/// Takes a mesh while it is made. A closure that takes triangles is one to which vertices have no names.
+/// Takes a mesh while it is made. A closure that takes triangles is one to which vertices have no
+/// names.
 pub trait MeshSink {
     /// What the sink calls a vertex.
     type Name: Copy + Default;
 
-    /// Takes a vertex before the first triangle that has it, and names it. The same vertex comes again only where it `may_recur`: at the
-    /// border of a block, and on a lattice point, where edges meet.
+    /// Takes a vertex before the first triangle that has it, and names it. The same vertex comes
+    /// again only where it `may_recur`: at the border of a block, and on a lattice point, where
+    /// edges meet.
     fn vertex(&mut self, vertex: &Vertex, may_recur: bool) -> Self::Name;
 
     /// Takes a triangle, and what its corners are called.

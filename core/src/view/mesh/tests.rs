@@ -17,7 +17,11 @@ fn mesh(volume: &Volume<'_>) -> Vec<Triangle> {
     triangles
 }
 
-fn filled(low: [i32; 3], high: [i32; 3], sample_at: impl Fn([i32; 3]) -> LatticeSample) -> Volume<'static> {
+fn filled(
+    low: [i32; 3],
+    high: [i32; 3],
+    sample_at: impl Fn([i32; 3]) -> LatticeSample,
+) -> Volume<'static> {
     let mut volume = empty(&VolumeConfig::default(), cuboid(low, high).count());
     fill(&mut volume, cuboid(low, high), sample_at);
     volume
@@ -42,7 +46,9 @@ fn sides(triangles: &[Triangle]) -> BTreeMap<(Key, Key), usize> {
     let mut sides = BTreeMap::new();
     for triangle in triangles {
         for i in 0..3 {
-            *sides.entry((key(&triangle.vertices[i]), key(&triangle.vertices[(i + 1) % 3]))).or_default() += 1;
+            *sides
+                .entry((key(&triangle.vertices[i]), key(&triangle.vertices[(i + 1) % 3])))
+                .or_default() += 1;
         }
     }
     sides
@@ -58,11 +64,15 @@ fn assert_closed(triangles: &[Triangle]) {
 /// Closed, and at each side exactly two triangles meet.
 fn assert_manifold(triangles: &[Triangle]) {
     assert_closed(triangles);
-    assert!(sides(triangles).values().all(|&count| count == 1), "more than two triangles at a side");
+    assert!(
+        sides(triangles).values().all(|&count| count == 1),
+        "more than two triangles at a side"
+    );
 }
 
 fn euler(triangles: &[Triangle]) -> i64 {
-    let mut vertices: Vec<Key> = triangles.iter().flat_map(|t| t.vertices.iter().map(key)).collect();
+    let mut vertices: Vec<Key> =
+        triangles.iter().flat_map(|t| t.vertices.iter().map(key)).collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices.len() as i64 - sides(triangles).len() as i64 / 2 + triangles.len() as i64
@@ -76,7 +86,9 @@ fn a_ball_across_many_blocks_becomes_a_closed_sphere_of_its_radius() {
     assert_eq!(euler(&triangles), 2);
     let mut sum = 0.0;
     for triangle in &triangles {
-        let corners = triangle.vertices.map(|v| nalgebra::Vector3::from(v.position_m) / VOXEL_M - nalgebra::Vector3::from(center));
+        let corners = triangle.vertices.map(|v| {
+            nalgebra::Vector3::from(v.position_m) / VOXEL_M - nalgebra::Vector3::from(center)
+        });
         for corner in corners {
             assert!((corner.norm() - 15.2).abs() < 0.03, "{}", corner.norm());
             sum += corner.norm() - 15.2;
@@ -132,7 +144,8 @@ fn distances_of_exactly_zero_open_no_cracks() {
         assert_closed(&triangles);
     }
     // A plane through lattice points.
-    let triangles = mesh(&filled([0; 3], [1, 1, 0], |p| Some(((p[2] - 4) as f32 * VOXEL_M, 1, [0; 3]))));
+    let triangles =
+        mesh(&filled([0; 3], [1, 1, 0], |p| Some(((p[2] - 4) as f32 * VOXEL_M, 1, [0; 3]))));
     assert_eq!(triangles.len(), 2 * 15 * 15);
     assert!(triangles.iter().flat_map(|t| t.vertices).all(|v| v.position_m[2] == 4.0 * VOXEL_M));
 }
@@ -149,7 +162,9 @@ fn an_unseen_lattice_point_leaves_a_hole_of_the_cells_around_it() {
 
 #[test]
 fn a_minimum_weight_cuts_away_what_was_seen_less_often() {
-    let volume = filled([0; 3], [0; 3], |p| Some(((p[2] as f32 - 3.6) * VOXEL_M, if p[0] < 4 { 2 } else { 3 }, [9; 3])));
+    let volume = filled([0; 3], [0; 3], |p| {
+        Some(((p[2] as f32 - 3.6) * VOXEL_M, if p[0] < 4 { 2 } else { 3 }, [9; 3]))
+    });
     let count = |min_weight| volume.triangles(&MeshConfig { min_weight }, &mut |_| ());
     assert_eq!([1, 2, 3, 4].map(count), [2 * 7 * 7, 2 * 7 * 7, 2 * 3 * 7, 0]);
 }
@@ -158,10 +173,17 @@ fn a_minimum_weight_cuts_away_what_was_seen_less_often() {
 fn colour_runs_along_the_edge_and_falls_back_to_the_coloured_end() {
     let volume = filled([0; 3], [0; 3], |p| {
         let colour = if p[2] <= 3 { [100, 0, 20] } else { [200, 0, 40] };
-        Some(((p[2] as f32 - 3.25) * VOXEL_M, 1, if p[0] > 3 && p[2] <= 3 { [0; 3] } else { colour }))
+        Some((
+            (p[2] as f32 - 3.25) * VOXEL_M,
+            1,
+            if p[0] > 3 && p[2] <= 3 { [0; 3] } else { colour },
+        ))
     });
     for vertex in mesh(&volume).iter().flat_map(|t| t.vertices) {
-        assert_eq!(vertex.colour, if vertex.position_m[0] > 3.5 * VOXEL_M { [200, 0, 40] } else { [125, 0, 25] });
+        assert_eq!(
+            vertex.colour,
+            if vertex.position_m[0] > 3.5 * VOXEL_M { [200, 0, 40] } else { [125, 0, 25] }
+        );
     }
 }
 
@@ -174,8 +196,15 @@ fn order_follows_slots_and_two_blocks_agree_on_their_border() {
     fill(&mut back, cuboid([1, 0, 0], [1, 0, 0]).chain(cuboid([0; 3], [0; 3])), &sample_at);
     let (there, back) = (mesh(&there), mesh(&back));
     assert_manifold(&there);
-    let first = there.iter().filter(|t| t.vertices.iter().all(|v| v.position_m[0] <= 8.0 * VOXEL_M)).count();
-    assert_eq!([&there[first..], &there[..first]].concat(), back, "the same triangles, the second block's first");
+    let first = there
+        .iter()
+        .filter(|t| t.vertices.iter().all(|v| v.position_m[0] <= 8.0 * VOXEL_M))
+        .count();
+    assert_eq!(
+        [&there[first..], &there[..first]].concat(),
+        back,
+        "the same triangles, the second block's first"
+    );
 }
 
 /// Keeps the vertices in the order of their names.
@@ -209,11 +238,18 @@ fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
         for (triangle, names) in &triangles {
             assert_eq!(triangle.vertices, names.map(|name| vertices[name].0));
         }
-        let first_uses: Vec<usize> = triangles.iter().flat_map(|(_, names)| names).copied().fold(Vec::new(), |mut first, name| {
-            first.extend((name == first.len()).then_some(name));
-            first
-        });
-        assert_eq!(first_uses.len(), vertices.len(), "each is named by the first triangle that has it");
+        let first_uses: Vec<usize> = triangles.iter().flat_map(|(_, names)| names).copied().fold(
+            Vec::new(),
+            |mut first, name| {
+                first.extend((name == first.len()).then_some(name));
+                first
+            },
+        );
+        assert_eq!(
+            first_uses.len(),
+            vertices.len(),
+            "each is named by the first triangle that has it"
+        );
         let mut times: BTreeMap<Key, usize> = BTreeMap::new();
         vertices.iter().for_each(|(vertex, _)| *times.entry(key(vertex)).or_default() += 1);
         assert!(vertices.iter().all(|(vertex, may_recur)| *may_recur || times[&key(vertex)] == 1));
@@ -226,8 +262,16 @@ fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
 fn a_vertex_has_the_weight_of_the_nearer_point() {
     let weight = |p: [i32; 3]| if p[2] <= 3 { 10 } else { 20 };
     for (depth, expected) in [(3.25, 10), (3.75, 20)] {
-        let volume = filled([0; 3], [1, 1, 0], |p| Some(((p[2] as f32 - depth) * VOXEL_M, weight(p), [9; 3])));
+        let volume = filled([0; 3], [1, 1, 0], |p| {
+            Some(((p[2] as f32 - depth) * VOXEL_M, weight(p), [9; 3]))
+        });
         let triangles = mesh(&volume);
-        assert!(triangles.len() > 100 && triangles.iter().flat_map(|t| t.vertices).all(|vertex| vertex.weight == expected));
+        assert!(
+            triangles.len() > 100
+                && triangles
+                    .iter()
+                    .flat_map(|t| t.vertices)
+                    .all(|vertex| vertex.weight == expected)
+        );
     }
 }

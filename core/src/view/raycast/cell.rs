@@ -1,4 +1,5 @@
-//! One cell of the lattice as a ray meets it: where the ray passes it, and the trilinear field between its corners.
+//! One cell of the lattice as a ray meets it: where the ray passes it, and the trilinear field
+//! between its corners.
 
 use super::ray_camera::{AXES, Ray};
 use crate::geometry::scalar::{max_f32, min_f32};
@@ -13,12 +14,15 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// Gives unseen corners the value of the plane through the seen ones, its slope along each axis the mean over the edges with both
-    /// ends seen. Exact for a plane, hence no bias to either side. `None` when no edge tells the slope along some axis.
+    /// Gives unseen corners the value of the plane through the seen ones, its slope along each axis
+    /// the mean over the edges with both ends seen. Exact for a plane, hence no bias to either
+    /// side. `None` when no edge tells the slope along some axis.
     #[expect(clippy::indexing_slicing, reason = "masks keep corners below 8")]
     pub fn complete(&self) -> Option<[f32; 8]> {
         let mut known = [0.0; 8];
-        (0..).zip(&mut known).for_each(|(corner, known)| *known = f32::from(self.observed >> corner & 1));
+        (0..)
+            .zip(&mut known)
+            .for_each(|(corner, known)| *known = f32::from(self.observed >> corner & 1));
         let slope = |low: [usize; 4], step: usize| {
             let (mut sum, mut edges) = (0.0, 0.0);
             for low in low {
@@ -51,7 +55,8 @@ impl Corners {
     }
 }
 
-/// The trilinear field in a cell, as the coefficients of 1, x, y, z, xy, xz, yz, xyz for x, y, z from 0 to 1.
+/// The trilinear field in a cell, as the coefficients of 1, x, y, z, xy, xz, yz, xyz for x, y, z
+/// from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Field(pub [f32; 8]);
 
@@ -67,7 +72,9 @@ impl Field {
     #[inline(always)]
     pub fn at(&self, [x, y, z]: [f32; 3]) -> f32 {
         let [one, by_x, by_y, by_z, by_xy, by_xz, by_yz, by_xyz] = self.0;
-        (one + by_z * z) + y * (by_y + by_yz * z) + x * ((by_x + by_xz * z) + y * (by_xy + by_xyz * z))
+        (one + by_z * z)
+            + y * (by_y + by_yz * z)
+            + x * ((by_x + by_xz * z) + y * (by_xy + by_xyz * z))
     }
 
     #[inline(always)]
@@ -81,12 +88,13 @@ impl Field {
     }
 }
 
-/// How far the lower (0) and the upper (1) face of a cell are from the camera along each axis, in lattice units. Cells side by side have
-/// the same figures at the face between them, so that what follows from these is the same in both.
+/// How far the lower (0) and the upper (1) face of a cell are from the camera along each axis, in
+/// lattice units. Cells side by side have the same figures at the face between them, so that what
+/// follows from these is the same in both.
 pub(super) type Faces = [[f32; 3]; 2];
 
-/// The depths at which a ray enters and leaves a cell, m, no nearer than `near_m`. It does not pass the cell where the second is not the
-/// larger one.
+/// The depths at which a ray enters and leaves a cell, m, no nearer than `near_m`. It does not pass
+/// the cell where the second is not the larger one.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 pub(super) fn depths_m(ray: &Ray, [lower, upper]: &Faces, near_m: f32) -> [f32; 2] {
@@ -99,7 +107,8 @@ pub(super) fn depths_m(ray: &Ray, [lower, upper]: &Faces, near_m: f32) -> [f32; 
     [enters_m, leaves_m]
 }
 
-/// Where a ray is at a depth, in a cell's coordinates: exactly 0 or 1 across a face that it passes there, and never outside.
+/// Where a ray is at a depth, in a cell's coordinates: exactly 0 or 1 across a face that it passes
+/// there, and never outside.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 pub(super) fn position(ray: &Ray, [lower, upper]: &Faces, depth_m: f32) -> [f32; 3] {
@@ -107,7 +116,8 @@ pub(super) fn position(ray: &Ray, [lower, upper]: &Faces, depth_m: f32) -> [f32;
     for axis in AXES {
         let between = min_f32(max_f32(ray.slope[axis] * depth_m - lower[axis], 0.0), 1.0);
         let below_upper = if upper[axis] * ray.per_unit[axis] == depth_m { 1.0 } else { between };
-        position[axis] = if lower[axis] * ray.per_unit[axis] == depth_m { 0.0 } else { below_upper };
+        position[axis] =
+            if lower[axis] * ray.per_unit[axis] == depth_m { 0.0 } else { below_upper };
     }
     position
 }
@@ -118,8 +128,8 @@ pub(super) fn along([[x, y, z], [to_x, to_y, to_z]]: [[f32; 3]; 2], share: f32) 
     [x + (to_x - x) * share, y + (to_y - y) * share, z + (to_z - z) * share]
 }
 
-/// The trilinear mean of the corners at a point. On a face it is that of the face's corners, to the bit: the others count 0, so that cells
-/// side by side agree at the face between them.
+/// The trilinear mean of the corners at a point. On a face it is that of the face's corners, to the
+/// bit: the others count 0, so that cells side by side agree at the face between them.
 #[inline(always)]
 pub(super) fn mean(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let [a, b, c, d, e, f, g, h] = *corners;
@@ -148,21 +158,33 @@ mod tests {
                 let mut beside = point;
                 beside[axis] += 0.5;
                 let slope = (field.at(beside) - field.at(point)) / 0.5;
-                assert!((field.gradient(point)[axis] - slope).abs() < 0.2, "linear along each axis");
+                assert!(
+                    (field.gradient(point)[axis] - slope).abs() < 0.2,
+                    "linear along each axis"
+                );
             }
         }
     }
 
     #[test]
     fn unseen_corners_of_a_plane_are_completed_exactly() {
-        let plane = |corner: usize| 100.0 + 300.0 * (corner & 1) as f32 - 50.0 * (corner >> 1 & 1) as f32 - 700.0 * (corner >> 2) as f32;
+        let plane = |corner: usize| {
+            100.0 + 300.0 * (corner & 1) as f32
+                - 50.0 * (corner >> 1 & 1) as f32
+                - 700.0 * (corner >> 2) as f32
+        };
         let exact: [f32; 8] = core::array::from_fn(plane);
         let mut completed = 0;
         for observed in 0..=u8::MAX {
-            let sdf = core::array::from_fn(|corner| if observed >> corner & 1 == 1 { plane(corner) } else { 9_999.0 });
+            let sdf = core::array::from_fn(|corner| {
+                if observed >> corner & 1 == 1 { plane(corner) } else { 9_999.0 }
+            });
             if let Some(corners) = (Corners { sdf, observed }).complete() {
                 completed += 1;
-                corners.iter().zip(exact).for_each(|(sdf, exact)| assert!((sdf - exact).abs() < 1e-3));
+                corners
+                    .iter()
+                    .zip(exact)
+                    .for_each(|(sdf, exact)| assert!((sdf - exact).abs() < 1e-3));
             }
         }
         assert!(completed > 100, "{completed} of 256");

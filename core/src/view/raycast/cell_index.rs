@@ -1,4 +1,5 @@
-//! Cells of a block and their corners as words, so that a corner's block and voxel are a few integer operations.
+//! Cells of a block and their corners as words, so that a corner's block and voxel are a few
+//! integer operations.
 
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
 
@@ -18,7 +19,8 @@ const UNITS: u32 = 0o111;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CellIndex(u32);
 
-/// A lattice point: which of the blocks around a block's last corner it is in, 1 the next in x, 2 in y, 4 in z, and its voxel there.
+/// A lattice point: which of the blocks around a block's last corner it is in, 1 the next in x, 2
+/// in y, 4 in z, and its voxel there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Point {
     block: u32,
@@ -86,7 +88,10 @@ impl CellIndex {
     pub fn corner_values<T: Copy>(self, voxels: &[T; BLOCK_VOXELS]) -> Option<[T; 8]> {
         // From the cell's first corner to its last.
         let window: &[T; 74] = voxels.get(self.voxel()..)?.first_chunk()?;
-        Some([window[0], window[1], window[8], window[9], window[64], window[65], window[72], window[73]])
+        Some([
+            window[0], window[1], window[8], window[9], window[64], window[65], window[72],
+            window[73],
+        ])
     }
 }
 
@@ -116,10 +121,15 @@ mod tests {
 
     #[test]
     fn cells_and_their_corners_are_where_their_coordinates_say() {
-        for (x, y, z) in (0..8).flat_map(|z| (0..8).flat_map(move |y| (0..8).map(move |x| (x, y, z)))) {
+        for (x, y, z) in
+            (0..8).flat_map(|z| (0..8).flat_map(move |y| (0..8).map(move |x| (x, y, z))))
+        {
             let cell = CellIndex::of_voxel((x + 8 * y + 64 * z) as u32);
             assert_eq!([0, 1, 2].map(|axis| cell.coordinate(axis) as i32), [x, y, z]);
-            assert_eq!((cell.voxel() as i32, cell.bit()), (x + 8 * y + 64 * z, (z as usize, (x + 8 * y) as u32)));
+            assert_eq!(
+                (cell.voxel() as i32, cell.bit()),
+                (x + 8 * y + 64 * z, (z as usize, (x + 8 * y) as u32))
+            );
             assert_eq!(cell.is_inner(), x < 7 && y < 7 && z < 7);
             for (corner, point) in (0..).zip(cell.corners()) {
                 let [x, y, z] = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];

@@ -2,8 +2,9 @@
 
 use crate::geometry::scalar::floored_i32;
 
-/// The colours at the corners of a cell: two words each, red and blue, green and whether there is a colour. Sixteen bits apart, so that
-/// sums of what 256 counts in all make of them stay apart too. All 0 is no colour.
+/// The colours at the corners of a cell: two words each, red and blue, green and whether there is a
+/// colour. Sixteen bits apart, so that sums of what 256 counts in all make of them stay apart too.
+/// All 0 is no colour.
 pub(super) type Colours = [u32; 16];
 
 /// One corner's words.
@@ -16,11 +17,24 @@ pub(super) fn words([red, green, blue]: [u8; 3]) -> [u32; 2] {
 /// What each corner of a cell counts at a point in it, in 256ths.
 #[inline(always)]
 fn counts([x, y, z]: [f32; 3]) -> [u32; 8] {
-    let [x, y, z] = [floored_i32(x * 256.0) as u32, floored_i32(y * 256.0) as u32, floored_i32(z * 256.0) as u32];
+    let [x, y, z] = [
+        floored_i32(x * 256.0) as u32,
+        floored_i32(y * 256.0) as u32,
+        floored_i32(z * 256.0) as u32,
+    ];
     let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
     let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
     let count = |area: u32, height: u32| (area * height) >> 16;
-    [count(a, nz), count(b, nz), count(c, nz), count(d, nz), count(a, z), count(b, z), count(c, z), count(d, z)]
+    [
+        count(a, nz),
+        count(b, nz),
+        count(c, nz),
+        count(d, nz),
+        count(a, z),
+        count(b, z),
+        count(c, z),
+        count(d, z),
+    ]
 }
 
 /// The mean of the coloured corners of a cell at a point in it, by nearness in 256ths.

@@ -53,7 +53,8 @@ impl<'a> CrossedCells<'a, '_> {
     /// The cell of an id.
     #[inline]
     pub fn get(&self, CellId(id): CellId) -> Option<CrossedCell<'a>> {
-        let (entry, at) = (id as usize / BLOCK_VOXELS, CellIndex::of_voxel(id % BLOCK_VOXELS as u32));
+        let (entry, at) =
+            (id as usize / BLOCK_VOXELS, CellIndex::of_voxel(id % BLOCK_VOXELS as u32));
         let block = self.surface.block(entry)?;
         let (layer, bit) = at.bit();
         let fully_observed = block.cells.get(layer)?.fully_observed >> bit & 1 == 1;
@@ -73,7 +74,8 @@ impl<'a> CrossedCells<'a, '_> {
         faces
     }
 
-    /// Distances at the corners of a cell; those that were not seen are on the plane through the others. `None` where nothing tells that plane.
+    /// Distances at the corners of a cell; those that were not seen are on the plane through the
+    /// others. `None` where nothing tells that plane.
     #[inline(always)]
     pub fn corners(&self, cell: &CrossedCell<'_>) -> Option<[f32; 8]> {
         if cell.fully_observed && cell.at.is_inner() {
@@ -88,7 +90,9 @@ impl<'a> CrossedCells<'a, '_> {
         let mut corners = Corners::default();
         for (corner, (sdf, point)) in corners.sdf.iter_mut().zip(cell.at.corners()).enumerate() {
             *sdf = self.sdf(cell.slots, point);
-            corners.observed |= u8::from(cell.fully_observed || self.weight(cell.slots, point) >= self.min_weight) << corner;
+            corners.observed |=
+                u8::from(cell.fully_observed || self.weight(cell.slots, point) >= self.min_weight)
+                    << corner;
         }
         if cell.fully_observed { Some(corners.sdf) } else { corners.complete() }
     }
@@ -114,7 +118,8 @@ impl<'a> CrossedCells<'a, '_> {
         let mut colours = Colours::default();
         for (words, point) in colours.as_chunks_mut::<2>().0.iter_mut().zip(cell.at.corners()) {
             if let Some([red, green, blue]) = self.blocks.colour(cell.slots[point.block()]) {
-                *words = colour::words([red[point.voxel()], green[point.voxel()], blue[point.voxel()]]);
+                *words =
+                    colour::words([red[point.voxel()], green[point.voxel()], blue[point.voxel()]]);
             }
         }
         colours

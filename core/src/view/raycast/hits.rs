@@ -47,7 +47,8 @@ impl<'a> Hits<'a> {
         }
     }
 
-    /// Adds a column whose ray meets the surface in a cell: there is space where not [`Self::is_full`].
+    /// Adds a column whose ray meets the surface in a cell: there is space where not
+    /// [`Self::is_full`].
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
     pub fn push(&mut self, cells: &CrossedCells<'a, '_>, u: usize, id: CellId) {
@@ -95,7 +96,14 @@ impl<'a> Hits<'a> {
                 && depth_m <= far_m
             {
                 let colour = at_lane(&met.colour, lane).map(|channel| channel as u8);
-                let hit = hit(cells, cell, depth_m, at_lane(&met.point, lane), at_lane(&met.direction, lane), colour);
+                let hit = hit(
+                    cells,
+                    cell,
+                    depth_m,
+                    at_lane(&met.point, lane),
+                    at_lane(&met.direction, lane),
+                    colour,
+                );
                 show(self.crossings.columns[lane] as usize, hit);
             }
         }
@@ -103,7 +111,8 @@ impl<'a> Hits<'a> {
     }
 }
 
-/// What is seen at a point of a cell, given in which direction from there, in camera axes, the field rises.
+/// What is seen at a point of a cell, given in which direction from there, in camera axes, the
+/// field rises.
 #[inline]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 fn hit(
@@ -176,8 +185,8 @@ struct Met {
     colour: [Eight<i32>; 3],
 }
 
-/// The work on these rays: false position, which halves the weight of an end that stays (the Illinois rule), so that both ends close
-/// in; then the field's gradient.
+/// The work on these rays: false position, which halves the weight of an end that stays (the
+/// Illinois rule), so that both ends close in; then the field's gradient.
 struct Meet<'a> {
     crossings: &'a Crossings,
     rays: &'a RowOfRays,
@@ -194,12 +203,14 @@ impl Work for Meet<'_> {
     fn run(self) -> Met {
         let Self { crossings, rays, .. } = self;
         let mut fields = [[0.0; LANES]; 8];
-        let (mut from, mut to, mut depths, mut values) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        let (mut from, mut to, mut depths, mut values) =
+            ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 2], [[0.0; LANES]; 2]);
         for lane in 0..LANES {
             let corners = at_lane(&crossings.corners, lane);
             let (ray, faces) = (rays.ray(crossings.columns[lane]), crossings.faces(lane));
             let [enters_m, leaves_m] = depths_m(&ray, &faces, self.near_m);
-            let [entry, exit] = [position(&ray, &faces, enters_m), position(&ray, &faces, leaves_m)];
+            let [entry, exit] =
+                [position(&ray, &faces, enters_m), position(&ray, &faces, leaves_m)];
             set(&mut from, lane, &entry);
             set(&mut to, lane, &exit);
             set(&mut depths, lane, &[enters_m, leaves_m]);
@@ -209,22 +220,29 @@ impl Work for Meet<'_> {
             set(&mut fields, lane, &Field::new(&at_lane(&crossings.corners, lane)).0);
         }
         let ends = |lane: usize| [at_lane(&from, lane), at_lane(&to, lane)];
-        let ([mut low, mut low_value], [mut high, mut high_value]) = ([[0.0; LANES], values[0]], [[1.0; LANES], values[1]]);
+        let ([mut low, mut low_value], [mut high, mut high_value]) =
+            ([[0.0; LANES], values[0]], [[1.0; LANES], values[1]]);
         let (mut share, mut side, mut is_open) = ([0.0; LANES], [0i32; LANES], [1i32; LANES]);
         for _ in 0..MAX_REFINEMENTS {
             let mut open = 0;
             for lane in 0..LANES {
-                let next = low[lane] + (high[lane] - low[lane]) * (low_value[lane] / (low_value[lane] - high_value[lane]));
+                let next = low[lane]
+                    + (high[lane] - low[lane])
+                        * (low_value[lane] / (low_value[lane] - high_value[lane]));
                 let value = Field(at_lane(&fields, lane)).at(along(ends(lane), next));
                 share[lane] = if is_open[lane] != 0 { next } else { share[lane] };
                 is_open[lane] &= i32::from((value >= GOOD_ENOUGH) | (value <= -GOOD_ENOUGH));
                 open |= is_open[lane];
                 let is_before = value > 0.0;
-                let [high_stays, low_stays] = [is_before & (side[lane] > 0), !is_before & (side[lane] < 0)];
-                (low[lane], high[lane]) = if is_before { (next, high[lane]) } else { (low[lane], next) };
+                let [high_stays, low_stays] =
+                    [is_before & (side[lane] > 0), !is_before & (side[lane] < 0)];
+                (low[lane], high[lane]) =
+                    if is_before { (next, high[lane]) } else { (low[lane], next) };
                 let (lower, higher) = (low_value[lane], high_value[lane]);
-                low_value[lane] = if is_before { value } else { lower * if low_stays { 0.5 } else { 1.0 } };
-                high_value[lane] = if is_before { higher * if high_stays { 0.5 } else { 1.0 } } else { value };
+                low_value[lane] =
+                    if is_before { value } else { lower * if low_stays { 0.5 } else { 1.0 } };
+                high_value[lane] =
+                    if is_before { higher * if high_stays { 0.5 } else { 1.0 } } else { value };
                 side[lane] = if is_before { 1 } else { -1 };
             }
             if open == 0 {
@@ -242,7 +260,8 @@ impl Work for Meet<'_> {
                 let row = self.rotation[axis];
                 met.colour[axis][lane] = colour[axis];
                 met.point[axis][lane] = point[axis];
-                met.direction[axis][lane] = row[0] * gradient[0] + row[1] * gradient[1] + row[2] * gradient[2];
+                met.direction[axis][lane] =
+                    row[0] * gradient[0] + row[1] * gradient[1] + row[2] * gradient[2];
             }
         }
         met

@@ -1,23 +1,30 @@
 //! The map as a camera at any pose would see it: depth, normal, colour and weight per pixel.
 //!
-//! The surface is where the trilinear field between lattice points falls from above 0, in free space that was seen, to 0 or below. A ray
-//! is tried in every cell that it passes and that has corners on both sides, and within the first that stops it the surface is found by
-//! false position: nothing thin is jumped over, and the depth carries no bias of a step length. A ray that begins behind a surface, or
-//! comes out of unseen space at its back, meets none there. Where corners of a cell were never seen, the plane through the others stands in.
+//! The surface is where the trilinear field between lattice points falls from above 0, in free
+//! space that was seen, to 0 or below. A ray is tried in every cell that it passes and that has
+//! corners on both sides, and within the first that stops it the surface is found by false
+//! position: nothing thin is jumped over, and the depth carries no bias of a step length. A ray
+//! that begins behind a surface, or comes out of unseen space at its back, meets none there. Where
+//! corners of a cell were never seen, the plane through the others stands in.
 //!
-//! Cells go to the rays, not rays to the cells (docs/decisions/0050-cells-are-projected.md): the blocks in view are reduced to bits for the
-//! cells that the surface runs through (`signs`, `surface`), these are projected into the picture, from near to far, and each pixel keeps
-//! the one that its ray enters first (`visibility`); what is seen there is worked out once for each pixel (`hits`). Both work on eight rays at
-//! a time. What two cells say of a ray at the face between them is equal to the bit, so that no ray slips through, but
-//! where corners were guessed. The tests compare with a walk through every cell.
+//! Cells go to the rays, not rays to the cells (docs/decisions/0050-cells-are-projected.md): the
+//! blocks in view are reduced to bits for the cells that the surface runs through (`signs`,
+//! `surface`), these are projected into the picture, from near to far, and each pixel keeps the one
+//! that its ray enters first (`visibility`); what is seen there is worked out once for each pixel
+//! (`hits`). Both work on eight rays at a time. What two cells say of a ray at the face between
+//! them is equal to the bit, so that no ray slips through, but where corners were guessed. The
+//! tests compare with a walk through every cell.
 //!
-//! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds what lies nearer, so that each pixel shows the
-//! nearest surface and says whose it is. Of equal depths the map added first is seen.
+//! Several maps make one picture: [`Raycaster::cast`] begins it and [`Raycaster::cast_over`] adds
+//! what lies nearer, so that each pixel shows the nearest surface and says whose it is. Of equal
+//! depths the map added first is seen.
 //!
-//! Memory: 12 bytes a pixel for the images, 8 bytes a pixel of 64 rows, 300 bytes per `visible_blocks` and 8 bytes for the next power of
-//! two of twice their number. Time: linear in blocks in view, in the cells that the surface runs through and in the pixels they cover.
+//! Memory: 12 bytes a pixel for the images, 8 bytes a pixel of 64 rows, 300 bytes per
+//! `visible_blocks` and 8 bytes for the next power of two of twice their number. Time: linear in
+//! blocks in view, in the cells that the surface runs through and in the pixels they cover.
 //!
-//! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says where.
+//! When more blocks are in view than `visible_blocks`, the picture ends nearer, and the report says
+//! where.
 
 mod cell;
 mod cell_index;
@@ -78,13 +85,15 @@ impl fmt::Display for RaycastError {
 
 impl core::error::Error for RaycastError {}
 
-/// Where a picture is taken from, and how many of its pixels are wanted. A pose alone stands for all of them.
+/// Where a picture is taken from, and how many of its pixels are wanted. A pose alone stands for
+/// all of them.
 #[derive(Clone, Copy, Debug)]
 pub struct RaycastView {
     /// Camera to world.
     pub t_world_camera: Transform,
-    /// Every so many columns and rows are looked at, from the first on, at least 1. Time falls with the number of pixels; where it is a power
-    /// of two, they show what they show in the whole picture, to the last bit.
+    /// Every so many columns and rows are looked at, from the first on, at least 1. Time falls with
+    /// the number of pixels; where it is a power of two, they show what they show in the whole
+    /// picture, to the last bit.
     pub every: usize,
 }
 
@@ -186,8 +195,14 @@ impl<'s> Raycaster<'s> {
         }
     }
 
-    /// Looks at a map from a viewpoint. The picture is read with [`Self::depth_m`] and its like until the next one.
-    pub fn cast<E: Executor>(&mut self, volume: &Volume<'_>, view: &Viewpoint, executor: &E) -> Result<RaycastReport, RaycastError> {
+    /// Looks at a map from a viewpoint. The picture is read with [`Self::depth_m`] and its like
+    /// until the next one.
+    pub fn cast<E: Executor>(
+        &mut self,
+        volume: &Volume<'_>,
+        view: &Viewpoint,
+        executor: &E,
+    ) -> Result<RaycastReport, RaycastError> {
         (self.width, self.height) = (0, 0);
         let pixels = view.width.saturating_mul(view.height);
         if pixels == 0 || pixels > self.depth_m.len() || !self.visibility.fits(view.width) {
@@ -203,9 +218,10 @@ impl<'s> Raycaster<'s> {
         Ok(self.draw(volume, &ray_camera, 0, executor))
     }
 
-    /// Adds another map to the picture, of the same size and seen with the same rig; `view` is the camera's place in that map's own frame.
-    /// Where the map is nearer than what is there it is shown, and [`Self::layer`] is `layer`. The report counts these pixels. After an
-    /// error the picture is as it was.
+    /// Adds another map to the picture, of the same size and seen with the same rig; `view` is the
+    /// camera's place in that map's own frame. Where the map is nearer than what is there it is
+    /// shown, and [`Self::layer`] is `layer`. The report counts these pixels. After an error the
+    /// picture is as it was.
     pub(crate) fn cast_over<E: Executor>(
         &mut self,
         volume: &Volume<'_>,
@@ -220,10 +236,22 @@ impl<'s> Raycaster<'s> {
     }
 
     /// Draws a map over a picture of the camera's size.
-    fn draw<E: Executor>(&mut self, volume: &Volume<'_>, ray_camera: &RayCamera, layer: u8, executor: &E) -> RaycastReport {
+    fn draw<E: Executor>(
+        &mut self,
+        volume: &Volume<'_>,
+        ray_camera: &RayCamera,
+        layer: u8,
+        executor: &E,
+    ) -> RaycastReport {
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
-        let in_view = self.surface.find(volume, ray_camera, [near_m, self.config.far_m], min_weight, executor);
+        let in_view = self.surface.find(
+            volume,
+            ray_camera,
+            [near_m, self.config.far_m],
+            min_weight,
+            executor,
+        );
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
@@ -251,10 +279,13 @@ impl<'s> Raycaster<'s> {
         .0;
         let rows = ray_camera.height.div_ceil(4);
         let (high, low) = picture.split(2 * rows, ray_camera.width);
-        let ((a, b), (c, d)) = (high.split(rows, ray_camera.width), low.split(rows, ray_camera.width));
+        let ((a, b), (c, d)) =
+            (high.split(rows, ray_camera.width), low.split(rows, ray_camera.width));
         let strips = self.visibility.strips(ray_camera.width);
         // Sky and road go together, so that two threads have about the same to do.
-        let hits = each(executor, zip2([a, d, b, c], strips), |(band, strip)| scene.draw(band, strip, executor.vectors()));
+        let hits = each(executor, zip2([a, d, b, c], strips), |(band, strip)| {
+            scene.draw(band, strip, executor.vectors())
+        });
         RaycastReport {
             pixels: hits.iter().sum(),
             blocks_in_view: in_view.blocks,
@@ -263,12 +294,14 @@ impl<'s> Raycaster<'s> {
         }
     }
 
-    /// Depth along the camera's z, m; 0 where there is no surface. `None` before the first picture, as for the other images.
+    /// Depth along the camera's z, m; 0 where there is no surface. `None` before the first picture,
+    /// as for the other images.
     pub fn depth_m(&self) -> Option<View<'_, f32>> {
         View::new(self.depth_m, self.width, self.height)
     }
 
-    /// Normal in camera axes, towards the camera, in units of 1 / [`NORMAL_ONE`]; all 0 where there is no surface.
+    /// Normal in camera axes, towards the camera, in units of 1 / [`NORMAL_ONE`]; all 0 where there
+    /// is no surface.
     pub fn normal(&self) -> Option<View<'_, [i8; 3]>> {
         View::new(self.normal, self.width, self.height)
     }
@@ -349,11 +382,20 @@ impl Scene<'_, '_> {
             let mut images = Row { depth_m, normal, colour, weight, layers };
             let rays = self.ray_camera.row(v);
             let mut show = |hits: &mut Hits<'_>, images: &mut Row<'_>| {
-                hits.take(&self.cells, &rays, self.limits_m, &self.ray_camera.rotation, vectors, |u, hit| {
-                    count += u32::from(images.show(u, &hit, self.layer));
-                });
+                hits.take(
+                    &self.cells,
+                    &rays,
+                    self.limits_m,
+                    &self.ray_camera.rotation,
+                    vectors,
+                    |u, hit| {
+                        count += u32::from(images.show(u, &hit, self.layer));
+                    },
+                );
             };
-            for (u, &id) in strip.row(row).iter().take(width).enumerate().filter(|(_, id)| **id != CellId::NONE) {
+            for (u, &id) in
+                strip.row(row).iter().take(width).enumerate().filter(|(_, id)| **id != CellId::NONE)
+            {
                 hits.push(&self.cells, u, id);
                 if hits.is_full() {
                     show(&mut hits, &mut images);
@@ -386,11 +428,17 @@ impl Row<'_> {
     fn show(&mut self, u: usize, hit: &Hit, layer: u8) -> bool {
         let is_nearer = self.is_nearer(u, hit.depth_m);
         if is_nearer
-            && let (Some(depth_m), Some(normal), Some(colour), Some(weight), Some(shown)) =
-                (self.depth_m.get_mut(u), self.normal.get_mut(u), self.colour.get_mut(u), self.weight.get_mut(u), self.layers.get_mut(u))
+            && let (Some(depth_m), Some(normal), Some(colour), Some(weight), Some(shown)) = (
+                self.depth_m.get_mut(u),
+                self.normal.get_mut(u),
+                self.colour.get_mut(u),
+                self.weight.get_mut(u),
+                self.layers.get_mut(u),
+            )
         {
             let unit = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
-            (*depth_m, *normal, *colour, *weight, *shown) = (hit.depth_m, unit, hit.colour, hit.weight, layer);
+            (*depth_m, *normal, *colour, *weight, *shown) =
+                (hit.depth_m, unit, hit.colour, hit.weight, layer);
         }
         is_nearer
     }

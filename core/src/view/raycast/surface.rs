@@ -1,6 +1,7 @@
 //! The blocks in view and the cells of each that the surface runs through.
 //!
-//! Made anew for every picture: blocks are culled, their signs become bits, the bits of neighbours joined into crossed cells.
+//! Made anew for every picture: blocks are culled, their signs become bits, the bits of neighbours
+//! joined into crossed cells.
 
 use super::{
     crossed::CellId,
@@ -27,7 +28,8 @@ pub(super) struct Surface<'s> {
     local: &'s mut [[i32; 3]],
     /// First and last row of the picture that a block may be seen in.
     rows: &'s mut [[u16; 2]],
-    /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where no block is.
+    /// The block's own slot and those of the blocks after it in x (1), y (2), z (4); [`NONE`] where
+    /// no block is.
     slots: &'s mut [[Slot; 8]],
     signs: &'s mut [[signs::Layers; 2]],
     cells: &'s mut [Cells],
@@ -113,8 +115,14 @@ impl<'s> Surface<'s> {
     }
 
     /// Lists the blocks that have a cell, or a neighbour with a corner, that may be in the picture.
-    fn cull(&mut self, volume: &Volume<'_>, ray_camera: &RayCamera, [near_m, far_m]: [f32; 2]) -> InView {
-        // Cells of the block before this one end at this block's first points: the box is one longer on that side.
+    fn cull(
+        &mut self,
+        volume: &Volume<'_>,
+        ray_camera: &RayCamera,
+        [near_m, far_m]: [f32; 2],
+    ) -> InView {
+        // Cells of the block before this one end at this block's first points: the box is one
+        // longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
         let blocks = volume.pool().live().filter_map(|slot| {
             let local = ray_camera.local(volume.blocks().coord(slot)?)?;
@@ -144,7 +152,9 @@ impl<'s> Surface<'s> {
         }
         // The nearest first: most of what they hide is left out before it is looked at.
         for (slot, local, rows, depth_m) in blocks {
-            if let Some(start) = starts.get_mut(..steps).and_then(|starts| starts.get_mut(step_of(depth_m))) {
+            if let Some(start) =
+                starts.get_mut(..steps).and_then(|starts| starts.get_mut(step_of(depth_m)))
+            {
                 self.set(*start, slot, local, rows);
                 *start += 1;
             }
@@ -156,7 +166,9 @@ impl<'s> Surface<'s> {
     }
 
     fn set(&mut self, at: usize, slot: Slot, block: [i32; 3], in_rows: [i32; 2]) {
-        if let (Some(local), Some(rows), Some(slots)) = (self.local.get_mut(at), self.rows.get_mut(at), self.slots.get_mut(at)) {
+        if let (Some(local), Some(rows), Some(slots)) =
+            (self.local.get_mut(at), self.rows.get_mut(at), self.slots.get_mut(at))
+        {
             (*local, *rows) = (block, in_rows.map(|row| row as u16));
             *slots = [slot, NONE, NONE, NONE, NONE, NONE, NONE, NONE];
         }
@@ -187,12 +199,18 @@ impl<'s> Surface<'s> {
     fn read_signs<E: Executor>(&mut self, volume: &Volume<'_>, min_weight: u8, executor: &E) {
         let read = |(signs, slots): (&mut [[signs::Layers; 2]], &[[Slot; 8]])| {
             for (signs, [slot, ..]) in signs.iter_mut().zip(slots) {
-                if let (Some(sdf), Some(weight)) = (volume.blocks().sdf(*slot), volume.blocks().weight(*slot)) {
+                if let (Some(sdf), Some(weight)) =
+                    (volume.blocks().sdf(*slot), volume.blocks().weight(*slot))
+                {
                     *signs = signs::of_block(sdf, weight, min_weight);
                 }
             }
         };
-        let (Some(signs), Some(slots)) = (self.signs.get_mut(..self.len), self.slots.get(..self.len)) else { return };
+        let (Some(signs), Some(slots)) =
+            (self.signs.get_mut(..self.len), self.slots.get(..self.len))
+        else {
+            return;
+        };
         let bands = Bands::of(self.len);
         each(executor, zip2(bands.split_mut(signs, 1), bands.split(slots, 1)), read);
     }
@@ -205,8 +223,14 @@ impl<'s> Surface<'s> {
             let mut around = [&UNSEEN; 8];
             let mut slots = [NONE; 8];
             for (n, (around, slot)) in (0i32..).zip(around.iter_mut().zip(&mut slots)) {
-                let entry = if n == 0 { Some(at) } else { self.entry([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)]) };
-                if let Some((signs, slots)) = entry.and_then(|entry| self.signs.get(entry).zip(self.slots.get(entry))) {
+                let entry = if n == 0 {
+                    Some(at)
+                } else {
+                    self.entry([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)])
+                };
+                if let Some((signs, slots)) =
+                    entry.and_then(|entry| self.signs.get(entry).zip(self.slots.get(entry)))
+                {
                     *around = signs;
                     *slot = slots[0];
                 }
@@ -252,10 +276,16 @@ impl<'s> Surface<'s> {
         })
     }
 
-    /// The blocks that may be seen in rows of the picture from a first to a last one, and their entries, from near to far.
-    pub fn blocks_in_rows(&self, [first, last]: [usize; 2]) -> impl Iterator<Item = (usize, BlockInView<'_>)> {
-        let is_seen = move |rows: &[u16; 2]| usize::from(rows[0]) <= last && usize::from(rows[1]) >= first;
-        let entries = self.rows.iter().take(self.len).enumerate().filter(move |(_, rows)| is_seen(rows));
+    /// The blocks that may be seen in rows of the picture from a first to a last one, and their
+    /// entries, from near to far.
+    pub fn blocks_in_rows(
+        &self,
+        [first, last]: [usize; 2],
+    ) -> impl Iterator<Item = (usize, BlockInView<'_>)> {
+        let is_seen =
+            move |rows: &[u16; 2]| usize::from(rows[0]) <= last && usize::from(rows[1]) >= first;
+        let entries =
+            self.rows.iter().take(self.len).enumerate().filter(move |(_, rows)| is_seen(rows));
         entries.filter_map(|(entry, _)| Some((entry, self.block(entry)?)))
     }
 

@@ -1,9 +1,10 @@
 //! Which cell each pixel's ray meets the surface in: the nearest of those it passes.
 //!
-//! Cells are projected into the picture one by one (cell projection: Wilhelms, Van Gelder, *A Coherent Projection Approach for Direct Volume
-//! Rendering*, 1991), and of all that stop a pixel's ray the one it enters first is kept: their order changes nothing but the time. What is
-//! seen there is worked out afterwards, once for each pixel (Burns, Hunt, *The Visibility Buffer*, 2013). Eight rays side by side are tried
-//! at once.
+//! Cells are projected into the picture one by one (cell projection: Wilhelms, Van Gelder, *A
+//! Coherent Projection Approach for Direct Volume Rendering*, 1991), and of all that stop a pixel's
+//! ray the one it enters first is kept: their order changes nothing but the time. What is seen
+//! there is worked out afterwards, once for each pixel (Burns, Hunt, *The Visibility Buffer*,
+//! 2013). Eight rays side by side are tried at once.
 
 use super::{
     cell::{Faces, depths_m, mean, position},
@@ -20,7 +21,8 @@ use crate::{
     volume::BLOCK_SIDE,
 };
 
-/// Rows of the picture that cells are projected into at once, at most: few enough for a processor's cache.
+/// Rows of the picture that cells are projected into at once, at most: few enough for a processor's
+/// cache.
 const MAX_STRIP_ROWS: usize = 16;
 
 /// The cell of each pixel, for a strip of rows of each band.
@@ -61,14 +63,19 @@ impl<'s> Visibility<'s> {
 
     /// Whether a picture of this width fits.
     pub fn fits(&self, width: usize) -> bool {
-        Self::stride(width).checked_mul(BANDS * self.strip_rows).is_some_and(|pixels| pixels <= self.cells.len())
+        Self::stride(width)
+            .checked_mul(BANDS * self.strip_rows)
+            .is_some_and(|pixels| pixels <= self.cells.len())
     }
 
     /// A strip for each band.
     pub fn strips(&mut self, width: usize) -> [Strip<'_>; BANDS] {
         let (stride, rows) = (Self::stride(width), self.strip_rows);
         let bands = Bands::of(BANDS);
-        let memory = zip2(bands.split_mut(self.enters_m, rows * stride), bands.split_mut(self.cells, rows * stride));
+        let memory = zip2(
+            bands.split_mut(self.enters_m, rows * stride),
+            bands.split_mut(self.cells, rows * stride),
+        );
         memory.map(|(enters_m, cells)| Strip { rows, stride, enters_m, cells })
     }
 }
@@ -99,7 +106,10 @@ impl Strip<'_> {
     #[inline(always)]
     fn eight(&mut self, row: usize, first: usize) -> Option<(&mut Eight<f32>, &mut Eight<CellId>)> {
         let start = row * self.stride + first;
-        Some((self.enters_m.get_mut(start..)?.first_chunk_mut()?, self.cells.get_mut(start..)?.first_chunk_mut()?))
+        Some((
+            self.enters_m.get_mut(start..)?.first_chunk_mut()?,
+            self.cells.get_mut(start..)?.first_chunk_mut()?,
+        ))
     }
 }
 
@@ -126,7 +136,10 @@ impl Work for Projection<'_, '_, '_, '_> {
                 while crossed != 0 {
                     let bit = crossed.trailing_zeros();
                     crossed &= crossed - 1;
-                    cells.push(CellIndex::of_voxel(z << 6 | bit), layer.fully_observed >> bit & 1 == 1);
+                    cells.push(
+                        CellIndex::of_voxel(z << 6 | bit),
+                        layer.fully_observed >> bit & 1 == 1,
+                    );
                     if cells.len == LANES {
                         self.project(entry, &block, &mut cells, &mut passing);
                     }
@@ -141,10 +154,19 @@ impl Projection<'_, '_, '_, '_> {
     /// Tries the rays that may pass some cells of a block.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
-    fn project(&mut self, entry: usize, block: &BlockInView<'_>, cells: &mut Extents, passing: &mut Passing) {
+    fn project(
+        &mut self,
+        entry: usize,
+        block: &BlockInView<'_>,
+        cells: &mut Extents,
+        passing: &mut Passing,
+    ) {
         cells.find(self.ray_camera, block.local, self.limits_m);
         for lane in 0..cells.len.min(LANES) {
-            let [first, last] = [cells.rows[0][lane].max(self.rows[0] as i32), cells.rows[1][lane].min(self.rows[1] as i32)];
+            let [first, last] = [
+                cells.rows[0][lane].max(self.rows[0] as i32),
+                cells.rows[1][lane].min(self.rows[1] as i32),
+            ];
             if first > last {
                 continue;
             }
@@ -154,23 +176,39 @@ impl Projection<'_, '_, '_, '_> {
                 at: cells.at[lane],
                 fully_observed: cells.fully_observed[lane],
             };
-            let pixels = [cells.columns[0][lane], cells.columns[1][lane], first, last].map(|at| at as usize);
+            let pixels =
+                [cells.columns[0][lane], cells.columns[1][lane], first, last].map(|at| at as usize);
             self.cover(CellId::new(entry, cell.at), &cell, cells.nearest_m[lane], pixels, passing);
         }
         cells.len = 0;
     }
 
-    /// Tries the rays of pixels from a first to a last column and row that show nothing nearer than a cell.
+    /// Tries the rays of pixels from a first to a last column and row that show nothing nearer than
+    /// a cell.
     #[inline(always)]
-    fn cover(&mut self, id: CellId, cell: &CrossedCell<'_>, nearest_m: f32, [left, right, first, last]: [usize; 4], passing: &mut Passing) {
+    fn cover(
+        &mut self,
+        id: CellId,
+        cell: &CrossedCell<'_>,
+        nearest_m: f32,
+        [left, right, first, last]: [usize; 4],
+        passing: &mut Passing,
+    ) {
         // Of a cell that is hidden no corner is read.
         let mut target = None;
         for u in (left..right + 1).step_by(LANES) {
             // What the pixels beyond it show is no matter of this cell.
             let own = lanes::first(right + 1 - u);
             for v in first..last + 1 {
-                let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else { continue };
-                if enters_m.iter().zip(own).fold(0, |any, (&enters_m, own)| any | own & i16::from(nearest_m < enters_m)) == 0 {
+                let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else {
+                    continue;
+                };
+                if enters_m
+                    .iter()
+                    .zip(own)
+                    .fold(0, |any, (&enters_m, own)| any | own & i16::from(nearest_m < enters_m))
+                    == 0
+                {
                     continue;
                 }
                 if target.is_none() {
@@ -178,7 +216,14 @@ impl Projection<'_, '_, '_, '_> {
                     target = Some(Target { id, faces: self.cells.faces(cell), corners });
                 }
                 if let Some(target) = &target {
-                    target.meet(&self.ray_camera.row(v), u, self.limits_m, passing, enters_m, cells);
+                    target.meet(
+                        &self.ray_camera.row(v),
+                        u,
+                        self.limits_m,
+                        passing,
+                        enters_m,
+                        cells,
+                    );
                 }
             }
         }
@@ -197,7 +242,8 @@ struct Extents {
     nearest_m: Eight<f32>,
 }
 
-/// What is left of a cell's nearest depth, so that no rounding takes a ray from a cell that it enters first.
+/// What is left of a cell's nearest depth, so that no rounding takes a ray from a cell that it
+/// enters first.
 const NEARER: f32 = 0.999;
 
 impl Extents {
@@ -234,8 +280,9 @@ struct Passing {
     per_unit: [Eight<f32>; 3],
     /// Where they enter and leave it.
     depths_m: [Eight<f32>; 2],
-    /// All ones for those that pass it, for those of them that leave it behind the surface, and for those that meet the surface. Each has
-    /// memory of its own: what is masked in place is stored in parts, for which the next load has to wait.
+    /// All ones for those that pass it, for those of them that leave it behind the surface, and for
+    /// those that meet the surface. Each has memory of its own: what is masked in place is stored
+    /// in parts, for which the next load has to wait.
     passes: Eight<u32>,
     leaves_behind: Eight<u32>,
     meets: Eight<u32>,
@@ -245,7 +292,8 @@ impl Passing {
     /// The field where a ray passes a cell at a depth.
     #[inline(always)]
     fn value(&self, target: &Target, lane: usize, depth_m: f32) -> f32 {
-        let ray = Ray { slope: at_lane(&self.slope, lane), per_unit: at_lane(&self.per_unit, lane) };
+        let ray =
+            Ray { slope: at_lane(&self.slope, lane), per_unit: at_lane(&self.per_unit, lane) };
         mean(&target.corners, position(&ray, &target.faces, depth_m))
     }
 }
@@ -258,7 +306,8 @@ struct Target {
 }
 
 impl Target {
-    /// Takes the pixels whose rays come from free space through the surface in this cell, and enter it before the one they had.
+    /// Takes the pixels whose rays come from free space through the surface in this cell, and enter
+    /// it before the one they had.
     #[inline(always)]
     #[expect(
         clippy::indexing_slicing,
@@ -286,7 +335,8 @@ impl Target {
         // Most rays that pass a cell leave it before the surface.
         let mut any = 0;
         for lane in 0..LANES {
-            let is_behind = u32::from(passing.value(self, lane, passing.depths_m[1][lane]) <= 0.0).wrapping_neg();
+            let is_behind = u32::from(passing.value(self, lane, passing.depths_m[1][lane]) <= 0.0)
+                .wrapping_neg();
             passing.leaves_behind[lane] = passing.passes[lane] & is_behind;
             any |= passing.passes[lane] & is_behind;
         }
@@ -294,10 +344,13 @@ impl Target {
             return;
         }
         for lane in 0..LANES {
-            let is_before = u32::from(passing.value(self, lane, passing.depths_m[0][lane]) > 0.0).wrapping_neg();
+            let is_before = u32::from(passing.value(self, lane, passing.depths_m[0][lane]) > 0.0)
+                .wrapping_neg();
             passing.meets[lane] = passing.leaves_behind[lane] & is_before;
         }
-        for ((nearest_m, enters_m), &meets) in nearest_m.iter_mut().zip(&passing.depths_m[0]).zip(&passing.meets) {
+        for ((nearest_m, enters_m), &meets) in
+            nearest_m.iter_mut().zip(&passing.depths_m[0]).zip(&passing.meets)
+        {
             *nearest_m = f32::from_bits(enters_m.to_bits() & meets | nearest_m.to_bits() & !meets);
         }
         for (CellId(nearest), &meets) in cells.iter_mut().zip(&passing.meets) {

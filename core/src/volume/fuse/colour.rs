@@ -15,22 +15,39 @@ use crate::{
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
 const PAST_MAX: usize = 5;
 /// The shares of a colour seen for each weight of the past, times -32,768.
-const COLOUR_SHARES: [i16; PAST_MAX + 1] =
-    [share_of_one(0), share_of_one(1), share_of_one(2), share_of_one(3), share_of_one(4), share_of_one(5)];
+const COLOUR_SHARES: [i16; PAST_MAX + 1] = [
+    share_of_one(0),
+    share_of_one(1),
+    share_of_one(2),
+    share_of_one(3),
+    share_of_one(4),
+    share_of_one(5),
+];
 
 impl Fusion<'_> {
-    /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is that after this observation.
-    #[expect(clippy::indexing_slicing, reason = "masks keep voxels below LAYER_VOXELS, the length of every layer")]
+    /// Averages the colours at voxels near the surface in, after [`Fusion::layer`]. `weight` is
+    /// that after this observation.
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "masks keep voxels below LAYER_VOXELS, the length of every layer"
+    )]
     #[inline(always)]
-    pub(super) fn colour_layer(&self, scratch: &mut Scratch, [red, green, blue]: [&mut Layer<u8>; 3], weight: &Layer<u8>) {
+    pub(super) fn colour_layer(
+        &self,
+        scratch: &mut Scratch,
+        [red, green, blue]: [&mut Layer<u8>; 3],
+        weight: &Layer<u8>,
+    ) {
         let near = self.near_surface(scratch);
         // Where none is near, no pixel need be read.
         if near.iter().fold(0, |any, near| any | near) == 0 {
             return;
         }
-        let (mut reds, mut greens, mut blues) = ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
+        let (mut reds, mut greens, mut blues) =
+            ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
-            Some(image) => scratch.pixels_at(bits(&near), image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
+            Some(image) => scratch
+                .pixels_at(bits(&near), image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
             None => scratch.pixels(self.seen.grey, &mut reds),
         }
         // In between, bytes stored one by one arrive where vectors read them.
@@ -54,25 +71,37 @@ impl Fusion<'_> {
     fn near_surface(&self, scratch: &Scratch) -> Layer<u8> {
         let mut near = [0; LAYER_VOXELS];
         let band_m = self.colour_band_m;
-        for (near, ((distance_m, hit), gain)) in near.iter_mut().zip(scratch.distance_m.iter().zip(&scratch.hit).zip(&scratch.gain)) {
+        for (near, ((distance_m, hit), gain)) in
+            near.iter_mut().zip(scratch.distance_m.iter().zip(&scratch.hit).zip(&scratch.gain))
+        {
             let is_near = (*distance_m <= band_m) & (*distance_m >= -band_m);
             *near = u8::from(is_near & (hit & gain != 0));
         }
         near
     }
 
-    /// The share of the colours seen, times -32,768: all where there is no colour yet, none away from the surface and where another
-    /// surface's may be seen.
+    /// The share of the colours seen, times -32,768: all where there is no colour yet, none away
+    /// from the surface and where another surface's may be seen.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
-    fn colour_shares(&self, scratch: &Scratch, near: &Layer<u8>, planes: [&Layer<u8>; 3], weight: &Layer<u8>) -> Layer<i16> {
+    fn colour_shares(
+        &self,
+        scratch: &Scratch,
+        near: &Layer<u8>,
+        planes: [&Layer<u8>; 3],
+        weight: &Layer<u8>,
+    ) -> Layer<i16> {
         let [all, second, third, fourth, fifth, sixth] = COLOUR_SHARES;
         let noted = self.seen.noted;
         let mut share = [0; LAYER_VOXELS];
         for (share, &weight) in share.iter_mut().zip(weight) {
             // By masks: a choice among five becomes branches.
             let from = |sum: i16, change: i16| change & -i16::from(i16::from(weight) >= sum);
-            *share = second + from(3, third - second) + from(4, fourth - third) + from(5, fifth - fourth) + from(6, sixth - fifth);
+            *share = second
+                + from(3, third - second)
+                + from(4, fourth - third)
+                + from(5, fifth - fourth)
+                + from(6, sixth - fifth);
         }
         for (share, &observed_m) in share.iter_mut().zip(&scratch.observed_m) {
             *share &= -i16::from(!noted | !is_spoiled(observed_m));

@@ -1,7 +1,8 @@
 //! The kernel: 64 voxels at a time, those of a block with one z.
 //!
-//! Each loop goes over all of them and has no branches: that is what becomes vector instructions. Loops over eight voxels are unrolled before
-//! they can. What is 32 bits wide is done in as few loops as possible; 16 bits have their own, for twice as many fit into a vector.
+//! Each loop goes over all of them and has no branches: that is what becomes vector instructions.
+//! Loops over eight voxels are unrolled before they can. What is 32 bits wide is done in as few
+//! loops as possible; 16 bits have their own, for twice as many fit into a vector.
 
 use super::Fusion;
 use crate::{
@@ -45,8 +46,8 @@ impl Shares {
     }
 }
 
-/// Share of one observation where the past weighs `past`, up to 255, times -32,768: so it fits its type even where it is all. A division has
-/// vectors, a table has none.
+/// Share of one observation where the past weighs `past`, up to 255, times -32,768: so it fits its
+/// type even where it is all. A division has vectors, a table has none.
 #[inline(always)]
 pub(super) const fn share_of_one(past: i32) -> i16 {
     -rounded_i32(32_768.0 / (past as f32 + 1.0)) as i16
@@ -101,7 +102,8 @@ impl Scratch {
         }
     }
 
-    /// The pixels of an image of the depths' size at all voxels. What those show that fall outside means nothing.
+    /// The pixels of an image of the depths' size at all voxels. What those show that fall outside
+    /// means nothing.
     #[inline(always)]
     pub(super) fn pixels<T: Copy + Default>(&mut self, image: View<'_, T>, shown: &mut Layer<T>) {
         let (pixels, index) = self.indexed(image);
@@ -111,10 +113,19 @@ impl Scratch {
         }
     }
 
-    /// The same at the voxels of these bits alone, which fall into the image: faster where a pixel is several items.
+    /// The same at the voxels of these bits alone, which fall into the image: faster where a pixel
+    /// is several items.
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer")]
-    pub(super) fn pixels_at<T: Copy + Default>(&mut self, mut bits: u64, image: View<'_, T>, mut visit: impl FnMut(usize, T)) {
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "the mask keeps voxels below LAYER_VOXELS, the length of every layer"
+    )]
+    pub(super) fn pixels_at<T: Copy + Default>(
+        &mut self,
+        mut bits: u64,
+        image: View<'_, T>,
+        mut visit: impl FnMut(usize, T),
+    ) {
         let (pixels, index) = self.indexed(image);
         while bits != 0 {
             let i = bits.trailing_zeros() as usize & (LAYER_VOXELS - 1);
@@ -131,7 +142,8 @@ impl Scratch {
         if padding == 0 {
             return (pixels, &self.pixel);
         }
-        for (padded, (&pixel, &row)) in self.padded.iter_mut().zip(self.pixel.iter().zip(&self.row)) {
+        for (padded, (&pixel, &row)) in self.padded.iter_mut().zip(self.pixel.iter().zip(&self.row))
+        {
             *padded = pixel.wrapping_add(padding.wrapping_mul(row as u32));
         }
         (pixels, &self.padded)
@@ -149,7 +161,8 @@ fn loaded<T: Copy + Default>(items: &[T], index: &[u32; BLOCK_SIDE]) -> [T; BLOC
 }
 
 impl Fusion<'_> {
-    /// Fuses layer `z` of a block whose first voxel lies at `corner` in the camera. Whether any voxel changed; then `scratch` tells
+    /// Fuses layer `z` of a block whose first voxel lies at `corner` in the camera. Whether any
+    /// voxel changed; then `scratch` tells
     /// [`Fusion::colour_layer`] which.
     #[inline(always)]
     pub(super) fn layer(
@@ -172,9 +185,13 @@ impl Fusion<'_> {
 
     /// Where the voxels fall in the image.
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer; axes are below 3")]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "below LAYER_VOXELS, the length of every layer; axes are below 3"
+    )]
     fn project(&self, corner: Vector3<f32>, z: usize, scratch: &mut Scratch) {
-        let starts = core::array::from_fn(|y| corner + self.steps[1] * y as f32 + self.steps[2] * z as f32);
+        let starts =
+            core::array::from_fn(|y| corner + self.steps[1] * y as f32 + self.steps[2] * z as f32);
         let layers = [&mut scratch.x_m, &mut scratch.y_m, &mut scratch.z_m];
         for (axis, layer) in layers.into_iter().enumerate() {
             fill(layer, &starts, axis, &self.along_x[axis]);
@@ -194,7 +211,9 @@ impl Fusion<'_> {
     /// Reads the depths observed.
     #[inline(always)]
     fn observe(&self, scratch: &mut Scratch) {
-        for (observed_m, pixel) in scratch.observed_m.as_chunks_mut().0.iter_mut().zip(scratch.pixel.as_chunks().0) {
+        for (observed_m, pixel) in
+            scratch.observed_m.as_chunks_mut().0.iter_mut().zip(scratch.pixel.as_chunks().0)
+        {
             *observed_m = loaded(self.depth_m, pixel);
         }
     }
@@ -203,16 +222,20 @@ impl Fusion<'_> {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn measure(&self, scratch: &mut Scratch) -> bool {
-        let (truncation_m, behind_m, scale, noted) = (self.config.truncation_m, self.behind_m, self.scale, self.seen.noted);
+        let (truncation_m, behind_m, scale, noted) =
+            (self.config.truncation_m, self.behind_m, self.scale, self.seen.noted);
         let mut any = 0;
         for i in 0..LAYER_VOXELS {
             let observed_m = scratch.observed_m[i];
             let along_z_m = observed_m - scratch.z_m[i];
             let distance_m = if noted { along_z_m * obliqueness(observed_m) } else { along_z_m };
-            let hit = -i16::from((observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m));
+            let hit = -i16::from(
+                (observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m),
+            );
             scratch.hit[i] = hit;
             scratch.distance_m[i] = distance_m;
-            scratch.target[i] = rounded_i32(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
+            scratch.target[i] =
+                rounded_i32(clamp_f32(distance_m, -truncation_m, truncation_m) * scale) as i16;
             any |= hit;
         }
         any != 0
@@ -221,14 +244,23 @@ impl Fusion<'_> {
     /// What each observation weighs, and its share of the average.
     #[inline(always)]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
-        let pasts = weight.iter().zip(&scratch.observed_m).map(|(&weight, &observed_m)| self.past(weight, observed_m));
+        let pasts = weight
+            .iter()
+            .zip(&scratch.observed_m)
+            .map(|(&weight, &observed_m)| self.past(weight, observed_m));
         if self.plain_weights {
-            scratch.share.iter_mut().zip(pasts).for_each(|(share, past)| *share = share_of_one(past));
+            scratch
+                .share
+                .iter_mut()
+                .zip(pasts)
+                .for_each(|(share, past)| *share = share_of_one(past));
             return;
         }
         scratch.past.iter_mut().zip(pasts).for_each(|(to, past)| *to = past as u8);
         self.weigh(scratch);
-        for ((share, &gain), &past) in scratch.share.iter_mut().zip(&scratch.gain).zip(&scratch.past) {
+        for ((share, &gain), &past) in
+            scratch.share.iter_mut().zip(&scratch.gain).zip(&scratch.past)
+        {
             *share = self.shares.of(i32::from(past) + i32::from(gain), i32::from(gain));
         }
     }
@@ -237,15 +269,25 @@ impl Fusion<'_> {
     #[inline(always)]
     fn weigh(&self, scratch: &mut Scratch) {
         let most = self.config.observation_weight.most() as f32;
-        for (gain, (&observed_m, &distance_m)) in scratch.gain.iter_mut().zip(scratch.observed_m.iter().zip(&scratch.distance_m)) {
+        for (gain, (&observed_m, &distance_m)) in
+            scratch.gain.iter_mut().zip(scratch.observed_m.iter().zip(&scratch.distance_m))
+        {
             let at_1_m = if distance_m >= self.free_m { 25.0 } else { 100.0 };
             let weight = floored_i32(clamp_f32(at_1_m / observed_m, 1.0, most));
             *gain = weight as i16 & -i16::from(observed_m > 0.0);
         }
         let Some(class) = self.seen.class else { return };
-        for (gain, (&column, &row)) in scratch.gain.iter_mut().zip(scratch.column.iter().zip(&scratch.row)).filter(|(gain, _)| **gain > 0) {
+        for (gain, (&column, &row)) in scratch
+            .gain
+            .iter_mut()
+            .zip(scratch.column.iter().zip(&scratch.row))
+            .filter(|(gain, _)| **gain > 0)
+        {
             let class = class.get(column as usize, row as usize).map(usize::from);
-            let by_class = class.and_then(|class| self.config.class_weight.get(class % CLASS_COUNT)).copied().unwrap_or(1);
+            let by_class = class
+                .and_then(|class| self.config.class_weight.get(class % CLASS_COUNT))
+                .copied()
+                .unwrap_or(1);
             *gain = (*gain * i16::from(by_class)).min(MAX_OBSERVATION_WEIGHT);
         }
     }
@@ -270,7 +312,12 @@ impl Fusion<'_> {
 
 /// Sets a coordinate of all voxels, from those of the first voxels of its rows on.
 #[inline(always)]
-fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize, along: &[f32; BLOCK_SIDE]) {
+fn fill(
+    layer: &mut Layer<f32>,
+    starts: &[Vector3<f32>; BLOCK_SIDE],
+    axis: usize,
+    along: &[f32; BLOCK_SIDE],
+) {
     for (row, start) in layer.as_chunks_mut::<BLOCK_SIDE>().0.iter_mut().zip(starts) {
         let start = start[axis];
         for (coordinate, along) in row.iter_mut().zip(along) {
@@ -279,7 +326,8 @@ fn fill(layer: &mut Layer<f32>, starts: &[Vector3<f32>; BLOCK_SIDE], axis: usize
     }
 }
 
-/// `old + round((seen - old) * share)` of a share times -32,768, as a sum of two products of 16 bits.
+/// `old + round((seen - old) * share)` of a share times -32,768, as a sum of two products of 16
+/// bits.
 #[inline(always)]
 pub(super) fn averaged(old: i32, seen: i32, share: i16) -> i32 {
     // Both shares are negative, and add up to -32,768.

@@ -1,18 +1,24 @@
-//! Fusing a depth image into the visible blocks: integer running averages (Curless, Levoy: *A Volumetric Method for Building Complex
-//! Models from Range Images*, 1996, projective along the camera's z as in Newcombe et al., *KinectFusion*, 2011).
+//! Fusing a depth image into the visible blocks: integer running averages (Curless, Levoy: *A
+//! Volumetric Method for Building Complex Models from Range Images*, 1996, projective along the
+//! camera's z as in Newcombe et al., *KinectFusion*, 2011).
 //!
-//! A lattice point at depth z that projects onto a pixel of depth d observes `o = min((d - z) / truncation, 1)`, unless `o < -1`: then it
-//! is hidden. Where the depth has notes (`observed`), `d - z` is then taken along the surface's normal. Neither is what lies
-//! farther than `behind_m` behind the surface observed, for it may belong to another. With weight w and observation weight v, in units of 1 / 32,767:
+//! A lattice point at depth z that projects onto a pixel of depth d observes
+//! `o = min((d - z) / truncation, 1)`, unless `o < -1`: then it is hidden. Where the depth has
+//! notes (`observed`), `d - z` is then taken along the surface's normal. Neither is what lies
+//! farther than `behind_m` behind the surface observed, for it may belong to another. With weight w
+//! and observation weight v, in units of 1 / 32,767:
 //!
-//! `sdf += round((o - sdf) * v / (p + v))`, `w = min(w + v, max_weight)`, where the past counts `p = min(w, d / 2 m)` (`volume.observation_weight`),
+//! `sdf += round((o - sdf) * v / (p + v))`, `w = min(w + v, max_weight)`, where the past counts
+//! `p = min(w, d / 2 m)` (`volume.observation_weight`),
 //!
-//! where `v / (p + v)` is a 15-bit fraction from a table. Colour is averaged likewise within `colour_band` of the surface, with a weight
-//! of at most 5, so that its 8 bits keep following.
+//! where `v / (p + v)` is a 15-bit fraction from a table. Colour is averaged likewise within
+//! `colour_band` of the surface, with a weight of at most 5, so that its 8 bits keep following.
 //!
-//! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others 64 voxels are fused at a time (`layer`).
+//! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others
+//! 64 voxels are fused at a time (`layer`).
 //!
-//! Time: linear in visible blocks. Blocks are taken in slot order in four fixed bands; no block's result depends on another's.
+//! Time: linear in visible blocks. Blocks are taken in slot order in four fixed bands; no block's
+//! result depends on another's.
 
 mod band;
 mod colour;
@@ -89,7 +95,12 @@ struct Fusion<'a> {
 impl<'a> Fusion<'a> {
     // Never inlined: the copies of its tables must not stay in the caller's frame.
     #[inline(never)]
-    fn new(config: &'a VolumeConfig, view: &Viewpoint, seen: Observation<'a>, horizon: Option<Horizon<'a>>) -> Self {
+    fn new(
+        config: &'a VolumeConfig,
+        view: &Viewpoint,
+        seen: Observation<'a>,
+        horizon: Option<Horizon<'a>>,
+    ) -> Self {
         let (camera_from_world, camera) = view.camera_from_world();
         let voxel_m = f64::from(config.voxel_size_m);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -100,7 +111,8 @@ impl<'a> Fusion<'a> {
             camera_from_world,
             camera,
             steps,
-            along_x: [steps[0].x, steps[0].y, steps[0].z].map(|step| core::array::from_fn(|x| step * x as f32)),
+            along_x: [steps[0].x, steps[0].y, steps[0].z]
+                .map(|step| core::array::from_fn(|x| step * x as f32)),
             corners: corners(&steps),
             horizon,
             focal_px: view.rig.focal_px as f32,
@@ -127,7 +139,9 @@ impl Volume<'_> {
         let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());
-        let changes = each(executor, [a, b, c, d], |band| executor.vectors().run(FuseBand { fusion: &fusion, band }));
+        let changes = each(executor, [a, b, c, d], |band| {
+            executor.vectors().run(FuseBand { fusion: &fusion, band })
+        });
         self.digest = changes.iter().fold(self.digest, |sum, change| sum.wrapping_add(*change));
     }
 }
@@ -149,7 +163,10 @@ impl Work for FuseBand<'_, '_> {
         let mut scratch = Scratch::new();
         for &slot in band.slots {
             let at = slot.index().wrapping_sub(band.first);
-            let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at)) else { continue };
+            let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at))
+            else {
+                continue;
+            };
             let mut colour = band.colour.get_mut(at);
             if fusion.block(header.coord(), &mut scratch, voxels, colour.as_deref_mut()) {
                 let new = block_digest(header.coord(), voxels, colour.as_deref());
@@ -165,7 +182,13 @@ impl Work for FuseBand<'_, '_> {
 impl Fusion<'_> {
     /// Fuses one block. Whether any voxel changed.
     #[inline(always)]
-    fn block(&self, coord: BlockCoord, scratch: &mut Scratch, voxels: &mut Voxels, mut colour: Option<&mut Colour>) -> bool {
+    fn block(
+        &self,
+        coord: BlockCoord,
+        scratch: &mut Scratch,
+        voxels: &mut Voxels,
+        mut colour: Option<&mut Colour>,
+    ) -> bool {
         let voxel_m = f64::from(self.config.voxel_size_m);
         let origin_m = Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m));
         let corner = (self.camera_from_world * (origin_m - self.camera.coords)).cast::<f32>();
@@ -176,7 +199,9 @@ impl Fusion<'_> {
         for (z, (sdf, weight)) in voxels.layers_mut().enumerate() {
             if self.layer((corner, z), scratch, sdf, weight) {
                 changed = true;
-                if let Some(planes) = colour.as_deref_mut().and_then(|colour| colour_layer_mut(colour, z)) {
+                if let Some(planes) =
+                    colour.as_deref_mut().and_then(|colour| colour_layer_mut(colour, z))
+                {
                     self.colour_layer(scratch, planes, weight);
                 }
             }
@@ -184,15 +209,17 @@ impl Fusion<'_> {
         changed
     }
 
-    /// Whether no voxel of the block whose first one lies at `corner` can be observed: it is outside the image, or behind all that is
-    /// observed where it can fall.
+    /// Whether no voxel of the block whose first one lies at `corner` can be observed: it is
+    /// outside the image, or behind all that is observed where it can fall.
     #[inline(always)]
     fn is_hidden(&self, corner: Vector3<f32>) -> bool {
         let Some(horizon) = self.horizon else { return false };
         let [x_m, y_m, z_m] = &self.corners;
         let [mut columns, mut rows, mut depths_m] = [[0.0; CORNERS]; 3];
         let seen = columns.iter_mut().zip(&mut rows).zip(&mut depths_m);
-        for (((column, row), depth_m), ((&x_m, &y_m), &z_m)) in seen.zip(x_m.iter().zip(y_m).zip(z_m)) {
+        for (((column, row), depth_m), ((&x_m, &y_m), &z_m)) in
+            seen.zip(x_m.iter().zip(y_m).zip(z_m))
+        {
             *depth_m = corner.z + z_m;
             let scale = self.focal_px / *depth_m;
             *column = (corner.x + x_m) * scale + self.center_u_px;
@@ -206,11 +233,16 @@ impl Fusion<'_> {
         // A pixel more, so that no rounding hides what is seen.
         let span = |seen: &[f32; CORNERS], size: u32| {
             let (first, last) = (floor_i32(least(seen)) - 1, floor_i32(greatest(seen)) + 2);
-            (last >= 0 && first < size as i32).then(|| [first.max(0) as usize, last.min(size as i32 - 1) as usize])
+            (last >= 0 && first < size as i32)
+                .then(|| [first.max(0) as usize, last.min(size as i32 - 1) as usize])
         };
-        let (Some(columns), Some(rows)) = (span(&columns, self.width), span(&rows, self.height)) else { return true };
+        let (Some(columns), Some(rows)) = (span(&columns, self.width), span(&rows, self.height))
+        else {
+            return true;
+        };
         // A twentieth of a voxel more, for the same reason.
-        horizon.greatest_m(columns, rows) + self.config.truncation_m < nearest_m - 0.05 * self.config.voxel_size_m
+        horizon.greatest_m(columns, rows) + self.config.truncation_m
+            < nearest_m - 0.05 * self.config.voxel_size_m
     }
 }
 
@@ -218,7 +250,14 @@ impl Fusion<'_> {
 fn corners(steps: &[Vector3<f32>; 3]) -> [[f32; CORNERS]; 3] {
     let side = (BLOCK_SIDE - 1) as f32;
     [0, 1, 2].map(|axis| {
-        core::array::from_fn(|n| steps.iter().enumerate().filter(|(along, _)| n >> along & 1 == 1).map(|(_, step)| step[axis] * side).sum())
+        core::array::from_fn(|n| {
+            steps
+                .iter()
+                .enumerate()
+                .filter(|(along, _)| n >> along & 1 == 1)
+                .map(|(_, step)| step[axis] * side)
+                .sum()
+        })
     })
 }
 
@@ -236,9 +275,17 @@ fn greatest(corners: &[f32; CORNERS]) -> f32 {
 
 /// Digest of a block's coordinates and content.
 #[inline(always)]
-pub(super) fn block_digest(coord: BlockCoord, Voxels { sdf, weight }: &Voxels, colour: Option<&Colour>) -> u64 {
+pub(super) fn block_digest(
+    coord: BlockCoord,
+    Voxels { sdf, weight }: &Voxels,
+    colour: Option<&Colour>,
+) -> u64 {
     let mut digest = Digest::default();
-    digest.u64([coord.x, coord.y, coord.z, 0].iter().fold(0, |packed, &along| packed << 16 | u64::from(along as u16)));
+    digest.u64(
+        [coord.x, coord.y, coord.z, 0]
+            .iter()
+            .fold(0, |packed, &along| packed << 16 | u64::from(along as u16)),
+    );
     digest.whole_i16s(sdf);
     digest.whole_bytes(weight);
     for plane in colour.into_iter().flatten() {

@@ -21,7 +21,11 @@ pub fn empty(config: &VolumeConfig, blocks: usize) -> Volume<'static> {
 }
 
 /// Adds the blocks of `coords` in order, filled by `sample_at`, which is given lattice points.
-pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord>, sample_at: impl Fn([i32; 3]) -> LatticeSample) {
+pub fn fill(
+    volume: &mut Volume<'_>,
+    coords: impl IntoIterator<Item = BlockCoord>,
+    sample_at: impl Fn([i32; 3]) -> LatticeSample,
+) {
     let scale = 32_767.0 / volume.config.truncation_m;
     for coord in coords {
         let slot = volume.pool.take().unwrap();
@@ -31,8 +35,11 @@ pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord
         let origin = coord.origin();
         for voxel in 0..BLOCK_VOXELS {
             let [x, y, z] = [voxel & 7, voxel >> 3 & 7, voxel >> 6].map(|c| c as i32);
-            if let Some((sdf_m, weight, colour)) = sample_at([origin[0] + x, origin[1] + y, origin[2] + z]) {
-                volume.blocks.voxels[slot].sdf[voxel] = libm::roundf(clamp_f32(sdf_m * scale, -32_767.0, 32_767.0)) as i16;
+            if let Some((sdf_m, weight, colour)) =
+                sample_at([origin[0] + x, origin[1] + y, origin[2] + z])
+            {
+                volume.blocks.voxels[slot].sdf[voxel] =
+                    libm::roundf(clamp_f32(sdf_m * scale, -32_767.0, 32_767.0)) as i16;
                 volume.blocks.voxels[slot].weight[voxel] = weight;
                 (0..3).for_each(|c| volume.blocks.colour[slot][c][voxel] = colour[c]);
             }
@@ -42,6 +49,8 @@ pub fn fill(volume: &mut Volume<'_>, coords: impl IntoIterator<Item = BlockCoord
 
 /// All blocks from `low` to `high`, both included, x fastest.
 pub fn cuboid(low: [i32; 3], high: [i32; 3]) -> impl Iterator<Item = BlockCoord> {
-    (low[2]..=high[2])
-        .flat_map(move |z| (low[1]..=high[1]).flat_map(move |y| (low[0]..=high[0]).map(move |x| BlockCoord::new(x, y, z).unwrap())))
+    (low[2]..=high[2]).flat_map(move |z| {
+        (low[1]..=high[1])
+            .flat_map(move |y| (low[0]..=high[0]).map(move |x| BlockCoord::new(x, y, z).unwrap()))
+    })
 }

@@ -19,7 +19,8 @@ fn seen(volume: &Volume<'_>, within: &OrientedBox) -> [usize; 2] {
         let origin = volume.blocks().coord(slot).unwrap().origin();
         for (index, weight) in volume.blocks.voxels[slot.index()].weight.iter().enumerate() {
             let offset = [index % 8, index / 8 % 8, index / 64];
-            let point_m = [0, 1, 2].map(|axis| voxel_m * (f64::from(origin[axis]) + offset[axis] as f64));
+            let point_m =
+                [0, 1, 2].map(|axis| voxel_m * (f64::from(origin[axis]) + offset[axis] as f64));
             counts[usize::from(!within.contains(point_m))] += usize::from(*weight > 0);
         }
     }
@@ -55,12 +56,23 @@ fn a_block_with_nothing_left_goes_back_to_the_pool() {
         assert_eq!(volume.erase(&all, 1), seen as u32);
         // Blocks that were made and never seen in stay: pruning frees them.
         assert_eq!(
-            volume.pool().live().filter(|slot| volume.blocks.voxels[slot.index()].weight.iter().any(|weight| *weight > 0)).count(),
+            volume
+                .pool()
+                .live()
+                .filter(|slot| volume.blocks.voxels[slot.index()]
+                    .weight
+                    .iter()
+                    .any(|weight| *weight > 0))
+                .count(),
             0
         );
         fuse_wall(volume, 1);
         assert_eq!(volume.erase(&OrientedBox { high_m: [f64::NAN; 3], ..all }, 1), 0);
         let endless = OrientedBox { low_m: [-1e9; 3], high_m: [1e9; 3], ..all };
-        assert_eq!([volume.erase(&endless, 1), volume.erase(&endless, 1)], [seen as u32, 0], "by the blocks that there are");
+        assert_eq!(
+            [volume.erase(&endless, 1), volume.erase(&endless, 1)],
+            [seen as u32, 0],
+            "by the blocks that there are"
+        );
     });
 }

@@ -23,7 +23,10 @@ impl BlockStore for MemoryStore {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         if !self.is_closed {
             let colour = block.colour.map_or(vec![], |planes| planes.as_flattened().to_vec());
-            self.blocks.insert(block.coord, Content { sdf: block.sdf.to_vec(), weight: block.weight.to_vec(), colour });
+            self.blocks.insert(
+                block.coord,
+                Content { sdf: block.sdf.to_vec(), weight: block.weight.to_vec(), colour },
+            );
         }
         !self.is_closed
     }
@@ -39,8 +42,14 @@ impl BlockStore for MemoryStore {
     }
 }
 
-/// Maps a corridor with a bumpy end wall from the given positions, then evicts every block. Returns the sum of the reports of all frames.
-fn run(blocks: usize, config: &VolumeConfig, positions_m: &[f64], store: &mut MemoryStore) -> EvictionReport {
+/// Maps a corridor with a bumpy end wall from the given positions, then evicts every block. Returns
+/// the sum of the reports of all frames.
+fn run(
+    blocks: usize,
+    config: &VolumeConfig,
+    positions_m: &[f64],
+    store: &mut MemoryStore,
+) -> EvictionReport {
     let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| (i % 251) as u8).collect();
     let mut sum = EvictionReport::default();
     with_volume(&Capacity { blocks, ..CAPACITY }, config, |volume| {
@@ -53,7 +62,8 @@ fn run(blocks: usize, config: &VolumeConfig, positions_m: &[f64], store: &mut Me
             };
         };
         for (i, &z) in positions_m.iter().enumerate() {
-            let depth_m: Vec<f32> = bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
+            let depth_m: Vec<f32> =
+                bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
             let view = view([0.0; 3], [0.0, 0.0, z]);
             let seen = observation(&depth_m, &grey);
             let report = volume.allocate(&view, seen.depth_m, store, &Serial);
@@ -65,7 +75,11 @@ fn run(blocks: usize, config: &VolumeConfig, positions_m: &[f64], store: &mut Me
         }
         volume.finish();
         add(&mut sum, volume.stream_out(store));
-        assert_eq!((volume.pool.len(), volume.digest()), (0, 0), "nothing left, nothing miscounted");
+        assert_eq!(
+            (volume.pool.len(), volume.digest()),
+            (0, 0),
+            "nothing left, nothing miscounted"
+        );
     });
     sum
 }
@@ -109,7 +123,12 @@ fn pruning_catches_what_leaves_within_the_window() {
     run(6_000, &config(2), &ahead, &mut unbounded);
     run(unbounded.blocks.len() / 5, &config(2), &ahead, &mut streamed);
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
-    assert!(unbounded.blocks.values().all(|kept| kept.weight.iter().all(|&weight| weight == 0 || weight > 2)));
+    assert!(
+        unbounded
+            .blocks
+            .values()
+            .all(|kept| kept.weight.iter().all(|&weight| weight == 0 || weight > 2))
+    );
 }
 
 #[test]
@@ -128,12 +147,20 @@ fn a_map_set_to_refuse_evicts_nothing() {
         let mut refused = 0;
         for i in 0..20 {
             let seen = observation(&depth_m, &grey);
-            let report = volume.allocate(&view([0.0; 3], [0.0, 0.0, f64::from(i)]), seen.depth_m, &mut NoStore, &Serial);
+            let report = volume.allocate(
+                &view([0.0; 3], [0.0, 0.0, f64::from(i)]),
+                seen.depth_m,
+                &mut NoStore,
+                &Serial,
+            );
             assert_eq!(report.eviction, EvictionReport::default());
             refused += report.refused;
         }
         assert!(refused > 0);
-        assert!(volume.find(BlockCoord::of_lattice([0, 0, 60]).unwrap()).is_some(), "the first wall is still there");
+        assert!(
+            volume.find(BlockCoord::of_lattice([0, 0, 60]).unwrap()).is_some(),
+            "the first wall is still there"
+        );
     });
 }
 
@@ -144,7 +171,8 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
     let config = VolumeConfig { prune_weight: 1, prune_lag: 3, ..VolumeConfig::default() };
     with_volume(&capacity, &config, |volume| {
         let (mut store, mut random) = (MemoryStore::default(), Random::new(9));
-        // Per block its weight everywhere and the frame it was last seen in; in the store or in the map.
+        // Per block its weight everywhere and the frame it was last seen in; in the store or in the
+        // map.
         let mut model: BTreeMap<BlockCoord, u8> = BTreeMap::new();
         let mut operations = 0;
         while operations < 1_000_000 {
@@ -152,19 +180,28 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
             let mut report = AllocationReport::default();
             for _ in 0..random.below(25) {
                 operations += 1;
-                let coord = BlockCoord::new(random.below(8) as i32, random.below(8) as i32, 3).unwrap();
+                let coord =
+                    BlockCoord::new(random.below(8) as i32, random.below(8) as i32, 3).unwrap();
                 let (refused, empty) = (report.refused, report.eviction.empty);
                 volume.request(coord.origin().map(|c| c >> 3), [0; 3], &mut store, &mut report);
                 if report.eviction.empty > empty {
                     // A block of weight 1 left within the window and was pruned on its way.
-                    model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || store.blocks.contains_key(coord));
+                    model.retain(|coord, weight| {
+                        *weight > 1
+                            || volume.find(*coord).is_some()
+                            || store.blocks.contains_key(coord)
+                    });
                 }
                 let Some(slot) = volume.find(coord) else {
                     assert!(report.refused > refused);
                     continue;
                 };
                 let old = model.get(&coord).copied().unwrap_or(0);
-                assert_eq!(volume.blocks.voxels[slot.index()].weight[7], old, "a block is as it was left, in the map or loaded");
+                assert_eq!(
+                    volume.blocks.voxels[slot.index()].weight[7],
+                    old,
+                    "a block is as it was left, in the map or loaded"
+                );
                 if random.below(4) > 0 {
                     volume.blocks.voxels[slot.index()].weight.fill(old.saturating_add(1));
                     volume.update_digest(slot);
@@ -173,11 +210,15 @@ fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() 
             }
             volume.visible.sort(volume.pool.high_water());
             volume.prune();
-            model.retain(|coord, weight| *weight > 1 || volume.find(*coord).is_some() || store.blocks.contains_key(coord));
+            model.retain(|coord, weight| {
+                *weight > 1 || volume.find(*coord).is_some() || store.blocks.contains_key(coord)
+            });
             assert_eq!(volume.pool.len(), volume.index.len());
         }
         let stored = store.blocks.iter().map(|(&coord, kept)| (coord, kept.weight[7]));
-        let live = volume.pool.live().map(|slot| (volume.blocks.coord(slot).unwrap(), volume.blocks.voxels[slot.index()].weight[7]));
+        let live = volume.pool.live().map(|slot| {
+            (volume.blocks.coord(slot).unwrap(), volume.blocks.voxels[slot.index()].weight[7])
+        });
         let all: BTreeMap<_, _> = stored.chain(live).filter(|(_, weight)| *weight > 0).collect();
         assert_eq!(all, model);
     });

@@ -9,7 +9,12 @@ use std::collections::BTreeSet;
 #[test]
 fn a_wall_ahead_is_stored_at_its_distance() {
     let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![77; WIDTH * HEIGHT]);
-    let config = VolumeConfig { truncation_m: 0.4, behind_m: 0.4, allocation_m: 0.4, ..VolumeConfig::default() };
+    let config = VolumeConfig {
+        truncation_m: 0.4,
+        behind_m: 0.4,
+        allocation_m: 0.4,
+        ..VolumeConfig::default()
+    };
     with_volume(&CAPACITY, &config, |volume| {
         for _ in 0..3 {
             fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
@@ -18,10 +23,18 @@ fn a_wall_ahead_is_stored_at_its_distance() {
         for k in 53..=67 {
             let expected = (3.0 - f64::from(k) * 0.05) / 0.4 * 32_767.0;
             let voxel = sampler.voxel([0, 0, k]).unwrap();
-            assert!((f64::from(voxel.sdf) - expected).abs() <= 1.5, "at {k}: {} for {expected}", voxel.sdf);
+            assert!(
+                (f64::from(voxel.sdf) - expected).abs() <= 1.5,
+                "at {k}: {} for {expected}",
+                voxel.sdf
+            );
             assert_eq!(voxel.weight, 3);
         }
-        assert_eq!(sampler.voxel([0, 0, 51]).map(|voxel| voxel.sdf), Some(32_767), "free space within the block");
+        assert_eq!(
+            sampler.voxel([0, 0, 51]).map(|voxel| voxel.sdf),
+            Some(32_767),
+            "free space within the block"
+        );
         assert_eq!(sampler.voxel([0, 0, 69]), None, "behind the truncation nothing was observed");
         let slot = volume.find(BlockCoord::of_lattice([0, 0, 60]).unwrap()).unwrap();
         assert_eq!(volume.blocks().colour(slot).unwrap()[1][4 << 6], 77);
@@ -33,29 +46,59 @@ fn makes_exactly_the_blocks_of_the_lattice_points_nearest_to_the_rays() {
     let depth_m = bumpy_depth();
     let view = view([0.1, -0.2, 0.05], [1.0, -0.3, 2.0]);
     with_volume(&CAPACITY, &VolumeConfig::default(), |volume| {
-        let report = volume.allocate(&view, View::new(&depth_m, WIDTH, HEIGHT).unwrap(), &mut NoStore, &Serial);
+        let report = volume.allocate(
+            &view,
+            View::new(&depth_m, WIDTH, HEIGHT).unwrap(),
+            &mut NoStore,
+            &Serial,
+        );
         let mut fine = BTreeSet::new();
         let block_m = 0.4;
-        // The first frame's: every second row from the first on, and in it every second pixel, from the second and the first on by turns.
-        let is_taken = |i: usize| (i / WIDTH).is_multiple_of(2) && (i % WIDTH + i / WIDTH / 2) % 2 == 1;
-        for (i, &depth) in depth_m.iter().enumerate().filter(|(i, depth)| **depth > 0.0 && is_taken(*i)) {
-            let direction = Vector3::new(((i % WIDTH) as f64 - RIG.center_u_px) / 80.0, ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0, 1.0);
+        // The first frame's: every second row from the first on, and in it every second pixel, from
+        // the second and the first on by turns.
+        let is_taken =
+            |i: usize| (i / WIDTH).is_multiple_of(2) && (i % WIDTH + i / WIDTH / 2) % 2 == 1;
+        for (i, &depth) in
+            depth_m.iter().enumerate().filter(|(i, depth)| **depth > 0.0 && is_taken(*i))
+        {
+            let direction = Vector3::new(
+                ((i % WIDTH) as f64 - RIG.center_u_px) / 80.0,
+                ((i / WIDTH) as f64 - RIG.center_v_px) / 80.0,
+                1.0,
+            );
             // Two rows above and two columns to the left.
             let beside = [i.checked_sub(2 * WIDTH), i.checked_sub(2).filter(|_| i % WIDTH > 1)];
-            let beside = beside.into_iter().flatten().map(|at| depth_m[at]).filter(|&beside| beside > 0.0);
-            let reach = f64::from(min_f32(beside.map(|beside| 0.5 * (beside - depth).abs()).fold(0.2, max_f32), 0.75));
+            let beside =
+                beside.into_iter().flatten().map(|at| depth_m[at]).filter(|&beside| beside > 0.0);
+            let reach = f64::from(min_f32(
+                beside.map(|beside| 0.5 * (beside - depth).abs()).fold(0.2, max_f32),
+                0.75,
+            ));
             for step in 0..=3_000 {
                 let at = f64::from(depth) + reach * (f64::from(step) / 1_500.0 - 1.0);
-                let point = view.t_world_camera.transform_point(Point3::from(direction * at)).coords / block_m;
+                let point =
+                    view.t_world_camera.transform_point(Point3::from(direction * at)).coords
+                        / block_m;
                 let block = [point.x, point.y, point.z].map(|c| (c + 1.0 / 16.0).floor() as i32);
                 fine.insert(BlockCoord::new(block[0], block[1], block[2]).unwrap());
             }
         }
-        let made: BTreeSet<_> = volume.visible().slots().iter().map(|&slot| volume.blocks().coord(slot).unwrap()).collect();
+        let made: BTreeSet<_> = volume
+            .visible()
+            .slots()
+            .iter()
+            .map(|&slot| volume.blocks().coord(slot).unwrap())
+            .collect();
         assert_eq!(report.made as usize, made.len());
         assert!(fine.is_subset(&made), "no block a ray runs through is missed");
-        // The sampled twin steps over corners of less than half a millimetre; hardly any block hangs on one.
-        assert!(made.len() - fine.len() <= made.len() / 100, "{} made, {} found by small steps", made.len(), fine.len());
+        // The sampled twin steps over corners of less than half a millimetre; hardly any block
+        // hangs on one.
+        assert!(
+            made.len() - fine.len() <= made.len() / 100,
+            "{} made, {} found by small steps",
+            made.len(),
+            fine.len()
+        );
     });
 }
 
@@ -66,7 +109,11 @@ fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
 
 /// What a weight counts for against an observation at a depth.
 fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
-    if config.observation_weight == ObservationWeight::Nearest { weight.min(libm::rintf(0.5 * depth_m) as i32) } else { weight }
+    if config.observation_weight == ObservationWeight::Nearest {
+        weight.min(libm::rintf(0.5 * depth_m) as i32)
+    } else {
+        weight
+    }
 }
 
 /// What an observation of a class at a depth weighs, so far before the surface.
@@ -92,8 +139,11 @@ fn fuse_slowly(
 ) {
     let (camera_from_world, camera) = view.camera_from_world();
     let voxel_m = f64::from(config.voxel_size_m);
-    let corner = (camera_from_world * (Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m)) - camera.coords)).cast::<f32>();
-    let step = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
+    let corner = (camera_from_world
+        * (Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m)) - camera.coords))
+        .cast::<f32>();
+    let step = [Vector3::x(), Vector3::y(), Vector3::z()]
+        .map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
     let averaged = |old: i32, new: i32, gain: i32, sum: i32| {
         let share = (gain * (((1 << 23) + sum / 2) / sum) + 128) >> 8;
         old + (((new - old) * share + (1 << 14)) >> 15)
@@ -101,7 +151,11 @@ fn fuse_slowly(
     for voxel in 0..BLOCK_VOXELS {
         let (x, y, z) = (voxel & 7, voxel >> 3 & 7, voxel >> 6);
         let first = corner + step[1] * y as f32 + step[2] * z as f32;
-        let at = Vector3::new(first.x + step[0].x * x as f32, first.y + step[0].y * x as f32, first.z + step[0].z * x as f32);
+        let at = Vector3::new(
+            first.x + step[0].x * x as f32,
+            first.y + step[0].y * x as f32,
+            first.z + step[0].z * x as f32,
+        );
         if at.z <= 0.0 {
             continue;
         }
@@ -120,25 +174,32 @@ fn fuse_slowly(
         // The lowest five bits: sixteenths less one, and whether the colour is another's.
         let notes = if seen.noted { depth.to_bits() & 31 } else { 15 };
         let distance = distance * ((notes & 15) + 1) as f32 / 16.0;
-        if distance < -crate::geometry::scalar::max_f32(config.behind_m, 2.0 * config.voxel_size_m) {
+        if distance < -crate::geometry::scalar::max_f32(config.behind_m, 2.0 * config.voxel_size_m)
+        {
             continue;
         }
-        let observed =
-            if distance < config.truncation_m { libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32 } else { 32_767 };
+        let observed = if distance < config.truncation_m {
+            libm::rintf(distance * (32_767.0 / config.truncation_m)) as i32
+        } else {
+            32_767
+        };
         let w = i32::from(weight[voxel]);
         let gain = gain(config, seen.class.map(|class| class.get(u, v).unwrap()), depth, distance);
         if gain == 0 {
             continue;
         }
-        sdf[voxel] = averaged(i32::from(sdf[voxel]), observed, gain, past(config, w, depth) + gain) as i16;
+        sdf[voxel] =
+            averaged(i32::from(sdf[voxel]), observed, gain, past(config, w, depth) + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
-        if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0 {
+        if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0
+        {
             continue;
         }
         let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };
         for (plane, target) in colour.iter_mut().zip(target_colour(seen, u, v)) {
-            plane[voxel] = averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
+            plane[voxel] =
+                averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
         }
     }
 }
@@ -152,7 +213,12 @@ fn equals_the_plain_twin_bit_for_bit() {
 }
 
 fn equals_the_plain_twin(observation_weight: ObservationWeight) {
-    let mut config = VolumeConfig { max_weight: 7, behind_m: 0.4, observation_weight, ..VolumeConfig::default() };
+    let mut config = VolumeConfig {
+        max_weight: 7,
+        behind_m: 0.4,
+        observation_weight,
+        ..VolumeConfig::default()
+    };
     config.class_weight[..3].copy_from_slice(&[0, 1, 3]);
     let grey: Vec<u8> = (0..(WIDTH + 5) * HEIGHT).map(|i| (i % 251) as u8).collect();
     let rgb: Vec<[u8; 3]> = grey.iter().map(|&grey| [grey, 255 - grey, grey / 3]).collect();
@@ -162,14 +228,25 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
         for i in 0..8 {
             // Every other frame shows a wall that hides most of what the one before showed.
             let noted = i % 4 > 1;
-            let shown_m = bumpy_depth().into_iter().map(|depth| if i % 2 == 1 { 0.5 * depth } else { depth }).zip(0u32..);
-            let note = |(depth, at): (f32, u32)| f32::from_bits(depth.to_bits() & !31 | at.wrapping_mul(2_654_435_761) >> 27);
-            let depth_m: Vec<f32> = shown_m.map(|(depth, at)| if noted && depth > 0.0 { note((depth, at)) } else { depth }).collect();
+            let shown_m = bumpy_depth()
+                .into_iter()
+                .map(|depth| if i % 2 == 1 { 0.5 * depth } else { depth })
+                .zip(0u32..);
+            let note = |(depth, at): (f32, u32)| {
+                f32::from_bits(depth.to_bits() & !31 | at.wrapping_mul(2_654_435_761) >> 27)
+            };
+            let depth_m: Vec<f32> = shown_m
+                .map(|(depth, at)| if noted && depth > 0.0 { note((depth, at)) } else { depth })
+                .collect();
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
             let stride = WIDTH + if i % 2 == 1 { 5 } else { 0 };
             let seen = Observation {
                 grey: View::with_stride(&grey, WIDTH, HEIGHT, stride).unwrap(),
-                colour: if i % 4 < 2 { View::with_stride(&rgb, WIDTH, HEIGHT, stride) } else { None },
+                colour: if i % 4 < 2 {
+                    View::with_stride(&rgb, WIDTH, HEIGHT, stride)
+                } else {
+                    None
+                },
                 class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
                 noted,
                 ..observation(&depth_m, &grey)
@@ -177,14 +254,28 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
             volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);
             let blocks = &volume.blocks;
             let slots = volume.visible().slots().iter();
-            let twins: Vec<_> = slots.map(|&slot| (slot, blocks.voxels[slot.index()], *blocks.colour(slot).unwrap())).collect();
+            let twins: Vec<_> = slots
+                .map(|&slot| (slot, blocks.voxels[slot.index()], *blocks.colour(slot).unwrap()))
+                .collect();
             volume.fuse(&view, seen, &Serial);
             for (slot, mut voxels, mut colour) in twins {
                 let before = voxels;
-                fuse_slowly(&config, &view, &seen, volume.blocks().coord(slot).unwrap(), &mut voxels, &mut colour);
+                fuse_slowly(
+                    &config,
+                    &view,
+                    &seen,
+                    volume.blocks().coord(slot).unwrap(),
+                    &mut voxels,
+                    &mut colour,
+                );
                 let fused = &volume.blocks.voxels[slot.index()];
-                assert!(fused.sdf == voxels.sdf && fused.weight == voxels.weight && *volume.blocks().colour(slot).unwrap() == colour);
-                unchanged += usize::from(before.weight == voxels.weight && before.sdf == voxels.sdf);
+                assert!(
+                    fused.sdf == voxels.sdf
+                        && fused.weight == voxels.weight
+                        && *volume.blocks().colour(slot).unwrap() == colour
+                );
+                unchanged +=
+                    usize::from(before.weight == voxels.weight && before.sdf == voxels.sdf);
             }
         }
         assert!(unchanged > 100, "{unchanged} blocks were hidden");
@@ -208,13 +299,20 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
                     volume.fuse(&view, seen, &Serial)
                 }
                 // In slot order: the slots are the same too.
-                let coords: Vec<_> = volume.visible().slots().iter().map(|&slot| volume.blocks().coord(slot)).collect();
+                let coords: Vec<_> = volume
+                    .visible()
+                    .slots()
+                    .iter()
+                    .map(|&slot| volume.blocks().coord(slot))
+                    .collect();
                 digests.push((volume.digest(), coords));
             }
             let of_content = volume
                 .pool()
                 .live()
-                .filter(|&slot| volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight > 0))
+                .filter(|&slot| {
+                    volume.blocks().weight(slot).unwrap().iter().any(|&weight| weight > 0)
+                })
                 .map(|slot| {
                     let blocks = volume.blocks();
                     let coord = blocks.coord(slot).unwrap();
@@ -233,14 +331,23 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 #[test]
 fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
     let coords = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
-    let contents = [(5, 3), (-5, 4)].map(|(sdf, weight)| Voxels { sdf: [sdf; BLOCK_VOXELS], weight: [weight; BLOCK_VOXELS] });
+    let contents = [(5, 3), (-5, 4)]
+        .map(|(sdf, weight)| Voxels { sdf: [sdf; BLOCK_VOXELS], weight: [weight; BLOCK_VOXELS] });
     let planes = [[0; BLOCK_VOXELS], [1; BLOCK_VOXELS], [2; BLOCK_VOXELS]];
     let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
         let blocks = coords.iter().zip(order.map(|at| &contents[at]));
-        blocks.map(|(&coord, voxels)| fuse::block_digest(coord, voxels, Some(planes))).fold(0u64, u64::wrapping_add)
+        blocks
+            .map(|(&coord, voxels)| fuse::block_digest(coord, voxels, Some(planes)))
+            .fold(0u64, u64::wrapping_add)
     };
     let swapped = [planes[1], planes[0], planes[2]];
-    let sums = [sum([0, 1], &planes), sum([1, 0], &planes), sum([0, 0], &planes), sum([1, 1], &planes), sum([0, 1], &swapped)];
+    let sums = [
+        sum([0, 1], &planes),
+        sum([1, 0], &planes),
+        sum([0, 0], &planes),
+        sum([1, 1], &planes),
+        sum([0, 1], &swapped),
+    ];
     assert!((0..sums.len()).all(|one| (0..one).all(|other| sums[one] != sums[other])), "{sums:?}");
 }
 
@@ -255,7 +362,10 @@ fn a_full_pool_refuses_and_counts_and_keeps_what_it_has() {
                 assert_eq!(volume.pool().len(), blocks);
                 assert_eq!(volume.visible().slots().len(), blocks);
             }
-            let seen = (0..blocks as u32).map(Slot::new).filter(|&slot| volume.blocks().weight(slot).unwrap().contains(&3)).count();
+            let seen = (0..blocks as u32)
+                .map(Slot::new)
+                .filter(|&slot| volume.blocks().weight(slot).unwrap().contains(&3))
+                .count();
             assert!(seen > 0, "the blocks there are keep being fused");
         });
     }
@@ -290,16 +400,20 @@ fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
             max_weight: 25,
             ..VolumeConfig::default()
         };
-        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
-            let (depth_m, grey) = (vec![depth; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
-            let point = [0, 0, (depth / 0.05) as i32];
-            fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
-            assert_eq!(volume.sampler().voxel(point).unwrap().weight, expected);
-            for _ in 0..6 {
+        with_volume(
+            &Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY },
+            &config,
+            |volume| {
+                let (depth_m, grey) = (vec![depth; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
+                let point = [0, 0, (depth / 0.05) as i32];
                 fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
-            }
-            assert_eq!(volume.sampler().voxel(point).unwrap().weight, 25);
-        });
+                assert_eq!(volume.sampler().voxel(point).unwrap().weight, expected);
+                for _ in 0..6 {
+                    fuse_once(volume, &view([0.0; 3], [0.0; 3]), &depth_m, &grey);
+                }
+                assert_eq!(volume.sampler().voxel(point).unwrap().weight, 25);
+            },
+        );
     }
 }
 
@@ -309,12 +423,21 @@ fn what_was_taken_for_free_space_yields_to_a_surface() {
     let distance = |observation_weight| {
         let config = VolumeConfig { observation_weight, ..VolumeConfig::default() };
         let mut sdf = 0;
-        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
-            for depth_m in [5.0, 10.0, 10.0, 5.0] {
-                fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![depth_m; WIDTH * HEIGHT], &vec![50; WIDTH * HEIGHT]);
-            }
-            sdf = volume.sampler().voxel([0, 0, 100]).unwrap().sdf;
-        });
+        with_volume(
+            &Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY },
+            &config,
+            |volume| {
+                for depth_m in [5.0, 10.0, 10.0, 5.0] {
+                    fuse_once(
+                        volume,
+                        &view([0.0; 3], [0.0; 3]),
+                        &vec![depth_m; WIDTH * HEIGHT],
+                        &vec![50; WIDTH * HEIGHT],
+                    );
+                }
+                sdf = volume.sampler().voxel([0, 0, 100]).unwrap().sdf;
+            },
+        );
         sdf
     };
     // Those of 10 m weigh 20 of 40 parts, or 4 of 24.
@@ -324,23 +447,41 @@ fn what_was_taken_for_free_space_yields_to_a_surface() {
 
 #[test]
 fn near_observations_replace_the_past_and_weights_still_count() {
-    for (observation_weight, depth, past) in
-        [(ObservationWeight::Nearest, 4.0, 2), (ObservationWeight::Nearest, 16.0, 8), (ObservationWeight::One, 4.0, 10)]
-    {
-        let config = VolumeConfig { observation_weight, distance: DistanceAlong::Ray, ..VolumeConfig::default() };
-        with_volume(&Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY }, &config, |volume| {
-            let point = [0, 0, (depth / 0.05) as i32 - 2];
-            let mut fused = |depth: f32| {
-                fuse_once(volume, &view([0.0; 3], [0.0; 3]), &vec![depth; WIDTH * HEIGHT], &vec![50; WIDTH * HEIGHT]);
-                let voxel = volume.sampler().voxel(point).unwrap();
-                (f64::from(voxel.sdf), voxel.weight)
-            };
-            let before = (0..10).map(|_| fused(depth)).last().unwrap().0;
-            let (after, weight) = fused(depth + 0.15);
-            let step = 0.15 / 0.75 * 32_767.0 / f64::from(past + 1);
-            assert!((after - before - step).abs() < 3.0, "{observation_weight:?} at {depth} m: {before} to {after}");
-            assert_eq!(weight, 11);
-        });
+    for (observation_weight, depth, past) in [
+        (ObservationWeight::Nearest, 4.0, 2),
+        (ObservationWeight::Nearest, 16.0, 8),
+        (ObservationWeight::One, 4.0, 10),
+    ] {
+        let config = VolumeConfig {
+            observation_weight,
+            distance: DistanceAlong::Ray,
+            ..VolumeConfig::default()
+        };
+        with_volume(
+            &Capacity { blocks: 20_000, visible_blocks: 20_000, ..CAPACITY },
+            &config,
+            |volume| {
+                let point = [0, 0, (depth / 0.05) as i32 - 2];
+                let mut fused = |depth: f32| {
+                    fuse_once(
+                        volume,
+                        &view([0.0; 3], [0.0; 3]),
+                        &vec![depth; WIDTH * HEIGHT],
+                        &vec![50; WIDTH * HEIGHT],
+                    );
+                    let voxel = volume.sampler().voxel(point).unwrap();
+                    (f64::from(voxel.sdf), voxel.weight)
+                };
+                let before = (0..10).map(|_| fused(depth)).last().unwrap().0;
+                let (after, weight) = fused(depth + 0.15);
+                let step = 0.15 / 0.75 * 32_767.0 / f64::from(past + 1);
+                assert!(
+                    (after - before - step).abs() < 3.0,
+                    "{observation_weight:?} at {depth} m: {before} to {after}"
+                );
+                assert_eq!(weight, 11);
+            },
+        );
     }
 }
 
@@ -350,7 +491,8 @@ fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
     config.class_weight[7] = 0;
     config.class_weight[8] = 3;
     let (depth_m, grey) = (vec![3.0; WIDTH * HEIGHT], vec![50; WIDTH * HEIGHT]);
-    let class: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| if i % WIDTH < WIDTH / 2 { 7 } else { 8 }).collect();
+    let class: Vec<u8> =
+        (0..WIDTH * HEIGHT).map(|i| if i % WIDTH < WIDTH / 2 { 7 } else { 8 }).collect();
     with_volume(&CAPACITY, &config, |volume| {
         let mut seen = observation(&depth_m, &grey);
         seen.class = View::new(&class, WIDTH, HEIGHT);

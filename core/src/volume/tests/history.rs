@@ -1,4 +1,5 @@
-//! The ring of frames by itself: what it covers, what is due, what it says it uses, and what a snapshot keeps of it.
+//! The ring of frames by itself: what it covers, what is due, what it says it uses, and what a
+//! snapshot keeps of it.
 
 use super::*;
 use crate::{
@@ -8,7 +9,8 @@ use crate::{
 use std::boxed::Box;
 
 /// Three words of slots, three frames.
-const CAPACITY: Capacity = Capacity { blocks: 150, visible_blocks: 150, history_frames: 3, ..super::CAPACITY };
+const CAPACITY: Capacity =
+    Capacity { blocks: 150, visible_blocks: 150, history_frames: 3, ..super::CAPACITY };
 const BYTES: usize = VisibleHistory::bytes(&CAPACITY);
 
 fn with_history(test: impl FnOnce(&mut VisibleHistory<'_>)) {
@@ -31,29 +33,47 @@ fn all_due(history: &mut VisibleHistory<'_>) -> Vec<u32> {
 fn takes_three_words_a_frame_three_for_what_is_due_and_four_bytes_a_block() {
     // Each region is rounded up to 64 bytes.
     assert_eq!(BYTES, 128 + 64 + 640);
-    assert_eq!(VisibleHistory::bytes(&Capacity { blocks: 64, history_frames: 16, ..CAPACITY }), 128 + 64 + 256);
+    assert_eq!(
+        VisibleHistory::bytes(&Capacity { blocks: 64, history_frames: 16, ..CAPACITY }),
+        128 + 64 + 256
+    );
 }
 
 #[test]
 fn covers_the_frames_between_the_oldest_and_the_last() {
     with_history(|history| {
-        assert_eq!((history.capacity(), history.len(), history.is_empty(), history.oldest()), (3, 0, true, None));
-        assert_eq!((history.covers(7), history.expire(), history.words_in_use()), (false, None, [0, 0]));
+        assert_eq!(
+            (history.capacity(), history.len(), history.is_empty(), history.oldest()),
+            (3, 0, true, None)
+        );
+        assert_eq!(
+            (history.covers(7), history.expire(), history.words_in_use()),
+            (false, None, [0, 0])
+        );
         for frame in 7..10 {
             history.push(frame, &slots([frame]));
         }
         assert_eq!((history.len(), history.is_empty(), history.oldest()), (3, false, Some(7)));
-        assert_eq!([6, 7, 8, 9, 10].map(|frame| history.covers(frame)), [false, true, true, true, false]);
+        assert_eq!(
+            [6, 7, 8, 9, 10].map(|frame| history.covers(frame)),
+            [false, true, true, true, false]
+        );
         assert_eq!(history.words_in_use(), [9, 9]);
         assert_eq!(history.expire(), Some(7));
         assert_eq!((history.len(), history.oldest(), history.words_in_use()), (2, Some(8), [6, 9]));
         assert_eq!([7, 8, 9, 10].map(|frame| history.covers(frame)), [false, true, true, false]);
         history.push(10, &slots([10]));
-        assert_eq!([history.expire(), history.expire(), history.expire(), history.expire()], [Some(8), Some(9), Some(10), None]);
+        assert_eq!(
+            [history.expire(), history.expire(), history.expire(), history.expire()],
+            [Some(8), Some(9), Some(10), None]
+        );
         assert_eq!(all_due(history), [7, 8, 9, 10], "each frame had its own set");
         // An empty ring begins anew wherever the next frame is.
         history.push(100, &[]);
-        assert_eq!((history.oldest(), history.covers(100), history.words_in_use()), (Some(100), true, [3, 9]));
+        assert_eq!(
+            (history.oldest(), history.covers(100), history.words_in_use()),
+            (Some(100), true, [3, 9])
+        );
     });
 }
 
@@ -68,7 +88,10 @@ fn what_is_due_is_taken_once_from_a_slot_on_in_ascending_order() {
         assert_eq!(history.take_due(64), Some(Slot::new(64)));
         assert_eq!(history.take_due(64), Some(Slot::new(65)));
         assert_eq!((history.take_due(128), history.due()), (Some(Slot::new(130)), 4));
-        assert_eq!((history.take_due(150), history.take_due(1_000), history.due()), (None, None, 4));
+        assert_eq!(
+            (history.take_due(150), history.take_due(1_000), history.due()),
+            (None, None, 4)
+        );
         assert_eq!(all_due(history), [0, 63, 127, 149]);
         assert_eq!(history.due(), 0);
     });
@@ -87,7 +110,11 @@ fn a_block_that_is_freed_is_not_due_and_one_made_later_in_its_slot_neither() {
         history.on_free(seen[3]);
         history.allocated_at(seen[3], 7);
         history.expire();
-        assert_eq!(all_due(history), [3, 71], "freed before its frame left, and given out again since");
+        assert_eq!(
+            all_due(history),
+            [3, 71],
+            "freed before its frame left, and given out again since"
+        );
     });
 }
 
@@ -113,7 +140,8 @@ fn a_snapshot_keeps_the_ring_what_is_due_and_when_blocks_were_made() {
         history.visit(141, &mut writer);
         writer.finish().unwrap();
     });
-    // Oldest, length and peak, three frames and what is due of three words each, 141 births, the checksum.
+    // Oldest, length and peak, three frames and what is due of three words each, 141 births, the
+    // checksum.
     assert_eq!(bytes.len(), 3 * 4 + 4 * 3 * 8 + 141 * 4 + 8);
     with_history(|history| {
         let mut rest = &bytes[..];
@@ -134,6 +162,10 @@ fn a_snapshot_keeps_the_ring_what_is_due_and_when_blocks_were_made() {
                 all_due(history)
             })
             .collect();
-        assert_eq!(frames, [vec![1, 100], vec![1, 100], vec![1, 66, 120]], "of each frame the blocks that are as old");
+        assert_eq!(
+            frames,
+            [vec![1, 100], vec![1, 100], vec![1, 66, 120]],
+            "of each frame the blocks that are as old"
+        );
     });
 }

@@ -18,8 +18,10 @@ use std::{vec, vec::Vec};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
-const RIG: StereoRig = StereoRig { focal_px: 80.0, center_u_px: 47.5, center_v_px: 31.5, baseline_m: 0.5 };
-const CAPACITY: Capacity = Capacity { blocks: 6_000, visible_blocks: 6_000, colour: true, ..Capacity::TINY };
+const RIG: StereoRig =
+    StereoRig { focal_px: 80.0, center_u_px: 47.5, center_v_px: 31.5, baseline_m: 0.5 };
+const CAPACITY: Capacity =
+    Capacity { blocks: 6_000, visible_blocks: 6_000, colour: true, ..Capacity::TINY };
 
 /// Runs `test` with a volume of that capacity.
 fn with_volume(capacity: &Capacity, config: &VolumeConfig, test: impl FnOnce(&mut Volume<'_>)) {
@@ -63,7 +65,12 @@ fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
     }
 }
 
-fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &[u8]) -> AllocationReport {
+fn fuse_once(
+    volume: &mut Volume<'_>,
+    view: &Viewpoint,
+    depth_m: &[f32],
+    grey: &[u8],
+) -> AllocationReport {
     let seen = observation(depth_m, grey);
     let report = volume.allocate(view, seen.depth_m, &mut NoStore, &Serial);
     volume.fuse(view, seen, &Serial);
@@ -71,7 +78,8 @@ fn fuse_once(volume: &mut Volume<'_>, view: &Viewpoint, depth_m: &[f32], grey: &
 }
 
 impl Volume<'_> {
-    /// Flips a bit of a voxel, 0 to 15 of its distance, 16 to 23 of its weight, and lets the digest know.
+    /// Flips a bit of a voxel, 0 to 15 of its distance, 16 to 23 of its weight, and lets the digest
+    /// know.
     pub(crate) fn flip(&mut self, slot: Slot, voxel: usize, bit: u32) {
         self.flip_behind_its_back(slot, voxel, bit);
         self.update_digest(slot);

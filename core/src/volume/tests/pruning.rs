@@ -45,15 +45,25 @@ fn coords(from: i32, count: i32) -> Vec<BlockCoord> {
 fn frees_low_weight_blocks_lag_frames_after_they_were_seen_and_no_others() {
     with_volume(&CAPACITY, &pruning(2, 10), |volume| {
         volume.visible.begin_frame();
-        let low_weight: Vec<Slot> = coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
-        let high_weight: Vec<Slot> = coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
-        let before: Vec<_> =
-            high_weight.iter().map(|&slot| (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)).collect();
+        let low_weight: Vec<Slot> =
+            coords(0, 60).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let high_weight: Vec<Slot> =
+            coords(100, 40).into_iter().map(|coord| plant(volume, coord, |_| 5)).collect();
+        let before: Vec<_> = high_weight
+            .iter()
+            .map(|&slot| {
+                (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight)
+            })
+            .collect();
         low_weight.iter().chain(&high_weight).for_each(|&slot| volume.visible.mark(slot).unwrap());
         volume.visible.sort(volume.pool.high_water());
         assert_eq!(volume.prune(), PruneReport::default());
         for _ in 1..10 {
-            assert_eq!(frame(volume, &[]), PruneReport::default(), "nothing changes within the lag");
+            assert_eq!(
+                frame(volume, &[]),
+                PruneReport::default(),
+                "nothing changes within the lag"
+            );
         }
         assert_eq!(volume.pool.len(), 100);
         let report = frame(volume, &[]);
@@ -70,7 +80,10 @@ fn frees_low_weight_blocks_lag_frames_after_they_were_seen_and_no_others() {
         );
         assert_eq!((volume.pool.len(), volume.index.len()), (40, 40));
         for (&slot, before) in high_weight.iter().zip(&before) {
-            assert_eq!((volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight), *before);
+            assert_eq!(
+                (volume.blocks.voxels[slot.index()].sdf, volume.blocks.voxels[slot.index()].weight),
+                *before
+            );
         }
         let digest = volume.digest();
         coords(0, 60).into_iter().for_each(|coord| {
@@ -94,10 +107,18 @@ fn a_half_noisy_block_keeps_its_good_voxels() {
         let report = frame(volume, &[]);
         assert_eq!((report.voxels_reset, report.blocks_freed), (256, 0));
         for voxel in 0..BLOCK_VOXELS {
-            let here = (volume.blocks.voxels[0].weight[voxel], volume.blocks.voxels[0].sdf[voxel], volume.blocks.colour[0][2][voxel]);
+            let here = (
+                volume.blocks.voxels[0].weight[voxel],
+                volume.blocks.voxels[0].sdf[voxel],
+                volume.blocks.colour[0][2][voxel],
+            );
             assert_eq!(here, if voxel % 2 == 0 { (0, 0, 0) } else { (2, 100 + voxel as i16, 9) });
         }
-        let content = fuse::block_digest(BlockCoord::default(), &volume.blocks.voxels[0], volume.blocks.colour.first());
+        let content = fuse::block_digest(
+            BlockCoord::default(),
+            &volume.blocks.voxels[0],
+            volume.blocks.colour.first(),
+        );
         assert_eq!(volume.digest(), content);
     });
 }
@@ -116,14 +137,21 @@ fn blocks_left_unread_have_no_voxel_of_low_weight() {
                         fuse_once(volume, &view([0.0; 3], [0.0; 3]), depth_m, &grey);
                     }
                 }
-                for (slot, Voxels { weight, .. }) in volume.blocks.voxels.iter().enumerate().take(volume.pool.high_water()) {
-                    let least = weight.iter().copied().filter(|&weight| weight > 0).min().unwrap_or(0);
+                for (slot, Voxels { weight, .. }) in
+                    volume.blocks.voxels.iter().enumerate().take(volume.pool.high_water())
+                {
+                    let least =
+                        weight.iter().copied().filter(|&weight| weight > 0).min().unwrap_or(0);
                     assert_eq!(volume.blocks.header[slot].min_weight, least, "slot {slot}");
                 }
                 if !known {
                     volume.blocks.header.iter_mut().for_each(|header| header.min_weight = 0);
                 }
-                digests.push((volume.prune_whole(prune_weight), volume.digest(), volume.pool.len()));
+                digests.push((
+                    volume.prune_whole(prune_weight),
+                    volume.digest(),
+                    volume.pool.len(),
+                ));
             });
         }
         assert_eq!(digests[0], digests[1], "weight {prune_weight}");
@@ -132,15 +160,23 @@ fn blocks_left_unread_have_no_voxel_of_low_weight() {
 
 #[test]
 fn visits_no_more_blocks_a_frame_than_allowed_and_forgets_none() {
-    with_volume(&CAPACITY, &VolumeConfig { prune_blocks_per_frame: 7, ..pruning(1, 2) }, |volume| {
-        volume.visible.begin_frame();
-        let slots: Vec<Slot> = coords(0, 30).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
-        frame(volume, &slots);
-        frame(volume, &[]);
-        let visited: Vec<_> = (0..6).map(|_| frame(volume, &[])).map(|report| (report.visited, report.carried_over)).collect();
-        assert_eq!(visited, [(7, 23), (7, 16), (7, 9), (7, 2), (2, 0), (0, 0)]);
-        assert!(volume.pool.is_empty());
-    });
+    with_volume(
+        &CAPACITY,
+        &VolumeConfig { prune_blocks_per_frame: 7, ..pruning(1, 2) },
+        |volume| {
+            volume.visible.begin_frame();
+            let slots: Vec<Slot> =
+                coords(0, 30).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+            frame(volume, &slots);
+            frame(volume, &[]);
+            let visited: Vec<_> = (0..6)
+                .map(|_| frame(volume, &[]))
+                .map(|report| (report.visited, report.carried_over))
+                .collect();
+            assert_eq!(visited, [(7, 23), (7, 16), (7, 9), (7, 2), (2, 0), (0, 0)]);
+            assert!(volume.pool.is_empty());
+        },
+    );
 }
 
 #[test]
@@ -176,7 +212,11 @@ fn voxels_of_a_block_are_counted_by_how_often_they_were_seen() {
         // 64 voxels of each weight from 0 to 7.
         let slot = plant(volume, BlockCoord::default(), |voxel| (voxel % 8) as u8);
         assert_eq!(volume.prune_block(slot, by_weight(3)), (3 * 64, false));
-        assert_eq!(volume.prune_block(slot, by_weight(3)), (0, false), "nothing of low weight is left");
+        assert_eq!(
+            volume.prune_block(slot, by_weight(3)),
+            (0, false),
+            "nothing of low weight is left"
+        );
         assert_eq!(volume.prune_block(slot, by_weight(6)), (3 * 64, false), "4 to 6");
         assert_eq!(volume.prune_block(slot, by_weight(7)), (64, true));
     });
@@ -200,7 +240,8 @@ fn weight_zero_is_off() {
 fn finish_prunes_what_is_still_in_the_window() {
     with_volume(&CAPACITY, &pruning(1, 50), |volume| {
         volume.visible.begin_frame();
-        let slots: Vec<Slot> = coords(0, 5).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
+        let slots: Vec<Slot> =
+            coords(0, 5).into_iter().map(|coord| plant(volume, coord, |_| 1)).collect();
         frame(volume, &slots);
         assert_eq!(volume.finish().blocks_freed, 5);
         assert_eq!((volume.digest(), volume.pool.len(), volume.history.len()), (0, 0, 0));
@@ -217,7 +258,8 @@ struct Model {
 #[test]
 fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
     const LAG: u32 = 9;
-    let capacity = Capacity { blocks: 90, visible_blocks: 90, history_frames: LAG as usize, ..CAPACITY };
+    let capacity =
+        Capacity { blocks: 90, visible_blocks: 90, history_frames: LAG as usize, ..CAPACITY };
     // Weight 9 everywhere: pruning visits blocks but takes none, so that only the test frees.
     with_volume(&capacity, &pruning(1, LAG), |volume| {
         let (mut model, mut random) = (Model::default(), Random::new(77));
@@ -249,7 +291,9 @@ fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
                 .and_then(|then| model.seen.get(&then))
                 .into_iter()
                 .flatten()
-                .filter(|(coord, frame_made)| model.alive.get(coord).is_some_and(|(_, alive)| alive == frame_made))
+                .filter(|(coord, frame_made)| {
+                    model.alive.get(coord).is_some_and(|(_, alive)| alive == frame_made)
+                })
                 .map(|(coord, _)| *coord)
                 .collect();
             if volume.history.len() == volume.history.capacity() {
@@ -272,7 +316,12 @@ fn a_million_blocks_made_and_freed_leak_nothing() {
     with_volume(&capacity, &pruning(1, 1), |volume| {
         let (mut model, mut random) = (BTreeMap::new(), Random::new(3));
         for _ in 0..1_000_000 {
-            let coord = BlockCoord::new(random.below(9) as i32, random.below(9) as i32, random.below(9) as i32).unwrap();
+            let coord = BlockCoord::new(
+                random.below(9) as i32,
+                random.below(9) as i32,
+                random.below(9) as i32,
+            )
+            .unwrap();
             assert_eq!(volume.find(coord), model.get(&coord).copied());
             if let Some(slot) = model.remove(&coord) {
                 volume.free_block(slot);
@@ -301,7 +350,10 @@ fn six_blocks_of_one_bucket_can_be_removed_in_any_order() {
             orders = orders
                 .into_iter()
                 .flat_map(|order: Vec<usize>| {
-                    (0..6).filter(|i| !order.contains(i)).map(|i| [&order[..], &[i]].concat()).collect::<Vec<_>>()
+                    (0..6)
+                        .filter(|i| !order.contains(i))
+                        .map(|i| [&order[..], &[i]].concat())
+                        .collect::<Vec<_>>()
                 })
                 .collect();
         }
@@ -311,7 +363,10 @@ fn six_blocks_of_one_bucket_can_be_removed_in_any_order() {
             for (removed, &which) in order.iter().enumerate() {
                 volume.free_block(slots[which]);
                 for (i, (&coord, &slot)) in mates.iter().zip(&slots).enumerate() {
-                    assert_eq!(volume.find(coord), (!order[..=removed].contains(&i)).then_some(slot));
+                    assert_eq!(
+                        volume.find(coord),
+                        (!order[..=removed].contains(&i)).then_some(slot)
+                    );
                 }
             }
             assert!(volume.pool.is_empty() && volume.index.is_empty());

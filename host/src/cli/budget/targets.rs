@@ -4,7 +4,8 @@ use crate::report::text::grouped;
 use dynvox_core::Capacity;
 use serde_json::json;
 
-/// A machine that a script of `tests/targets` builds a program for, and what its machine code takes.
+/// A machine that a script of `tests/targets` builds a program for, and what its machine code
+/// takes.
 struct Target {
     /// Name of the script.
     name: &'static str,
@@ -15,11 +16,16 @@ struct Target {
 }
 
 /// Upper bounds: the script fails where its program takes more.
-const TARGETS: [Target; 1] = [Target { name: "cortex-m7", code_bytes: 780 << 10, stack_bytes: 32 << 10 }];
+const TARGETS: [Target; 1] =
+    [Target { name: "cortex-m7", code_bytes: 780 << 10, stack_bytes: 32 << 10 }];
 
 /// Prints, for each capacity and target, what a program takes in all.
 pub fn show(capacities: &[(String, Capacity)], as_json: bool) -> anyhow::Result<()> {
-    let rows = || TARGETS.iter().flat_map(|target| capacities.iter().map(move |(name, capacity)| (target, name, capacity.bytes())));
+    let rows = || {
+        TARGETS.iter().flat_map(|target| {
+            capacities.iter().map(move |(name, capacity)| (target, name, capacity.bytes()))
+        })
+    };
     if as_json {
         let row = |(target, name, slab): (&Target, &String, usize)| {
             json!({
@@ -34,12 +40,31 @@ pub fn show(capacities: &[(String, Capacity)], as_json: bool) -> anyhow::Result<
         outln!("{}", serde_json::to_string_pretty(&rows().map(row).collect::<Vec<_>>())?);
         return Ok(());
     }
-    outln!("{:<12}{:<12}{:>16}{:>12}{:>12}{:>16}", "target", "capacity", "slab, bytes", "stack", "code", "sum");
+    outln!(
+        "{:<12}{:<12}{:>16}{:>12}{:>12}{:>16}",
+        "target",
+        "capacity",
+        "slab, bytes",
+        "stack",
+        "code",
+        "sum"
+    );
     for (target, name, slab) in rows() {
         let sum = slab + target.stack_bytes + target.code_bytes;
-        let cells = [slab, target.stack_bytes, target.code_bytes, sum].map(|bytes| grouped(bytes as u64));
-        outln!("{:<12}{name:<12}{:>16}{:>12}{:>12}{:>16}", target.name, cells[0], cells[1], cells[2], cells[3]);
+        let cells =
+            [slab, target.stack_bytes, target.code_bytes, sum].map(|bytes| grouped(bytes as u64));
+        outln!(
+            "{:<12}{name:<12}{:>16}{:>12}{:>12}{:>16}",
+            target.name,
+            cells[0],
+            cells[1],
+            cells[2],
+            cells[3]
+        );
     }
-    outln!("\nstack and code: the most that tests/targets/{} lets its program take; your own code comes on top", TARGETS[0].name);
+    outln!(
+        "\nstack and code: the most that tests/targets/{} lets its program take; your own code comes on top",
+        TARGETS[0].name
+    );
     Ok(())
 }

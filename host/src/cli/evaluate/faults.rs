@@ -76,7 +76,11 @@ fn listed(at: usize) -> Vec<String> {
 
 pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
     if args.at == 0 || args.at >= args.frames {
-        bail!("--at {} leaves no frame before or after it. Give 1 to {}", args.at, args.frames.saturating_sub(1));
+        bail!(
+            "--at {} leaves no frame before or after it. Give 1 to {}",
+            args.at,
+            args.frames.saturating_sub(1)
+        );
     }
     let faults = if args.fault.is_empty() { listed(args.at) } else { args.fault.clone() };
     let mut rows = Vec::new();
@@ -118,15 +122,20 @@ fn line(FaultRow { fault, outcome }: &FaultRow) -> String {
 /// Maps with one fault and compares with the truth.
 fn outcome(args: &FaultsArgs, fault: &str) -> anyhow::Result<FaultOutcome> {
     let (faults, frames) = (format!("--faults={fault}"), format!("--frames={}", args.frames));
-    let words = ["dynvox", &faults, &frames].into_iter().map(str::to_owned).chain(args.run.iter().cloned());
-    let plan = run::plan_of(&words.collect::<Vec<_>>()).with_context(|| format!("{fault} cannot be tried"))?;
+    let words =
+        ["dynvox", &faults, &frames].into_iter().map(str::to_owned).chain(args.run.iter().cloned());
+    let plan = run::plan_of(&words.collect::<Vec<_>>())
+        .with_context(|| format!("{fault} cannot be tried"))?;
     Ok(FaultOutcome::of(&evaluated(&plan)?, args.at))
 }
 
 /// Maps the frames of a plan and puts the truth beside each.
 fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
     let Some(truth) = plan.dataset.truth() else {
-        bail!("{} has no true poses. Give a data set that has, or none for the synthetic street", plan.dataset.name());
+        bail!(
+            "{} has no true poses. Give a data set that has, or none for the synthetic street",
+            plan.dataset.name()
+        );
     };
     let mut slab = vec![0; plan.capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&plan.capacity, &plan.config, &mut slab)?;
@@ -134,8 +143,11 @@ fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
     let mut frames = Vec::new();
     for (_, index) in plan.frames.from_position(0) {
         let images = plan.dataset.frame(index)?;
-        let detections: Vec<_> = images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let (Some(frame), Some(&true_pose)) = (stereo_frame(&images, &detections), truth.get(index)) else {
+        let detections: Vec<_> =
+            images.masks.instances.iter().map(InstanceMask::detection).collect();
+        let (Some(frame), Some(&true_pose)) =
+            (stereo_frame(&images, &detections), truth.get(index))
+        else {
             bail!("frame {index} has no images or no true pose. Choose other frames with --frames");
         };
         let frame = StereoFrame { time_ns: plan.dataset.stamp_ns(index), ..frame };

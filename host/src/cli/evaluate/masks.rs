@@ -27,10 +27,16 @@ pub fn run(args: &MasksArgs) -> anyhow::Result<()> {
 fn print_figures(figures: &FileFigures) {
     outln!("{:<16}{:>6}{:>10}{:>8}{:>8}", "frame", "mask", "pixels", "truth", "IoU");
     for one in &figures.found {
-        let (truth, iou) = one.best.map_or(("-".to_owned(), 0.0), |(truth, iou)| (truth.to_string(), iou));
+        let (truth, iou) =
+            one.best.map_or(("-".to_owned(), 0.0), |(truth, iou)| (truth.to_string(), iou));
         outln!("{:<16}{:>6}{:>10}{truth:>8}{iou:>8.3}", one.frame, one.id, one.pixels);
     }
-    outln!("{} frames; {} masks, {} of them with an IoU below {FOUND_IOU}", figures.frames, figures.found.len(), figures.false_masks);
+    outln!(
+        "{} frames; {} masks, {} of them with an IoU below {FOUND_IOU}",
+        figures.frames,
+        figures.found.len(),
+        figures.false_masks
+    );
     for area in &figures.truth {
         outln!("{}", area_line(area));
     }

@@ -1,7 +1,9 @@
 //! `dynvox evaluate stereo`.
 
 use crate::cli::settings::Settings;
-use crate::evaluate::stereo::{BAD_PX, Estimate, PartFigures, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set};
+use crate::evaluate::stereo::{
+    BAD_PX, Estimate, PartFigures, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set,
+};
 use crate::formats::{Image, read_picture, read_png_deep, read_png_u16, write_png_deep};
 use crate::observe::pictures;
 use crate::run::Threads;
@@ -14,14 +16,18 @@ use serde::Serialize;
 use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
-/// Names of the regions: what both cameras see and all, each whole, its background and its foreground.
-const REGIONS: [&str; 6] = ["noc", "noc_background", "noc_foreground", "occ", "occ_background", "occ_foreground"];
+/// Names of the regions: what both cameras see and all, each whole, its background and its
+/// foreground.
+const REGIONS: [&str; 6] =
+    ["noc", "noc_background", "noc_foreground", "occ", "occ_background", "occ_foreground"];
 
 #[derive(Debug, clap::Args)]
 pub struct StereoArgs {
-    /// Folder of KITTI 2012 (image_0, image_1, disp_noc, disp_occ) or 2015 (image_2, image_3, disp_noc_0, disp_occ_0, obj_map), or the one with its training/
+    /// Folder of KITTI 2012 (image_0, image_1, disp_noc, disp_occ) or 2015 (image_2, image_3,
+    /// disp_noc_0, disp_occ_0, obj_map), or the one with its training/
     folder: PathBuf,
-    /// Evaluate another program's disparities instead: 16-bit PNG (value / 256 px, 0 none) of the images' names
+    /// Evaluate another program's disparities instead: 16-bit PNG (value / 256 px, 0 none) of the
+    /// images' names
     #[arg(long, value_name = "DIR")]
     disparity: Option<PathBuf>,
     /// Settings from a file; config.toml of a run is one
@@ -30,7 +36,8 @@ pub struct StereoArgs {
     /// One setting of the matcher, as in --set stereo.texture_min=10; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write the disparities (16-bit PNG, value / 256 px, 0 none; odd values were filled in) and pictures of their errors into this folder
+    /// Write the disparities (16-bit PNG, value / 256 px, 0 none; odd values were filled in) and
+    /// pictures of their errors into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads; the result does not depend on them
@@ -63,12 +70,20 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
             None => threads.run(|| matched(pair, &config, &threads))?,
         };
         let whole = filled(&given);
-        count(pair, &Estimate { given: &given, filled: &whole, marked: args.disparity.is_none() }, &mut counts)?;
+        count(
+            pair,
+            &Estimate { given: &given, filled: &whole, marked: args.disparity.is_none() },
+            &mut counts,
+        )?;
         if let Some(folder) = &args.out {
             write(folder, pair, &given, args.disparity.is_none())?;
         }
     }
-    let regions = REGIONS.into_iter().zip(counts).filter_map(|(name, counts)| Some((name, counts.figures()?))).collect();
+    let regions = REGIONS
+        .into_iter()
+        .zip(counts)
+        .filter_map(|(name, counts)| Some((name, counts.figures()?)))
+        .collect();
     let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&found)?);
@@ -79,34 +94,62 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
 }
 
 /// The core's own disparity of a pair.
-fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyhow::Result<Image<u16>> {
-    let [left, right] = [read_picture(&pair.images[0])?.to_8_bit(None).grey, read_picture(&pair.images[1])?.to_8_bit(None).grey];
+fn matched(
+    pair: &StereoPair,
+    config: &StereoConfig,
+    threads: &Threads,
+) -> anyhow::Result<Image<u16>> {
+    let [left, right] = [
+        read_picture(&pair.images[0])?.to_8_bit(None).grey,
+        read_picture(&pair.images[1])?.to_8_bit(None).grey,
+    ];
     let (width, height) = (left.width(), left.height());
     if (right.width(), right.height()) != (width, height) {
-        bail!("{} and {} differ in size. Fetch the pair anew", pair.images[0].display(), pair.images[1].display());
+        bail!(
+            "{} and {} differ in size. Fetch the pair anew",
+            pair.images[0].display(),
+            pair.images[1].display()
+        );
     }
     let capacity = Capacity { image_width: width, image_height: height, ..Capacity::SMALL };
     let bytes = StereoMatcher::bytes(&capacity);
-    let Some(mut slab) = HostSlab::map(bytes) else { bail!("this machine has no {bytes} bytes for an image of {width} x {height} px") };
-    let refused = |reason: String| anyhow::anyhow!("{} cannot be matched: {reason}", pair.images[0].display());
-    let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(|error| refused(format!("{error:?}")))?;
+    let Some(mut slab) = HostSlab::map(bytes) else {
+        bail!("this machine has no {bytes} bytes for an image of {width} x {height} px")
+    };
+    let refused = |reason: String| {
+        anyhow::anyhow!("{} cannot be matched: {reason}", pair.images[0].display())
+    };
+    let mut carver =
+        Carver::new(slab.bytes_mut(), bytes).map_err(|error| refused(format!("{error:?}")))?;
     let mut matcher = StereoMatcher::new_in(&capacity, &mut carver);
     carver.check().map_err(|error| refused(format!("{error:?}")))?;
-    let (Some(left), Some(right)) = (left.view(), right.view()) else { return Err(refused("it has no pixels".into())) };
+    let (Some(left), Some(right)) = (left.view(), right.view()) else {
+        return Err(refused("it has no pixels".into()));
+    };
     // A pair that cannot be matched covers nothing: that shows in the figures.
     matcher.compute(config, left, right, threads);
     Ok(Image::from_view(&matcher.disparity_q8()))
 }
 
 /// Counts a pair in every region it has truth for.
-fn count(pair: &StereoPair, estimate: &Estimate<'_>, counts: &mut [StereoCounts; REGIONS.len()]) -> anyhow::Result<()> {
+fn count(
+    pair: &StereoPair,
+    estimate: &Estimate<'_>,
+    counts: &mut [StereoCounts; REGIONS.len()],
+) -> anyhow::Result<()> {
     let given = estimate.given;
     let same = |path: &Path, image: &Image<u16>| {
         if (image.width(), image.height()) == (given.width(), given.height()) {
             return Ok(());
         }
-        let sizes = [image, given].map(|image| format!("{} x {} px", image.width(), image.height()));
-        bail!("{} is {}, but the disparity {}. Fetch one of them anew", path.display(), sizes[0], sizes[1])
+        let sizes =
+            [image, given].map(|image| format!("{} x {} px", image.width(), image.height()));
+        bail!(
+            "{} is {}, but the disparity {}. Fetch one of them anew",
+            path.display(),
+            sizes[0],
+            sizes[1]
+        )
     };
     let objects = pair.objects.as_deref().map(read_png_u16).transpose()?;
     if let (Some(path), Some(objects)) = (&pair.objects, &objects) {
@@ -128,7 +171,8 @@ fn count(pair: &StereoPair, estimate: &Estimate<'_>, counts: &mut [StereoCounts;
 
 /// Writes a pair's disparities, and its errors over the left image.
 fn write(folder: &Path, pair: &StereoPair, given: &Image<u16>, marked: bool) -> anyhow::Result<()> {
-    create_dir_all(folder).with_context(|| format!("{} cannot be made. Check --out", folder.display()))?;
+    create_dir_all(folder)
+        .with_context(|| format!("{} cannot be made. Check --out", folder.display()))?;
     let path = |ending: &str| folder.join(format!("{}{ending}.png", pair.name));
     write_png_deep(&path(""), given)?;
     let Some(truth) = pair.truth.iter().rev().flatten().next() else { return Ok(()) };
@@ -152,9 +196,18 @@ fn print_figures(found: &Found) {
     BAD_PX.iter().for_each(|px| out!("{:>18}", format!("> {px} px")));
     outln!("{:>12}{:>10}", "mean |e|", "mean e");
     for (name, of) in REGIONS.iter().filter_map(|name| Some((name, found.regions.get(name)?))) {
-        let both = |given: f64, filled: f64| format!("{:.2} | {:.2}", 100.0 * given, 100.0 * filled);
-        out!("{name:<16}{:>11}{:>9.2}%{:>18}", of.pixels, 100.0 * of.coverage, both(of.d1, of.d1_filled));
-        of.bad.iter().zip(of.bad_filled).for_each(|(given, filled)| out!("{:>18}", both(*given, filled)));
+        let both =
+            |given: f64, filled: f64| format!("{:.2} | {:.2}", 100.0 * given, 100.0 * filled);
+        out!(
+            "{name:<16}{:>11}{:>9.2}%{:>18}",
+            of.pixels,
+            100.0 * of.coverage,
+            both(of.d1, of.d1_filled)
+        );
+        of.bad
+            .iter()
+            .zip(of.bad_filled)
+            .for_each(|(given, filled)| out!("{:>18}", both(*given, filled)));
         outln!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
         print_part("  measured", of.measured.as_ref().filter(|_| of.filled_in.is_some()));
         print_part("  filled in", of.filled_in.as_ref());
@@ -164,7 +217,12 @@ fn print_figures(found: &Found) {
 /// A line for a part of a region's estimates.
 fn print_part(name: &str, part: Option<&PartFigures>) {
     let Some(part) = part else { return };
-    out!("{name:<16}{:>11}{:>9.2}%{:>18}", "", 100.0 * part.coverage, format!("{:.2}       ", 100.0 * part.d1));
+    out!(
+        "{name:<16}{:>11}{:>9.2}%{:>18}",
+        "",
+        100.0 * part.coverage,
+        format!("{:.2}       ", 100.0 * part.d1)
+    );
     part.bad.iter().for_each(|bad| out!("{:>18}", format!("{:.2}        ", 100.0 * bad)));
     outln!("");
 }

@@ -1,14 +1,17 @@
 //! `dynvox evaluate trajectory`.
 
-use crate::evaluate::trajectory::{self, TrajectoryErrors, WithoutBoresight, frames_of_run, matched, read_trajectory, truth_of_frames};
+use crate::evaluate::trajectory::{
+    self, TrajectoryErrors, WithoutBoresight, frames_of_run, matched, read_trajectory,
+    truth_of_frames,
+};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct TrajectoryArgs {
     /// Estimated poses: a file in KITTI's or TUM's format, or a run folder
     estimate: PathBuf,
-    /// True poses, in either format; joined by time where both have times, by the numbers of a run folder's frames where they are more than those, row by
-    /// row otherwise
+    /// True poses, in either format; joined by time where both have times, by the numbers of a run
+    /// folder's frames where they are more than those, row by row otherwise
     truth: PathBuf,
     /// Write the figures to standard output as JSON
     #[arg(long)]
@@ -22,7 +25,8 @@ pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
         truth = truth_of_frames(truth, &frames)?;
     }
     let (estimate, truth) = matched(&read_trajectory(&args.estimate)?, &truth)?;
-    let found = trajectory::errors(&truth, &estimate).ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
+    let found = trajectory::errors(&truth, &estimate)
+        .ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&found)?);
         return Ok(());
@@ -37,15 +41,24 @@ fn print_figures(found: &TrajectoryErrors) {
     outln!("{:<28}{:.4} m, {:.4} deg", "frame to frame, RMS", found.rpe_t_m, found.rpe_r_deg);
     outln!("{:<28}{:.4} m", "after alignment (ATE), RMS", found.ate_m);
     for (length_m, percent, deg_per_m, segments) in &found.per_length {
-        outln!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m, {segments} segments", format!("segments of {length_m} m"));
+        outln!(
+            "{:<28}{percent:.4} %, {deg_per_m:.5} deg/m, {segments} segments",
+            format!("segments of {length_m} m")
+        );
     }
     if let (Some(percent), Some(deg_per_m)) = (found.t_err_percent, found.r_err_deg_per_m) {
         outln!("{:<28}{percent:.4} %, {deg_per_m:.5} deg/m", "all segments (t_err, r_err)");
     }
     if let Some([right, down, forward]) = found.mean_error_percent {
-        outln!("{:<28}{right:.3} % right, {down:.3} % down, {forward:.3} % forward", "mean error as a vector");
+        outln!(
+            "{:<28}{right:.3} % right, {down:.3} % down, {forward:.3} % forward",
+            "mean error as a vector"
+        );
     }
     if let Some(WithoutBoresight { angle_deg, t_err_percent, rpe_t_m }) = found.without_boresight {
-        outln!("{:<28}{t_err_percent:.4} %, {rpe_t_m:.4} m; the angle: {angle_deg:.3} deg", "without a boresight angle");
+        outln!(
+            "{:<28}{t_err_percent:.4} %, {rpe_t_m:.4} m; the angle: {angle_deg:.3} deg",
+            "without a boresight angle"
+        );
     }
 }

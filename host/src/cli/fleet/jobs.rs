@@ -2,7 +2,9 @@
 
 use super::{Shard, each};
 use crate::cli::{run::plan_of, sweep};
-use crate::fleet::{self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap};
+use crate::fleet::{
+    self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap,
+};
 use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::read_frame_digests;
 use crate::report::text::counted;
@@ -23,7 +25,8 @@ pub fn quiet_line(arguments: &[String]) -> Vec<String> {
     ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect()
 }
 
-/// What identifies a run: its settings, what is known of its data set, its first and its last image.
+/// What identifies a run: its settings, what is known of its data set, its first and its last
+/// image.
 fn identify(plan: &Plan) -> anyhow::Result<Identity> {
     let mut digest = Digest::default();
     for (key, value) in RunManifest::of(plan, std::iter::empty(), Path::new(""))?.fingerprint() {
@@ -53,7 +56,12 @@ pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
 /// Writes jobs, and says what to do with them.
 pub fn write(manifest: &Manifest, out: &Path) -> anyhow::Result<()> {
     manifest.write(out)?;
-    outln!("{} jobs in {}. Do them with: dynvox fleet run {}", manifest.jobs.len(), out.display(), out.display());
+    outln!(
+        "{} jobs in {}. Do them with: dynvox fleet run {}",
+        manifest.jobs.len(),
+        out.display(),
+        out.display()
+    );
     Ok(())
 }
 
@@ -67,7 +75,11 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
                 && let Some(of) = fleet::prior(job, folder)?.uncertainty
             {
                 let turn_deg = of.rotation_rad.to_degrees();
-                outln!("{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees", job.name, of.position_m);
+                outln!(
+                    "{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees",
+                    job.name,
+                    of.position_m
+                );
             }
         }
         Ok(())
@@ -97,7 +109,8 @@ fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     }
 }
 
-/// Blocks as far about surfaces as distances are kept: registration searches so far, and what is free of one epoch's surfaces tells what has changed.
+/// Blocks as far about surfaces as distances are kept: registration searches so far, and what is
+/// free of one epoch's surfaces tells what has changed.
 const ALLOCATION: [&str; 2] = ["--set", "volume.allocation_m=64"];
 
 /// Runs one job in a process of its own.
@@ -127,7 +140,8 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
     };
     let blocks = run_folder.join(BLOCKS_FILE);
     let (mut store, _) = BlockFile::open(&blocks, lattice.voxel_size_m, lattice.truncation_m)?;
-    let camera = Camera { rig: plan.config.rig, size: plan.dataset.size(), poses: cameras(&run_folder)? };
+    let camera =
+        Camera { rig: plan.config.rig, size: plan.dataset.size(), poses: cameras(&run_folder)? };
     std::fs::create_dir_all(folder.join("submaps"))?;
     fleet::keep(&mut store, &lattice, &camera, &job.submap(folder))?;
     std::fs::remove_file(&blocks)?;
@@ -138,13 +152,23 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
 fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
     let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
     let rows = read_frame_digests(&std::fs::read_to_string(run_folder.join(FRAMES_FILE))?)?;
-    Ok(rows.iter().zip(poses).map(|(row, t_map_camera)| CameraPose { frame: row.frame, segment: row.segment, t_map_camera }).collect())
+    Ok(rows
+        .iter()
+        .zip(poses)
+        .map(|(row, t_map_camera)| CameraPose {
+            frame: row.frame,
+            segment: row.segment,
+            t_map_camera,
+        })
+        .collect())
 }
 
 /// What became of a job, in words.
 fn state(folder: &Path, job: &Job) -> String {
     match (job.state(folder), left_out(folder, job)) {
-        (JobState::Done, frames @ 1..) => format!("done; {} after the camera was lost are left out", counted(frames, "frame")),
+        (JobState::Done, frames @ 1..) => {
+            format!("done; {} after the camera was lost are left out", counted(frames, "frame"))
+        }
         (state, _) => word(state).to_owned(),
     }
 }
@@ -177,6 +201,8 @@ pub fn status(folder: &Path, json: bool) -> anyhow::Result<()> {
         return Ok(());
     }
     outln!("{:<24}{:<20}{:>14}  state", "recording", "id", "memory, MiB");
-    manifest.jobs.iter().for_each(|job| outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, state(folder, job)));
+    manifest.jobs.iter().for_each(|job| {
+        outln!("{:<24}{:<20}{:>14}  {}", job.name, job.id, job.bytes >> 20, state(folder, job))
+    });
     Ok(())
 }

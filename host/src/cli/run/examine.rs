@@ -24,7 +24,11 @@ pub fn examine(args: &RunArgs, dataset: &dyn FrameSource) -> anyhow::Result<Exam
     Ok(Examined { warnings: warnings(args, dataset, &frames)?, interval_s })
 }
 
-fn warnings(args: &RunArgs, dataset: &dyn FrameSource, frames: &FrameNumbers) -> anyhow::Result<Vec<String>> {
+fn warnings(
+    args: &RunArgs,
+    dataset: &dyn FrameSource,
+    frames: &FrameNumbers,
+) -> anyhow::Result<Vec<String>> {
     if args.path.is_none() {
         // The synthetic street knows what it renders.
         return Ok(Vec::new());

@@ -23,7 +23,8 @@ pub fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
     // Before networks, which would run on every image that is examined.
     let Examined { warnings, interval_s } = examine::examine(args, recorded.as_ref())?;
     let dataset = args.dress(recorded)?;
-    let (profile, capacity) = args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
+    let (profile, capacity) =
+        args.bounds.resolve(dataset.size(), dataset.rectification(), settings.voxel_size_m())?;
     choose(args, &mut settings, &capacity);
     let frames = FrameNumbers::of(dataset.as_ref(), args.start, args.stride, args.frames)?;
     if let Some(interval_s) = interval_s {
@@ -55,7 +56,11 @@ pub fn plan(args: &RunArgs, stop: &StopRequest) -> anyhow::Result<Plan> {
         evaluation_delay: args.evaluation_delay,
         save_instances: None,
         save_map_disparity: None,
-        rss_limit_bytes: args.rss_limit_mib.map_or(run::resident_limit_bytes(&capacity, dataset.size()), |mib| mib.saturating_mul(MIB)),
+        rss_limit_bytes: args
+            .rss_limit_mib
+            .map_or(run::resident_limit_bytes(&capacity, dataset.size()), |mib| {
+                mib.saturating_mul(MIB)
+            }),
         quiet: args.silent(),
         dataset,
     })
@@ -81,13 +86,22 @@ pub struct MapperPlan {
     pub threads: usize,
 }
 
-/// What the bounds, settings and threads of a run's command line make of cameras, without a data set; `interval_s` is the time between two frames.
+/// What the bounds, settings and threads of a run's command line make of cameras, without a data
+/// set; `interval_s` is the time between two frames.
 ///
 /// # Errors
 /// The sentences of `dynvox run`.
-pub fn mapper_of(line: &[String], cameras: &FittedGeometry, interval_s: Option<f64>) -> anyhow::Result<MapperPlan> {
+pub fn mapper_of(
+    line: &[String],
+    cameras: &FittedGeometry,
+    interval_s: Option<f64>,
+) -> anyhow::Result<MapperPlan> {
     let (args, mut settings, threads) = parsed(line)?;
-    let (profile, capacity) = args.bounds.resolve(cameras.size, cameras.rectification.as_ref(), settings.voxel_size_m())?;
+    let (profile, capacity) = args.bounds.resolve(
+        cameras.size,
+        cameras.rectification.as_ref(),
+        settings.voxel_size_m(),
+    )?;
     choose(&args, &mut settings, &capacity);
     if let Some(interval_s) = interval_s {
         settings.set_frame_interval_s(interval_s);
@@ -95,7 +109,9 @@ pub fn mapper_of(line: &[String], cameras: &FittedGeometry, interval_s: Option<f
     match &args.egomotion {
         Some(EgomotionChoice::Stereo) => settings.set_motion_source(MotionSource::Stereo),
         Some(EgomotionChoice::Icp) => settings.set_motion_source(MotionSource::Icp),
-        Some(EgomotionChoice::File(_)) => bail!("--egomotion file:POSES needs a data set. Give each frame its pose"),
+        Some(EgomotionChoice::File(_)) => {
+            bail!("--egomotion file:POSES needs a data set. Give each frame its pose")
+        }
         None => {}
     }
     let config = settings.config(cameras.rig, cameras.rectification.as_ref());
@@ -116,15 +132,20 @@ fn parsed(line: &[String]) -> anyhow::Result<(RunArgs, Settings, usize)> {
     if !args.masks.need_no_recording() {
         bail!("masks from files and networks need a data set. Give each frame its detections");
     }
-    let (settings, threads) = (Settings::resolve(args.config.as_deref(), &args.set)?, threads(&args)?);
+    let (settings, threads) =
+        (Settings::resolve(args.config.as_deref(), &args.set)?, threads(&args)?);
     Ok((args, settings, threads))
 }
 
 /// Threads to work with.
 fn threads(args: &RunArgs) -> anyhow::Result<usize> {
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
+    let threads = args
+        .threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
     if threads > MOST_THREADS {
-        bail!("--threads {threads} is more than {MOST_THREADS}. Give at most the number of processors");
+        bail!(
+            "--threads {threads} is more than {MOST_THREADS}. Give at most the number of processors"
+        );
     }
     if threads == 0 || args.stride == 0 || args.frames == Some(0) {
         bail!("--threads, --stride and --frames must be at least 1. Give a larger number");

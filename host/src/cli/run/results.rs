@@ -1,4 +1,5 @@
-//! The files of a run folder that are written at the end, after the map and the objects. A file that the disk refuses is missing, and the others are written.
+//! The files of a run folder that are written at the end, after the map and the objects. A file
+//! that the disk refuses is missing, and the others are written.
 
 use crate::formats::{SETTINGS_FILE, SUMMARY_FILE, TRUE_TRAJECTORY_FILE, kitti_line};
 use crate::report::{self, Summary};
@@ -33,8 +34,10 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
         Incomplete::add_missing(&mut incomplete, GLB_FILE, &error.to_string());
     }
     run.incomplete = incomplete;
-    let viewer = scene.and_then(|scene| report::viewer::fragment(folder.path(), &run.header.name, &scene));
-    let viewer = viewer.unwrap_or_else(|error| html! { p { b { "The report has no viewer: " (error) } } });
+    let viewer =
+        scene.and_then(|scene| report::viewer::fragment(folder.path(), &run.header.name, &scene));
+    let viewer =
+        viewer.unwrap_or_else(|error| html! { p { b { "The report has no viewer: " (error) } } });
     if let Err(error) = folder.write("report.html", |out| report::html::write(out, run, &viewer)) {
         Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
     }
@@ -55,14 +58,25 @@ fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
         files.push(("calibration.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
     }
     if let Some(truth) = &sections.trajectory.truth {
-        files.push((TRUE_TRAJECTORY_FILE, Box::new(|out| truth.iter().try_for_each(|pose| out.write_all(kitti_line(pose).as_bytes())))));
+        files.push((
+            TRUE_TRAJECTORY_FILE,
+            Box::new(|out| {
+                truth.iter().try_for_each(|pose| out.write_all(kitti_line(pose).as_bytes()))
+            }),
+        ));
     }
     if !sections.tracks.comparisons.is_empty() {
-        files.push(("tracks_truth.csv", Box::new(|out| report::write_tracks_truth(out, &sections.tracks))));
+        files.push((
+            "tracks_truth.csv",
+            Box::new(|out| report::write_tracks_truth(out, &sections.tracks)),
+        ));
     }
     if let Some(reference) = &sections.reference {
         files.push(("lidar.csv", Box::new(|out| report::write_reference(out, &reference.frames))));
-        files.push(("surface_errors.csv", Box::new(|out| report::write_surface_errors(out, &reference.surface_errors))));
+        files.push((
+            "surface_errors.csv",
+            Box::new(|out| report::write_surface_errors(out, &reference.surface_errors)),
+        ));
     }
     files
 }

@@ -77,14 +77,20 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
     let manifest = checkpoint.manifest().clone();
     // Relative paths among the arguments start at the working directory of the run.
     let working_dir = manifest.working_dir();
-    std::env::set_current_dir(&working_dir)
-        .with_context(|| format!("the run was started in {}, which cannot be entered", working_dir.display()))?;
-    let line: Vec<String> = std::iter::once("dynvox".to_owned()).chain(manifest.arguments().iter().cloned()).collect();
-    let mut original = RunArgs::parse(&line).context("another dynvox started the run: this one does not accept its command line")?;
+    std::env::set_current_dir(&working_dir).with_context(|| {
+        format!("the run was started in {}, which cannot be entered", working_dir.display())
+    })?;
+    let line: Vec<String> =
+        std::iter::once("dynvox".to_owned()).chain(manifest.arguments().iter().cloned()).collect();
+    let mut original = RunArgs::parse(&line)
+        .context("another dynvox started the run: this one does not accept its command line")?;
     if folder.is_complete() {
         let target = folder.commit(&temporary_files(original.keep_blocks, false))?;
         if !args.silent() {
-            eprintln!("note: {} was complete but for files that it no longer needs; they are removed", target.display());
+            eprintln!(
+                "note: {} was complete but for files that it no longer needs; they are removed",
+                target.display()
+            );
         }
         return Ok(());
     }
@@ -98,7 +104,11 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
     plan.checkpoints = original.snapshot_every.map(|every| CheckpointPlan { every, manifest });
     if !args.silent() {
         print_header(&plan);
-        eprintln!("note: resuming after frame {} of {}", checkpoint.frames(), plan.frames.listed().len());
+        eprintln!(
+            "note: resuming after frame {} of {}",
+            checkpoint.frames(),
+            plan.frames.listed().len()
+        );
     }
     finish(&original, &plan, folder, Some(checkpoint))
 }
@@ -111,7 +121,10 @@ mod tests {
     #[test]
     fn every_argument_is_either_fixed_or_may_change_on_resume() {
         let changeable = ["resume", "threads", "rss_limit_mib", "snapshot_every", "json", "quiet"];
-        let mut all: Vec<String> = super::super::RunCommand::command().get_arguments().map(|one| one.get_id().to_string()).collect();
+        let mut all: Vec<String> = super::super::RunCommand::command()
+            .get_arguments()
+            .map(|one| one.get_id().to_string())
+            .collect();
         all.sort();
         let mut listed: Vec<&str> = FIXED_ARGUMENTS.into_iter().chain(changeable).collect();
         listed.sort();

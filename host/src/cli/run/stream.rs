@@ -20,7 +20,11 @@ pub fn is_stream(path: &Path) -> bool {
 }
 
 /// The stereo pairs on standard input.
-pub fn open(args: &RunArgs, rectified: RectifiedSize, stop: &StopRequest) -> anyhow::Result<Box<dyn FrameSource>> {
+pub fn open(
+    args: &RunArgs,
+    rectified: RectifiedSize,
+    stop: &StopRequest,
+) -> anyhow::Result<Box<dyn FrameSource>> {
     if args.calibration.is_empty() {
         bail!("a stream has no calibration beside it. Give one with --calibration FILE");
     }
@@ -34,7 +38,9 @@ pub fn open(args: &RunArgs, rectified: RectifiedSize, stop: &StopRequest) -> any
         ("--egomotion file", matches!(args.egomotion, Some(EgomotionChoice::File(_)))),
     ];
     if let Some((option, _)) = of_recordings.iter().find(|(_, given)| *given) {
-        bail!("{option} needs a recording, and a stream comes once. Leave it out, or record the stream first");
+        bail!(
+            "{option} needs a recording, and a stream comes once. Leave it out, or record the stream first"
+        );
     }
     let options = StreamOptions {
         name: "stream".to_owned(),
@@ -43,9 +49,15 @@ pub fn open(args: &RunArgs, rectified: RectifiedSize, stop: &StopRequest) -> any
         rate_hz: args.rate,
         when_late: args.when_late.unwrap_or_default(),
     };
-    let pairs = NetpbmPairs::new(BufReader::with_capacity(BUFFER_BYTES, stdin()), args.stacking(), args.bits);
+    let pairs = NetpbmPairs::new(
+        BufReader::with_capacity(BUFFER_BYTES, stdin()),
+        args.stacking(),
+        args.bits,
+    );
     match Stream::begin(options, stop.clone(), pairs) {
-        Err(InputError::PastEnd { .. }) => bail!("standard input ended without an image. Let a program write PGM or PPM images to it"),
+        Err(InputError::PastEnd { .. }) => bail!(
+            "standard input ended without an image. Let a program write PGM or PPM images to it"
+        ),
         stream => Ok(Box::new(stream?)),
     }
 }

@@ -1,7 +1,9 @@
-//! Masks against true masks: how much of each true one its best mask covers, and which masks are of nothing.
+//! Masks against true masks: how much of each true one its best mask covers, and which masks are of
+//! nothing.
 //!
-//! The measure is intersection over union (IoU). A true mask is found when one of the frame's masks has an IoU of at least [`FOUND_IOU`] with
-//! it, the threshold of COCO's and KITTI-MOTS's first figures.
+//! The measure is intersection over union (IoU). A true mask is found when one of the frame's masks
+//! has an IoU of at least [`FOUND_IOU`] with it, the threshold of COCO's and KITTI-MOTS's first
+//! figures.
 
 mod files;
 mod moving;
@@ -62,12 +64,18 @@ impl Overlaps {
 
     /// Pixels of a mask found that lie in true masks for which `holds` is true.
     pub fn shared_px(&self, found: u16, holds: impl Fn(u16) -> bool) -> u64 {
-        self.both.iter().filter(|((label, truth), _)| *label == found && holds(*truth)).map(|(_, count)| count).sum()
+        self.both
+            .iter()
+            .filter(|((label, truth), _)| *label == found && holds(*truth))
+            .map(|(_, count)| count)
+            .sum()
     }
 
     /// IoU of a mask found with a true one.
     pub fn iou(&self, found: u16, truth: u16) -> f64 {
-        let of = |counts: &BTreeMap<u16, u64>, label: u16| counts.get(&label).copied().unwrap_or_default();
+        let of = |counts: &BTreeMap<u16, u64>, label: u16| {
+            counts.get(&label).copied().unwrap_or_default()
+        };
         let both = self.both.get(&(found, truth)).copied().unwrap_or_default();
         let either = of(&self.found, found) + of(&self.truth, truth) - both;
         if either == 0 { 0.0 } else { both as f64 / either as f64 }
@@ -75,18 +83,31 @@ impl Overlaps {
 
     /// The best mask for a true one: its label and their IoU.
     pub fn best_for_truth(&self, truth: u16) -> Option<(u16, f64)> {
-        best(self.both.keys().filter(|(_, label)| *label == truth).map(|&(found, _)| (found, self.iou(found, truth))))
+        best(
+            self.both
+                .keys()
+                .filter(|(_, label)| *label == truth)
+                .map(|&(found, _)| (found, self.iou(found, truth))),
+        )
     }
 
     /// The best true mask for one that was found.
     pub fn best_for_found(&self, found: u16) -> Option<(u16, f64)> {
-        best(self.both.keys().filter(|(label, _)| *label == found).map(|&(_, truth)| (truth, self.iou(found, truth))))
+        best(
+            self.both
+                .keys()
+                .filter(|(label, _)| *label == found)
+                .map(|&(_, truth)| (truth, self.iou(found, truth))),
+        )
     }
 }
 
 /// The largest; of equals the first.
 fn best(candidates: impl Iterator<Item = (u16, f64)>) -> Option<(u16, f64)> {
-    candidates.fold(None, |best, one| if best.is_none_or(|(_, most)| one.1 > most) { Some(one) } else { best })
+    candidates.fold(
+        None,
+        |best, one| if best.is_none_or(|(_, most)| one.1 > most) { Some(one) } else { best },
+    )
 }
 
 #[cfg(test)]
@@ -95,7 +116,8 @@ mod tests {
 
     #[test]
     fn overlaps_are_counted_and_the_best_pair_is_named() {
-        // Label 1 covers the true mask 7 by half and has as much beside it; label 2 shares a pixel with it.
+        // Label 1 covers the true mask 7 by half and has as much beside it; label 2 shares a pixel
+        // with it.
         let pairs = [(1, 7), (1, 7), (1, 0), (1, 0), (2, 7), (0, 7), (0, 0), (3, 9)];
         let overlaps = Overlaps::of(pairs.into_iter());
         assert_eq!(overlaps.found().collect::<Vec<_>>(), [(1, 4), (2, 1), (3, 1)]);
@@ -103,6 +125,9 @@ mod tests {
         assert_eq!(overlaps.best_for_truth(7), Some((1, 2.0 / 6.0)));
         assert_eq!(overlaps.best_for_found(2), Some((7, 0.25)));
         assert_eq!((overlaps.best_for_truth(8), overlaps.iou(3, 9)), (None, 1.0));
-        assert_eq!((overlaps.shared_px(1, |truth| truth == 7), overlaps.shared_px(1, |truth| truth == 9)), (2, 0));
+        assert_eq!(
+            (overlaps.shared_px(1, |truth| truth == 7), overlaps.shared_px(1, |truth| truth == 9)),
+            (2, 0)
+        );
     }
 }

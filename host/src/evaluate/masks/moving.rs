@@ -39,7 +39,8 @@ pub struct MovingFigures {
     /// Mean IoU of all that were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_iou: Option<f64>,
-    /// Masks of moving objects, found by motion, less than half of whose pixels show one; over all frames.
+    /// Masks of moving objects, found by motion, less than half of whose pixels show one; over all
+    /// frames.
     pub false_masks: u64,
 }
 
@@ -61,8 +62,9 @@ pub struct RangeFigures {
 }
 
 impl MovingErrors {
-    /// Takes in a frame: the objects, with the value of each in the exact masks, and the masks' overlaps with these. `large_enough` tells of
-    /// how many visible pixels on an object counts; `by_motion` which masks were found by motion.
+    /// Takes in a frame: the objects, with the value of each in the exact masks, and the masks'
+    /// overlaps with these. `large_enough` tells of how many visible pixels on an object counts;
+    /// `by_motion` which masks were found by motion.
     pub fn add(
         &mut self,
         overlaps: &Overlaps,
@@ -82,7 +84,11 @@ impl MovingErrors {
             self.in_sight.insert(object.id, age);
             let distance_m = (t_world_camera.inverse() * object.t_world_object).translation_m[2];
             let range = RANGES_M.iter().position(|end_m| distance_m < *end_m);
-            let Some(sums) = range.and_then(|range| self.ranges.get_mut(range)).filter(|_| age >= COUNTS_FROM) else { continue };
+            let Some(sums) =
+                range.and_then(|range| self.ranges.get_mut(range)).filter(|_| age >= COUNTS_FROM)
+            else {
+                continue;
+            };
             let iou = overlaps.best_for_truth(label).map_or(0.0, |(_, iou)| iou);
             sums.objects += 1;
             if iou >= FOUND_IOU {
@@ -90,8 +96,12 @@ impl MovingErrors {
                 sums.iou += iou;
             }
         }
-        let moves = |label: u16| objects.iter().any(|object| object.moving && u16::from(object.instance) == label);
-        let is_false = |&(found, pixels): &(u16, u64)| by_motion(found) && 2 * overlaps.shared_px(found, moves) < pixels;
+        let moves = |label: u16| {
+            objects.iter().any(|object| object.moving && u16::from(object.instance) == label)
+        };
+        let is_false = |&(found, pixels): &(u16, u64)| {
+            by_motion(found) && 2 * overlaps.shared_px(found, moves) < pixels
+        };
         self.false_masks += overlaps.found().filter(is_false).count() as u64;
     }
 
@@ -106,7 +116,10 @@ impl MovingErrors {
             recall: share(sums.found as f64, sums.objects),
             mean_iou: share(sums.iou, sums.found),
         };
-        let (iou, found) = self.ranges.iter().fold((0.0, 0), |(iou, found), sums| (iou + sums.iou, found + sums.found));
+        let (iou, found) = self
+            .ranges
+            .iter()
+            .fold((0.0, 0), |(iou, found), sums| (iou + sums.iou, found + sums.found));
         (self.frames > 0).then(|| MovingFigures {
             frames: self.frames,
             ranges: self.ranges.iter().zip(begins).zip(RANGES_M).map(range).collect(),
@@ -138,11 +151,19 @@ mod tests {
     #[test]
     fn moving_objects_count_from_their_fourth_frame_and_masks_of_nothing_are_false() {
         let objects = [object(1, true, 5.0), object(2, true, 25.0), object(3, false, 8.0)];
-        // Mask 10 is on the first, three of four pixels; mask 11 on the parked one; the second is not found.
-        let pairs = || [(10, 1), (10, 1), (10, 1), (0, 1), (0, 2), (11, 3), (11, 3), (11, 0)].into_iter();
+        // Mask 10 is on the first, three of four pixels; mask 11 on the parked one; the second is
+        // not found.
+        let pairs =
+            || [(10, 1), (10, 1), (10, 1), (0, 1), (0, 2), (11, 3), (11, 3), (11, 0)].into_iter();
         let mut errors = MovingErrors::default();
         for _ in 0..5 {
-            errors.add(&Overlaps::of(pairs()), &objects, &Transform::IDENTITY, |_| true, |label| label == 11);
+            errors.add(
+                &Overlaps::of(pairs()),
+                &objects,
+                &Transform::IDENTITY,
+                |_| true,
+                |label| label == 11,
+            );
         }
         let figures = errors.figures().unwrap();
         let [near, middle, far] = &figures.ranges[..] else { panic!("three ranges") };
@@ -151,7 +172,13 @@ mod tests {
         assert_eq!((far.objects, far.recall), (2, Some(0.0)));
         assert_eq!((figures.false_masks, figures.mean_iou), (5, Some(0.75)));
         // What was out of sight begins anew.
-        errors.add(&Overlaps::of(pairs()), &objects[1..], &Transform::IDENTITY, |_| true, |_| false);
+        errors.add(
+            &Overlaps::of(pairs()),
+            &objects[1..],
+            &Transform::IDENTITY,
+            |_| true,
+            |_| false,
+        );
         errors.add(&Overlaps::of(pairs()), &objects, &Transform::IDENTITY, |_| true, |_| false);
         assert_eq!(errors.figures().unwrap().ranges[0].objects, 2);
     }

@@ -1,11 +1,13 @@
-//! Association of tracks with true objects: HOTA at one threshold of the boxes' overlap (Luiten et al., *HOTA: A Higher Order Metric for Evaluating
-//! Multi-object Tracking*, IJCV 2021).
+//! Association of tracks with true objects: HOTA at one threshold of the boxes' overlap (Luiten et
+//! al., *HOTA: A Higher Order Metric for Evaluating Multi-object Tracking*, IJCV 2021).
 //!
-//! In each frame tracks and true objects are paired one to one, best overlap first, at least [`super::OVERLAP_MIN`]. `DetA = TP / (TP + FN + FP)`.
-//! A pair of a frame has the association `TPA / (TPA + FNA + FPA)`: the frames its track and its object share against all in which either was; `AssA` is the
-//! mean over all pairs, `HOTA = sqrt(DetA AssA)`. The original maximises the pairing over the whole sequence and averages over thresholds; here
-//! the threshold is one, and the boxes are those of masks. Objects too small for a detection do not count as missed, tracks in unlabelled
-//! regions do not count as false.
+//! In each frame tracks and true objects are paired one to one, best overlap first, at least
+//! [`super::OVERLAP_MIN`]. `DetA = TP / (TP + FN + FP)`. A pair of a frame has the association
+//! `TPA / (TPA + FNA + FPA)`: the frames its track and its object share against all in which either
+//! was; `AssA` is the mean over all pairs, `HOTA = sqrt(DetA AssA)`. The original maximises the
+//! pairing over the whole sequence and averages over thresholds; here the threshold is one, and the
+//! boxes are those of masks. Objects too small for a detection do not count as missed, tracks in
+//! unlabelled regions do not count as false.
 
 use dynvox_core::masks::PixelBox;
 use serde::{Deserialize, Serialize};
@@ -48,9 +50,17 @@ pub type LabelledBox = (u32, PixelBox, bool);
 
 impl Association {
     /// Takes in a frame: tracks by number and box, true objects, and unlabelled regions.
-    pub fn add(&mut self, tracks: &[(u32, PixelBox)], objects: &[LabelledBox], unknown: &[PixelBox]) {
-        let candidates = tracks.iter().flat_map(|(track, a)| objects.iter().map(move |(object, b, _)| (a.overlap(b), *track, *object)));
-        let mut candidates: Vec<(f32, u32, u32)> = candidates.filter(|pair| pair.0 >= super::OVERLAP_MIN).collect();
+    pub fn add(
+        &mut self,
+        tracks: &[(u32, PixelBox)],
+        objects: &[LabelledBox],
+        unknown: &[PixelBox],
+    ) {
+        let candidates = tracks.iter().flat_map(|(track, a)| {
+            objects.iter().map(move |(object, b, _)| (a.overlap(b), *track, *object))
+        });
+        let mut candidates: Vec<(f32, u32, u32)> =
+            candidates.filter(|pair| pair.0 >= super::OVERLAP_MIN).collect();
         // Best first; of equals the older ones.
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         let (mut paired_tracks, mut paired_objects) = (BTreeSet::new(), BTreeSet::new());
@@ -129,8 +139,13 @@ mod tests {
     #[test]
     fn misses_and_spurious_tracks_count_but_not_what_is_small_or_unknown() {
         let mut association = Association::default();
-        // Two tracks on one object: one of them is of nothing. A small object may be missed; a large one not.
-        association.add(&[(1, at(0)), (2, at(2))], &[(7, at(0), true), (8, at(50), false), (9, at(80), true)], &[]);
+        // Two tracks on one object: one of them is of nothing. A small object may be missed; a
+        // large one not.
+        association.add(
+            &[(1, at(0)), (2, at(2))],
+            &[(7, at(0), true), (8, at(50), false), (9, at(80), true)],
+            &[],
+        );
         association.add(&[(3, at(100))], &[], &[at(97)]);
         association.add(&[], &[], &[at(97)]);
         let figures = association.figures().unwrap();

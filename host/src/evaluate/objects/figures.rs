@@ -24,7 +24,8 @@ pub struct ObjectFigures {
     pub late_far: LateStates,
     /// Changes between static and dynamic of objects whose true state did not change.
     pub flips: u32,
-    /// Moving objects within [`NEAR_M`]: frames, median translation error (m) and rotation error (degrees).
+    /// Moving objects within [`NEAR_M`]: frames, median translation error (m) and rotation error
+    /// (degrees).
     pub moving_near: Medians,
     /// Moving objects from [`NEAR_M`] to [`FAR_M`].
     pub moving_far: Medians,
@@ -49,11 +50,16 @@ pub struct Medians {
 
 impl ObjectFigures {
     /// Sums up; `None` when nothing was compared.
-    pub(super) fn of(comparisons: &BTreeMap<u32, Vec<TrackComparison>>, association: Option<AssociationFigures>) -> Option<Self> {
-        let tracks: Vec<TrackErrors> = comparisons.values().map(|comparisons| TrackErrors::of(comparisons)).collect();
+    pub(super) fn of(
+        comparisons: &BTreeMap<u32, Vec<TrackComparison>>,
+        association: Option<AssociationFigures>,
+    ) -> Option<Self> {
+        let tracks: Vec<TrackErrors> =
+            comparisons.values().map(|comparisons| TrackErrors::of(comparisons)).collect();
         let medians = |moving: bool, from_m: f64, to_m: f64| {
             let all = comparisons.values().flatten();
-            let within = all.filter(|one| one.moving == moving && (from_m..to_m).contains(&one.distance_m));
+            let within =
+                all.filter(|one| one.moving == moving && (from_m..to_m).contains(&one.distance_m));
             let errors: Vec<[f64; 2]> = within.filter_map(|one| one.error).collect();
             let of = |at: usize| median(errors.iter().map(|error| error[at]));
             Medians { frames: errors.len(), t_m: of(0), r_deg: of(1) }
@@ -68,7 +74,11 @@ impl ObjectFigures {
             moving_near: medians(true, 0.0, NEAR_M),
             moving_far: medians(true, NEAR_M, FAR_M),
             standing_near: medians(false, 0.0, NEAR_M),
-            false_dynamic_frames: tracks.iter().map(|track| track.confusion[0][2]).max().unwrap_or_default(),
+            false_dynamic_frames: tracks
+                .iter()
+                .map(|track| track.confusion[0][2])
+                .max()
+                .unwrap_or_default(),
             confusion: [[0; 3]; 2],
         };
         for (sum, counts) in tracks.iter().flat_map(|track| track.confusion.iter().enumerate()) {

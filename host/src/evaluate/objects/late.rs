@@ -1,12 +1,13 @@
-//! Tracks whose motion state was not right in time, and how many of them only while the image showed little of the object.
+//! Tracks whose motion state was not right in time, and how many of them only while the image
+//! showed little of the object.
 
 use super::{TrackComparison, Visibility};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Tracks at some distance that were seen long enough for a right motion state, and those that did not have it. A track that comes nearer
-/// may count at both distances.
+/// Tracks at some distance that were seen long enough for a right motion state, and those that did
+/// not have it. A track that comes nearer may count at both distances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LateStates {
     /// Tracks with a frame in which the state should have been right.
@@ -21,17 +22,22 @@ pub struct LateStates {
 
 impl LateStates {
     /// Counts the tracks at those distances, m.
-    pub(super) fn of(comparisons: &BTreeMap<u32, Vec<TrackComparison>>, distances_m: Range<f64>) -> Self {
+    pub(super) fn of(
+        comparisons: &BTreeMap<u32, Vec<TrackComparison>>,
+        distances_m: Range<f64>,
+    ) -> Self {
         let mut sum = Self::default();
         for track in comparisons.values() {
-            let due = || track.iter().filter(|one| one.is_due() && distances_m.contains(&one.distance_m));
+            let due =
+                || track.iter().filter(|one| one.is_due() && distances_m.contains(&one.distance_m));
             let late = || due().filter(|one| one.is_late());
             sum.tracks += usize::from(due().next().is_some());
             if late().next().is_some() {
                 sum.late += 1;
                 let cut = late().all(|one| one.view == Visibility::Cut);
                 sum.late_cut += usize::from(cut);
-                sum.late_small += usize::from(!cut && late().all(|one| one.view != Visibility::Whole));
+                sum.late_small +=
+                    usize::from(!cut && late().all(|one| one.view != Visibility::Whole));
             }
         }
         sum

@@ -1,11 +1,13 @@
 //! Tracks against ground truth: motion states, motions, speeds, association.
 //!
-//! A track seen in a frame belongs to the true object whose box its own overlaps most, at least by [`OVERLAP_MIN`]. Its motion since the
-//! last frame is compared in the object's own frame, as DynoSAM's *motion error* (Morris, Wang, Kliniewski, Ila, *DynoSAM*, 2025; before it Zhang et al.,
-//! *VDO-SLAM*, 2020): `E = (true_before^-1 true_now)^-1 (true_before^-1 M true_before)`, with `M` the estimated motion over ground, carried into the
-//! truth's world by the camera's two poses, so that the camera's drift does not count. Both factors are motions of a rigid body: the difference
-//! of two positions in the camera, which the original took, ignores the effect of rotation. The error's translation is that of the middle of
-//! the object's foot.
+//! A track seen in a frame belongs to the true object whose box its own overlaps most, at least by
+//! [`OVERLAP_MIN`]. Its motion since the last frame is compared in the object's own frame, as
+//! DynoSAM's *motion error* (Morris, Wang, Kliniewski, Ila, *DynoSAM*, 2025; before it Zhang et
+//! al., *VDO-SLAM*, 2020): `E = (true_before^-1 true_now)^-1 (true_before^-1 M true_before)`, with
+//! `M` the estimated motion over ground, carried into the truth's world by the camera's two poses,
+//! so that the camera's drift does not count. Both factors are motions of a rigid body: the
+//! difference of two positions in the camera, which the original took, ignores the effect of
+//! rotation. The error's translation is that of the middle of the object's foot.
 
 pub mod association;
 mod figures;
@@ -61,7 +63,8 @@ impl Visibility {
 
     fn of(object: &PixelBox, size: (usize, usize)) -> Self {
         let (right, bottom) = (object.left + object.width, object.top + object.height);
-        if object.left <= 0 || object.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32 {
+        if object.left <= 0 || object.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32
+        {
             Self::Cut
         } else if object.width < SMALL_PX || object.height < SMALL_PX {
             Self::Small
@@ -88,7 +91,8 @@ pub struct TrackComparison {
     pub distance_m: f64,
     /// How much of the true object is in the image.
     pub view: Visibility,
-    /// Error of the motion, m and degrees; `None` where none was estimated or the object was not there before.
+    /// Error of the motion, m and degrees; `None` where none was estimated or the object was not
+    /// there before.
     pub error: Option<[f64; 2]>,
     /// True speed, m/s.
     pub true_speed_m_s: f64,
@@ -104,7 +108,8 @@ impl TrackComparison {
 
     /// Whether the state should be right by now and is not.
     fn is_late(&self) -> bool {
-        self.is_due() && self.state != if self.moving { MotionState::Dynamic } else { MotionState::Static }
+        self.is_due()
+            && self.state != if self.moving { MotionState::Dynamic } else { MotionState::Static }
     }
 }
 
@@ -122,8 +127,9 @@ pub struct ObjectErrors {
 }
 
 impl ObjectErrors {
-    /// Compares the tracks seen in a frame, whose images have `size`; call it for every frame. `large_enough` tells which boxes are large
-    /// enough for a detection: others do not count as missed.
+    /// Compares the tracks seen in a frame, whose images have `size`; call it for every frame.
+    /// `large_enough` tells which boxes are large enough for a detection: others do not count as
+    /// missed.
     pub fn add(
         &mut self,
         tracks: &[TrackReport],
@@ -132,8 +138,16 @@ impl ObjectErrors {
         size: (usize, usize),
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
-        let boxes: Vec<(u32, PixelBox)> = tracks.iter().filter(|track| track.detected).map(|track| (track.id, track.pixels)).collect();
-        let objects: Vec<_> = truth.objects.iter().map(|one| (one.id, one.pixels, large_enough(&one.pixels))).collect();
+        let boxes: Vec<(u32, PixelBox)> = tracks
+            .iter()
+            .filter(|track| track.detected)
+            .map(|track| (track.id, track.pixels))
+            .collect();
+        let objects: Vec<_> = truth
+            .objects
+            .iter()
+            .map(|one| (one.id, one.pixels, large_enough(&one.pixels)))
+            .collect();
         self.association.add(&boxes, &objects, &truth.unlabelled);
         let frame = self.frame;
         for object in &truth.objects {
@@ -158,14 +172,16 @@ impl ObjectErrors {
                 moving: object.moving,
                 state: track.state,
                 settled: frame - first.max(changed),
-                distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation_m[2],
+                distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation_m
+                    [2],
                 view: Visibility::of(&object.pixels, size),
                 error,
                 true_speed_m_s: object.speed_m_s,
                 speed_m_s: track.speed_m_s.map(|[speed, _]| f64::from(speed)),
             });
         }
-        self.before = truth.objects.iter().map(|object| (object.id, object.t_world_object)).collect();
+        self.before =
+            truth.objects.iter().map(|object| (object.id, object.t_world_object)).collect();
         self.frame += 1;
     }
 
@@ -176,8 +192,11 @@ impl ObjectErrors {
 
     /// Every comparison, by frame and then by track.
     pub fn comparisons(&self) -> Vec<(u32, TrackComparison)> {
-        let mut rows: Vec<(u32, TrackComparison)> =
-            self.tracks.iter().flat_map(|(&id, comparisons)| comparisons.iter().map(move |one| (id, *one))).collect();
+        let mut rows: Vec<(u32, TrackComparison)> = self
+            .tracks
+            .iter()
+            .flat_map(|(&id, comparisons)| comparisons.iter().map(move |one| (id, *one)))
+            .collect();
         rows.sort_by_key(|(id, one)| (one.at, *id));
         rows
     }
@@ -191,7 +210,11 @@ impl ObjectErrors {
 /// The true object that a box belongs to: the one it overlaps most, at least by [`OVERLAP_MIN`].
 pub fn true_object<'t>(pixels: &PixelBox, truth: &'t ObjectsTruth) -> Option<&'t TrueObject> {
     let overlap = |object: &&TrueObject| object.pixels.overlap(pixels);
-    truth.objects.iter().max_by(|a, b| overlap(a).total_cmp(&overlap(b))).filter(|object| overlap(object) >= OVERLAP_MIN)
+    truth
+        .objects
+        .iter()
+        .max_by(|a, b| overlap(a).total_cmp(&overlap(b)))
+        .filter(|object| overlap(object) >= OVERLAP_MIN)
 }
 
 /// Error of a motion over ground in the object's frame: translation in m, rotation in degrees.
@@ -204,6 +227,8 @@ fn motion_error(before: &Transform, now: &Transform, motion_world: &Transform) -
 
 /// Root mean square of finite values; `None` of none.
 fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.filter(|value| value.is_finite()).fold((0.0, 0u32), |(sum, count), value| (sum + value * value, count + 1));
+    let (sum, count) = values
+        .filter(|value| value.is_finite())
+        .fold((0.0, 0u32), |(sum, count), value| (sum + value * value, count + 1));
     (count > 0).then(|| (sum / f64::from(count)).sqrt())
 }

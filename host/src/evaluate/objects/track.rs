@@ -61,8 +61,11 @@ impl TrackErrors {
             *votes.entry(one.truth).or_default() += 1;
             late_frames += u32::from(one.is_late() && one.distance_m < FAR_M);
             if one.state != MotionState::Uncertain {
-                let same = |before: &&TrackComparison| before.truth == one.truth && before.moving == one.moving && one.is_due();
-                flips += u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
+                let same = |before: &&TrackComparison| {
+                    before.truth == one.truth && before.moving == one.moving && one.is_due()
+                };
+                flips +=
+                    u32::from(last.filter(same).is_some_and(|before| before.state != one.state));
                 last = Some(one);
             }
         }
@@ -79,8 +82,11 @@ impl TrackErrors {
             me_r_deg: median(errors(1)),
             me_t_rms_m: rms(errors(0)),
             me_r_rms_deg: rms(errors(1)),
-            true_speed_m_s: median(comparisons.iter().map(|one| one.true_speed_m_s)).unwrap_or_default(),
-            speed_error_m_s: median(dynamic.filter_map(|one| Some(one.speed_m_s? - one.true_speed_m_s))),
+            true_speed_m_s: median(comparisons.iter().map(|one| one.true_speed_m_s))
+                .unwrap_or_default(),
+            speed_error_m_s: median(
+                dynamic.filter_map(|one| Some(one.speed_m_s? - one.true_speed_m_s)),
+            ),
             nearest_m: comparisons.iter().map(|one| one.distance_m).fold(f64::MAX, f64::min),
             moving: comparisons.iter().map(|one| (one.at, one.moving)).collect(),
         }

@@ -58,7 +58,8 @@ pub struct SourceCounts {
     pub errors_alone: [u32; ACCEPTANCE_RULES.len()],
 }
 
-/// Counts of one region in one frame. `total = errors + missing + correct` for either source and every rule.
+/// Counts of one region in one frame. `total = errors + missing + correct` for either source and
+/// every rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Points.
@@ -88,7 +89,8 @@ impl Counts {
         }
     }
 
-    /// Share of the points both sources have that are right in source `source`, by rule `rule`; `None` where there is no point.
+    /// Share of the points both sources have that are right in source `source`, by rule `rule`;
+    /// `None` where there is no point.
     pub fn accuracy(&self, source: usize, rule: usize) -> Option<f64> {
         right(self.sources[source].errors[rule], self.total - self.missing)
     }

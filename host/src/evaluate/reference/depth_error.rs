@@ -17,8 +17,8 @@ pub struct DepthErrorFigures {
     pub median_error_m: f64,
     /// Median reference depth of the same points, m, to a centimetre.
     pub median_depth_m: f64,
-    /// Median distance of the reference points from the plane the map shows at their pixel, m, to half a millimetre: on a road seen from low above it is a
-    /// small part of the depth error.
+    /// Median distance of the reference points from the plane the map shows at their pixel, m, to
+    /// half a millimetre: on a road seen from low above it is a small part of the depth error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub median_surface_m: Option<f64>,
 }
@@ -34,7 +34,8 @@ pub struct DepthErrors {
 }
 
 impl DepthErrors {
-    /// Takes in a point that the map shows. `along_normal` is the length of a ray of depth 1 along the surface's normal, where there is a normal.
+    /// Takes in a point that the map shows. `along_normal` is the length of a ray of depth 1 along
+    /// the surface's normal, where there is a normal.
     pub fn add(&mut self, shown_m: f64, true_m: f64, along_normal: Option<f64>) {
         let error_m = (shown_m - true_m).abs();
         count(&mut self.errors, error_m / ERROR_BIN_M);
@@ -46,7 +47,8 @@ impl DepthErrors {
 
     /// The figures; `None` without a point.
     pub fn figures(&self) -> Option<DepthErrorFigures> {
-        let median = |counts: &[u64], bin_m: f64| Some(bin_m * (quantile_bin(counts, 0.5)? as f64 + 0.5));
+        let median =
+            |counts: &[u64], bin_m: f64| Some(bin_m * (quantile_bin(counts, 0.5)? as f64 + 0.5));
         Some(DepthErrorFigures {
             median_error_m: median(&self.errors, ERROR_BIN_M)?,
             median_depth_m: median(&self.depths, DEPTH_BIN_M)?,
@@ -74,7 +76,11 @@ mod tests {
             errors.add(shown_m, true_m, Some(-0.2));
         }
         let figures = errors.figures().unwrap();
-        assert!((figures.median_error_m - 0.1).abs() < 0.001 && (figures.median_depth_m - 10.0).abs() < 0.02, "{figures:?}");
+        assert!(
+            (figures.median_error_m - 0.1).abs() < 0.001
+                && (figures.median_depth_m - 10.0).abs() < 0.02,
+            "{figures:?}"
+        );
         assert!((figures.median_surface_m.unwrap() - 0.02).abs() < 0.001, "{figures:?}");
     }
 }

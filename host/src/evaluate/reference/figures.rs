@@ -60,7 +60,8 @@ pub struct ReferenceFigures {
     /// The static background.
     #[serde(rename = "static")]
     pub still: PairFigures,
-    /// Objects with a volume of their own; `None` when the map is evaluated later, for the places of objects in a past frame are not kept.
+    /// Objects with a volume of their own; `None` when the map is evaluated later, for the places
+    /// of objects in a past frame are not kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dynamic: Option<PairFigures>,
     /// Points on objects without a volume: not in the figures above.
@@ -76,8 +77,15 @@ pub struct ReferenceFigures {
 
 impl ReferenceFigures {
     /// Sums up; `None` without a frame.
-    pub fn of(source: &'static str, delay_frames: usize, frames: &[EvaluatedFrame], depth: Option<DepthErrorFigures>) -> Option<Self> {
-        let counted = |of: fn(&EvaluatedFrame) -> u32| frames.iter().map(|frame| u64::from(of(frame))).sum::<u64>();
+    pub fn of(
+        source: &'static str,
+        delay_frames: usize,
+        frames: &[EvaluatedFrame],
+        depth: Option<DepthErrorFigures>,
+    ) -> Option<Self> {
+        let counted = |of: fn(&EvaluatedFrame) -> u32| {
+            frames.iter().map(|frame| u64::from(of(frame))).sum::<u64>()
+        };
         (!frames.is_empty()).then(|| Self {
             source,
             rule: Rule::KITTI_NAME,
@@ -96,7 +104,9 @@ impl ReferenceFigures {
 fn pair(frames: &[EvaluatedFrame], region: Region) -> PairFigures {
     let counts: Vec<&Counts> = frames.iter().map(|frame| &frame.regions[region as usize]).collect();
     let source = |source: usize| {
-        let over = |of: &dyn Fn(&Counts) -> Option<f64>| mean(counts.iter().filter_map(|counts| of(counts)));
+        let over = |of: &dyn Fn(&Counts) -> Option<f64>| {
+            mean(counts.iter().filter_map(|counts| of(counts)))
+        };
         SourceFigures {
             accuracy: over(&|counts| counts.accuracy(source, 0)),
             completeness: over(&|counts| counts.completeness(source)),
@@ -104,7 +114,12 @@ fn pair(frames: &[EvaluatedFrame], region: Region) -> PairFigures {
             points: counts.iter().map(|counts| u64::from(counts.total)).sum(),
             accuracy_alone: over(&|counts| counts.accuracy_alone(source, 0)),
             accuracy_by_px: (1..ACCEPTANCE_RULES.len())
-                .filter_map(|rule| Some((ACCEPTANCE_RULES[rule].px, over(&|counts| counts.accuracy(source, rule))?)))
+                .filter_map(|rule| {
+                    Some((
+                        ACCEPTANCE_RULES[rule].px,
+                        over(&|counts| counts.accuracy(source, rule))?,
+                    ))
+                })
                 .collect(),
         }
     };

@@ -1,4 +1,5 @@
-//! What became of each point of the static map: so that the maps of several runs can be compared on the points all of them show.
+//! What became of each point of the static map: so that the maps of several runs can be compared on
+//! the points all of them show.
 
 use super::{PendingFrame, Region, Rule};
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,8 @@ impl PointOutcomes {
         let (mut shown, mut right) = (vec![0; words], vec![0; words]);
         for (at, (sample, &px)) in frame.samples.iter().zip(shown_px).enumerate() {
             let is_shown = sample.region == Region::Static && px > 0.0;
-            let is_right = is_shown && !Rule::KITTI.is_error(enlarged * px, enlarged * sample.point.disparity_px);
+            let is_right = is_shown
+                && !Rule::KITTI.is_error(enlarged * px, enlarged * sample.point.disparity_px);
             shown[at / WORD] |= u64::from(is_shown) << (at % WORD);
             right[at / WORD] |= u64::from(is_right) << (at % WORD);
         }
@@ -34,22 +36,35 @@ impl PointOutcomes {
     }
 }
 
-/// Accuracy of each run on the points that all runs show: means over the frames that all of them evaluated, at the same points. And how many points that are.
-/// `None` without runs or points.
+/// Accuracy of each run on the points that all runs show: means over the frames that all of them
+/// evaluated, at the same points. And how many points that are. `None` without runs or points.
 pub fn on_common_points(runs: &[&[PointOutcomes]]) -> Option<(Vec<f64>, u64)> {
     let (first, _) = runs.split_first()?;
     let (mut sums, mut frames, mut points) = (vec![0.0; runs.len()], 0u32, 0u64);
     for frame in *first {
-        let same = |run: &&[PointOutcomes]| run.iter().position(|other| (other.frame, other.points) == (frame.frame, frame.points));
-        let Some(of): Option<Vec<&PointOutcomes>> = runs.iter().map(|run| run.get(same(run)?)).collect() else { continue };
-        let words = of.iter().map(|one| one.shown.len().min(one.right.len())).min().unwrap_or_default();
-        let common: Vec<u64> = (0..words).map(|word| of.iter().fold(u64::MAX, |all, one| all & one.shown[word])).collect();
+        let same = |run: &&[PointOutcomes]| {
+            run.iter().position(|other| (other.frame, other.points) == (frame.frame, frame.points))
+        };
+        let Some(of): Option<Vec<&PointOutcomes>> =
+            runs.iter().map(|run| run.get(same(run)?)).collect()
+        else {
+            continue;
+        };
+        let words =
+            of.iter().map(|one| one.shown.len().min(one.right.len())).min().unwrap_or_default();
+        let common: Vec<u64> = (0..words)
+            .map(|word| of.iter().fold(u64::MAX, |all, one| all & one.shown[word]))
+            .collect();
         let all: u32 = common.iter().map(|word| word.count_ones()).sum();
         if all == 0 {
             continue;
         }
         for (sum, one) in sums.iter_mut().zip(&of) {
-            let right: u32 = common.iter().zip(&one.right).map(|(common, right)| (common & right).count_ones()).sum();
+            let right: u32 = common
+                .iter()
+                .zip(&one.right)
+                .map(|(common, right)| (common & right).count_ones())
+                .sum();
             *sum += f64::from(right) / f64::from(all);
         }
         frames += 1;
@@ -64,7 +79,9 @@ mod tests {
 
     #[test]
     fn only_points_that_all_show_count() {
-        let run = |shown: u64, right: u64| vec![PointOutcomes { frame: 3, points: 5, shown: vec![shown], right: vec![right] }];
+        let run = |shown: u64, right: u64| {
+            vec![PointOutcomes { frame: 3, points: 5, shown: vec![shown], right: vec![right] }]
+        };
         // The second run drops two points; one was wrong in the first.
         let (first, second) = (run(0b11111, 0b00111), run(0b01101, 0b01101));
         let (accuracy, points) = on_common_points(&[&first, &second]).unwrap();

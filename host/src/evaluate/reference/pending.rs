@@ -1,4 +1,5 @@
-//! Frames that wait for their evaluation. The regions of a frame's points and what the input measured are fixed while the frame is there.
+//! Frames that wait for their evaluation. The regions of a frame's points and what the input
+//! measured are fixed while the frame is there.
 
 use super::{Counts, EvaluatedFrame, ProjectedPoint, ProjectedScan, Region, ScanCount};
 use crate::formats::Image;
@@ -50,15 +51,29 @@ impl PendingFrame {
         Self { frame, t_world_camera, count: scan.count, samples, picture: None }
     }
 
-    /// Compares with a view of the map from the frame's pose; `focal_baseline_px_m` turns its depth into disparity. Also gives the map's
-    /// disparity of each sample, 0 where it shows nothing. `enlarged` px of the stored images are one px of those compared: errors are
-    /// counted at full size, at every scale.
-    pub fn compare(&self, map_depth_m: &View<'_, f32>, focal_baseline_px_m: f64, enlarged: f32) -> (EvaluatedFrame, Vec<f32>) {
+    /// Compares with a view of the map from the frame's pose; `focal_baseline_px_m` turns its depth
+    /// into disparity. Also gives the map's disparity of each sample, 0 where it shows nothing.
+    /// `enlarged` px of the stored images are one px of those compared: errors are counted at full
+    /// size, at every scale.
+    pub fn compare(
+        &self,
+        map_depth_m: &View<'_, f32>,
+        focal_baseline_px_m: f64,
+        enlarged: f32,
+    ) -> (EvaluatedFrame, Vec<f32>) {
         let mut regions = [Counts::default(); 3];
         let shown = |sample: &Sample| {
-            let depth_m = map_depth_m.get(sample.point.u.into(), sample.point.v.into()).unwrap_or_default();
-            let shown_px = if depth_m > 1e-5 { (focal_baseline_px_m / f64::from(depth_m)) as f32 } else { 0.0 };
-            regions[sample.region as usize].add(enlarged * sample.point.disparity_px, [enlarged * sample.input_px, enlarged * shown_px]);
+            let depth_m =
+                map_depth_m.get(sample.point.u.into(), sample.point.v.into()).unwrap_or_default();
+            let shown_px = if depth_m > 1e-5 {
+                (focal_baseline_px_m / f64::from(depth_m)) as f32
+            } else {
+                0.0
+            };
+            regions[sample.region as usize].add(
+                enlarged * sample.point.disparity_px,
+                [enlarged * sample.input_px, enlarged * shown_px],
+            );
             shown_px
         };
         let shown_px = self.samples.iter().map(shown).collect();
@@ -73,7 +88,8 @@ pub struct PendingFrames {
 }
 
 impl PendingFrames {
-    /// One step: a frame goes in, or none where there is no reference, and the one of `delay` steps ago comes out.
+    /// One step: a frame goes in, or none where there is no reference, and the one of `delay` steps
+    /// ago comes out.
     pub fn step(&mut self, delay: usize, frame: Option<PendingFrame>) -> Option<PendingFrame> {
         self.waiting.push_back(frame);
         if self.waiting.len() > delay { self.waiting.pop_front().flatten() } else { None }

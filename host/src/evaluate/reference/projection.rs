@@ -69,7 +69,8 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
         count: ScanCount { points: scan.points_m.len() as u32, ..ScanCount::default() },
     };
     for point in &scan.points_m {
-        let [[u, v, depth_m], [u_right, v_right, _]] = scan.cameras.map(|camera| seen(&camera, point));
+        let [[u, v, depth_m], [u_right, v_right, _]] =
+            scan.cameras.map(|camera| seen(&camera, point));
         let disparity_px = u - u_right;
         // False for NaN.
         let measures = field.contains(depth_m) && disparity_px > 0.0;
@@ -78,12 +79,18 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
             continue;
         }
         let (column, row) = (u.round(), v.round());
-        if !((0.0..field.width as f64).contains(&column) && (0.0..field.height as f64).contains(&row)) {
+        if !((0.0..field.width as f64).contains(&column)
+            && (0.0..field.height as f64).contains(&row))
+        {
             projected.count.outside += 1;
             continue;
         }
         projected.count.epipolar += u32::from((v - v_right).abs() > EPIPOLAR_PX);
-        projected.points.push(ProjectedPoint { u: column as u16, v: row as u16, disparity_px: disparity_px as f32 });
+        projected.points.push(ProjectedPoint {
+            u: column as u16,
+            v: row as u16,
+            disparity_px: disparity_px as f32,
+        });
     }
     projected
 }
@@ -98,7 +105,9 @@ fn seen(camera: &[f64; 12], [x, y, z]: &[f64; 3]) -> [f64; 3] {
 /// Takes a renderer's exact depth in place of a scan, thinned evenly to at most [`EXACT_POINTS`].
 pub fn sample_exact_depth(depth_m: &Image<f32>, rig: &StereoRig, field: &Field) -> ProjectedScan {
     let (width, height) = (depth_m.width(), depth_m.height());
-    let step = (1..).find(|step| width.div_ceil(*step) * height.div_ceil(*step) <= EXACT_POINTS).unwrap_or(1);
+    let step = (1..)
+        .find(|step| width.div_ceil(*step) * height.div_ceil(*step) <= EXACT_POINTS)
+        .unwrap_or(1);
     let mut projected = ProjectedScan::default();
     for v in (0..height).step_by(step) {
         for u in (0..width).step_by(step) {

@@ -7,7 +7,8 @@ use dynvox_core::tracking::{InstanceAt, MotionState, Treatment};
 pub enum Region {
     /// The static background: no mask, or one of a class that cannot move.
     Static = 0,
-    /// An object that is reconstructed in a volume of its own and whose motion is known, moving or parked.
+    /// An object that is reconstructed in a volume of its own and whose motion is known, moving or
+    /// parked.
     Dynamic = 1,
     /// An object without a volume: of a class that is only masked out, or of unknown motion.
     Ignored = 2,

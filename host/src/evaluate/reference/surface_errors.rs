@@ -1,4 +1,5 @@
-//! Where in the world the static map is off: distances of the reference's points from the surface, cell by cell.
+//! Where in the world the static map is off: distances of the reference's points from the surface,
+//! cell by cell.
 //!
 //! Memory: 28 bytes or so for each cell of the surface that was compared.
 
@@ -27,9 +28,13 @@ pub struct SurfaceErrors {
 }
 
 impl SurfaceErrors {
-    /// Takes in a point of the map's surface, and the distance from it to what the reference has at the same pixel.
+    /// Takes in a point of the map's surface, and the distance from it to what the reference has at
+    /// the same pixel.
     pub fn add(&mut self, position_m: [f64; 3], distance_m: f64) {
-        let (sum, count) = self.cells.entry(position_m.map(|metres| (metres / CELL_M).floor() as i32)).or_default();
+        let (sum, count) = self
+            .cells
+            .entry(position_m.map(|metres| (metres / CELL_M).floor() as i32))
+            .or_default();
         *sum += distance_m;
         *count += 1;
     }
@@ -51,12 +56,18 @@ mod tests {
     #[test]
     fn points_of_one_cell_are_averaged() {
         let mut errors = SurfaceErrors::default();
-        for (at, distance_m) in [([0.05, 0.0, 0.1], 0.1), ([-0.05, 0.0, 0.1], 0.5), ([0.15, 0.19, 0.0], 0.3)] {
+        for (at, distance_m) in
+            [([0.05, 0.0, 0.1], 0.1), ([-0.05, 0.0, 0.1], 0.5), ([0.15, 0.19, 0.0], 0.3)]
+        {
             errors.add(at, distance_m);
         }
         let cells: Vec<SurfaceError> = errors.cells().collect();
         assert_eq!(cells.len(), 2);
         assert_eq!((cells[0].points, cells[0].mean_m), (1, 0.5));
-        assert!(cells[1].points == 2 && (cells[1].mean_m - 0.2).abs() < 1e-12 && (cells[1].center_m[0] - 0.1).abs() < 1e-12);
+        assert!(
+            cells[1].points == 2
+                && (cells[1].mean_m - 0.2).abs() < 1e-12
+                && (cells[1].center_m[0] - 0.1).abs() < 1e-12
+        );
     }
 }

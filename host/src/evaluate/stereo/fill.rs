@@ -1,9 +1,11 @@
-//! Filling holes as the benchmarks do before they rank: along each row by the farther of the two neighbours.
+//! Filling holes as the benchmarks do before they rank: along each row by the farther of the two
+//! neighbours.
 
 use crate::formats::Image;
 
-/// Fills every hole of a disparity image (0 is none): each run of holes in a row by the smaller of the disparities at its ends, at the image's sides by
-/// the one there is; rows without any by the nearest row above that has some, else below. An image without disparity stays empty.
+/// Fills every hole of a disparity image (0 is none): each run of holes in a row by the smaller of
+/// the disparities at its ends, at the image's sides by the one there is; rows without any by the
+/// nearest row above that has some, else below. An image without disparity stays empty.
 pub fn filled(disparity: &Image<u16>) -> Image<u16> {
     let (width, height) = (disparity.width(), disparity.height());
     let mut pixels = disparity.pixels().to_vec();
@@ -22,10 +24,15 @@ pub fn filled(disparity: &Image<u16>) -> Image<u16> {
             at += run + 1;
         }
     }
-    let empty = |pixels: &[u16], v: usize| pixels[v * width..(v + 1) * width].iter().all(|&pixel| pixel == 0);
+    let empty = |pixels: &[u16], v: usize| {
+        pixels[v * width..(v + 1) * width].iter().all(|&pixel| pixel == 0)
+    };
     let rows: Vec<bool> = (0..height).map(|v| empty(&pixels, v)).collect();
     for v in (0..height).filter(|&v| rows[v]) {
-        let from = (0..v).rev().find(|&other| !rows[other]).or_else(|| (v..height).find(|&other| !rows[other]));
+        let from = (0..v)
+            .rev()
+            .find(|&other| !rows[other])
+            .or_else(|| (v..height).find(|&other| !rows[other]));
         if let Some(from) = from {
             pixels.copy_within(from * width..(from + 1) * width, v * width);
         }

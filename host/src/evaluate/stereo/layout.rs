@@ -66,7 +66,9 @@ pub enum StereoSetError {
         path: PathBuf,
     },
     /// No truth for any image.
-    #[error("{path} has images, but no ground truth: it should be in {truth}. The benchmarks' test halves have none")]
+    #[error(
+        "{path} has images, but no ground truth: it should be in {truth}. The benchmarks' test halves have none"
+    )]
     NoTruth {
         /// The folder.
         path: PathBuf,
@@ -86,8 +88,13 @@ pub fn find_stereo_set(path: &Path) -> Result<StereoSet, StereoSetError> {
     let mut without_truth = None;
     for root in [path.to_path_buf(), path.join("training")] {
         for Layout { name, cameras, truth } in LAYOUTS {
-            let found = |names: &[&str]| names.iter().map(|name| root.join(name)).find(|folder| folder.is_dir());
-            let ([Some(left), Some(right)], objects) = (cameras.map(found), root.join(OBJECTS)) else { continue };
+            let found = |names: &[&str]| {
+                names.iter().map(|name| root.join(name)).find(|folder| folder.is_dir())
+            };
+            let ([Some(left), Some(right)], objects) = (cameras.map(found), root.join(OBJECTS))
+            else {
+                continue;
+            };
             let there = |file: PathBuf| Some(file).filter(|file| file.is_file());
             let mut pairs: Vec<StereoPair> = left
                 .read_dir()

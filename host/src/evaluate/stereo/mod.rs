@@ -1,9 +1,13 @@
-//! Disparity against KITTI's stereo benchmarks of 2012 (Geiger, Lenz, Urtasun, CVPR 2012) and 2015 (Menze, Geiger, CVPR 2015).
+//! Disparity against KITTI's stereo benchmarks of 2012 (Geiger, Lenz, Urtasun, CVPR 2012) and 2015
+//! (Menze, Geiger, CVPR 2015).
 //!
-//! A pixel with truth is *bad by n* when it is off by more than n px, and wrong by *D1* when it is off by more than 3 px and by more than 5 % of the truth.
-//! Shares are given of the pixels that have an estimate, and, as the benchmarks rank, of all pixels with truth after the estimate's holes are
-//! filled ([`filled`]). What the matcher itself filled in (the core marks it: [`DISPARITY_FILLED`]) is counted apart from what it measured. Pixels are counted over all pairs together. Regions: what is seen in both images (`noc`), all (`occ`), each once
-//! more for foreground and background where the benchmark has an `obj_map`.
+//! A pixel with truth is *bad by n* when it is off by more than n px, and wrong by *D1* when it is
+//! off by more than 3 px and by more than 5 % of the truth. Shares are given of the pixels that
+//! have an estimate, and, as the benchmarks rank, of all pixels with truth after the estimate's
+//! holes are filled ([`filled`]). What the matcher itself filled in (the core marks it:
+//! [`DISPARITY_FILLED`]) is counted apart from what it measured. Pixels are counted over all pairs
+//! together. Regions: what is seen in both images (`noc`), all (`occ`), each once more for
+//! foreground and background where the benchmark has an `obj_map`.
 
 mod fill;
 mod layout;
@@ -60,17 +64,37 @@ pub struct Estimate<'a> {
 }
 
 impl StereoCounts {
-    /// Takes in an image: truth in 1/256 px, 0 none; `counts` tells which pixels belong to the region.
-    pub fn add(&mut self, truth: &Image<u16>, estimate: &Estimate<'_>, counts: impl Fn(usize) -> bool) {
+    /// Takes in an image: truth in 1/256 px, 0 none; `counts` tells which pixels belong to the
+    /// region.
+    pub fn add(
+        &mut self,
+        truth: &Image<u16>,
+        estimate: &Estimate<'_>,
+        counts: impl Fn(usize) -> bool,
+    ) {
         let px = |q8: u16| f32::from(q8) / ONE_PX;
-        let pixels = truth.pixels().iter().zip(estimate.given.pixels()).zip(estimate.filled.pixels()).enumerate();
-        for (_, ((&truth, &given), &filled)) in pixels.filter(|(at, ((truth, _), _))| **truth > 0 && counts(*at)) {
+        let pixels = truth
+            .pixels()
+            .iter()
+            .zip(estimate.given.pixels())
+            .zip(estimate.filled.pixels())
+            .enumerate();
+        for (_, ((&truth, &given), &filled)) in
+            pixels.filter(|(at, ((truth, _), _))| **truth > 0 && counts(*at))
+        {
             self.pixels += 1;
             self.given += u64::from(given > 0);
-            for (way, estimate) in [given, filled].into_iter().enumerate().filter(|(way, estimate)| *way == 1 || *estimate > 0) {
+            for (way, estimate) in [given, filled]
+                .into_iter()
+                .enumerate()
+                .filter(|(way, estimate)| *way == 1 || *estimate > 0)
+            {
                 self.d1[way] += u64::from(Rule::KITTI.is_error(px(estimate), px(truth)));
                 let off_px = (px(estimate) - px(truth)).abs();
-                self.bad[way].iter_mut().zip(BAD_PX).for_each(|(bad, limit)| *bad += u64::from(off_px > limit));
+                self.bad[way]
+                    .iter_mut()
+                    .zip(BAD_PX)
+                    .for_each(|(bad, limit)| *bad += u64::from(off_px > limit));
             }
             if given > 0 {
                 let error = f64::from(px(given) - px(truth));

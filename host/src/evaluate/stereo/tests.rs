@@ -26,10 +26,16 @@ fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone(
     counts.add(&truth, &estimate, |_| true);
     let found = counts.figures().unwrap();
     assert_eq!((found.pixels, found.coverage), (4, 0.75));
-    // The hole takes the disparity of the pixel beside it without truth, the smaller one: off by 13 px.
+    // The hole takes the disparity of the pixel beside it without truth, the smaller one: off by 13
+    // px.
     assert_eq!((found.d1, found.d1_filled), (1.0 / 3.0, 2.0 / 4.0));
-    assert_eq!((found.bad, found.bad_filled), ([2.0 / 3.0, 2.0 / 3.0, 0.0, 0.0], [0.75, 0.75, 0.25, 0.25]));
-    assert!((found.mean_error_px - 7.0 / 3.0).abs() < 1e-9 && found.mean_signed_error_px.abs() < 1e-9);
+    assert_eq!(
+        (found.bad, found.bad_filled),
+        ([2.0 / 3.0, 2.0 / 3.0, 0.0, 0.0], [0.75, 0.75, 0.25, 0.25])
+    );
+    assert!(
+        (found.mean_error_px - 7.0 / 3.0).abs() < 1e-9 && found.mean_signed_error_px.abs() < 1e-9
+    );
     let mut foreground = StereoCounts::default();
     foreground.add(&truth, &estimate, |at| at == 2);
     assert_eq!(foreground.figures().unwrap().d1, 1.0);
@@ -39,7 +45,10 @@ fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone(
     marked.add(&truth, &Estimate { given: &given, filled: &whole, marked: true }, |_| true);
     let found = marked.figures().unwrap();
     let parts = [found.measured.unwrap(), found.filled_in.unwrap()];
-    assert_eq!(parts.map(|part| (part.coverage, part.d1, part.bad[1])), [(0.5, 0.0, 0.5), (0.25, 1.0, 1.0)]);
+    assert_eq!(
+        parts.map(|part| (part.coverage, part.d1, part.bad[1])),
+        [(0.5, 0.0, 0.5), (0.25, 1.0, 1.0)]
+    );
     assert!(StereoCounts::default().figures().is_none());
 }
 
@@ -51,7 +60,9 @@ fn both_layouts_are_found_and_a_folder_without_truth_is_told() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, "").unwrap();
     };
-    assert!(find_stereo_set(root.path()).unwrap_err().to_string().contains("is not a stereo benchmark"));
+    assert!(
+        find_stereo_set(root.path()).unwrap_err().to_string().contains("is not a stereo benchmark")
+    );
     touch("training/image_2/000000_10.png");
     touch("training/image_2/000000_11.png");
     touch("training/image_3/000000_10.png");
@@ -60,7 +71,11 @@ fn both_layouts_are_found_and_a_folder_without_truth_is_told() {
     touch("training/obj_map/000000_10.png");
     let set = find_stereo_set(&root.path().join("training")).unwrap();
     assert_eq!((set.name, set.pairs.len()), ("kitti-2015", 1));
-    assert!(set.pairs[0].truth[0].is_none() && set.pairs[0].truth[1].is_some() && set.pairs[0].objects.is_some());
+    assert!(
+        set.pairs[0].truth[0].is_none()
+            && set.pairs[0].truth[1].is_some()
+            && set.pairs[0].objects.is_some()
+    );
     assert_eq!(find_stereo_set(root.path()).unwrap(), set);
     assert!(find_stereo_set(Path::new("/nowhere")).unwrap_err().to_string().contains("no folder"));
 }

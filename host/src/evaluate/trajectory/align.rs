@@ -4,16 +4,24 @@ use super::rms;
 use dynvox_core::geometry::Transform;
 use nalgebra::{Matrix3, Matrix4, Point3, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 
-/// Root mean square distance after the rigid motion that minimises it (Horn, *Closed-form solution of absolute orientation using unit
-/// quaternions*, JOSA A 1987): the rotation is the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix.
+/// Root mean square distance after the rigid motion that minimises it (Horn, *Closed-form solution
+/// of absolute orientation using unit quaternions*, JOSA A 1987): the rotation is the eigenvector
+/// of the largest eigenvalue of a symmetric 4 x 4 matrix.
 pub(super) fn aligned_error_m(truth: &[Transform], estimate: &[Transform]) -> f64 {
-    let positions = |poses: &[Transform]| poses.iter().map(|pose| Vector3::from(pose.translation_m)).collect::<Vec<_>>();
+    let positions = |poses: &[Transform]| {
+        poses.iter().map(|pose| Vector3::from(pose.translation_m)).collect::<Vec<_>>()
+    };
     let (truth, estimate) = (positions(truth), positions(estimate));
-    let centre = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let centre =
+        |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let (to, from) = (centre(&truth), centre(&estimate));
-    let spread: Matrix3<f64> = estimate.iter().zip(&truth).map(|(a, b)| (a - from) * (b - to).transpose()).sum();
+    let spread: Matrix3<f64> =
+        estimate.iter().zip(&truth).map(|(a, b)| (a - from) * (b - to).transpose()).sum();
     let rotation = horn_rotation(&spread);
-    rms(estimate.iter().zip(&truth).map(|(a, b)| (rotation.transform_point(&Point3::from(a - from)).coords - (b - to)).norm()))
+    rms(estimate
+        .iter()
+        .zip(&truth)
+        .map(|(a, b)| (rotation.transform_point(&Point3::from(a - from)).coords - (b - to)).norm()))
 }
 
 fn horn_rotation(s: &Matrix3<f64>) -> UnitQuaternion<f64> {

@@ -65,14 +65,18 @@ pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError>
     if !table.is_file() {
         return Ok(None);
     }
-    let unreadable = |error: csv::Error| TrajectoryError::Frames { path: table.clone(), reason: error.to_string() };
+    let unreadable = |error: csv::Error| TrajectoryError::Frames {
+        path: table.clone(),
+        reason: error.to_string(),
+    };
     let mut rows = csv::Reader::from_path(&table).map_err(unreadable)?;
-    let frames: Result<Vec<usize>, _> = rows.deserialize().map(|row| row.map(|FrameNumber { frame }| frame)).collect();
+    let frames: Result<Vec<usize>, _> =
+        rows.deserialize().map(|row| row.map(|FrameNumber { frame }| frame)).collect();
     frames.map(Some).map_err(unreadable)
 }
 
-/// The rows of `truth` that belong to these frames: KITTI's rows are numbered as a data set's frames. All of them where they have times, or are as
-/// many as the frames.
+/// The rows of `truth` that belong to these frames: KITTI's rows are numbered as a data set's
+/// frames. All of them where they have times, or are as many as the frames.
 ///
 /// # Errors
 /// There is no row for a frame.
@@ -80,7 +84,13 @@ pub fn truth_of_frames(truth: Trajectory, frames: &[usize]) -> Result<Trajectory
     if truth.times_s.is_some() || truth.poses.len() == frames.len() {
         return Ok(truth);
     }
-    let row = |&frame: &usize| truth.poses.get(frame).copied().ok_or(TrajectoryError::NoRow { frame, rows: truth.poses.len() });
+    let row = |&frame: &usize| {
+        truth
+            .poses
+            .get(frame)
+            .copied()
+            .ok_or(TrajectoryError::NoRow { frame, rows: truth.poses.len() })
+    };
     Ok(Trajectory { times_s: None, poses: frames.iter().map(row).collect::<Result<_, _>>()? })
 }
 
@@ -93,21 +103,41 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     Ok(read_poses(&path)?)
 }
 
-/// The poses of both that are of the same frame: by time where both have times, otherwise row by row.
+/// The poses of both that are of the same frame: by time where both have times, otherwise row by
+/// row.
 ///
 /// # Errors
 /// They cannot be matched, or fewer than two can.
-pub fn matched(first: &Trajectory, second: &Trajectory) -> Result<(Vec<Transform>, Vec<Transform>), TrajectoryError> {
+pub fn matched(
+    first: &Trajectory,
+    second: &Trajectory,
+) -> Result<(Vec<Transform>, Vec<Transform>), TrajectoryError> {
     let pairs: Vec<(Transform, Transform)> = match (&first.times_s, &second.times_s) {
         (Some(times), Some(others)) => {
             let nearest = |time: &f64| {
-                let at = others.iter().enumerate().min_by(|a, b| (a.1 - time).abs().total_cmp(&(b.1 - time).abs()))?;
-                ((at.1 - time).abs() <= SAME_TIME_S).then(|| second.poses.get(at.0).copied()).flatten()
+                let at = others
+                    .iter()
+                    .enumerate()
+                    .min_by(|a, b| (a.1 - time).abs().total_cmp(&(b.1 - time).abs()))?;
+                ((at.1 - time).abs() <= SAME_TIME_S)
+                    .then(|| second.poses.get(at.0).copied())
+                    .flatten()
             };
-            times.iter().zip(&first.poses).filter_map(|(time, pose)| Some((*pose, nearest(time)?))).collect()
+            times
+                .iter()
+                .zip(&first.poses)
+                .filter_map(|(time, pose)| Some((*pose, nearest(time)?)))
+                .collect()
         }
-        _ if first.poses.len() == second.poses.len() => first.poses.iter().copied().zip(second.poses.iter().copied()).collect(),
-        _ => return Err(TrajectoryError::Lengths { first: first.poses.len(), second: second.poses.len() }),
+        _ if first.poses.len() == second.poses.len() => {
+            first.poses.iter().copied().zip(second.poses.iter().copied()).collect()
+        }
+        _ => {
+            return Err(TrajectoryError::Lengths {
+                first: first.poses.len(),
+                second: second.poses.len(),
+            });
+        }
     };
     if pairs.len() < 2 {
         return Err(TrajectoryError::Few { pairs: pairs.len() });

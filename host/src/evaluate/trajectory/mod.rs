@@ -1,9 +1,12 @@
-//! Trajectory errors: KITTI's relative errors over sub-lengths, relative error per frame, absolute error after alignment.
+//! Trajectory errors: KITTI's relative errors over sub-lengths, relative error per frame, absolute
+//! error after alignment.
 //!
-//! `E = (est_i^-1 est_j)^-1 (true_i^-1 true_j)` is the error of a segment from frame i to frame j. A segment of length L ends at the first
-//! frame whose distance travelled along the truth is at least L beyond frame i's; the errors of all segments of all lengths are averaged
-//! (Geiger, Lenz, Urtasun, *Are we ready for autonomous driving?*, CVPR 2012: 100 to 800 m, from every tenth frame on). A path shorter than
-//! 200 m would have few segments of few lengths: it is measured over 5 to 50 m from every frame on, and the result lists its lengths.
+//! `E = (est_i^-1 est_j)^-1 (true_i^-1 true_j)` is the error of a segment from frame i to frame j.
+//! A segment of length L ends at the first frame whose distance travelled along the truth is at
+//! least L beyond frame i's; the errors of all segments of all lengths are averaged (Geiger, Lenz,
+//! Urtasun, *Are we ready for autonomous driving?*, CVPR 2012: 100 to 800 m, from every tenth frame
+//! on). A path shorter than 200 m would have few segments of few lengths: it is measured over 5 to
+//! 50 m from every frame on, and the result lists its lengths.
 
 mod align;
 mod boresight;
@@ -29,14 +32,16 @@ const LONG_STEP: usize = 10;
 /// Errors of a trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrajectoryErrors {
-    /// Mean translation error of the segments, percent of their length; `None` where the path is shorter than every length.
+    /// Mean translation error of the segments, percent of their length; `None` where the path is
+    /// shorter than every length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_err_percent: Option<f64>,
     /// Mean rotation error of the segments, degrees per metre.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub r_err_deg_per_m: Option<f64>,
-    /// Mean of the segments' translation errors as vectors, percent of their length, along the camera's axes at their start: right, down,
-    /// forward. Noise averages out here. What does not is a camera turned against that of the truth (right, down) or a wrong scale (forward).
+    /// Mean of the segments' translation errors as vectors, percent of their length, along the
+    /// camera's axes at their start: right, down, forward. Noise averages out here. What does not
+    /// is a camera turned against that of the truth (right, down) or a wrong scale (forward).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_error_percent: Option<[f64; 3]>,
     /// What is left of the errors where the camera's axes are turned to those of the truth.
@@ -48,11 +53,13 @@ pub struct TrajectoryErrors {
     pub rpe_r_deg: f64,
     /// Root mean square distance of the positions after the best rigid alignment, m.
     pub ate_m: f64,
-    /// Each sub-length that fits at least once: length in m, translation in percent, rotation in deg/m, segments.
+    /// Each sub-length that fits at least once: length in m, translation in percent, rotation in
+    /// deg/m, segments.
     pub per_length: Vec<(f64, f64, f64, usize)>,
 }
 
-/// Compares an estimated with a true `t_world_camera` per frame. `None` with fewer than two frames or unequal lists.
+/// Compares an estimated with a true `t_world_camera` per frame. `None` with fewer than two frames
+/// or unequal lists.
 pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryErrors> {
     if truth.len() < 2 || truth.len() != estimate.len() {
         return None;
@@ -90,20 +97,27 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     })
 }
 
-/// Errors of the segments, and of the steps from frame to frame, where the camera's axes are turned to those of the truth.
+/// Errors of the segments, and of the steps from frame to frame, where the camera's axes are turned
+/// to those of the truth.
 fn without_boresight(segments: &[Segment], steps: &[Segment]) -> Option<WithoutBoresight> {
     let turn = boresight(segments)?;
-    let turned = |segment: &Segment| Segment { estimated: turn * segment.estimated * turn.inverse(), ..*segment };
+    let turned = |segment: &Segment| Segment {
+        estimated: turn * segment.estimated * turn.inverse(),
+        ..*segment
+    };
     Some(WithoutBoresight {
         angle_deg: turn.angle_rad().to_degrees(),
-        t_err_percent: SegmentError::mean(&segments.iter().map(turned).collect::<Vec<_>>())?.percent,
+        t_err_percent: SegmentError::mean(&segments.iter().map(turned).collect::<Vec<_>>())?
+            .percent,
         rpe_t_m: rms(steps.iter().map(|step| turned(step).error().distance_m())),
     })
 }
 
 /// Distance travelled up to each frame, m.
 pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
-    let steps = poses.windows(2).map(|pair| (Vector3::from(pair[1].translation_m) - Vector3::from(pair[0].translation_m)).norm());
+    let steps = poses.windows(2).map(|pair| {
+        (Vector3::from(pair[1].translation_m) - Vector3::from(pair[0].translation_m)).norm()
+    });
     std::iter::once(0.0)
         .chain(steps.scan(0.0, |sum, step| {
             *sum += step;
@@ -139,7 +153,8 @@ struct SegmentError {
 impl SegmentError {
     fn of(segment: &Segment) -> Self {
         let (error, Segment { length_m, estimated, actual }) = (segment.error(), segment);
-        let [estimated_m, actual_m] = [estimated, actual].map(|moved| Vector3::from(moved.translation_m));
+        let [estimated_m, actual_m] =
+            [estimated, actual].map(|moved| Vector3::from(moved.translation_m));
         Self {
             percent: error.distance_m() / length_m * 100.0,
             deg_per_m: error.angle_rad().to_degrees() / length_m,

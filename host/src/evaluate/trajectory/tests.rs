@@ -21,23 +21,33 @@ fn a_trajectory_one_percent_too_long_has_one_percent_error() {
         [(5, 75), (10, 70), (20, 60), (30, 50), (40, 40), (50, 30)]
     );
     let long = errors(&arc(260, step(1.0)), &arc(260, step(1.01))).unwrap();
-    let rows: Vec<(usize, usize)> = long.per_length.iter().map(|row| (row.0 as usize, row.3)).collect();
-    assert_eq!(rows, [(100, 16), (200, 6)], "a path over 200 m is measured as the benchmark does, from every tenth frame on");
+    let rows: Vec<(usize, usize)> =
+        long.per_length.iter().map(|row| (row.0 as usize, row.3)).collect();
+    assert_eq!(
+        rows,
+        [(100, 16), (200, 6)],
+        "a path over 200 m is measured as the benchmark does, from every tenth frame on"
+    );
 }
 
 #[test]
 fn a_trajectory_turned_and_moved_as_a_whole_has_no_error() {
-    let truth = arc(60, Transform::new(Vector3::new(0.0, 0.02, 0.001), Vector3::new(0.0, 0.0, 0.8)));
+    let truth =
+        arc(60, Transform::new(Vector3::new(0.0, 0.02, 0.001), Vector3::new(0.0, 0.0, 0.8)));
     let away = Transform::new(Vector3::new(0.3, -2.0, 0.1), Vector3::new(5.0, -3.0, 9.0));
     let moved: Vec<Transform> = truth.iter().map(|pose| away * pose).collect();
     let found = errors(&truth, &moved).unwrap();
-    assert!(found.ate_m < 1e-9 && found.rpe_t_m < 1e-9 && found.t_err_percent.unwrap() < 1e-9, "{found:?}");
+    assert!(
+        found.ate_m < 1e-9 && found.rpe_t_m < 1e-9 && found.t_err_percent.unwrap() < 1e-9,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noise() {
     let truth = swerving(120, 0.0);
-    // A camera that looks .5 degrees to the right of the truth's, and 1 % too long: what lies ahead appears at its left.
+    // A camera that looks .5 degrees to the right of the truth's, and 1 % too long: what lies ahead
+    // appears at its left.
     let turned = Transform::new(Vector3::new(0.0, 0.5_f64.to_radians(), 0.0), Vector3::zeros());
     let estimate = truth.iter().map(|pose| {
         let pose = turned.inverse() * *pose * turned;
@@ -45,9 +55,17 @@ fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noi
     });
     let found = errors(&truth, &estimate.collect::<Vec<_>>()).unwrap();
     let [right, down, forward] = found.mean_error_percent.unwrap();
-    assert!((right + 100.0 * 0.5_f64.to_radians()).abs() < 0.05 && down.abs() < 0.01 && (forward - 1.0).abs() < 0.05, "{found:?}");
+    assert!(
+        (right + 100.0 * 0.5_f64.to_radians()).abs() < 0.05
+            && down.abs() < 0.01
+            && (forward - 1.0).abs() < 0.05,
+        "{found:?}"
+    );
     let left = found.without_boresight.unwrap();
-    assert!((left.angle_deg - 0.5).abs() < 0.01 && (left.t_err_percent - 1.0).abs() < 0.05, "the scale is left: {left:?}");
+    assert!(
+        (left.angle_deg - 0.5).abs() < 0.01 && (left.t_err_percent - 1.0).abs() < 0.05,
+        "the scale is left: {left:?}"
+    );
     assert!(left.rpe_t_m < 0.9 * found.rpe_t_m, "{found:?}");
     let beside = |(at, pose): (usize, &Transform)| {
         let [x, y, z] = pose.translation_m;
@@ -56,16 +74,27 @@ fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noi
     let noisy = errors(&truth, &truth.iter().enumerate().map(beside).collect::<Vec<_>>()).unwrap();
     let mean = Vector3::from(noisy.mean_error_percent.unwrap()).norm();
     assert!(mean < 0.1 * noisy.t_err_percent.unwrap(), "{noisy:?}");
-    assert!(noisy.without_boresight.unwrap().t_err_percent > 0.95 * noisy.t_err_percent.unwrap(), "noise is no rotation: {noisy:?}");
+    assert!(
+        noisy.without_boresight.unwrap().t_err_percent > 0.95 * noisy.t_err_percent.unwrap(),
+        "noise is no rotation: {noisy:?}"
+    );
 }
 
-/// The same drive in Python gave the figures of the test below: numpy with a singular value decomposition for the alignment.
+/// The same drive in Python gave the figures of the test below: numpy with a singular value
+/// decomposition for the alignment.
 fn swerving(count: usize, noise: f64) -> Vec<Transform> {
     let step = |i: f64| {
-        let turn = [1e-3 * (0.3 * i).sin() + noise * 2e-4 * (1.7 * i).cos(), 0.015 * (0.11 * i).sin() + noise * 3e-4 * (2.3 * i).sin()];
+        let turn = [
+            1e-3 * (0.3 * i).sin() + noise * 2e-4 * (1.7 * i).cos(),
+            0.015 * (0.11 * i).sin() + noise * 3e-4 * (2.3 * i).sin(),
+        ];
         let ahead = 0.9 + 0.2 * (0.2 * i).sin() + noise * (0.01 * (1.1 * i).cos() + 0.005);
-        let sideways = [0.01 * i.cos() + noise * 4e-3 * (1.3 * i).sin(), noise * 3e-3 * (0.7 * i).cos()];
-        Transform::new(Vector3::new(turn[0], turn[1], noise * 1e-4 * (0.9 * i).cos()), Vector3::new(sideways[0], sideways[1], ahead))
+        let sideways =
+            [0.01 * i.cos() + noise * 4e-3 * (1.3 * i).sin(), noise * 3e-3 * (0.7 * i).cos()];
+        Transform::new(
+            Vector3::new(turn[0], turn[1], noise * 1e-4 * (0.9 * i).cos()),
+            Vector3::new(sideways[0], sideways[1], ahead),
+        )
     };
     let poses = (1..count).scan(Transform::IDENTITY, |pose, i| {
         *pose = *pose * step(i as f64);
@@ -77,13 +106,20 @@ fn swerving(count: usize, noise: f64) -> Vec<Transform> {
 #[test]
 fn agrees_with_an_evaluation_in_numpy() {
     let found = errors(&swerving(70, 0.0), &swerving(70, 1.0)).unwrap();
-    let close = |name: &str, value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-5, "{name}: {value} for {expected}");
+    let close = |name: &str, value: f64, expected: f64| {
+        assert!((value / expected - 1.0).abs() < 1e-5, "{name}: {value} for {expected}")
+    };
     close("t_err", found.t_err_percent.unwrap(), 0.583_875_637_2);
     close("r_err", found.r_err_deg_per_m.unwrap(), 0.001_243_667_17);
     close("rpe_t", found.rpe_t_m, 0.009_383_868_18);
     close("rpe_r", found.rpe_r_deg, 0.015_194_045_0);
     close("ate", found.ate_m, 0.100_734_890_1);
-    let expected = [(5.0, 0.613_154_659_0, 65), (10.0, 0.593_158_881_8, 59), (20.0, 0.567_203_337_7, 46), (50.0, 0.560_707_572_6, 13)];
+    let expected = [
+        (5.0, 0.613_154_659_0, 65),
+        (10.0, 0.593_158_881_8, 59),
+        (20.0, 0.567_203_337_7, 46),
+        (50.0, 0.560_707_572_6, 13),
+    ];
     for (length_m, percent, pieces) in expected {
         let row = found.per_length.iter().find(|row| row.0 == length_m).unwrap();
         close("piece", row.1, percent);
@@ -95,13 +131,18 @@ fn agrees_with_an_evaluation_in_numpy() {
 fn too_little_to_compare_is_none() {
     let truth = arc(3, Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)));
     assert!(errors(&truth[..1], &truth[..1]).is_none() && errors(&truth, &truth[..2]).is_none());
-    assert_eq!(errors(&truth, &truth).unwrap().t_err_percent, None, "two metres are shorter than every length");
+    assert_eq!(
+        errors(&truth, &truth).unwrap().t_err_percent,
+        None,
+        "two metres are shorter than every length"
+    );
 }
 
 #[test]
 fn agrees_with_evo() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
-    let [estimate, truth] = ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
+    let [estimate, truth] =
+        ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
     let (estimate, truth) = matched(&estimate, &truth).unwrap();
     let found = errors(&truth, &estimate).unwrap();
     let evo: serde_json::Value = serde_json::from_str(include_str!("evo/figures.json")).unwrap();
@@ -131,11 +172,13 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     let times_ns: Vec<u64> = (0..12).map(|at| 100_000_000_000 + 100_000_000 * at).collect();
     let times: Vec<f64> = times_ns.iter().map(|&ns| ns as f64 / 1e9).collect();
     let write = |name: &str, lines: &[String]| {
-        std::fs::write(folder.path().join(name), format!("# a comment\n{}", lines.concat())).unwrap();
+        std::fs::write(folder.path().join(name), format!("# a comment\n{}", lines.concat()))
+            .unwrap();
         folder.path().join(name)
     };
     let kitti_lines: Vec<String> = poses.iter().map(kitti_line).collect();
-    let tum_lines: Vec<String> = times_ns.iter().zip(&poses).map(|(time_ns, pose)| tum_line(*time_ns, pose)).collect();
+    let tum_lines: Vec<String> =
+        times_ns.iter().zip(&poses).map(|(time_ns, pose)| tum_line(*time_ns, pose)).collect();
     let kitti = read_trajectory(&write("kitti.txt", &kitti_lines)).unwrap();
     let tum = read_trajectory(&write("trajectory_tum.txt", &tum_lines)).unwrap();
     assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
@@ -151,11 +194,22 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     assert!(a.len() == 6 && errors(&a, &b).unwrap().ate_m < 1e-9);
     assert!(matched(&half, &kitti).unwrap_err().to_string().contains("has 6 poses, the second 12"));
     let late = Trajectory {
-        times_s: half.times_s.iter().map(|times| times.iter().map(|time| time + 5e3).collect()).next(),
+        times_s: half
+            .times_s
+            .iter()
+            .map(|times| times.iter().map(|time| time + 5e3).collect())
+            .next(),
         ..half
     };
     assert!(matched(&late, &tum).unwrap_err().to_string().contains("same clock"));
     let mixed = write("mixed.txt", &[kitti_lines[0].clone(), tum_lines[0].clone()]);
-    assert!(read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format"));
-    assert!(read_trajectory(&folder.path().join("none")).unwrap_err().to_string().contains("cannot be read"));
+    assert!(
+        read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format")
+    );
+    assert!(
+        read_trajectory(&folder.path().join("none"))
+            .unwrap_err()
+            .to_string()
+            .contains("cannot be read")
+    );
 }

@@ -7,11 +7,12 @@ use dynvox_core::rectify::{Rectification, Sizing};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Widest and highest image that raw pairs are rectified to unless a size is given: wider and higher ones cost time and show nothing that was
-/// not seen.
+/// Widest and highest image that raw pairs are rectified to unless a size is given: wider and
+/// higher ones cost time and show nothing that was not seen.
 pub const LARGEST_PX: [u32; 2] = [1_920, 1_088];
 
-/// How large raw pairs are rectified. Without a size it is the calibration's own, else all that both cameras see of one rectangle.
+/// How large raw pairs are rectified. Without a size it is the calibration's own, else all that
+/// both cameras see of one rectangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RectifiedSize {
@@ -21,7 +22,8 @@ pub struct RectifiedSize {
     /// Height, px.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_px: Option<u32>,
-    /// Focal length, px, with a size only; the least that leaves no pixel without image when absent.
+    /// Focal length, px, with a size only; the least that leaves no pixel without image when
+    /// absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<f64>,
 }
@@ -43,14 +45,22 @@ impl RectifiedSize {
                 let [max_width, max_height] = LARGEST_PX;
                 Ok(Sizing::Automatic { max_width, max_height })
             }
-            (Some(width), Some(height), _) if !(sides.contains(&width) && sides.contains(&height)) => {
-                Err(format!("the rectified size {width} x {height} px must lie within {} to {} px a side", Self::LEAST_PX, Self::MOST_PX))
+            (Some(width), Some(height), _)
+                if !(sides.contains(&width) && sides.contains(&height)) =>
+            {
+                Err(format!(
+                    "the rectified size {width} x {height} px must lie within {} to {} px a side",
+                    Self::LEAST_PX,
+                    Self::MOST_PX
+                ))
             }
             (Some(_), Some(_), Some(focal_px)) if !(focal_px.is_finite() && focal_px > 0.0) => {
                 Err(format!("the rectified focal length {focal_px} px must be a positive number"))
             }
             (Some(width), Some(height), focal_px) => Ok(Sizing::Given { width, height, focal_px }),
-            (None, None, Some(_)) => Err("a rectified focal length needs a rectified size".to_owned()),
+            (None, None, Some(_)) => {
+                Err("a rectified focal length needs a rectified size".to_owned())
+            }
             _ => Err("a rectified size needs width and height".to_owned()),
         }
     }
@@ -109,18 +119,34 @@ impl CameraGeometry {
     /// What is mapped of images of a size.
     ///
     /// # Errors
-    /// A raw calibration is for images of another size, or cannot be rectified to the size that is asked for.
-    pub fn fitted(&self, size: (usize, usize), rectified: &RectifiedSize) -> Result<FittedGeometry, FormatError> {
+    /// A raw calibration is for images of another size, or cannot be rectified to the size that is
+    /// asked for.
+    pub fn fitted(
+        &self,
+        size: (usize, usize),
+        rectified: &RectifiedSize,
+    ) -> Result<FittedGeometry, FormatError> {
         match self {
             Self::Rectified(rig) => Ok(FittedGeometry { rig: *rig, size, rectification: None }),
             Self::Raw { calibration, path } => {
-                calibration.fits(path, [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX)))?;
+                calibration.fits(
+                    path,
+                    [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX)),
+                )?;
                 let sizing = rectified.sizing().map_err(|reason| {
-                    FormatError::content(path, reason, "Give --rectified WxH, and --rectified-focal PX with it, or neither")
+                    FormatError::content(
+                        path,
+                        reason,
+                        "Give --rectified WxH, and --rectified-focal PX with it, or neither",
+                    )
                 })?;
-                let (rectification, rig) = calibration
-                    .rectify(sizing)
-                    .map_err(|problem| FormatError::content(path, problem.to_string(), "Check the calibration's numbers"))?;
+                let (rectification, rig) = calibration.rectify(sizing).map_err(|problem| {
+                    FormatError::content(
+                        path,
+                        problem.to_string(),
+                        "Check the calibration's numbers",
+                    )
+                })?;
                 let size = (rectification.width as usize, rectification.height as usize);
                 Ok(FittedGeometry { rig, size, rectification: Some(rectification) })
             }
@@ -128,8 +154,9 @@ impl CameraGeometry {
     }
 }
 
-/// The calibration of a raw pair that lies in a recording's folder: our own `calibration.toml`, Kalibr's `camchain.yaml`, EuRoC's
-/// `sensor.yaml` of each camera, or KITTI raw's `calib_cam_to_cam.txt`, there or a folder up.
+/// The calibration of a raw pair that lies in a recording's folder: our own `calibration.toml`,
+/// Kalibr's `camchain.yaml`, EuRoC's `sensor.yaml` of each camera, or KITTI raw's
+/// `calib_cam_to_cam.txt`, there or a folder up.
 pub fn beside(folder: &Path) -> Option<Vec<PathBuf>> {
     let one = |path: PathBuf| path.is_file().then(|| vec![path]);
     let euroc = || {

@@ -1,7 +1,7 @@
 //! KITTI's projection matrices, with and without labels.
 //!
-//! KITTI's rectified camera k projects with `P_k = K [I | t_k]`, so the two cameras of a pair share `K` and their baseline is
-//! `(P_left[0,3] - P_right[0,3]) / focal`.
+//! KITTI's rectified camera k projects with `P_k = K [I | t_k]`, so the two cameras of a pair share
+//! `K` and their baseline is `(P_left[0,3] - P_right[0,3]) / focal`.
 
 use super::{checked, unusable};
 use crate::formats::{FormatError, read_text};
@@ -24,8 +24,9 @@ pub struct KittiCalibration {
 }
 
 impl KittiCalibration {
-    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order; `P_rect_00:` is another name of P0,
-    /// `Tr:` and `R0_rect:` have several. Other lines are passed over.
+    /// Reads lines `P0: 12 numbers`, or bare lines of 12 numbers for P0, P1, ... in order;
+    /// `P_rect_00:` is another name of P0, `Tr:` and `R0_rect:` have several. Other lines are
+    /// passed over.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
         Self::parse(&read_text(path)?, path)
     }
@@ -37,7 +38,8 @@ impl KittiCalibration {
         for (number, line) in text.lines().enumerate().map(|(at, line)| (at + 1, line.trim())) {
             let Some(first) = line.split_whitespace().next() else { continue };
             let slot = match first.trim_end_matches(':') {
-                // A scan is optional: where these lines are damaged it is missed when it is asked for.
+                // A scan is optional: where these lines are damaged it is missed when it is asked
+                // for.
                 "Tr" | "Tr_velo_cam" | "Tr_velo_to_cam" => {
                     lidar = numbers(line);
                     continue;
@@ -57,7 +59,9 @@ impl KittiCalibration {
                 _ => continue,
             };
             let values = line.split_whitespace().filter(|word| !word.starts_with('P'));
-            let values: Option<Vec<f64>> = values.map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect();
+            let values: Option<Vec<f64>> = values
+                .map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()))
+                .collect();
             let row = values.and_then(|values| Projection::try_from(values).ok()).ok_or_else(|| {
                 let action = "Compare it with a calib.txt of the benchmark: one line per camera, `P0: ` and 12 numbers";
                 unusable(path, format!("line {number} is not a projection matrix of 12 numbers"), action)
@@ -73,7 +77,8 @@ impl KittiCalibration {
     pub fn rig(&self, left: usize, right: usize) -> Result<StereoRig, FormatError> {
         let ([p_left, p_right], path) = ([self.camera(left)?, self.camera(right)?], &self.path);
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-        let shared = [0, 5, 2, 6].iter().all(|&at| near(p_left[at], p_right[at])) && near(p_left[0], p_left[5]);
+        let shared = [0, 5, 2, 6].iter().all(|&at| near(p_left[at], p_right[at]))
+            && near(p_left[0], p_left[5]);
         if !shared {
             return Err(unusable(
                 path,
@@ -99,7 +104,8 @@ impl KittiCalibration {
 
     /// LiDAR to rectified camera 0: `R0 * Tr`; `None` where the file does not say.
     pub fn t_camera_lidar(&self) -> Option<Matrix3x4<f64>> {
-        let rectifying = self.rectifying.map_or_else(Matrix3::identity, |rows| Matrix3::from_row_slice(&rows));
+        let rectifying =
+            self.rectifying.map_or_else(Matrix3::identity, |rows| Matrix3::from_row_slice(&rows));
         Some(rectifying * Matrix3x4::from_row_slice(&self.lidar?))
     }
 
@@ -111,7 +117,9 @@ impl KittiCalibration {
     /// Projection of camera `camera`.
     pub fn camera(&self, camera: usize) -> Result<Projection, FormatError> {
         self.cameras.get(camera).copied().flatten().ok_or_else(|| {
-            let action = format!("Add the line `P{camera}: ` with the 12 numbers of that camera's projection matrix");
+            let action = format!(
+                "Add the line `P{camera}: ` with the 12 numbers of that camera's projection matrix"
+            );
             unusable(&self.path, format!("it has no P{camera}"), action)
         })
     }
@@ -119,7 +127,10 @@ impl KittiCalibration {
 
 /// The numbers of a line after its label, if there are `N`, all finite.
 fn numbers<const N: usize>(line: &str) -> Option<[f64; N]> {
-    let values = line.split_whitespace().skip(1).map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()));
+    let values = line
+        .split_whitespace()
+        .skip(1)
+        .map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()));
     values.collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
@@ -132,7 +143,11 @@ mod tests {
     #[test]
     fn reads_lines_with_and_without_labels_alike() {
         let path = Path::new("calib.txt");
-        let labelled: String = GREY.lines().zip(["P0:", "P1:"]).map(|(line, label)| format!("{label} {line}\n")).collect::<String>()
+        let labelled: String = GREY
+            .lines()
+            .zip(["P0:", "P1:"])
+            .map(|(line, label)| format!("{label} {line}\n"))
+            .collect::<String>()
             + "Tr: 1 2 3\nR_rect 1 0\n";
         let a = KittiCalibration::parse(GREY, path).unwrap().rig(0, 1).unwrap();
         let b = KittiCalibration::parse(&labelled, path).unwrap().rig(0, 1).unwrap();
@@ -148,15 +163,22 @@ mod tests {
         let two = KittiCalibration::parse(GREY, path).unwrap();
         assert!(two.rig(2, 3).unwrap_err().to_string().contains("no P2"));
         let message = two.rig(1, 0).unwrap_err().to_string();
-        assert!(message.contains("baseline is -0.5") && message.contains("exchange the two cameras"), "{message}");
+        assert!(
+            message.contains("baseline is -0.5") && message.contains("exchange the two cameras"),
+            "{message}"
+        );
         let short = KittiCalibration::parse("P0: 1 2 3\n", path).unwrap_err().to_string();
         assert!(short.contains("line 1"), "{short}");
     }
 
     #[test]
     fn a_camera_beside_the_first_knows_its_place() {
-        let text = "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP2: 700 0 600 43.4 0 700 180 0.5 0 0 1 0.0025\n";
+        let text =
+            "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP2: 700 0 600 43.4 0 700 180 0.5 0 0 1 0.0025\n";
         let offset = KittiCalibration::parse(text, Path::new("c")).unwrap().offset_m(2).unwrap();
-        assert!((offset - Vector3::new((43.4 - 1.5) / 700.0, (0.5 - 0.45) / 700.0, 0.0025)).norm() < 1e-12);
+        assert!(
+            (offset - Vector3::new((43.4 - 1.5) / 700.0, (0.5 - 0.45) / 700.0, 0.0025)).norm()
+                < 1e-12
+        );
     }
 }

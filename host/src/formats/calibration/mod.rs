@@ -8,7 +8,9 @@ mod raw;
 pub use geometry::{CameraGeometry, FittedGeometry, LARGEST_PX, RectifiedSize, beside};
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
-pub use raw::{LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_kalibr, to_toml};
+pub use raw::{
+    LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_kalibr, to_toml,
+};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::{RigProblem, StereoRig};
@@ -23,8 +25,13 @@ fn unusable(path: &Path, reason: String, action: impl Into<String>) -> FormatErr
 fn checked(rig: StereoRig, path: &Path) -> Result<StereoRig, FormatError> {
     let (reason, action) = match rig.validate() {
         Ok(()) => return Ok(rig),
-        Err(RigProblem::Focal) => (format!("the focal length is {} px", rig.focal_px), "It must be above 0"),
-        Err(RigProblem::Center) => ("the principal point is not finite".to_owned(), "Give it in pixels from the image's corner"),
+        Err(RigProblem::Focal) => {
+            (format!("the focal length is {} px", rig.focal_px), "It must be above 0")
+        }
+        Err(RigProblem::Center) => (
+            "the principal point is not finite".to_owned(),
+            "Give it in pixels from the image's corner",
+        ),
         Err(RigProblem::Baseline) => (
             format!("the baseline is {} m", rig.baseline_m),
             "The right camera must stand to the right of the left one: exchange the two cameras, or correct the sign of the fourth number",

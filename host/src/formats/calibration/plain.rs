@@ -5,14 +5,15 @@ use crate::formats::{FormatError, read_text};
 use dynvox_core::geometry::StereoRig;
 use std::path::Path;
 
-/// Reads a plain stereo folder's calibration: KITTI's lines `P0:`, `P1:`, or one `key value` line each for `focal_px`, `center_u_px`,
-/// `center_v_px` and `baseline_m`. `#` begins a comment.
+/// Reads a plain stereo folder's calibration: KITTI's lines `P0:`, `P1:`, or one `key value` line
+/// each for `focal_px`, `center_u_px`, `center_v_px` and `baseline_m`. `#` begins a comment.
 ///
 /// # Errors
 /// The file cannot be read, a line is neither, a key is missing, or the rig cannot be.
 pub fn read_rig(path: &Path) -> Result<StereoRig, FormatError> {
     let text = read_text(path)?;
-    let text: String = text.lines().map(|line| line.split('#').next().unwrap_or("").to_owned() + "\n").collect();
+    let text: String =
+        text.lines().map(|line| line.split('#').next().unwrap_or("").to_owned() + "\n").collect();
     let keys = ["focal_px", "center_u_px", "center_v_px", "baseline_m"];
     if !text.lines().any(|line| keys.iter().any(|key| line.trim_start().starts_with(key))) {
         return KittiCalibration::parse(&text, path)?.rig(0, 1);
@@ -30,8 +31,17 @@ pub fn read_rig(path: &Path) -> Result<StereoRig, FormatError> {
         *slot = Some(number);
     }
     let [Some(focal_px), Some(center_u_px), Some(center_v_px), Some(baseline_m)] = values else {
-        let missing: Vec<&str> = keys.iter().zip(values).filter(|(_, value)| value.is_none()).map(|(key, _)| *key).collect();
-        return Err(unusable(path, format!("{} is missing", missing.join(", ")), "Add one line `key value` for each"));
+        let missing: Vec<&str> = keys
+            .iter()
+            .zip(values)
+            .filter(|(_, value)| value.is_none())
+            .map(|(key, _)| *key)
+            .collect();
+        return Err(unusable(
+            path,
+            format!("{} is missing", missing.join(", ")),
+            "Add one line `key value` for each",
+        ));
     };
     checked(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, path)
 }

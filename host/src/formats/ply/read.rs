@@ -1,4 +1,5 @@
-//! Binary little-endian PLY meshes, read triangle by triangle. Faces mostly name vertices near those before, so few of them are in memory.
+//! Binary little-endian PLY meshes, read triangle by triangle. Faces mostly name vertices near
+//! those before, so few of them are in memory.
 
 use super::Axes;
 use super::records::Records;
@@ -59,7 +60,8 @@ impl VertexLayout {
         let word = |at: usize| <[u8; 4]>::try_from(bytes.get(at..at + 4)?).ok();
         let metres = |at: usize| word(at).map(f32::from_le_bytes);
         let at = self.position?;
-        let colour = self.colour.and_then(|at| bytes.get(at..at + 3)?.try_into().ok()).unwrap_or_default();
+        let colour =
+            self.colour.and_then(|at| bytes.get(at..at + 3)?.try_into().ok()).unwrap_or_default();
         let object = self.object.and_then(word).map(u32::from_le_bytes).unwrap_or_default();
         let weight = self.weight.and_then(|at| bytes.get(at).copied()).unwrap_or_default();
         let position_m = self.axes.to_camera([metres(at)?, metres(at + 4)?, metres(at + 8)?]);
@@ -104,19 +106,25 @@ impl PlyMesh {
     /// # Errors
     /// It cannot be read, or is no such mesh.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
-        let refuse = |reason: &str| FormatError::content(path, reason, "Give a binary little-endian PLY of triangles");
+        let refuse = |reason: &str| {
+            FormatError::content(path, reason, "Give a binary little-endian PLY of triangles")
+        };
         let mut file = BufReader::new(File::open(path).map_err(FormatError::read(path))?);
-        let (mut layout, mut counts, mut element, mut binary) = (VertexLayout::default(), [0u64; 2], String::new(), false);
+        let (mut layout, mut counts, mut element, mut binary) =
+            (VertexLayout::default(), [0u64; 2], String::new(), false);
         loop {
             let mut line = String::new();
             // A file without line breaks is no PLY: 4 KiB of a line are enough.
-            let read = file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
+            let read =
+                file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
             let words: Vec<&str> = line.split_whitespace().collect();
             match words[..] {
                 ["end_header"] => break,
                 ["format", "binary_little_endian", _] => binary = true,
                 ["element", name, count] => {
-                    let count = count.parse().map_err(|_| refuse("a number of its header cannot be read"))?;
+                    let count = count
+                        .parse()
+                        .map_err(|_| refuse("a number of its header cannot be read"))?;
                     match name {
                         "vertex" => counts[0] = count,
                         "face" => counts[1] = count,
@@ -126,10 +134,15 @@ impl PlyMesh {
                 }
                 ["property", "list", "uchar", "uint" | "int", _] if element == "face" => {}
                 ["property", kind, name] if element == "vertex" => {
-                    layout.add(kind, name).ok_or_else(|| refuse("a type of its header is not known"))?;
+                    layout
+                        .add(kind, name)
+                        .ok_or_else(|| refuse("a type of its header is not known"))?;
                 }
                 ["comment", ..] => {
-                    layout.axes = Axes::ALL.into_iter().find(|axes| line.contains(axes.description())).unwrap_or(layout.axes);
+                    layout.axes = Axes::ALL
+                        .into_iter()
+                        .find(|axes| line.contains(axes.description()))
+                        .unwrap_or(layout.axes);
                 }
                 ["ply"] => {}
                 _ if read == 0 => return Err(refuse("it has no header of a PLY file")),
@@ -139,10 +152,14 @@ impl PlyMesh {
         if !binary || layout.position.is_none() {
             return Err(refuse("it is not binary, or its vertices have no positions"));
         }
-        let ([vertices, triangles], vertices_at) = (counts, file.stream_position().map_err(FormatError::read(path))?);
+        let ([vertices, triangles], vertices_at) =
+            (counts, file.stream_position().map_err(FormatError::read(path))?);
         let faces_at = vertices_at + vertices * layout.bytes as u64;
-        let open =
-            |at: u64| File::open(path).and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file)).map_err(FormatError::read(path));
+        let open = |at: u64| {
+            File::open(path)
+                .and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file))
+                .map_err(FormatError::read(path))
+        };
         let records = Records::new(open(0)?, vertices_at, vertices, layout.bytes);
         Ok(Self {
             vertices,
@@ -169,8 +186,8 @@ impl PlyMesh {
         })
     }
 
-    /// Hands the numbers of corners to `sink` until it breaks off: those in the first of every so many pieces. It reads the vertices that it does not
-    /// know.
+    /// Hands the numbers of corners to `sink` until it breaks off: those in the first of every so
+    /// many pieces. It reads the vertices that it does not know.
     ///
     /// # Errors
     /// The file ends early, a face is not a triangle, or `sink` fails.
@@ -187,7 +204,14 @@ impl PlyMesh {
             self.faces.read_exact(bytes)?;
             for face in bytes.as_chunks::<FACE_BYTES>().0 {
                 let [3, indices @ ..] = face else { return Err(damaged()) };
-                let [a, b, c] = [0, 4, 8].map(|at| u32::from_le_bytes([indices[at], indices[at + 1], indices[at + 2], indices[at + 3]]));
+                let [a, b, c] = [0, 4, 8].map(|at| {
+                    u32::from_le_bytes([
+                        indices[at],
+                        indices[at + 1],
+                        indices[at + 2],
+                        indices[at + 3],
+                    ])
+                });
                 if sink([a, b, c], &mut self.corners)?.is_break() {
                     return Ok(());
                 }
@@ -229,9 +253,16 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         std::fs::write(&path, &whole[..whole.len() - 5]).unwrap();
         assert!(PlyMesh::open(&path).unwrap().triangles(|_| ()).is_err(), "it ends early");
-        for text in ["", "ply\nformat ascii 1.0\nend_header\n", "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nend_header\n"] {
+        for text in [
+            "",
+            "ply\nformat ascii 1.0\nend_header\n",
+            "ply\nformat binary_little_endian 1.0\nelement tristrips 1\nend_header\n",
+        ] {
             std::fs::write(&path, text).unwrap();
-            assert!(PlyMesh::open(&path).unwrap_err().to_string().contains("Give a binary"), "{text}");
+            assert!(
+                PlyMesh::open(&path).unwrap_err().to_string().contains("Give a binary"),
+                "{text}"
+            );
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Records of one size in a file, read and changed at any position.
 //!
-//! Memory: [`CHUNKS`] chunks of [`CHUNK_RECORDS`] records, however long the file is. What is asked for together should lie near each other.
+//! Memory: [`CHUNKS`] chunks of [`CHUNK_RECORDS`] records, however long the file is. What is asked
+//! for together should lie near each other.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -72,10 +73,12 @@ impl Records {
         Ok(())
     }
 
-    /// Changes each record once, and writes what has changed: first what is in memory, so that no more is read than is not.
+    /// Changes each record once, and writes what has changed: first what is in memory, so that no
+    /// more is read than is not.
     pub fn finish(mut self, mut change: impl FnMut(&mut [u8])) -> io::Result<File> {
         let in_memory: Vec<u64> = self.chunks.iter().flatten().map(|chunk| chunk.number).collect();
-        let read = (0..self.len.div_ceil(CHUNK_RECORDS)).filter(|number| !in_memory.contains(number));
+        let read =
+            (0..self.len.div_ceil(CHUNK_RECORDS)).filter(|number| !in_memory.contains(number));
         for number in in_memory.iter().copied().chain(read) {
             let size = self.size;
             let chunk = self.chunk(number * CHUNK_RECORDS)?;
@@ -96,8 +99,14 @@ impl Records {
         }
         if self.chunks[slot].is_none() {
             // What was appended last may not be in the file yet.
-            let there = self.file.metadata()?.len().saturating_sub(self.position(number)) / self.size as u64;
-            let mut bytes = vec![0; there.min(CHUNK_RECORDS).min(self.len - number * CHUNK_RECORDS) as usize * self.size];
+            let there = self.file.metadata()?.len().saturating_sub(self.position(number))
+                / self.size as u64;
+            let mut bytes = vec![
+                0;
+                there.min(CHUNK_RECORDS).min(self.len - number * CHUNK_RECORDS)
+                    as usize
+                    * self.size
+            ];
             self.file.seek(SeekFrom::Start(self.position(number)))?;
             self.file.read_exact(&mut bytes)?;
             self.chunks[slot] = Some(Chunk { number, changed: false, bytes });
@@ -111,7 +120,11 @@ impl Records {
 
     /// Writes a chunk that has changed.
     fn write(&mut self, slot: usize) -> io::Result<()> {
-        let Some(number) = self.chunks[slot].as_ref().filter(|chunk| chunk.changed).map(|chunk| chunk.number) else { return Ok(()) };
+        let Some(number) =
+            self.chunks[slot].as_ref().filter(|chunk| chunk.changed).map(|chunk| chunk.number)
+        else {
+            return Ok(());
+        };
         let position = self.position(number);
         self.file.seek(SeekFrom::Start(position))?;
         if let Some(chunk) = &mut self.chunks[slot] {
@@ -130,7 +143,8 @@ mod tests {
     fn records_far_apart_are_changed_while_others_are_appended() {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("records");
-        let file = File::options().read(true).write(true).create(true).truncate(true).open(&path).unwrap();
+        let file =
+            File::options().read(true).write(true).create(true).truncate(true).open(&path).unwrap();
         let mut records = Records::new(file, 3, 0, 4);
         // More than all slots hold.
         let count = CHUNKS as u64 * CHUNK_RECORDS + 9_000;
@@ -147,7 +161,9 @@ mod tests {
         let bytes = std::fs::read(path).unwrap();
         assert_eq!((visited, bytes.len() as u64), (count, 3 + 4 * count));
         for (at, record) in bytes[3..].chunks_exact(4).enumerate() {
-            let marked = (0..count).step_by(100_000).any(|step| step + 7 < count && (step + 7) / 2 == at as u64);
+            let marked = (0..count)
+                .step_by(100_000)
+                .any(|step| step + 7 < count && (step + 7) / 2 == at as u64);
             let expected = (at as u32) | if marked { 0xff00_0000 } else { 0 };
             assert_eq!(u32::from_le_bytes(record.try_into().unwrap()), expected, "{at}");
         }

@@ -1,8 +1,11 @@
-//! The map as a binary PLY, streamed: triangles go to disk as they come, and the header's counts are filled in at the end.
+//! The map as a binary PLY, streamed: triangles go to disk as they come, and the header's counts
+//! are filled in at the end.
 //!
-//! A vertex has position, normal (the mean over its triangles by area), colour, weight and the number of the object it belongs to. Memory: a window of
+//! A vertex has position, normal (the mean over its triangles by area), colour, weight and the
+//! number of the object it belongs to. Memory: a window of
 //! [`WINDOW`] recent vertices that may come again, so that triangles share them, and the records of those written last, whose normals grow. The
-//! mesh itself is never in memory. Vertices that fall out of the window are written again when they return, which costs bytes, not correctness.
+//! mesh itself is never in memory. Vertices that fall out of the window are written again when they
+//! return, which costs bytes, not correctness.
 
 use super::Axes;
 use super::records::Records;
@@ -13,13 +16,15 @@ use std::path::{Path, PathBuf};
 
 /// Vertices remembered for sharing.
 const WINDOW: usize = 1 << 19;
-/// Those of them that are looked at first, since they fit the processor's fastest memory. A divisor of [`WINDOW`].
+/// Those of them that are looked at first, since they fit the processor's fastest memory. A divisor
+/// of [`WINDOW`].
 const LATEST: usize = 1 << 10;
 /// Bytes of faces written at once.
 const FACES: usize = 1 << 17;
 /// Digits of a count in the header.
 const DIGITS: usize = 10;
-/// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the object's number.
+/// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the
+/// object's number.
 const VERTEX_BYTES: usize = 32;
 /// Where its normal begins.
 const NORMAL: usize = 12;
@@ -45,7 +50,8 @@ impl Mesh {
     }
 }
 
-/// A vertex as bits (position; colour and weight), and the number of the record behind its own. All 0 where no vertex was seen.
+/// A vertex as bits (position; colour and weight), and the number of the record behind its own. All
+/// 0 where no vertex was seen.
 type Recent = [u32; 5];
 
 /// Writes one PLY.
@@ -58,8 +64,8 @@ pub struct PlyWriter {
     face_count_at: u64,
     /// Recent vertices, each in the slot of its hash. Untouched slots cost no memory.
     window: Vec<Recent>,
-    /// The vertices that entered the window last, or were found in it, each in the slot of its hash. What leaves the window leaves this too: the slot of
-    /// the one decides that of the other.
+    /// The vertices that entered the window last, or were found in it, each in the slot of its
+    /// hash. What leaves the window leaves this too: the slot of the one decides that of the other.
     latest: Vec<Recent>,
     /// Vertices written before the object: they are not its own.
     others: u32,
@@ -78,16 +84,24 @@ impl PlyWriter {
         Self::begin_in(path, "the first camera", Axes::Camera)
     }
 
-    /// As [`PlyWriter::begin`], with the name of the frame of reference for the header. Triangles come in the camera's axes, and are written in
-    /// `axes`.
+    /// As [`PlyWriter::begin`], with the name of the frame of reference for the header. Triangles
+    /// come in the camera's axes, and are written in `axes`.
     ///
     /// # Errors
     /// The disk refuses.
     pub fn begin_in(path: &Path, frame: &str, axes: Axes) -> io::Result<Self> {
-        let options = || File::options().read(true).write(true).create(true).truncate(true).to_owned();
+        let options =
+            || File::options().read(true).write(true).create(true).truncate(true).to_owned();
         let mut file = BufWriter::new(options().open(path)?);
-        write!(file, "ply\nformat binary_little_endian 1.0\ncomment metres; {} of {frame}\n", axes.description())?;
-        writeln!(file, "comment object: 0 for the static map, otherwise the number of the object's track")?;
+        write!(
+            file,
+            "ply\nformat binary_little_endian 1.0\ncomment metres; {} of {frame}\n",
+            axes.description()
+        )?;
+        writeln!(
+            file,
+            "comment object: 0 for the static map, otherwise the number of the object's track"
+        )?;
         let vertex_count_at = count_line(&mut file, "element vertex ")?;
         file.write_all(PROPERTIES)?;
         let face_count_at = count_line(&mut file, "element face ")?;
@@ -118,7 +132,8 @@ impl PlyWriter {
         self.others = self.vertices.len().try_into().unwrap_or(u32::MAX);
     }
 
-    /// Adds a triangle whose vertices any other may have. [`PlyWriter::finish`] returns a failure, so that callbacks need no error path.
+    /// Adds a triangle whose vertices any other may have. [`PlyWriter::finish`] returns a failure,
+    /// so that callbacks need no error path.
     pub fn triangle(&mut self, vertices: [Vertex; 3]) {
         let names = vertices.map(|vertex| self.vertex(&vertex, true));
         MeshSink::triangle(self, &Triangle { vertices }, names);
@@ -141,8 +156,13 @@ impl PlyWriter {
         let [x, y, z] = vertex.position_m.map(f32::to_bits);
         let [red, green, blue] = vertex.colour;
         let bits = [x, y, z, u32::from_le_bytes([red, green, blue, vertex.weight])];
-        let key = bits[..3].iter().fold(0u32, |key, bits| (key ^ bits).wrapping_mul(0x9E37_79B1).rotate_left(13)) as usize;
-        let known = |[x, y, z, rest, next]: Recent| ([x, y, z, rest] == bits && next > self.others).then(|| next.wrapping_sub(1));
+        let key = bits[..3]
+            .iter()
+            .fold(0u32, |key, bits| (key ^ bits).wrapping_mul(0x9E37_79B1).rotate_left(13))
+            as usize;
+        let known = |[x, y, z, rest, next]: Recent| {
+            ([x, y, z, rest] == bits && next > self.others).then(|| next.wrapping_sub(1))
+        };
         let latest = &mut self.latest[key % LATEST];
         if let Some(index) = known(*latest) {
             return Ok(index);
@@ -161,7 +181,8 @@ impl PlyWriter {
 
     /// Writes a vertex and returns its position in the file.
     fn append(&mut self, Vertex { position_m, colour, weight }: &Vertex) -> io::Result<u32> {
-        let next = u32::try_from(self.vertices.len() + 1).map_err(|_| io::Error::other("a PLY holds at most 2^32 - 1 vertices"))?;
+        let next = u32::try_from(self.vertices.len() + 1)
+            .map_err(|_| io::Error::other("a PLY holds at most 2^32 - 1 vertices"))?;
         let mut record = [0; VERTEX_BYTES];
         for (bytes, value) in record.chunks_exact_mut(4).zip(self.axes.of_camera(*position_m)) {
             bytes.copy_from_slice(&value.to_le_bytes());
@@ -173,7 +194,8 @@ impl PlyWriter {
         Ok(next - 1)
     }
 
-    /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and what is at the path is not a PLY.
+    /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and
+    /// what is at the path is not a PLY.
     ///
     /// # Errors
     /// The disk refused, now or before.
@@ -198,7 +220,9 @@ impl PlyWriter {
         io::copy(&mut faces, &mut file)?;
         drop(faces);
         std::fs::remove_file(&self.faces_path)?;
-        for (at, count) in [(self.vertex_count_at, self.mesh.vertices), (self.face_count_at, self.mesh.triangles)] {
+        for (at, count) in
+            [(self.vertex_count_at, self.mesh.vertices), (self.face_count_at, self.mesh.triangles)]
+        {
             file.seek(SeekFrom::Start(at))?;
             write!(file, "{count:0DIGITS$}")?;
         }

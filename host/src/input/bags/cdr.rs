@@ -1,4 +1,5 @@
-//! Messages in CDR, the encoding of ROS 2: numbers aligned to their size, behind four bytes that say their order.
+//! Messages in CDR, the encoding of ROS 2: numbers aligned to their size, behind four bytes that
+//! say their order.
 
 use std::fmt::Write;
 
@@ -148,14 +149,21 @@ impl CameraInfo {
     /// Whether images come as a pinhole camera sees them, unturned.
     pub fn is_undistorted(&self) -> bool {
         let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-        self.distortion.iter().all(|value| *value == 0.0) && self.rotation == identity && self.camera[0] == self.projection[0]
+        self.distortion.iter().all(|value| *value == 0.0)
+            && self.rotation == identity
+            && self.camera[0] == self.projection[0]
     }
 
     /// The same as `camera_calibration` writes it to a file.
     pub fn as_yaml(&self) -> String {
-        let list = |values: &[f64]| values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ");
+        let list = |values: &[f64]| {
+            values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
+        };
         let model = if self.model.is_empty() { "plumb_bob" } else { &self.model };
-        let mut text = format!("image_width: {}\nimage_height: {}\ndistortion_model: {model}\n", self.width, self.height);
+        let mut text = format!(
+            "image_width: {}\nimage_height: {}\ndistortion_model: {model}\n",
+            self.width, self.height
+        );
         let matrices: [(&str, &[f64], usize); 4] = [
             ("camera_matrix", &self.camera, 3),
             ("distortion_coefficients", &self.distortion, 1),
@@ -165,7 +173,11 @@ impl CameraInfo {
         for (name, values, rows) in matrices {
             let columns = values.len() / rows;
             // Writing to a String cannot fail.
-            let _ = write!(text, "{name}:\n  rows: {rows}\n  cols: {columns}\n  data: [{}]\n", list(values));
+            let _ = write!(
+                text,
+                "{name}:\n  rows: {rows}\n  cols: {columns}\n  data: [{}]\n",
+                list(values)
+            );
         }
         text
     }

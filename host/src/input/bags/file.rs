@@ -34,11 +34,15 @@ impl BagFile {
             let shown = path.display();
             InputError::bag(
                 path,
-                format!("it is truncated or has no index ({reason}). Repair it with `mcap recover {shown} -o repaired.mcap`"),
+                format!(
+                    "it is truncated or has no index ({reason}). Repair it with `mcap recover {shown} -o repaired.mcap`"
+                ),
             )
         };
         let mut file = File::open(path).map_err(crate::input::source::read_failed(path))?;
-        let summary = summary(&mut file).map_err(|error| broken(error.to_string()))?.ok_or_else(|| broken("no summary".to_owned()))?;
+        let summary = summary(&mut file)
+            .map_err(|error| broken(error.to_string()))?
+            .ok_or_else(|| broken("no summary".to_owned()))?;
         if summary.chunk_indexes.is_empty() {
             return Err(broken("no chunk is listed".to_owned()));
         }
@@ -52,31 +56,41 @@ impl BagFile {
 
     /// Its topics in CDR, by name.
     pub fn topics(&self) -> Vec<Topic> {
-        let channels = self.summary.channels.values().filter(|channel| channel.message_encoding == "cdr");
+        let channels =
+            self.summary.channels.values().filter(|channel| channel.message_encoding == "cdr");
         let kind = |schema: &str| schema.replace("/msg/", "/");
         let mut topics: Vec<Topic> = channels
-            .filter_map(|channel| Some(Topic { name: channel.topic.clone(), kind: kind(&channel.schema.as_ref()?.name) }))
+            .filter_map(|channel| {
+                Some(Topic {
+                    name: channel.topic.clone(),
+                    kind: kind(&channel.schema.as_ref()?.name),
+                })
+            })
             .collect();
         topics.sort_by(|a, b| a.name.cmp(&b.name));
         topics.dedup();
         topics
     }
 
-    /// Hands each message of some topics, logged from `from_ns` to `to_ns`, to `take` with its topic and time, until that returns false.
+    /// Hands each message of some topics, logged from `from_ns` to `to_ns`, to `take` with its
+    /// topic and time, until that returns false.
     fn messages(
         &self,
         topics: &[&str],
         (from_ns, to_ns): (u64, u64),
         take: &mut dyn FnMut(&str, u64, &[u8]) -> bool,
     ) -> Result<(), InputError> {
-        let damaged = |error: McapError| InputError::bag(&self.path, format!("it is damaged: {error}. Record or copy it anew"));
+        let damaged = |error: McapError| {
+            InputError::bag(&self.path, format!("it is damaged: {error}. Record or copy it anew"))
+        };
         let failed = |error: std::io::Error| damaged(McapError::Io(error));
         let options = IndexedReaderOptions::new()
             .include_topics(topics.iter().copied())
             .starting_at(from_ns)
             .ending_at(to_ns)
             .with_record_length_limit(LONGEST);
-        let mut reader = IndexedReader::new_with_options(&self.summary, options).map_err(damaged)?;
+        let mut reader =
+            IndexedReader::new_with_options(&self.summary, options).map_err(damaged)?;
         let mut file = File::open(&self.path).map_err(failed)?;
         let mut chunk = Vec::new();
         while let Some(event) = reader.next_event() {
@@ -84,14 +98,20 @@ impl BagFile {
                 IndexedReadEvent::ReadChunkRequest { offset, length } => {
                     file.seek(SeekFrom::Start(offset)).map_err(failed)?;
                     chunk.clear();
-                    let read = file.by_ref().take(length as u64).read_to_end(&mut chunk).map_err(failed)?;
+                    let read = file
+                        .by_ref()
+                        .take(length as u64)
+                        .read_to_end(&mut chunk)
+                        .map_err(failed)?;
                     if read < length {
                         return Err(damaged(McapError::UnexpectedEof));
                     }
                     reader.insert_chunk_record_data(offset, &chunk).map_err(damaged)?;
                 }
                 IndexedReadEvent::Message { header, data } => {
-                    let Some(channel) = self.summary.channels.get(&header.channel_id) else { continue };
+                    let Some(channel) = self.summary.channels.get(&header.channel_id) else {
+                        continue;
+                    };
                     if !take(&channel.topic, header.log_time, data) {
                         return Ok(());
                     }
@@ -121,18 +141,30 @@ impl BagFile {
             false
         })?;
         info.ok_or_else(|| {
-            InputError::bag(&self.path, format!("{topic} has no whole CameraInfo. Give the calibration with --calibration FILE"))
+            InputError::bag(
+                &self.path,
+                format!(
+                    "{topic} has no whole CameraInfo. Give the calibration with --calibration FILE"
+                ),
+            )
         })
     }
 
     /// The two images of a pair.
-    pub fn pair(&self, topics: &[String; 2], pair: &[Entry; 2]) -> Result<[Picture; 2], InputError> {
+    pub fn pair(
+        &self,
+        topics: &[String; 2],
+        pair: &[Entry; 2],
+    ) -> Result<[Picture; 2], InputError> {
         let [left, right] = [0, 1].map(|side| self.picture(&topics[side], &pair[side]));
         Ok([left?, right?])
     }
 
     fn picture(&self, topic: &str, entry: &Entry) -> Result<Picture, InputError> {
-        let compressed = self.topics().iter().any(|known| known.name == topic && known.kind.ends_with("CompressedImage"));
+        let compressed = self
+            .topics()
+            .iter()
+            .any(|known| known.name == topic && known.kind.ends_with("CompressedImage"));
         let mut found = None;
         self.messages(&[topic], (entry.log_ns, entry.log_ns), &mut |_, _, data| {
             if stamp_ns(data) != Some(entry.stamp_ns) {
@@ -142,7 +174,8 @@ impl BagFile {
             false
         })?;
         let found = found.unwrap_or_else(|| Err("the message is gone".to_owned()));
-        let at = || PathBuf::from(format!("{} {topic} at {} ns", self.path.display(), entry.stamp_ns));
+        let at =
+            || PathBuf::from(format!("{} {topic} at {} ns", self.path.display(), entry.stamp_ns));
         found.map_err(|reason| InputError::Image { path: at(), reason })
     }
 }

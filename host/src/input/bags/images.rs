@@ -20,9 +20,14 @@ pub fn picture(message: &[u8], compressed: bool) -> Result<Picture, String> {
         "rgb16" | "bgr16" => (3, true),
         "rgba8" | "bgra8" => (4, false),
         encoding if pattern(encoding).is_some() => (1, encoding.ends_with("16")),
-        other => return Err(format!("its encoding is {other}; mono, rgb, bgr and bayer of 8 and 16 bit are read")),
+        other => {
+            return Err(format!(
+                "its encoding is {other}; mono, rgb, bgr and bayer of 8 and 16 bit are read"
+            ));
+        }
     };
-    let samples = samples(&image, width * channels, deep).ok_or_else(|| format!("it has fewer bytes than {width} x {height} pixels"))?;
+    let samples = samples(&image, width * channels, deep)
+        .ok_or_else(|| format!("it has fewer bytes than {width} x {height} pixels"))?;
     let blue_first = image.encoding.starts_with("bgr") || image.encoding == "8UC3";
     let pixel = |at: usize| -> [u16; 3] {
         let of = |channel: usize| samples.get(at * channels + channel).copied().unwrap_or_default();
@@ -36,7 +41,8 @@ pub fn picture(message: &[u8], compressed: bool) -> Result<Picture, String> {
     let picture = if deep {
         Image::new(width, height, colour).map(Picture::DeepColour)
     } else {
-        Image::new(width, height, colour.iter().map(|rgb| rgb.map(|value| value as u8)).collect()).map(Picture::Colour)
+        Image::new(width, height, colour.iter().map(|rgb| rgb.map(|value| value as u8)).collect())
+            .map(Picture::Colour)
     };
     picture.ok_or_else(|| "it has no pixels".to_owned())
 }
@@ -45,7 +51,8 @@ fn grey(samples: Vec<u16>, (width, height): (usize, usize), deep: bool) -> Resul
     let picture = if deep {
         Image::new(width, height, samples).map(Picture::DeepGrey)
     } else {
-        Image::new(width, height, samples.iter().map(|&value| value as u8).collect()).map(Picture::Grey)
+        Image::new(width, height, samples.iter().map(|&value| value as u8).collect())
+            .map(Picture::Grey)
     };
     picture.ok_or_else(|| "it has no pixels".to_owned())
 }
@@ -58,7 +65,13 @@ fn samples(image: &RawImage<'_>, per_row: usize, deep: bool) -> Option<Vec<u16>>
     for row in rows() {
         let row = row?;
         if deep {
-            let number = |bytes: &[u8; 2]| if image.big_endian { u16::from_be_bytes(*bytes) } else { u16::from_le_bytes(*bytes) };
+            let number = |bytes: &[u8; 2]| {
+                if image.big_endian {
+                    u16::from_be_bytes(*bytes)
+                } else {
+                    u16::from_le_bytes(*bytes)
+                }
+            };
             samples.extend(row.as_chunks().0.iter().map(number));
         } else {
             samples.extend(row.iter().map(|&byte| u16::from(byte)));
@@ -79,8 +92,13 @@ fn pattern(encoding: &str) -> Option<(usize, usize)> {
     })
 }
 
-/// Colours of a Bayer image: each the mean of the pixel's neighbours of that colour, itself included.
-fn demosaiced(samples: &[u16], (width, height): (usize, usize), (red_u, red_v): (usize, usize)) -> Vec<[u16; 3]> {
+/// Colours of a Bayer image: each the mean of the pixel's neighbours of that colour, itself
+/// included.
+fn demosaiced(
+    samples: &[u16],
+    (width, height): (usize, usize),
+    (red_u, red_v): (usize, usize),
+) -> Vec<[u16; 3]> {
     let channel = |u: usize, v: usize| match ((u + red_u) % 2, (v + red_v) % 2) {
         (0, 0) => 0,
         (1, 1) => 2,

@@ -1,7 +1,9 @@
-//! Recordings of ROS 2 as MCAP files: `sensor_msgs/Image`, `CompressedImage` and `CameraInfo` in CDR.
+//! Recordings of ROS 2 as MCAP files: `sensor_msgs/Image`, `CompressedImage` and `CameraInfo` in
+//! CDR.
 //!
-//! Opening reads the file once, chunk by chunk, for the time stamp of every image and the first calibration of each camera. A frame is then
-//! read by its time through the file's index. Memory: one chunk of the file at a time, 16 bytes for each image.
+//! Opening reads the file once, chunk by chunk, for the time stamp of every image and the first
+//! calibration of each camera. A frame is then read by its time through the file's index. Memory:
+//! one chunk of the file at a time, 16 bytes for each image.
 
 mod cdr;
 mod file;
@@ -49,32 +51,45 @@ pub struct Bag {
 
 /// The MCAP file at a path: itself, or the one in the folder of a recording.
 pub fn file_at(path: &Path) -> Option<PathBuf> {
-    let is_mcap = |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    let is_mcap =
+        |path: &Path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     if path.is_file() {
         return is_mcap(path).then(|| path.to_path_buf());
     }
     if !path.join("metadata.yaml").is_file() {
         return None;
     }
-    let mut files: Vec<PathBuf> = path.read_dir().ok()?.flatten().map(|entry| entry.path()).filter(|path| is_mcap(path)).collect();
+    let mut files: Vec<PathBuf> = path
+        .read_dir()
+        .ok()?
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| is_mcap(path))
+        .collect();
     files.sort();
     files.into_iter().next()
 }
 
 /// The command that makes an MCAP file of a recording of another kind, if it is one.
 pub fn conversion(path: &Path) -> Option<String> {
-    let other = |path: &Path| path.extension().is_some_and(|ending| ending == "db3" || ending == "bag");
+    let other =
+        |path: &Path| path.extension().is_some_and(|ending| ending == "db3" || ending == "bag");
     let found = if path.is_file() {
         Some(path.to_path_buf()).filter(|path| other(path))
     } else {
         path.join("metadata.yaml")
             .is_file()
-            .then(|| path.read_dir().ok()?.flatten().map(|entry| entry.path()).find(|path| other(path)))
+            .then(|| {
+                path.read_dir().ok()?.flatten().map(|entry| entry.path()).find(|path| other(path))
+            })
             .flatten()
     };
     let found = found?;
     let (from, to) = (found.display(), found.with_extension("mcap"));
-    Some(format!("{CONVERT} {from} {to}` (github.com/foxglove/mcap) and give the result", to = to.display()))
+    Some(format!(
+        "{CONVERT} {from} {to}` (github.com/foxglove/mcap) and give the result",
+        to = to.display()
+    ))
 }
 
 /// Opens the file.
@@ -85,26 +100,41 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
     let path = file_at(path).ok_or_else(|| InputError::File { path: path.to_path_buf() })?;
     let file = BagFile::open(&path)?;
     let topics = topics::choose(&file, options.topics.as_ref())?;
-    let entries = [0, 1].map(|side| file.entries(&topics[side])).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let entries = [0, 1]
+        .map(|side| file.entries(&topics[side]))
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()?;
     let stamps = |side: usize| entries[side].iter().map(|entry| entry.stamp_ns).collect::<Vec<_>>();
     let found = nearest_stamps(&stamps(0), &stamps(1));
-    let pairs: Vec<[Entry; 2]> = found.iter().map(|&(left, right)| [entries[0][left], entries[1][right]]).collect();
-    let first = pairs.first().ok_or_else(|| InputError::bag(&path, format!("no image of {} has a partner of {}", topics[0], topics[1])))?;
+    let pairs: Vec<[Entry; 2]> =
+        found.iter().map(|&(left, right)| [entries[0][left], entries[1][right]]).collect();
+    let first = pairs.first().ok_or_else(|| {
+        InputError::bag(&path, format!("no image of {} has a partner of {}", topics[0], topics[1]))
+    })?;
     let images = file.pair(&topics, first)?;
     let image_size = images[0].size();
-    let mut notes = vec![format!("{} (left) and {} (right), paired by time stamp", topics[0], topics[1])];
+    let mut notes =
+        vec![format!("{} (left) and {} (right), paired by time stamp", topics[0], topics[1])];
     if pairs.len() < entries[0].len().max(entries[1].len()) {
         let [left, right] = [0, 1].map(|side| entries[side].len() - pairs.len());
         notes.push(format!("{left} left and {right} right images have no partner: skipped"));
     }
     let bits = options.bits.or_else(|| images[0].largest_sample().map(significant_bits));
-    let geometry = cameras(&file, &topics, options, &mut notes)?.fitted(image_size, &options.rectified)?;
-    let name = path.file_stem().map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let geometry =
+        cameras(&file, &topics, options, &mut notes)?.fitted(image_size, &options.rectified)?;
+    let name = path
+        .file_stem()
+        .map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
     Ok(Bag { name, file, topics, pairs, image_size, bits, geometry, notes })
 }
 
 /// The cameras as they are given, else by the bag's `CameraInfo`.
-fn cameras(file: &BagFile, topics: &[String; 2], options: &OpenOptions, notes: &mut Vec<String>) -> Result<CameraGeometry, InputError> {
+fn cameras(
+    file: &BagFile,
+    topics: &[String; 2],
+    options: &OpenOptions,
+    notes: &mut Vec<String>,
+) -> Result<CameraGeometry, InputError> {
     if !options.calibration.is_empty() {
         return Ok(CameraGeometry::read(&options.calibration, None)?);
     }
@@ -116,8 +146,12 @@ fn cameras(file: &BagFile, topics: &[String; 2], options: &OpenOptions, notes: &
         infos.push(file.camera_info(&info)?);
         notes.push(format!("calibration of {info}"));
     }
-    let [left, right] = infos.as_slice() else { return Err(InputError::bag(file.path(), "two calibrations are needed")) };
-    if topics.iter().all(|topic| topic.contains("rect")) || [left, right].iter().all(|info| info.is_undistorted()) {
+    let [left, right] = infos.as_slice() else {
+        return Err(InputError::bag(file.path(), "two calibrations are needed"));
+    };
+    if topics.iter().all(|topic| topic.contains("rect"))
+        || [left, right].iter().all(|info| info.is_undistorted())
+    {
         return rectified(file.path(), left, right).map(CameraGeometry::Rectified);
     }
     let texts = [left, right].map(CameraInfo::as_yaml);
@@ -174,7 +208,9 @@ impl FrameSource for Bag {
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let pair = self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?;
         let pair = self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
-        require_size(&pair, self.image_size, |_| format!("{} frame {index}", self.file.path().display()).into())?;
+        require_size(&pair, self.image_size, |_| {
+            format!("{} frame {index}", self.file.path().display()).into()
+        })?;
         Ok(StereoImages::of_pair(pair))
     }
 

@@ -34,17 +34,30 @@ fn image(width: u32, height: u32, encoding: &str, step: u32, data: &[u8]) -> Vec
 
 #[test]
 fn pictures_of_every_encoding_are_what_was_in_them() {
-    let grey = |encoding: &str, step: u32, data: &[u8]| picture(&image(2, 2, encoding, step, data), false).unwrap().to_8_bit(Some(16));
-    assert_eq!(grey("mono8", 3, &[1, 2, 9, 3, 4, 9]).grey.pixels(), [1, 2, 3, 4], "rows may be padded");
+    let grey = |encoding: &str, step: u32, data: &[u8]| {
+        picture(&image(2, 2, encoding, step, data), false).unwrap().to_8_bit(Some(16))
+    };
+    assert_eq!(
+        grey("mono8", 3, &[1, 2, 9, 3, 4, 9]).grey.pixels(),
+        [1, 2, 3, 4],
+        "rows may be padded"
+    );
     assert_eq!(grey("mono16", 4, &[0, 1, 0, 2, 0, 3, 0, 4]).grey.pixels(), [1, 2, 3, 4]);
     let pixels = [10, 20, 30, 40, 50, 60, 1, 2, 3, 4, 5, 6];
     assert_eq!(grey("rgb8", 6, &pixels).colour.unwrap().pixels()[1], [40, 50, 60]);
     assert_eq!(grey("bgr8", 6, &pixels).colour.unwrap().pixels()[1], [60, 50, 40]);
-    for (encoding, data) in
-        [("rggb", [200, 100, 100, 50]), ("bggr", [50, 100, 100, 200]), ("grbg", [100, 200, 50, 100]), ("gbrg", [100, 50, 200, 100])]
-    {
+    for (encoding, data) in [
+        ("rggb", [200, 100, 100, 50]),
+        ("bggr", [50, 100, 100, 200]),
+        ("grbg", [100, 200, 50, 100]),
+        ("gbrg", [100, 50, 200, 100]),
+    ] {
         let colour = grey(&format!("bayer_{encoding}8"), 2, &data).colour.unwrap();
-        assert!(colour.pixels().iter().all(|rgb| *rgb == [200, 100, 50]), "{encoding}: {:?}", colour.pixels());
+        assert!(
+            colour.pixels().iter().all(|rgb| *rgb == [200, 100, 50]),
+            "{encoding}: {:?}",
+            colour.pixels()
+        );
     }
     let refused = |message: &[u8]| picture(message, false).unwrap_err();
     assert!(refused(&image(2, 2, "yuv422", 4, &[0; 8])).contains("its encoding is yuv422"));

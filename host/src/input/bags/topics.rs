@@ -23,8 +23,11 @@ impl FromStr for Topics {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let sides = text.split_once(',').filter(|(left, right)| !left.is_empty() && !right.is_empty());
-        sides.map(|(left, right)| Self([left.to_owned(), right.to_owned()])).ok_or_else(|| "must be LEFT,RIGHT".to_owned())
+        let sides =
+            text.split_once(',').filter(|(left, right)| !left.is_empty() && !right.is_empty());
+        sides
+            .map(|(left, right)| Self([left.to_owned(), right.to_owned()]))
+            .ok_or_else(|| "must be LEFT,RIGHT".to_owned())
     }
 }
 
@@ -32,8 +35,9 @@ fn is_image(topic: &Topic) -> bool {
     matches!(topic.kind.as_str(), "sensor_msgs/Image" | "sensor_msgs/CompressedImage")
 }
 
-/// The topics of the left and the right camera: as given, else the only two image topics whose names differ in the side alone. Rectified ones
-/// are preferred, then those that are not compressed.
+/// The topics of the left and the right camera: as given, else the only two image topics whose
+/// names differ in the side alone. Rectified ones are preferred, then those that are not
+/// compressed.
 ///
 /// # Errors
 /// A topic is not there, or there is no such pair.
@@ -43,7 +47,10 @@ pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], Inp
     if let Some(Topics(sides)) = given {
         return match sides.iter().find(|side| images.iter().all(|topic| topic.name != **side)) {
             None => Ok(sides.clone()),
-            Some(side) => Err(InputError::bag(file.path(), format!("it has no images at {side}. Its image topics are {names}"))),
+            Some(side) => Err(InputError::bag(
+                file.path(),
+                format!("it has no images at {side}. Its image topics are {names}"),
+            )),
         };
     }
     let mut pairs: Vec<[&Topic; 2]> = Vec::new();
@@ -56,18 +63,32 @@ pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], Inp
     }
     let rank = |[left, _]: &[&Topic; 2]| {
         let debug = left.name.contains("depth") || left.name.contains("debug");
-        (debug, !left.name.contains("rect"), left.kind.ends_with("CompressedImage"), left.name.contains("color"), left.name.len())
+        (
+            debug,
+            !left.name.contains("rect"),
+            left.kind.ends_with("CompressedImage"),
+            left.name.contains("color"),
+            left.name.len(),
+        )
     };
     let best = pairs.iter().min_by_key(|pair| rank(pair));
     best.map(|pair| pair.map(|topic| topic.name.clone())).ok_or_else(|| {
-        let found = if names.is_empty() { "it has no image topics in CDR".to_owned() } else { format!("its image topics are {names}") };
-        InputError::bag(file.path(), format!("the two cameras cannot be told: {found}. Name them with --topics LEFT,RIGHT"))
+        let found = if names.is_empty() {
+            "it has no image topics in CDR".to_owned()
+        } else {
+            format!("its image topics are {names}")
+        };
+        InputError::bag(
+            file.path(),
+            format!("the two cameras cannot be told: {found}. Name them with --topics LEFT,RIGHT"),
+        )
     })
 }
 
 /// The topic of a camera's calibration: `camera_info` beside its images.
 pub fn info_of(file: &BagFile, image_topic: &str) -> Option<String> {
-    let infos: Vec<Topic> = file.topics().into_iter().filter(|topic| topic.kind == "sensor_msgs/CameraInfo").collect();
+    let infos: Vec<Topic> =
+        file.topics().into_iter().filter(|topic| topic.kind == "sensor_msgs/CameraInfo").collect();
     // From the images' own name space upwards.
     let mut space = image_topic;
     while let Some((parent, _)) = space.rsplit_once('/') {

@@ -2,7 +2,8 @@
 
 use crate::formats::{FormatError, Image, read_opencv_depth, read_pfm, read_png_deep};
 use crate::input::source::{
-    AvailableMasks, FrameSource, GivenDepth, InputError, Overlay, OverlaySource, Quantity, StereoImages, to_disparity,
+    AvailableMasks, FrameSource, GivenDepth, InputError, Overlay, OverlaySource, Quantity,
+    StereoImages, to_disparity,
 };
 use dynvox_core::geometry::StereoRig;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,13 @@ impl FromStr for DepthChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let folder = |path: &str| if path.is_empty() { Err(format!("{text} names no folder")) } else { Ok(PathBuf::from(path)) };
+        let folder = |path: &str| {
+            if path.is_empty() {
+                Err(format!("{text} names no folder"))
+            } else {
+                Ok(PathBuf::from(path))
+            }
+        };
         Ok(match text.split_once(':') {
             None if text == "elas" => Self::Elas,
             None if text == "exact" => Self::Exact,
@@ -49,13 +56,21 @@ impl FromStr for DepthChoice {
 ///
 /// # Errors
 /// The folder does not exist, has nothing for the first frame, or the data set has no exact depth.
-pub fn attach(dataset: Box<dyn FrameSource>, choice: &DepthChoice) -> Result<Box<dyn FrameSource>, InputError> {
+pub fn attach(
+    dataset: Box<dyn FrameSource>,
+    choice: &DepthChoice,
+) -> Result<Box<dyn FrameSource>, InputError> {
     let (folder, quantity) = match choice {
         DepthChoice::Elas => return Ok(dataset),
         DepthChoice::Exact if dataset.masks() != AvailableMasks::Exact => {
-            return Err(InputError::depth(Path::new(dataset.name()), "only the synthetic street has exact depth".to_owned()));
+            return Err(InputError::depth(
+                Path::new(dataset.name()),
+                "only the synthetic street has exact depth".to_owned(),
+            ));
         }
-        DepthChoice::Exact => return Ok(Box::new(Overlay::new(dataset, Source::Exact, "exact depth".to_owned()))),
+        DepthChoice::Exact => {
+            return Ok(Box::new(Overlay::new(dataset, Source::Exact, "exact depth".to_owned())));
+        }
         DepthChoice::Files(folder) => (folder, quantity_of(folder)),
         DepthChoice::Disparity(folder) => (folder, Quantity::DisparityPx),
         DepthChoice::Depth(folder) => (folder, Quantity::DepthM),
@@ -63,28 +78,46 @@ pub fn attach(dataset: Box<dyn FrameSource>, choice: &DepthChoice) -> Result<Box
     if !folder.is_dir() {
         return Err(InputError::depth(folder, "there is no such folder".to_owned()));
     }
-    let folders = if folder.join(INNER).is_dir() { vec![folder.clone(), folder.join(INNER)] } else { vec![folder.clone()] };
-    let stems: Vec<String> = (0..dataset.len()).map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}"))).collect();
+    let folders = if folder.join(INNER).is_dir() {
+        vec![folder.clone(), folder.join(INNER)]
+    } else {
+        vec![folder.clone()]
+    };
+    let stems: Vec<String> = (0..dataset.len())
+        .map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}")))
+        .collect();
     let files: Vec<Option<PathBuf>> = stems.iter().map(|stem| file_of(&folders, stem)).collect();
     let there = files.iter().flatten().count();
     if there == 0 {
         let example = stems.first().map_or("000000", String::as_str);
-        return Err(InputError::depth(folder, format!("it has nothing for any frame; the first would be {example}.png, .pfm or .xml")));
+        return Err(InputError::depth(
+            folder,
+            format!("it has nothing for any frame; the first would be {example}.png, .pfm or .xml"),
+        ));
     }
     let what = match quantity {
         Quantity::DisparityPx => "disparity",
         Quantity::DepthM => "depth",
     };
-    let part = if there == files.len() { String::new() } else { format!(" for {there} of {} frames", files.len()) };
+    let part = if there == files.len() {
+        String::new()
+    } else {
+        format!(" for {there} of {} frames", files.len())
+    };
     let note = format!("{what} from {}{part}", folder.display());
     let expected = stems.iter().map(|stem| folder.join(format!("{stem}.png"))).collect();
     Ok(Box::new(Overlay::new(dataset, Source::Files { files, expected, quantity }, note)))
 }
 
-/// A folder whose name speaks of depth and not of disparity holds depth: `precomputed-depth-dispnet` holds disparity.
+/// A folder whose name speaks of depth and not of disparity holds depth:
+/// `precomputed-depth-dispnet` holds disparity.
 fn quantity_of(folder: &Path) -> Quantity {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-    if name.contains("depth") && !name.contains("disp") { Quantity::DepthM } else { Quantity::DisparityPx }
+    if name.contains("depth") && !name.contains("disp") {
+        Quantity::DepthM
+    } else {
+        Quantity::DisparityPx
+    }
 }
 
 /// The file of a frame: named as its image, or by its number in four digits as the original does.
@@ -92,19 +125,31 @@ fn file_of(folders: &[PathBuf], stem: &str) -> Option<PathBuf> {
     let short = stem.parse::<u32>().ok().map(|number| format!("{number:04}"));
     let stems = std::iter::once(stem).chain(short.as_deref());
     let candidates = stems.flat_map(|stem| folders.iter().map(move |folder| (folder, stem)));
-    let mut files = candidates.flat_map(|(folder, stem)| ENDINGS.map(|ending| folder.join(format!("{stem}.{ending}"))));
+    let mut files = candidates
+        .flat_map(|(folder, stem)| ENDINGS.map(|ending| folder.join(format!("{stem}.{ending}"))));
     files.find(|path| path.is_file())
 }
 
 /// Reads one file. What it holds follows from its format and `quantity`.
-pub(super) fn read(path: &Path, quantity: Quantity, size: (usize, usize), rig: &StereoRig) -> Result<GivenDepth, InputError> {
+pub(super) fn read(
+    path: &Path,
+    quantity: Quantity,
+    size: (usize, usize),
+    rig: &StereoRig,
+) -> Result<GivenDepth, InputError> {
     let (values, quantity) = match path.extension().and_then(|ending| ending.to_str()) {
         Some("pfm") => (read_pfm(path, size).map_err(InputError::depth_format)?, quantity),
-        Some("xml") => (read_opencv_depth(path, size).map_err(InputError::depth_format)?, Quantity::DepthM),
+        Some("xml") => {
+            (read_opencv_depth(path, size).map_err(InputError::depth_format)?, Quantity::DepthM)
+        }
         _ => {
             let image = read_png_deep(path).map_err(InputError::depth_format)?;
             if (image.width(), image.height()) != size {
-                return Err(InputError::depth_format(FormatError::other_size(path, (image.width(), image.height()), size)));
+                return Err(InputError::depth_format(FormatError::other_size(
+                    path,
+                    (image.width(), image.height()),
+                    size,
+                )));
             }
             let unit = match quantity {
                 Quantity::DisparityPx => 1.0 / 256.0,
@@ -127,20 +172,33 @@ enum Source {
 }
 
 impl OverlaySource for Source {
-    fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError> {
+    fn add(
+        &self,
+        dataset: &dyn FrameSource,
+        index: usize,
+        images: &mut StereoImages,
+    ) -> Result<(), InputError> {
         let (size, rig) = (dataset.size(), dataset.rig());
         images.depth = match self {
             Self::Exact => images.exact.as_ref().map(|exact| {
                 // The sky is no value that could not be used.
-                let depth_m: Image<f32> = exact.depth_m.map(|&depth_m| if depth_m.is_finite() { depth_m } else { 0.0 });
+                let depth_m: Image<f32> =
+                    exact.depth_m.map(|&depth_m| if depth_m.is_finite() { depth_m } else { 0.0 });
                 to_disparity(&depth_m, Quantity::DepthM, &rig)
             }),
-            Self::Files { files, expected, quantity } => match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
-                (Some(path), _) => Some(read(path, *quantity, size, &rig)?),
-                (None, Some(path)) => return Err(InputError::depth(path, "it is missing, as are .pfm and .xml of that name".to_owned())),
-                // Frames beyond the data set are its own to refuse.
-                (None, None) => None,
-            },
+            Self::Files { files, expected, quantity } => {
+                match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
+                    (Some(path), _) => Some(read(path, *quantity, size, &rig)?),
+                    (None, Some(path)) => {
+                        return Err(InputError::depth(
+                            path,
+                            "it is missing, as are .pfm and .xml of that name".to_owned(),
+                        ));
+                    }
+                    // Frames beyond the data set are its own to refuse.
+                    (None, None) => None,
+                }
+            }
         };
         Ok(())
     }

@@ -13,7 +13,8 @@ use tempfile::TempDir;
 
 const SIZE: (usize, usize) = (8, 6);
 /// 45 px m, as the fixtures were made for.
-const RIG: StereoRig = StereoRig { focal_px: 90.0, center_u_px: 4.0, center_v_px: 3.0, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 90.0, center_u_px: 4.0, center_v_px: 3.0, baseline_m: 0.5 };
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src/input/depth/fixtures").join(name)
@@ -35,12 +36,21 @@ fn disparities_of_opencv_arrive_bit_for_bit() {
         let put_in = [(2, 1), (3, 2), (4, 3)];
         for v in 0..SIZE.1 {
             for u in 0..SIZE.0 {
-                let none = (u, v) == (0, 0) || (name == "disparity.pfm" && put_in.contains(&(u, v)));
+                let none =
+                    (u, v) == (0, 0) || (name == "disparity.pfm" && put_in.contains(&(u, v)));
                 let expected = if none { 0 } else { (wedge_px(u, v) * 256.0).round() as u16 };
-                assert_eq!(given.disparity_q8.get(u, v), Some(expected), "{name} at {u}, {v}: rows are not upside down");
+                assert_eq!(
+                    given.disparity_q8.get(u, v),
+                    Some(expected),
+                    "{name} at {u}, {v}: rows are not upside down"
+                );
             }
         }
-        let expected = if name == "disparity.pfm" { DepthRefusals { not_finite: 2, out_of_range: 1 } } else { DepthRefusals::default() };
+        let expected = if name == "disparity.pfm" {
+            DepthRefusals { not_finite: 2, out_of_range: 1 }
+        } else {
+            DepthRefusals::default()
+        };
         assert_eq!(given.refused, expected, "{name}");
     }
 }
@@ -56,7 +66,10 @@ fn depths_of_opencv_become_the_disparities_they_were_made_of() {
                 assert!((found - wedge_px(u, v)).abs() < 0.004, "{name} at {u}, {v}: {found}");
             }
         }
-        assert_eq!((given.disparity_q8.get(0, 0), given.refused), (Some(0), DepthRefusals::default()));
+        assert_eq!(
+            (given.disparity_q8.get(0, 0), given.refused),
+            (Some(0), DepthRefusals::default())
+        );
     }
 }
 
@@ -77,15 +90,22 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
         fs::write(&path, bytes).unwrap();
         refusal_of(read_pfm(&path, (2, 1)))
     };
-    assert!(pfm(b"Pf\n2 2\n-1\n0123456701234567").contains("it is 2 x 2 px, but the images are 2 x 1 px"));
+    assert!(
+        pfm(b"Pf\n2 2\n-1\n0123456701234567")
+            .contains("it is 2 x 2 px, but the images are 2 x 1 px")
+    );
     assert!(pfm(b"Pf\n2 1\n-1\n0123").contains("holds 4 bytes of pixels, not 8"));
     assert!(pfm(b"PF\n2 1\n-1\n01234567").contains("in colour"));
     assert!(pfm(b"P5\n2 1\n255\nab").contains("does not begin with Pf"));
     assert!(pfm(b"Pf\n2 1\n0\n01234567").contains("scale"));
     assert!(pfm(b"Pf\n99999999999999999999 1\n-1\n").contains("not numbers"));
     assert!(pfm(b"Pf").contains("does not have the header"));
-    assert!(refusal_of(read_opencv_depth(&fixture("depth_float.xml"), SIZE)).contains("type \"f\""));
-    assert!(refusal_of(read_opencv_depth(&fixture("depth.xml"), (9, 6))).contains("it is 8 x 6 px"));
+    assert!(
+        refusal_of(read_opencv_depth(&fixture("depth_float.xml"), SIZE)).contains("type \"f\"")
+    );
+    assert!(
+        refusal_of(read_opencv_depth(&fixture("depth.xml"), (9, 6))).contains("it is 8 x 6 px")
+    );
     let text = fs::read_to_string(fixture("depth.xml")).unwrap();
     let xml = |text: &str| {
         let path = root.path().join("a.xml");
@@ -98,8 +118,14 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
     assert!(xml(&text[..200]).contains("not XML"));
     let small = root.path().join("small.png");
     image::GrayImage::new(8, 6).save(&small).unwrap();
-    assert!(refusal_of(read(&small, Quantity::DisparityPx, SIZE, &RIG)).contains("8 bit, not of one of 16"));
-    assert!(refusal_of(read(&fixture("disparity.png"), Quantity::DisparityPx, (4, 4), &RIG)).contains("8 x 6 px"));
+    assert!(
+        refusal_of(read(&small, Quantity::DisparityPx, SIZE, &RIG))
+            .contains("8 bit, not of one of 16")
+    );
+    assert!(
+        refusal_of(read(&fixture("disparity.png"), Quantity::DisparityPx, (4, 4), &RIG))
+            .contains("8 x 6 px")
+    );
 }
 
 #[test]
@@ -107,22 +133,33 @@ fn values_impossible_for_the_rig_are_counted_in_every_format() {
     let values = Image::new(6, 1, vec![f32::INFINITY, f32::NAN, -3.0, 256.0, 255.9, 0.0]).unwrap();
     let given = to_disparity(&values, Quantity::DisparityPx, &RIG);
     assert_eq!(given.disparity_q8.pixels(), [0, 0, 0, 0, 65_510, 0]);
-    assert_eq!((given.refused, given.refused.count()), (DepthRefusals { not_finite: 2, out_of_range: 2 }, 4));
-    let depths = to_disparity(&Image::new(3, 1, vec![0.1, 9.0, 1e9]).unwrap(), Quantity::DepthM, &RIG);
+    assert_eq!(
+        (given.refused, given.refused.count()),
+        (DepthRefusals { not_finite: 2, out_of_range: 2 }, 4)
+    );
+    let depths =
+        to_disparity(&Image::new(3, 1, vec![0.1, 9.0, 1e9]).unwrap(), Quantity::DepthM, &RIG);
     assert_eq!(depths.disparity_q8.pixels(), [0, 1_280, 0], "too near is refused, too far is none");
     assert_eq!(depths.refused.out_of_range, 1);
 }
 
-/// A stereo folder with two frames of the fixtures' size, enlarged to what the core takes, and `depth` beside it.
+/// A stereo folder with two frames of the fixtures' size, enlarged to what the core takes, and
+/// `depth` beside it.
 fn rig(folder: &str, name: &str, file: &str) -> TempDir {
     let root = TempDir::new().unwrap();
     for side in ["left", "right"] {
         fs::create_dir_all(root.path().join(side)).unwrap();
         for frame in 0..2 {
-            image::GrayImage::new(8, 6).save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap();
+            image::GrayImage::new(8, 6)
+                .save(root.path().join(side).join(format!("{frame:06}.png")))
+                .unwrap();
         }
     }
-    fs::write(root.path().join("calib.txt"), "focal_px 90\ncenter_u_px 4\ncenter_v_px 3\nbaseline_m 0.5\n").unwrap();
+    fs::write(
+        root.path().join("calib.txt"),
+        "focal_px 90\ncenter_u_px 4\ncenter_v_px 3\nbaseline_m 0.5\n",
+    )
+    .unwrap();
     fs::create_dir_all(root.path().join(folder)).unwrap();
     fs::copy(fixture(file), root.path().join(folder).join(name)).unwrap();
     root
@@ -135,7 +172,9 @@ fn laid_over(root: &TempDir, choice: &str) -> Result<Box<dyn FrameSource>, Input
 
 #[test]
 fn a_folders_name_says_what_it_holds_unless_the_option_does() {
-    let at = |root: &TempDir, choice: &str| laid_over(root, choice).unwrap().frame(0).unwrap().depth.unwrap().disparity_q8.get(1, 0);
+    let at = |root: &TempDir, choice: &str| {
+        laid_over(root, choice).unwrap().frame(0).unwrap().depth.unwrap().disparity_q8.get(1, 0)
+    };
     let disparity = rig("precomputed-depth-dispnet", "000000.png", "disparity.png");
     assert_eq!(at(&disparity, "files:ROOT/precomputed-depth-dispnet"), Some(5 * 256));
     let depth = rig("depth", "000000.png", "depth_mm.png");
@@ -144,25 +183,46 @@ fn a_folders_name_says_what_it_holds_unless_the_option_does() {
     let original = rig("elas/Frames", "0000.xml", "depth.xml");
     assert_eq!(at(&original, "files:ROOT/elas"), Some(5 * 256), "the original's names");
     let notes = laid_over(&original, "depth:ROOT/elas").unwrap().notes().to_vec();
-    assert!(notes.iter().any(|note| note.contains("depth from") && note.contains("for 1 of 2 frames")), "{notes:?}");
-    assert!(refusal_of(laid_over(&original, "files:ROOT/elas").unwrap().frame(1)).contains("000001.png cannot be used: it is missing"));
-    assert!(refusal_of(laid_over(&original, "files:ROOT/left").unwrap().frame(0)).contains("8 bit"), "pictures are no depth");
+    assert!(
+        notes.iter().any(|note| note.contains("depth from") && note.contains("for 1 of 2 frames")),
+        "{notes:?}"
+    );
+    assert!(
+        refusal_of(laid_over(&original, "files:ROOT/elas").unwrap().frame(1))
+            .contains("000001.png cannot be used: it is missing")
+    );
+    assert!(
+        refusal_of(laid_over(&original, "files:ROOT/left").unwrap().frame(0)).contains("8 bit"),
+        "pictures are no depth"
+    );
     assert!(refusal_of(laid_over(&original, "files:ROOT/nowhere")).contains("no such folder"));
-    assert!(refusal_of(laid_over(&original, "files:ROOT/elas/..")).contains("nothing for any frame"));
+    assert!(
+        refusal_of(laid_over(&original, "files:ROOT/elas/..")).contains("nothing for any frame")
+    );
     assert!(refusal_of(laid_over(&original, "exact")).contains("only the synthetic street"));
     assert!("pfm:x".parse::<DepthChoice>().is_err() && "files:".parse::<DepthChoice>().is_err());
 }
 
 #[test]
 fn scaled_images_have_scaled_disparities() {
-    let street = StreetFrames::new(StreetConfig { width: 160, height: 64, ..StreetConfig::default() }).unwrap();
+    let street =
+        StreetFrames::new(StreetConfig { width: 160, height: 64, ..StreetConfig::default() })
+            .unwrap();
     let street = attach(Box::new(street), &DepthChoice::Exact).unwrap();
     let whole = street.frame(0).unwrap();
     let half = Scaled::new(street, 0.5).unwrap();
     let (depth, exact) = (half.frame(0).unwrap(), half.rig().focal_baseline_px_m());
     let (shown, truth) = (depth.depth.unwrap().disparity_q8, depth.exact.unwrap().depth_m);
     assert_eq!((shown.width(), shown.height()), (80, 32));
-    let pairs = shown.pixels().iter().zip(truth.pixels()).filter(|(_, depth_m)| depth_m.is_finite() && **depth_m > 0.0);
-    let wrong = pairs.filter(|(disparity, depth_m)| (f64::from(**disparity) / 256.0 - exact / f64::from(**depth_m)).abs() > 0.005).count();
+    let pairs = shown
+        .pixels()
+        .iter()
+        .zip(truth.pixels())
+        .filter(|(_, depth_m)| depth_m.is_finite() && **depth_m > 0.0);
+    let wrong = pairs
+        .filter(|(disparity, depth_m)| {
+            (f64::from(**disparity) / 256.0 - exact / f64::from(**depth_m)).abs() > 0.005
+        })
+        .count();
     assert_eq!((wrong, whole.depth.unwrap().refused.count()), (0, 0));
 }

@@ -1,4 +1,5 @@
-//! Normalised cross-correlation of small patches over a wide window, in whole numbers and a row of shifts at a time.
+//! Normalised cross-correlation of small patches over a wide window, in whole numbers and a row of
+//! shifts at a time.
 
 use crate::formats::Image;
 use std::ops::RangeInclusive;
@@ -31,7 +32,8 @@ pub struct SearchedImage<'i> {
 impl<'i> SearchedImage<'i> {
     /// Sums up every patch; none fits into an image smaller than a patch.
     pub fn new(image: &'i Image<u8>) -> Self {
-        let (mut sums, mut squares) = (vec![0; image.pixels().len()], vec![0; image.pixels().len()]);
+        let (mut sums, mut squares) =
+            (vec![0; image.pixels().len()], vec![0; image.pixels().len()]);
         for first in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| y * image.width() + x)) {
             let shifted = image.pixels().get(first..).unwrap_or_default();
             for ((sum, square), &grey) in sums.iter_mut().zip(&mut squares).zip(shifted) {
@@ -39,17 +41,20 @@ impl<'i> SearchedImage<'i> {
                 *square += i32::from(grey) * i32::from(grey);
             }
         }
-        let inverse_lengths = sums.iter().zip(squares).map(|(&sum, squares)| inverse_length(sum, squares)).collect();
+        let inverse_lengths =
+            sums.iter().zip(squares).map(|(&sum, squares)| inverse_length(sum, squares)).collect();
         Self { image, sums, inverse_lengths }
     }
 
-    /// How similar the patch of another image about a pixel is to those within reach, columns and rows to either side. None where a patch would not be
-    /// within its image.
+    /// How similar the patch of another image about a pixel is to those within reach, columns and
+    /// rows to either side. None where a patch would not be within its image.
     pub fn scores(&self, other: &Image<u8>, center: [usize; 2], reach: [usize; 2]) -> Vec<Score> {
         let [u, v] = center;
-        let (Some(patch), Some(columns), Some(rows)) =
-            (patch(other, u, v), centers(u, reach[0], self.image.width()), centers(v, reach[1], self.image.height()))
-        else {
+        let (Some(patch), Some(columns), Some(rows)) = (
+            patch(other, u, v),
+            centers(u, reach[0], self.image.width()),
+            centers(v, reach[1], self.image.height()),
+        ) else {
             return Vec::new();
         };
         let sum: i32 = patch.iter().flatten().sum();
@@ -62,22 +67,32 @@ impl<'i> SearchedImage<'i> {
             let first = (row - HALF) * self.image.width() + columns.start() - HALF;
             for (y, greys) in patch.iter().enumerate() {
                 for (x, &grey) in greys.iter().enumerate() {
-                    let searched = self.image.pixels().get(first + y * self.image.width() + x..).unwrap_or_default();
-                    products.iter_mut().zip(searched).for_each(|(product, &other)| *product += grey * i32::from(other));
+                    let searched = self
+                        .image
+                        .pixels()
+                        .get(first + y * self.image.width() + x..)
+                        .unwrap_or_default();
+                    products
+                        .iter_mut()
+                        .zip(searched)
+                        .for_each(|(product, &other)| *product += grey * i32::from(other));
                 }
             }
             let patches = self.sums.iter().zip(&self.inverse_lengths).skip(first);
-            scores.extend(products.iter().zip(patches).zip(columns.clone()).map(|((product, (other, other_inverse)), column)| Score {
-                similarity: f64::from(AREA * product - sum * other) * (inverse * other_inverse),
-                du: column as i32 - u as i32,
-                dv: row as i32 - v as i32,
-            }));
+            scores.extend(products.iter().zip(patches).zip(columns.clone()).map(
+                |((product, (other, other_inverse)), column)| Score {
+                    similarity: f64::from(AREA * product - sum * other) * (inverse * other_inverse),
+                    du: column as i32 - u as i32,
+                    dv: row as i32 - v as i32,
+                },
+            ));
         }
         scores
     }
 }
 
-/// One over the length of a patch less its mean, times the square root of its area; 0 of a flat one.
+/// One over the length of a patch less its mean, times the square root of its area; 0 of a flat
+/// one.
 fn inverse_length(sum: i32, squares: i32) -> f64 {
     let spread = AREA * squares - sum * sum;
     if spread > AREA { 1.0 / f64::from(spread).sqrt() } else { 0.0 }
@@ -120,15 +135,27 @@ mod tests {
             let less_mean = |u: i32, v: i32| {
                 let patch = patch(&image, u as usize, v as usize).unwrap();
                 let mean = patch.iter().flatten().sum::<i32>() as f64 / f64::from(AREA);
-                patch.as_flattened().iter().map(|&grey| f64::from(grey) - mean).collect::<Vec<f64>>()
+                patch
+                    .as_flattened()
+                    .iter()
+                    .map(|&grey| f64::from(grey) - mean)
+                    .collect::<Vec<f64>>()
             };
             let (a, b) = (less_mean(20, 5), less_mean(20 + score.du, 5 + score.dv));
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             let cosine = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
             assert!((score.similarity - cosine).abs() < 1e-9);
         }
-        assert!(searched.scores(&image, [2, 5], [8, 4]).is_empty(), "the patch is not within the image");
+        assert!(
+            searched.scores(&image, [2, 5], [8, 4]).is_empty(),
+            "the patch is not within the image"
+        );
         let flat = Image::new(40, 30, vec![90; 1_200]).unwrap();
-        assert!(SearchedImage::new(&flat).scores(&image, [20, 15], [8, 4]).iter().all(|score| score.similarity == 0.0));
+        assert!(
+            SearchedImage::new(&flat)
+                .scores(&image, [20, 15], [8, 4])
+                .iter()
+                .all(|score| score.similarity == 0.0)
+        );
     }
 }

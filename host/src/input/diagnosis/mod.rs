@@ -1,8 +1,10 @@
-//! Examining images before the first is mapped: rectification, exchanged or identical cameras, order, exposure.
+//! Examining images before the first is mapped: rectification, exchanged or identical cameras,
+//! order, exposure.
 //!
-//! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree (`patches`), and a run of consecutive left
-//! images is compared as thumbnails (`order`). What makes a map meaningless is refused, what is doubtful is a warning. Too few matches give
-//! no verdict.
+//! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree
+//! (`patches`), and a run of consecutive left images is compared as thumbnails (`order`). What
+//! makes a map meaningless is refused, what is doubtful is a warning. Too few matches give no
+//! verdict.
 
 mod correlation;
 mod order;
@@ -89,7 +91,12 @@ pub struct RefusedInput {
 }
 
 fn messages(findings: &[Finding]) -> String {
-    findings.iter().filter(|finding| finding.refused).map(|finding| finding.message.as_str()).collect::<Vec<_>>().join(". ")
+    findings
+        .iter()
+        .filter(|finding| finding.refused)
+        .map(|finding| finding.message.as_str())
+        .collect::<Vec<_>>()
+        .join(". ")
 }
 
 /// Examines the frames with these numbers. Images that cannot be read are left to the run.
@@ -115,8 +122,13 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
         }
     }
     findings.extend(diagnose(&pairs));
-    let thumbnails = order::window(indices).iter().map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
-    findings.extend(order::check(&thumbnails.collect::<Vec<_>>(), indices.first().copied().unwrap_or(0)));
+    let thumbnails = order::window(indices)
+        .iter()
+        .map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
+    findings.extend(order::check(
+        &thumbnails.collect::<Vec<_>>(),
+        indices.first().copied().unwrap_or(0),
+    ));
     Ok(findings)
 }
 
@@ -137,8 +149,11 @@ struct Pair {
 impl Pair {
     fn of(left: &Image<u8>, right: &Image<u8>) -> Self {
         let count = left.pixels().len().max(1) as f64;
-        let sum = |image: &Image<u8>| image.pixels().iter().map(|&grey| u64::from(grey)).sum::<u64>() as f64 / count;
-        let differences = left.pixels().iter().zip(right.pixels()).map(|(a, b)| u64::from(a.abs_diff(*b)));
+        let sum = |image: &Image<u8>| {
+            image.pixels().iter().map(|&grey| u64::from(grey)).sum::<u64>() as f64 / count
+        };
+        let differences =
+            left.pixels().iter().zip(right.pixels()).map(|(a, b)| u64::from(a.abs_diff(*b)));
         Self {
             width_px: left.width() as f64,
             matches: patches::matches(left, right),
@@ -153,7 +168,12 @@ impl Pair {
 /// Mean contrast over one pixel as a share of that over four.
 fn focus(image: &Image<u8>) -> f64 {
     let contrast = |apart: usize| -> u64 {
-        let row = |row: &[u8]| row.iter().zip(row.iter().skip(apart)).map(|(a, b)| u64::from(a.abs_diff(*b))).sum::<u64>();
+        let row = |row: &[u8]| {
+            row.iter()
+                .zip(row.iter().skip(apart))
+                .map(|(a, b)| u64::from(a.abs_diff(*b)))
+                .sum::<u64>()
+        };
         image.pixels().chunks_exact(image.width().max(1)).map(row).sum()
     };
     contrast(1) as f64 / contrast(4).max(1) as f64
@@ -167,7 +187,9 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let most = |holds: &dyn Fn(&Pair) -> bool| !pairs.is_empty() && 2 * pairs.iter().filter(|pair| holds(pair)).count() > pairs.len();
+    let most = |holds: &dyn Fn(&Pair) -> bool| {
+        !pairs.is_empty() && 2 * pairs.iter().filter(|pair| holds(pair)).count() > pairs.len()
+    };
     if most(&|pair| pair.mean < BLACK) {
         findings.push(finding(
             Fault::Black,
@@ -177,7 +199,9 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
         return findings;
     }
     if most(&|pair| pair.difference < SAME) {
-        let message = "both cameras show the same image. Give the left camera's images and the right one's".to_owned();
+        let message =
+            "both cameras show the same image. Give the left camera's images and the right one's"
+                .to_owned();
         findings.push(finding(Fault::SameImage, true, message));
         return findings;
     }
@@ -185,13 +209,15 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
         findings.push(finding(
             Fault::Saturated,
             false,
-            "much of the images is saturated: nothing can be matched there. Lower the exposure".to_owned(),
+            "much of the images is saturated: nothing can be matched there. Lower the exposure"
+                .to_owned(),
         ));
     }
     for (camera, name) in ["left", "right"].into_iter().enumerate() {
         if most(&|pair| pair.focus.get(camera).is_some_and(|focus| *focus < FOCUS)) {
-            let message =
-                format!("the {name} images are out of focus or enlarged: disparities will be coarse. Focus the lens, or give --scale 0.5");
+            let message = format!(
+                "the {name} images are out of focus or enlarged: disparities will be coarse. Focus the lens, or give --scale 0.5"
+            );
             findings.push(finding(Fault::Focus, false, message));
         }
     }
@@ -204,7 +230,9 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
 
 fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let share = |holds: &dyn Fn(&PatchMatch) -> bool| matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64;
+    let share = |holds: &dyn Fn(&PatchMatch) -> bool| {
+        matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64
+    };
     if share(&|one| one.disparity_px < -1.0) > 0.6 {
         let message = "left and right are exchanged: what is near lies further left in the left images. Exchange the two folders or files";
         findings.push(finding(Fault::Exchanged, true, message.to_owned()));
@@ -221,7 +249,9 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     }
     let exposure = median(matches.iter().map(|one| one.brightness).collect());
     if !(1.0 / EXPOSURE..=EXPOSURE).contains(&exposure) {
-        let message = format!("the left images are {exposure:.2} times as bright as the right ones. Let both cameras expose alike");
+        let message = format!(
+            "the left images are {exposure:.2} times as bright as the right ones. Let both cameras expose alike"
+        );
         findings.push(finding(Fault::Exposure, false, message));
     }
     findings

@@ -1,4 +1,5 @@
-//! Whether frames follow each other: of consecutive left images each one's nearest must be a neighbour.
+//! Whether frames follow each other: of consecutive left images each one's nearest must be a
+//! neighbour.
 
 use super::{Fault, Finding, finding};
 use crate::formats::Image;
@@ -9,7 +10,8 @@ const WINDOW: usize = 24;
 const FEWEST: usize = 8;
 /// Columns of a thumbnail.
 const COLUMNS: usize = 64;
-/// A neighbour that is at most so much further away than the nearest frame counts as nearest: a standing camera's frames are all alike.
+/// A neighbour that is at most so much further away than the nearest frame counts as nearest: a
+/// standing camera's frames are all alike.
 const NEAREST: f64 = 1.3;
 /// Share of frames whose nearest is a neighbour, of frames in order.
 const IN_ORDER: f64 = 0.6;
@@ -26,10 +28,15 @@ pub fn thumbnail(image: &Image<u8>) -> Vec<f64> {
     let side = image.width().div_ceil(COLUMNS).max(1);
     let (columns, rows) = (image.width() / side, image.height() / side);
     let mean = |i: usize, j: usize| {
-        let pixels = (0..side).flat_map(|dv| (0..side).map(move |du| (i * side + du, j * side + dv)));
-        pixels.map(|(u, v)| f64::from(image.get(u, v).unwrap_or(0))).sum::<f64>() / (side * side) as f64
+        let pixels =
+            (0..side).flat_map(|dv| (0..side).map(move |du| (i * side + du, j * side + dv)));
+        pixels.map(|(u, v)| f64::from(image.get(u, v).unwrap_or(0))).sum::<f64>()
+            / (side * side) as f64
     };
-    let means: Vec<f64> = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| mean(i, j)).collect();
+    let means: Vec<f64> = (0..rows)
+        .flat_map(|j| (0..columns).map(move |i| (i, j)))
+        .map(|(i, j)| mean(i, j))
+        .collect();
     let all = means.iter().sum::<f64>() / means.len().max(1) as f64;
     means.iter().map(|one| one - all).collect()
 }
@@ -44,10 +51,15 @@ pub fn check(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
     if count < FEWEST {
         return None;
     }
-    let between = |a: usize, b: usize| thumbnails.get(a).zip(thumbnails.get(b)).map_or(f64::INFINITY, |(a, b)| distance(a, b));
+    let between = |a: usize, b: usize| {
+        thumbnails.get(a).zip(thumbnails.get(b)).map_or(f64::INFINITY, |(a, b)| distance(a, b))
+    };
     let follows = |at: &usize| {
         let neighbour = between(*at, at.wrapping_sub(1)).min(between(*at, at + 1));
-        let nearest = (0..count).filter(|other| other != at).map(|other| between(*at, other)).fold(f64::INFINITY, f64::min);
+        let nearest = (0..count)
+            .filter(|other| other != at)
+            .map(|other| between(*at, other))
+            .fold(f64::INFINITY, f64::min);
         neighbour <= NEAREST * nearest + 0.05
     };
     let share = (0..count).filter(follows).count() as f64 / count as f64;

@@ -1,5 +1,6 @@
-//! Patches of a left image matched to the right one, also across rows: first at half size over a wide window, then at full size about it,
-//! and below the pixel by a parabola. Similarity is normalised, so that exposure does not matter.
+//! Patches of a left image matched to the right one, also across rows: first at half size over a
+//! wide window, then at full size about it, and below the pixel by a parabola. Similarity is
+//! normalised, so that exposure does not matter.
 
 use super::correlation::{HALF, Score, SearchedImage};
 use crate::formats::Image;
@@ -41,7 +42,14 @@ fn half(image: &Image<u8>) -> Option<Image<u8>> {
         let at = |du: usize, dv: usize| u16::from(image.get(2 * u + du, 2 * v + dv).unwrap_or(0));
         ((at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1) + 2) / 4) as u8
     };
-    Image::new(width, height, (0..height).flat_map(|v| (0..width).map(move |u| (u, v))).map(|(u, v)| mean(u, v)).collect())
+    Image::new(
+        width,
+        height,
+        (0..height)
+            .flat_map(|v| (0..width).map(move |u| (u, v)))
+            .map(|(u, v)| mean(u, v))
+            .collect(),
+    )
 }
 
 /// A patch less its mean, and its length.
@@ -58,7 +66,8 @@ fn patch(image: &Image<u8>, u: i32, v: i32) -> Option<Patch> {
         return None;
     }
     let side = (2 * FINE + 1) as usize;
-    let from_first = image.pixels().get((v - FINE) as usize * image.width() + (u - FINE) as usize..)?;
+    let from_first =
+        image.pixels().get((v - FINE) as usize * image.width() + (u - FINE) as usize..)?;
     let mut values = [0.0; FINE_AREA];
     for (values, row) in values.chunks_exact_mut(side).zip(from_first.chunks(image.width())) {
         values.iter_mut().zip(row).for_each(|(value, &grey)| *value = f32::from(grey));
@@ -72,12 +81,15 @@ fn patch(image: &Image<u8>, u: i32, v: i32) -> Option<Patch> {
 /// Cosine of two patches; -1 where one is flat or outside.
 fn similarity(a: &Patch, b: Option<&Patch>) -> f64 {
     let Some(b) = b.filter(|b| a.length > 1.0 && b.length > 1.0) else { return -1.0 };
-    f64::from(a.values.iter().zip(&b.values).map(|(a, b)| a * b).sum::<f32>() / (a.length * b.length))
+    f64::from(
+        a.values.iter().zip(&b.values).map(|(a, b)| a * b).sum::<f32>() / (a.length * b.length),
+    )
 }
 
 /// Whether a patch has edges along rows and along columns.
 fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
-    let at = |du: i32, dv: i32| f64::from(image.get((u + du) as usize, (v + dv) as usize).unwrap_or(0));
+    let at =
+        |du: i32, dv: i32| f64::from(image.get((u + du) as usize, (v + dv) as usize).unwrap_or(0));
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for (du, dv) in (-COARSE..=COARSE).flat_map(|du| (-COARSE..=COARSE).map(move |dv| (du, dv))) {
         let (x, y) = (at(du + 1, dv) - at(du - 1, dv), at(du, dv + 1) - at(du, dv - 1));
@@ -90,13 +102,22 @@ fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
 
 /// The matches of a pair.
 pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
-    let (Some(small_left), Some(small_right)) = (half(left), half(right)) else { return Vec::new() };
+    let (Some(small_left), Some(small_right)) = (half(left), half(right)) else {
+        return Vec::new();
+    };
     let searched = SearchedImage::new(&small_right);
-    let centers = (STEP_PX..left.height()).step_by(STEP_PX).flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
+    let centers = (STEP_PX..left.height())
+        .step_by(STEP_PX)
+        .flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
     centers.filter_map(|(u, v)| find([left, right], &small_left, &searched, [u, v])).collect()
 }
 
-fn find([left, right]: [&Image<u8>; 2], small_left: &Image<u8>, searched: &SearchedImage<'_>, [u, v]: [usize; 2]) -> Option<PatchMatch> {
+fn find(
+    [left, right]: [&Image<u8>; 2],
+    small_left: &Image<u8>,
+    searched: &SearchedImage<'_>,
+    [u, v]: [usize; 2],
+) -> Option<PatchMatch> {
     let (small_u, small_v) = (u / 2, v / 2);
     if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u as i32, small_v as i32) {
         return None;
@@ -106,19 +127,32 @@ fn find([left, right]: [&Image<u8>; 2], small_left: &Image<u8>, searched: &Searc
     let &best = scores.iter().max_by(|a, b| a.similarity.total_cmp(&b.similarity))?;
     let apart = |other: &&Score| (other.du - best.du).abs() > 2 || (other.dv - best.dv).abs() > 2;
     let second = scores.iter().filter(apart).map(|score| score.similarity).fold(-1.0, f64::max);
-    let at_the_end = best.du.unsigned_abs() as usize == reach[0] || best.dv.unsigned_abs() as usize == reach[1];
+    let at_the_end =
+        best.du.unsigned_abs() as usize == reach[0] || best.dv.unsigned_abs() as usize == reach[1];
     if best.similarity < SIMILAR || best.similarity - second < CLEAR || at_the_end {
         return None;
     }
-    refined(left, right, [u, v].map(|at| at as i32), [u as i32 + 2 * best.du, v as i32 + 2 * best.dv])
+    refined(
+        left,
+        right,
+        [u, v].map(|at| at as i32),
+        [u as i32 + 2 * best.du, v as i32 + 2 * best.dv],
+    )
 }
 
 /// The place at full size, below the pixel.
-fn refined(left: &Image<u8>, right: &Image<u8>, [u, v]: [i32; 2], [near_u, near_v]: [i32; 2]) -> Option<PatchMatch> {
+fn refined(
+    left: &Image<u8>,
+    right: &Image<u8>,
+    [u, v]: [i32; 2],
+    [near_u, near_v]: [i32; 2],
+) -> Option<PatchMatch> {
     let sought = patch(left, u, v)?;
-    let score = |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv).as_ref());
+    let score =
+        |du: i32, dv: i32| similarity(&sought, patch(right, near_u + du, near_v + dv).as_ref());
     let around = (-3..=3).flat_map(|du| (-3..=3).map(move |dv| (du, dv)));
-    let (best, du, dv) = around.map(|(du, dv)| (score(du, dv), du, dv)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (best, du, dv) =
+        around.map(|(du, dv)| (score(du, dv), du, dv)).max_by(|a, b| a.0.total_cmp(&b.0))?;
     if best < SIMILAR || du.abs() == 3 || dv.abs() == 3 {
         return None;
     }

@@ -90,7 +90,8 @@ impl FrameSource for Spoilt<'_> {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let shuffled = index * 7 % self.len();
-        let mut frame = self.frames[if self.planted == Planted::Shuffled { shuffled } else { index }].clone();
+        let mut frame =
+            self.frames[if self.planted == Planted::Shuffled { shuffled } else { index }].clone();
         let right = &frame.right;
         let center = [0.5 * right.width() as f64, 0.5 * right.height() as f64];
         match self.planted {
@@ -106,7 +107,11 @@ impl FrameSource for Spoilt<'_> {
             Planted::Exchanged => std::mem::swap(&mut frame.left, &mut frame.right),
             Planted::SameTwice => frame.right = frame.left.clone(),
             Planted::Brighter(factor) => {
-                let pixels = right.pixels().iter().map(|&grey| (f64::from(grey) * factor).min(255.0) as u8).collect();
+                let pixels = right
+                    .pixels()
+                    .iter()
+                    .map(|&grey| (f64::from(grey) * factor).min(255.0) as u8)
+                    .collect();
                 frame.right = Image::new(right.width(), right.height(), pixels).unwrap();
             }
         }
@@ -155,7 +160,11 @@ fn each_fault_is_named(source: &dyn FrameSource) {
     for (planted, fault) in cases {
         let findings = found(source, &frames, planted);
         let faults: Vec<Fault> = findings.iter().map(|one| one.fault).collect();
-        println!("{} {planted:?}: {faults:?} {:?}", source.name(), findings.first().map(|one| &one.message));
+        println!(
+            "{} {planted:?}: {faults:?} {:?}",
+            source.name(),
+            findings.first().map(|one| &one.message)
+        );
         assert_eq!(faults, Vec::from_iter(fault), "{} {planted:?}", source.name());
         let off = |before: &str, truth: f64| (number(&findings[0].message, before) - truth).abs();
         match planted {
@@ -168,7 +177,8 @@ fn each_fault_is_named(source: &dyn FrameSource) {
 
 #[test]
 fn faults_planted_into_the_street_are_named() {
-    let config = StreetConfig { width: 480, height: 160, frames: FRAMES as u32, ..StreetConfig::default() };
+    let config =
+        StreetConfig { width: 480, height: 160, frames: FRAMES as u32, ..StreetConfig::default() };
     each_fault_is_named(&StreetFrames::new(config).unwrap());
 }
 
@@ -184,7 +194,9 @@ fn ten_streets_give_no_false_alarm() {
     let sizes = [(640, 192), (480, 160), (320, 240), (376, 240), (320, 96)];
     for seed in 1..=10 {
         let (width, height) = sizes[seed as usize % sizes.len()];
-        let street = StreetFrames::new(StreetConfig { seed, width, height, ..StreetConfig::default() }).unwrap();
+        let street =
+            StreetFrames::new(StreetConfig { seed, width, height, ..StreetConfig::default() })
+                .unwrap();
         let findings = found(&street, &frames(&street, 8), Planted::Nothing);
         assert!(findings.is_empty(), "seed {seed}, {width} x {height}: {findings:?}");
     }

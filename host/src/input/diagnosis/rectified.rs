@@ -19,8 +19,9 @@ impl<'d> RectifiedSource<'d> {
     /// Takes memory for the maps of a raw source.
     pub fn new(source: &'d dyn FrameSource) -> Result<Self, InputError> {
         let rectification = source.rectification().copied();
-        let side =
-            |of: fn(&Rectification) -> [u32; 2]| rectification.as_ref().map_or(0, |raw| of(raw).into_iter().max().unwrap_or(0) as usize);
+        let side = |of: fn(&Rectification) -> [u32; 2]| {
+            rectification.as_ref().map_or(0, |raw| of(raw).into_iter().max().unwrap_or(0) as usize)
+        };
         let (image_width, image_height) = source.size();
         let capacity = Capacity {
             image_width,
@@ -56,15 +57,26 @@ impl<'d> RectifiedSource<'d> {
     }
 
     /// Makes the maps and uses them; `None` where the source is rectified.
-    fn with_rectifier<R>(&mut self, work: impl FnOnce(&Rectifier<'_>, &mut RectifiedImages<'_>) -> R) -> Result<Option<R>, InputError> {
+    fn with_rectifier<R>(
+        &mut self,
+        work: impl FnOnce(&Rectifier<'_>, &mut RectifiedImages<'_>) -> R,
+    ) -> Result<Option<R>, InputError> {
         let Some(rectification) = self.rectification else { return Ok(None) };
-        let refused =
-            |reason: String| InputError::from(FormatError::content(Path::new(self.source.name()), reason, "Check the calibration"));
+        let refused = |reason: String| {
+            InputError::from(FormatError::content(
+                Path::new(self.source.name()),
+                reason,
+                "Check the calibration",
+            ))
+        };
         let bytes = Rectifier::bytes(&self.capacity) + RectifiedImages::bytes(&self.capacity);
-        let mut carver = Carver::new(&mut self.slab, bytes).map_err(|error| refused(error.to_string()))?;
+        let mut carver =
+            Carver::new(&mut self.slab, bytes).map_err(|error| refused(error.to_string()))?;
         let mut rectifier = Rectifier::new_in(&self.capacity, &mut carver);
         let mut images = RectifiedImages::new_in(&self.capacity, &mut carver);
-        rectifier.prepare(&rectification, &self.source.rig()).map_err(|error| refused(error.to_string()))?;
+        rectifier
+            .prepare(&rectification, &self.source.rig())
+            .map_err(|error| refused(error.to_string()))?;
         Ok(Some(work(&rectifier, &mut images)))
     }
 }

@@ -1,7 +1,9 @@
-//! How far the rows of matched points differ: a shift in the middle of the image and a roll, from vertical disparities alone.
+//! How far the rows of matched points differ: a shift in the middle of the image and a roll, from
+//! vertical disparities alone.
 //!
-//! A line over the columns, first through the medians of the left and the right third, then by least squares with Cauchy's weights: of any
-//! 100 matches 30 may be wrong. Vertical disparities tell rows and roll; of the horizontal offset they tell nothing.
+//! A line over the columns, first through the medians of the left and the right third, then by
+//! least squares with Cauchy's weights: of any 100 matches 30 may be wrong. Vertical disparities
+//! tell rows and roll; of the horizontal offset they tell nothing.
 
 use super::median;
 use super::patches::PatchMatch;
@@ -29,7 +31,8 @@ impl RowError {
     pub fn of(matches: &[&PatchMatch], width_px: f64) -> Self {
         let (mut shift_px, mut slope) = through_thirds(matches, width_px);
         for _ in 0..ROUNDS {
-            (shift_px, slope) = weighed(matches, width_px, (shift_px, slope)).unwrap_or((shift_px, slope));
+            (shift_px, slope) =
+                weighed(matches, width_px, (shift_px, slope)).unwrap_or((shift_px, slope));
         }
         Self {
             shift_px,
@@ -60,7 +63,11 @@ fn median_of(matches: &[&PatchMatch], value: impl Fn(&PatchMatch) -> f64) -> f64
 }
 
 /// One round of weighted least squares; `None` where the columns do not span enough.
-fn weighed(matches: &[&PatchMatch], width_px: f64, (shift_px, slope): (f64, f64)) -> Option<(f64, f64)> {
+fn weighed(
+    matches: &[&PatchMatch],
+    width_px: f64,
+    (shift_px, slope): (f64, f64),
+) -> Option<(f64, f64)> {
     let (mut sum, mut sum_u, mut sum_uu, mut sum_r, mut sum_ur) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for one in matches {
         let u = one.u_px - 0.5 * width_px;
@@ -74,7 +81,12 @@ fn weighed(matches: &[&PatchMatch], width_px: f64, (shift_px, slope): (f64, f64)
     }
     let determinant = sum * sum_uu - sum_u * sum_u;
     let spans = determinant > sum * sum * SPAN_MIN_PX * SPAN_MIN_PX;
-    spans.then(|| ((sum_uu * sum_r - sum_u * sum_ur) / determinant, (sum * sum_ur - sum_u * sum_r) / determinant))
+    spans.then(|| {
+        (
+            (sum_uu * sum_r - sum_u * sum_ur) / determinant,
+            (sum * sum_ur - sum_u * sum_r) / determinant,
+        )
+    })
 }
 
 #[cfg(test)]
@@ -85,7 +97,8 @@ mod tests {
         let one = |at: u32| {
             let u_px = f64::from(at * 37 % 600);
             // Three of ten are wrong, all to one side.
-            let rows_px = if at % 10 < 3 { 7.0 } else { rows_px(u_px) + 0.1 * f64::from(at % 7) - 0.3 };
+            let rows_px =
+                if at % 10 < 3 { 7.0 } else { rows_px(u_px) + 0.1 * f64::from(at % 7) - 0.3 };
             PatchMatch { u_px, disparity_px: 10.0, rows_px, brightness: 1.0 }
         };
         (0..200).map(one).collect()
@@ -96,13 +109,17 @@ mod tests {
         let roll = 0.6f64.to_radians().tan();
         let matches = matches(|u| 1.5 + roll * (u - 300.0));
         let found = RowError::of(&matches.iter().collect::<Vec<_>>(), 600.0);
-        assert!((found.shift_px - 1.5).abs() < 0.1 && (found.roll_deg - 0.6).abs() < 0.05, "{found:?}");
+        assert!(
+            (found.shift_px - 1.5).abs() < 0.1 && (found.roll_deg - 0.6).abs() < 0.05,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn matches_in_one_column_tell_no_roll_and_none_tell_nothing() {
-        let narrow: Vec<PatchMatch> =
-            (0..40).map(|_| PatchMatch { u_px: 50.0, disparity_px: 1.0, rows_px: 2.0, brightness: 1.0 }).collect();
+        let narrow: Vec<PatchMatch> = (0..40)
+            .map(|_| PatchMatch { u_px: 50.0, disparity_px: 1.0, rows_px: 2.0, brightness: 1.0 })
+            .collect();
         let found = RowError::of(&narrow.iter().collect::<Vec<_>>(), 600.0);
         assert_eq!((found.shift_px, found.roll_deg), (2.0, 0.0));
         assert_eq!(RowError::of(&[], 600.0), RowError::default());

@@ -11,25 +11,31 @@ const HEIGHT: usize = 200;
 /// Smooth noise of several scales about a shift in the world.
 fn texture(x: f64, y: f64) -> f64 {
     let hash = |i: i64, j: i64, seed: u64| {
-        let mixed = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (j as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F) ^ seed;
-        ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40) as f64 / (1u64 << 24) as f64
+        let mixed = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ (j as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+            ^ seed;
+        ((mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40) as f64
+            / (1u64 << 24) as f64
     };
     let layer = |scale: f64, seed: u64| {
         let (x, y) = (x / scale, y / scale);
         let (i, j) = (x.floor(), y.floor());
         let (s, t) = (x - i, y - j);
         let at = |di: i64, dj: i64| hash(i as i64 + di, j as i64 + dj, seed);
-        (at(0, 0) * (1.0 - s) + at(1, 0) * s) * (1.0 - t) + (at(0, 1) * (1.0 - s) + at(1, 1) * s) * t
+        (at(0, 0) * (1.0 - s) + at(1, 0) * s) * (1.0 - t)
+            + (at(0, 1) * (1.0 - s) + at(1, 1) * s) * t
     };
     20.0 + 90.0 * layer(3.0, 1) + 70.0 * layer(11.0, 2) + 50.0 * layer(60.0, 3)
 }
 
 fn image(at: impl Fn(f64, f64) -> f64) -> Image<u8> {
-    let pixels = (0..WIDTH * HEIGHT).map(|i| at((i % WIDTH) as f64, (i / WIDTH) as f64).clamp(0.0, 255.0) as u8);
+    let pixels = (0..WIDTH * HEIGHT)
+        .map(|i| at((i % WIDTH) as f64, (i / WIDTH) as f64).clamp(0.0, 255.0) as u8);
     Image::new(WIDTH, HEIGHT, pixels.collect()).unwrap()
 }
 
-/// Pairs of a wall 12 px of disparity away; `right` says where a right pixel looks in the left image, and how bright it is.
+/// Pairs of a wall 12 px of disparity away; `right` says where a right pixel looks in the left
+/// image, and how bright it is.
 fn faults(right: impl Fn(f64, f64) -> ([f64; 2], f64)) -> Vec<Fault> {
     let pairs: Vec<Pair> = (0..3)
         .map(|frame| {
@@ -42,7 +48,11 @@ fn faults(right: impl Fn(f64, f64) -> ([f64; 2], f64)) -> Vec<Fault> {
             Pair::of(&left, &seen)
         })
         .collect();
-    assert!(pairs.iter().all(|pair| pair.difference < SAME || pair.mean < BLACK || pair.matches.len() > 20));
+    assert!(
+        pairs
+            .iter()
+            .all(|pair| pair.difference < SAME || pair.mean < BLACK || pair.matches.len() > 20)
+    );
     diagnose(&pairs).into_iter().map(|finding| finding.fault).collect()
 }
 
@@ -68,7 +78,10 @@ fn the_message_gives_the_size_of_the_fault_and_large_faults_are_refused() {
         (findings[0].refused, findings[0].message.clone())
     };
     let (refused, message) = finding_for(3.0);
-    assert!(refused && message.contains("3.0 px apart in height") && message.contains("--calibration"), "{message}");
+    assert!(
+        refused && message.contains("3.0 px apart in height") && message.contains("--calibration"),
+        "{message}"
+    );
     assert!(!finding_for(0.8).0, "a warning");
 }
 
@@ -78,12 +91,20 @@ fn black_images_are_refused_and_few_matches_give_no_verdict() {
     assert_eq!(diagnose(&[Pair::of(&black, &black)])[0].fault, Fault::Black);
     let grey = image(|u, _| 100.0 + u / 10.0);
     let other = image(|u, _| 90.0 + u / 10.0);
-    assert!(diagnose(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus), "nothing can be matched");
+    assert!(
+        diagnose(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus),
+        "nothing can be matched"
+    );
 }
 
 #[test]
 fn shuffled_frames_are_out_of_order_and_a_gap_is_a_jump() {
-    let thumbnails = |shifts: &[f64]| shifts.iter().map(|shift| order::thumbnail(&image(|u, v| texture(u + shift, v)))).collect::<Vec<_>>();
+    let thumbnails = |shifts: &[f64]| {
+        shifts
+            .iter()
+            .map(|shift| order::thumbnail(&image(|u, v| texture(u + shift, v))))
+            .collect::<Vec<_>>()
+    };
     let moving: Vec<f64> = (0..16).map(|frame| 6.0 * f64::from(frame)).collect();
     assert!(order::check(&thumbnails(&moving), 0).is_none());
     let shuffled: Vec<f64> = (0..16).map(|frame| moving[frame * 7 % 16]).collect();
@@ -113,7 +134,8 @@ fn real_clips_give_no_false_alarm() {
         ("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", None),
     ];
     for (path, sequence) in clips {
-        let options = OpenOptions { sequence: sequence.map(str::to_owned), ..OpenOptions::default() };
+        let options =
+            OpenOptions { sequence: sequence.map(str::to_owned), ..OpenOptions::default() };
         let source = open(&data(path), &options).unwrap();
         let findings = examine(source.as_ref(), &(0..source.len()).collect::<Vec<_>>()).unwrap();
         assert!(findings.is_empty(), "{sequence:?}: {findings:?}");
@@ -125,7 +147,9 @@ fn real_clips_give_no_false_alarm() {
 fn single_real_pairs_give_no_false_alarm() {
     let folder = data("kitti-stereo-2012/training");
     for name in ["000027_10.png", "000151_10.png", "000174_10.png"] {
-        let [left, right] = ["image_0", "image_1"].map(|camera| read_picture(&folder.join(camera).join(name)).unwrap().to_8_bit(None).grey);
+        let [left, right] = ["image_0", "image_1"].map(|camera| {
+            read_picture(&folder.join(camera).join(name)).unwrap().to_8_bit(None).grey
+        });
         let findings = diagnose(&[Pair::of(&left, &right)]);
         assert!(findings.is_empty(), "{name}: {findings:?}");
     }

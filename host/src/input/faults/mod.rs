@@ -1,4 +1,5 @@
-//! Faults injected into a recording, drawn from a seed: what cameras, cables, drivers and detectors do wrong.
+//! Faults injected into a recording, drawn from a seed: what cameras, cables, drivers and detectors
+//! do wrong.
 //!
 //! [`Faults`] says which, [`FaultySource`] is the recording with them. The truth of a frame is that of the images delivered.
 
@@ -10,7 +11,9 @@ mod tests;
 
 pub use spec::{Fault, FaultKind, Faults, Side};
 
-use super::source::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
+use super::source::{
+    AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState,
+};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::random::Random;
 use dynvox_core::rectify::Rectification;
@@ -20,7 +23,10 @@ use order::{Delivery, deliveries};
 ///
 /// # Errors
 /// A sentence: the recording is a stream.
-pub fn attach(recording: Box<dyn FrameSource>, faults: Option<&Faults>) -> Result<Box<dyn FrameSource>, String> {
+pub fn attach(
+    recording: Box<dyn FrameSource>,
+    faults: Option<&Faults>,
+) -> Result<Box<dyn FrameSource>, String> {
     match faults {
         None => Ok(recording),
         Some(faults) => Ok(Box::new(FaultySource::new(recording, faults.clone())?)),
@@ -46,7 +52,9 @@ impl FaultySource {
             return Err("--faults needs a recording, and this is a stream. Save its frames to a folder first".to_owned());
         }
         let order = deliveries(inner.len(), &faults);
-        let truth = inner.truth().map(|truth| order.iter().filter_map(|one| truth.get(one.frame).copied()).collect());
+        let truth = inner
+            .truth()
+            .map(|truth| order.iter().filter_map(|one| truth.get(one.frame).copied()).collect());
         let mut notes = inner.notes().to_vec();
         notes.push(format!("faults are injected, {} in all", faults.list.len()));
         Ok(Self { inner, faults, order, truth, notes })
@@ -70,13 +78,23 @@ impl FaultySource {
 impl FrameSource for FaultySource {
     fn frame(&self, position: usize) -> Result<StereoImages, InputError> {
         let mut images = self.inner.frame(self.delivered(position)?.frame)?;
-        for (number, fault) in self.faults.list.iter().enumerate().filter(|(_, fault)| fault.covers(position)) {
-            let mut random = Random::new(self.faults.seed ^ ((number as u64 + 1) << 32) ^ (position as u64 + 1).wrapping_mul(0x9E37_79B9));
+        for (number, fault) in
+            self.faults.list.iter().enumerate().filter(|(_, fault)| fault.covers(position))
+        {
+            let mut random = Random::new(
+                self.faults.seed
+                    ^ ((number as u64 + 1) << 32)
+                    ^ (position as u64 + 1).wrapping_mul(0x9E37_79B9),
+            );
             if random.below(100) >= fault.percent {
                 continue;
             }
             match self.replaced_by(fault.kind, fault.first, position) {
-                Some((side, other)) => pictures::put_side(side, self.inner.frame(self.delivered(other)?.frame)?, &mut images),
+                Some((side, other)) => pictures::put_side(
+                    side,
+                    self.inner.frame(self.delivered(other)?.frame)?,
+                    &mut images,
+                ),
                 None => pictures::apply(fault.kind, &mut images, &mut random),
             }
         }

@@ -17,7 +17,9 @@ pub(super) fn deliveries(len: usize, faults: &Faults) -> Vec<Delivery> {
     let mut order: Vec<Delivery> = (0..len).map(|at| Delivery { frame: at, stamp: at }).collect();
     for (number, fault) in faults.list.iter().enumerate() {
         let mut random = Random::new(faults.seed ^ ((number as u64 + 1) << 32));
-        let affected: Vec<bool> = (0..order.len()).map(|at| fault.covers(at) && random.below(100) < fault.percent).collect();
+        let affected: Vec<bool> = (0..order.len())
+            .map(|at| fault.covers(at) && random.below(100) < fault.percent)
+            .collect();
         match fault.kind {
             FaultKind::Drop => {
                 let mut lost = affected.iter();
@@ -39,7 +41,9 @@ pub(super) fn deliveries(len: usize, faults: &Faults) -> Vec<Delivery> {
                 }
             }
             FaultKind::Jump(frames) => {
-                for at in (0..order.len()).filter(|&at| affected[at] && (at == fault.first || fault.percent < 100)) {
+                for at in (0..order.len())
+                    .filter(|&at| affected[at] && (at == fault.first || fault.percent < 100))
+                {
                     order[at..].iter_mut().for_each(|one| one.frame += frames);
                 }
                 order.retain(|one| one.frame < len);
@@ -55,7 +59,10 @@ mod tests {
     use super::*;
 
     fn order(len: usize, faults: &str) -> (Vec<usize>, Vec<usize>) {
-        deliveries(len, &faults.parse().unwrap()).into_iter().map(|one| (one.frame, one.stamp)).unzip()
+        deliveries(len, &faults.parse().unwrap())
+            .into_iter()
+            .map(|one| (one.frame, one.stamp))
+            .unzip()
     }
 
     #[test]

@@ -18,13 +18,19 @@ pub(super) fn apply(kind: FaultKind, images: &mut StereoImages, random: &mut Ran
             images.colour = None;
         }
         FaultKind::Black(side) => each_value(images, side, |_, _| 0),
-        FaultKind::Noise(side, sigma) => each_value(images, side, |_, value| saturated(f64::from(value) + sigma * gaussian(random))),
-        FaultKind::Brightness(side, factor) => each_value(images, side, |_, value| saturated(f64::from(value) * factor)),
+        FaultKind::Noise(side, sigma) => each_value(images, side, |_, value| {
+            saturated(f64::from(value) + sigma * gaussian(random))
+        }),
+        FaultKind::Brightness(side, factor) => {
+            each_value(images, side, |_, value| saturated(f64::from(value) * factor))
+        }
         FaultKind::Occlude(side, share) => {
             let covered = (images.left.width() as f64 * share).round() as usize;
             each_value(images, side, |column, value| if column < covered { COVER } else { value });
         }
-        FaultKind::Masks => images.masks.instances = absurd_masks(images.left.width(), images.left.height()),
+        FaultKind::Masks => {
+            images.masks.instances = absurd_masks(images.left.width(), images.left.height())
+        }
         FaultKind::Freeze(_) | FaultKind::Delay(_) => {}
         FaultKind::Drop | FaultKind::Duplicate | FaultKind::Swap | FaultKind::Jump(_) => {}
     }
@@ -82,5 +88,9 @@ fn absurd_masks(width: usize, height: usize) -> Vec<InstanceMask> {
         pixels: PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 },
         mask: vec![1; width * height],
     };
-    vec![of(Class::Car, (width, height)), of(Class::Bus, (width, height)), of(Class::Person, (1, 1))]
+    vec![
+        of(Class::Car, (width, height)),
+        of(Class::Bus, (width, height)),
+        of(Class::Person, (1, 1)),
+    ]
 }

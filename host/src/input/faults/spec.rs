@@ -120,14 +120,17 @@ impl FromStr for Fault {
         if !(1..=100).contains(&percent) {
             return Err(format!("{text}: the chance must be 1 to 100 percent"));
         }
-        let (what, frames) = rest.split_once('@').map_or((rest, None), |(what, frames)| (what, Some(frames)));
+        let (what, frames) =
+            rest.split_once('@').map_or((rest, None), |(what, frames)| (what, Some(frames)));
         let (first, end) = frames.map_or(Ok((0, usize::MAX)), |frames| range(text, frames))?;
         Ok(Self { kind: kind(text, what)?, first, end, percent })
     }
 }
 
 fn number<T: FromStr>(whole: &str, text: &str) -> Result<T, String> {
-    text.parse().map_err(|_| format!("{whole}: {text} is not a number it can be. Faults are written {GRAMMAR}"))
+    text.parse().map_err(|_| {
+        format!("{whole}: {text} is not a number it can be. Faults are written {GRAMMAR}")
+    })
 }
 
 /// The frames `FIRST`, `FIRST..` or `FIRST..END`.
@@ -137,24 +140,36 @@ fn range(whole: &str, text: &str) -> Result<(usize, usize), String> {
         Some((first, "")) => (number(whole, first)?, usize::MAX),
         Some((first, end)) => (number(whole, first)?, number(whole, end)?),
     };
-    if first < end { Ok((first, end)) } else { Err(format!("{whole}: there is no frame from {first} to before {end}")) }
+    if first < end {
+        Ok((first, end))
+    } else {
+        Err(format!("{whole}: there is no frame from {first} to before {end}"))
+    }
 }
 
 fn kind(whole: &str, text: &str) -> Result<FaultKind, String> {
-    let (name, amount) = text.split_once('=').map_or((text, None), |(name, amount)| (name, Some(amount)));
+    let (name, amount) =
+        text.split_once('=').map_or((text, None), |(name, amount)| (name, Some(amount)));
     let (name, side) = match name.split_once(':') {
         None => (name, Side::Both),
         Some((name, "left")) => (name, Side::Left),
         Some((name, "right")) => (name, Side::Right),
-        Some((_, side)) => return Err(format!("{whole}: there is no camera {side}: left or right")),
+        Some((_, side)) => {
+            return Err(format!("{whole}: there is no camera {side}: left or right"));
+        }
     };
-    let one_sided = matches!(name, "freeze" | "delay" | "black" | "noise" | "occlude" | "brightness");
+    let one_sided =
+        matches!(name, "freeze" | "delay" | "black" | "noise" | "occlude" | "brightness");
     if side != Side::Both && !one_sided {
         return Err(format!("{whole}: {name} happens to both cameras"));
     }
     let amount = |least: f64, most: f64| {
         let value: f64 = number(whole, amount.unwrap_or_default())?;
-        if (least..=most).contains(&value) { Ok(value) } else { Err(format!("{whole}: the amount must be within {least} to {most}")) }
+        if (least..=most).contains(&value) {
+            Ok(value)
+        } else {
+            Err(format!("{whole}: the amount must be within {least} to {most}"))
+        }
     };
     Ok(match name {
         "drop" => FaultKind::Drop,
@@ -169,7 +184,9 @@ fn kind(whole: &str, text: &str) -> Result<FaultKind, String> {
         "occlude" => FaultKind::Occlude(side, amount(0.0, 1.0)?),
         "brightness" => FaultKind::Brightness(side, amount(0.0, 100.0)?),
         "masks" => FaultKind::Masks,
-        _ => return Err(format!("{whole}: there is no fault {name}. Faults are written {GRAMMAR}")),
+        _ => {
+            return Err(format!("{whole}: there is no fault {name}. Faults are written {GRAMMAR}"));
+        }
     })
 }
 

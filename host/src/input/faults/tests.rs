@@ -4,7 +4,8 @@ use crate::input::{FrameSource, StereoImages, StreetFrames};
 use crate::synth::StreetConfig;
 
 fn street() -> StreetFrames {
-    StreetFrames::new(StreetConfig { frames: 6, width: 160, height: 48, ..StreetConfig::default() }).unwrap()
+    StreetFrames::new(StreetConfig { frames: 6, width: 160, height: 48, ..StreetConfig::default() })
+        .unwrap()
 }
 
 fn faulty(spec: &str) -> FaultySource {
@@ -39,17 +40,26 @@ fn images_freeze_come_late_and_are_exchanged() {
 
 #[test]
 fn values_change_as_they_are_told_to_and_only_in_the_frames_named() {
-    let of = |spec: &str| frames(spec).into_iter().map(|(frame, clean)| (frame.left, clean.left, frame.right)).collect::<Vec<_>>();
+    let of = |spec: &str| {
+        frames(spec)
+            .into_iter()
+            .map(|(frame, clean)| (frame.left, clean.left, frame.right))
+            .collect::<Vec<_>>()
+    };
     let black = of("black@3");
     assert_eq!((&black[0].0, mean(&black[1].0), &black[2].0), (&black[0].1, 0.0, &black[2].1));
     let dark = of("brightness:left=0.5@2..");
     assert!((mean(&dark[0].0) / mean(&dark[0].1) - 0.5).abs() < 0.01);
     let noisy = of("noise=8@2..");
     let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
-    let variance = noisy[0].0.pixels().iter().zip(noisy[0].1.pixels()).map(square).sum::<f64>() / noisy[0].0.pixels().len() as f64;
+    let variance = noisy[0].0.pixels().iter().zip(noisy[0].1.pixels()).map(square).sum::<f64>()
+        / noisy[0].0.pixels().len() as f64;
     assert!((7.0..9.0).contains(&variance.sqrt()), "{}", variance.sqrt());
     let covered = &of("occlude=0.25@2..")[0].0;
-    assert!((0..40).all(|u| covered.get(u, 20) == Some(40)) && covered.get(40, 20) == noisy[0].1.get(40, 20));
+    assert!(
+        (0..40).all(|u| covered.get(u, 20) == Some(40))
+            && covered.get(40, 20) == noisy[0].1.get(40, 20)
+    );
     assert_eq!(frames("masks@2")[0].0.masks.instances.len(), 3);
 }
 

@@ -29,17 +29,20 @@ pub const SIDES: [[&str; 2]; 15] = [
 /// Folder in which some recordings keep a camera's images, below that of the camera.
 const INNER: [&str; 3] = ["data", "data_rect", "images"];
 
-/// The two folders of a stereo recording, by their names. One of the two is enough: the other is then missed by name.
+/// The two folders of a stereo recording, by their names. One of the two is enough: the other is
+/// then missed by name.
 pub fn side_folders(path: &Path) -> Option<[PathBuf; 2]> {
     let both = SIDES.map(|sides| sides.map(|side| path.join(side)));
     let whole = both.iter().find(|sides| sides.iter().all(|folder| folder.is_dir()));
     // A single letter or digit is no sign of a stereo recording unless both are there.
-    let half = || both.iter().take(SIDES.len() - 3).find(|sides| sides.iter().any(|folder| folder.is_dir()));
+    let half = || {
+        both.iter().take(SIDES.len() - 3).find(|sides| sides.iter().any(|folder| folder.is_dir()))
+    };
     whole.or_else(half).cloned()
 }
 
-/// The images of one camera's folder, in it or in `data` below it, with their times: by `data.csv`, by `timestamps.txt` or `times.txt`, by
-/// their names, in this order.
+/// The images of one camera's folder, in it or in `data` below it, with their times: by `data.csv`,
+/// by `timestamps.txt` or `times.txt`, by their names, in this order.
 ///
 /// # Errors
 /// There is no image, or a table of times cannot be read.
@@ -47,18 +50,22 @@ pub fn camera_in(folder: &Path) -> Result<CameraFiles, InputError> {
     let inner = INNER.iter().map(|inner| folder.join(inner)).find(|inner| inner.is_dir());
     let files = pictures_in(inner.as_deref().unwrap_or(folder))?;
     let table = |name: &str| Some(folder.join(name)).filter(|path| path.is_file());
-    let stamps_ns = match (table("data.csv"), table("timestamps.txt").or_else(|| table("times.txt"))) {
-        (Some(path), _) => stamps_by_name(&path, &files)?,
-        (None, Some(path)) => stamps_by_row(&read_times(&path)?, &files),
-        (None, None) => stamps_in_names(&files),
-    };
+    let stamps_ns =
+        match (table("data.csv"), table("timestamps.txt").or_else(|| table("times.txt"))) {
+            (Some(path), _) => stamps_by_name(&path, &files)?,
+            (None, Some(path)) => stamps_by_row(&read_times(&path)?, &files),
+            (None, None) => stamps_in_names(&files),
+        };
     Ok(CameraFiles { files, stamps_ns })
 }
 
 fn stamps_by_name(table: &Path, files: &[PathBuf]) -> Result<Option<Vec<u64>>, InputError> {
-    let rows: BTreeMap<String, u64> =
-        read_stamped_names(table)?.into_iter().map(|(stamp, name)| (stem_of(Path::new(&name)), stamp)).collect();
-    let stamps: Option<Vec<u64>> = files.iter().map(|path| rows.get(&stem_of(path)).copied()).collect();
+    let rows: BTreeMap<String, u64> = read_stamped_names(table)?
+        .into_iter()
+        .map(|(stamp, name)| (stem_of(Path::new(&name)), stamp))
+        .collect();
+    let stamps: Option<Vec<u64>> =
+        files.iter().map(|path| rows.get(&stem_of(path)).copied()).collect();
     Ok(stamps.filter(|stamps| stamps.is_sorted_by(|a, b| a < b)))
 }
 
@@ -70,8 +77,8 @@ fn stamps_by_row(rows: &[u64], files: &[PathBuf]) -> Option<Vec<u64>> {
     files.iter().map(|path| rows.get(stem_of(path).parse::<usize>().ok()?).copied()).collect()
 }
 
-/// Splits the images of one folder by a prefix or suffix that names the camera: `left_0008`, `0008_right`, `cam0-0008`. `None` where not every
-/// name has one.
+/// Splits the images of one folder by a prefix or suffix that names the camera: `left_0008`,
+/// `0008_right`, `cam0-0008`. `None` where not every name has one.
 pub fn split_by_mark(files: &[PathBuf]) -> Option<[Vec<PathBuf>; 2]> {
     let separated = |rest: &str, at_end: bool| {
         let next = if at_end { rest.chars().next_back() } else { rest.chars().next() };
@@ -81,11 +88,20 @@ pub fn split_by_mark(files: &[PathBuf]) -> Option<[Vec<PathBuf>; 2]> {
         let rest = if suffix { stem.strip_suffix(mark) } else { stem.strip_prefix(mark) };
         rest.is_some_and(|rest| separated(rest, suffix))
     };
-    for ([left, right], suffix) in SIDES.into_iter().flat_map(|sides| [(sides, false), (sides, true)]) {
-        let side = |mark: &str| files.iter().filter(|path| has(&stem_of(path), mark, suffix)).cloned().collect::<Vec<_>>();
+    for ([left, right], suffix) in
+        SIDES.into_iter().flat_map(|sides| [(sides, false), (sides, true)])
+    {
+        let side = |mark: &str| {
+            files
+                .iter()
+                .filter(|path| has(&stem_of(path), mark, suffix))
+                .cloned()
+                .collect::<Vec<_>>()
+        };
         let sides = [side(left), side(right)];
         // One of each could as well be two frames that are numbered 0 and 1.
-        if sides.iter().all(|side| side.len() > 1) && sides[0].len() + sides[1].len() == files.len() {
+        if sides.iter().all(|side| side.len() > 1) && sides[0].len() + sides[1].len() == files.len()
+        {
             return Some(sides);
         }
     }

@@ -1,4 +1,5 @@
-//! EuRoC's layout, which TUM VI shares: `mav0/cam0/data`, `mav0/cam1/data`, and `data.csv` with the time stamp of each image.
+//! EuRoC's layout, which TUM VI shares: `mav0/cam0/data`, `mav0/cam1/data`, and `data.csv` with the
+//! time stamp of each image.
 
 use super::OpenOptions;
 use super::camera_folders::camera_in;
@@ -12,15 +13,23 @@ const SENSORS: &str = "mav0";
 
 /// Opens the recording. `path` is its root or `mav0` in it.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
-    let sensors = sensors_of(path).ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
+    let sensors = sensors_of(path)
+        .ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let action = "A recording of EuRoC or TUM VI has mav0/cam0 and mav0/cam1: fetch the other half";
-    let cameras = [camera_in(&present(sensors.join("cam0"), action)?)?, camera_in(&present(sensors.join("cam1"), action)?)?];
-    // The recordings are raw, with a calibration of each camera; a calib.txt says that they were rectified since.
-    let rectified = [sensors.join("calib.txt"), path.join("calib.txt")].into_iter().find(|file| file.is_file());
+    let cameras = [
+        camera_in(&present(sensors.join("cam0"), action)?)?,
+        camera_in(&present(sensors.join("cam1"), action)?)?,
+    ];
+    // The recordings are raw, with a calibration of each camera; a calib.txt says that they were
+    // rectified since.
+    let rectified =
+        [sensors.join("calib.txt"), path.join("calib.txt")].into_iter().find(|file| file.is_file());
     let cameras_from = match (options.calibration.is_empty(), rectified) {
         (false, _) => options.calibration.clone(),
         (true, Some(file)) => vec![file],
-        (true, None) => beside(&sensors).ok_or_else(|| InputError::Unrectified { path: path.to_path_buf() })?,
+        (true, None) => {
+            beside(&sensors).ok_or_else(|| InputError::Unrectified { path: path.to_path_buf() })?
+        }
     };
     let root = sensors.parent().filter(|root| *root != Path::new("")).unwrap_or(&sensors);
     Sequence::from_parts(Parts {

@@ -1,5 +1,5 @@
-//! Any two folders of images, one folder with prefixes or suffixes, or images that hold both cameras; beside them `calib.txt`, and if known
-//! `times.txt` and `poses.txt`.
+//! Any two folders of images, one folder with prefixes or suffixes, or images that hold both
+//! cameras; beside them `calib.txt`, and if known `times.txt` and `poses.txt`.
 
 use super::OpenOptions;
 use super::camera_folders::{camera_in, side_folders, split_by_mark};
@@ -15,15 +15,18 @@ use std::path::{Path, PathBuf};
 /// How far a principal point lies from the middle of an image at most, as a share of its side.
 const CENTRAL: f64 = 0.2;
 
-/// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see [`calibration::read_rig`]); without it a calibration of
-/// raw images is looked for ([`beside`]).
+/// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see
+/// [`calibration::read_rig`]); without it a calibration of raw images is looked for ([`beside`]).
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
     let cameras = match (options.calibration.as_slice(), file("calib.txt"), beside(path)) {
         ([], None, Some(own)) => CameraGeometry::read(&own, None)?,
-        ([], ..) => CameraGeometry::Rectified(calibration::read_rig(&present(path.join("calib.txt"), action)?)?),
+        ([], ..) => CameraGeometry::Rectified(calibration::read_rig(&present(
+            path.join("calib.txt"),
+            action,
+        )?)?),
         (given, ..) => CameraGeometry::read(given, None)?,
     };
     Sequence::from_parts(Parts {
@@ -32,8 +35,12 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         bits: options.bits,
         rectified: options.rectified,
         cameras,
-        times: file("times.txt").map(|file| read_times(&file).map(|times| (file, times))).transpose()?,
-        poses: file("poses.txt").map(|file| read_poses(&file).map(|read| (file, read.poses))).transpose()?,
+        times: file("times.txt")
+            .map(|file| read_times(&file).map(|times| (file, times)))
+            .transpose()?,
+        poses: file("poses.txt")
+            .map(|file| read_poses(&file).map(|read| (file, read.poses)))
+            .transpose()?,
         numbered: false,
         notes: Vec::new(),
         instances: path.join("instances"),
@@ -44,7 +51,10 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
 
 /// The name of a folder, also where `path` is relative.
 pub fn name_of(path: &Path) -> String {
-    path.canonicalize().ok().and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned())).unwrap_or("folder".into())
+    path.canonicalize()
+        .ok()
+        .and_then(|full| Some(full.file_name()?.to_string_lossy().into_owned()))
+        .unwrap_or("folder".into())
 }
 
 /// Whether the folder has this layout.
@@ -54,7 +64,8 @@ pub fn is_stereo_folder(path: &Path) -> bool {
 
 /// How the images lie there, as `inspect` says it.
 pub fn describe(path: &Path) -> String {
-    let name = |folder: &PathBuf| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name =
+        |folder: &PathBuf| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     match side_folders(path) {
         Some([left, right]) => format!("two folders, {} and {}", name(&left), name(&right)),
         None if pictures_in(path).is_ok_and(|files| split_by_mark(&files).is_some()) => {
@@ -64,26 +75,39 @@ pub fn describe(path: &Path) -> String {
     }
 }
 
-fn images(path: &Path, action: &str, stacking: Option<Stacking>, center_px: [f64; 2]) -> Result<ImageFiles, InputError> {
+fn images(
+    path: &Path,
+    action: &str,
+    stacking: Option<Stacking>,
+    center_px: [f64; 2],
+) -> Result<ImageFiles, InputError> {
     if let Some([left, right]) = side_folders(path) {
-        return Ok(ImageFiles::Cameras([camera_in(&present(left, action)?)?, camera_in(&present(right, action)?)?]));
+        return Ok(ImageFiles::Cameras([
+            camera_in(&present(left, action)?)?,
+            camera_in(&present(right, action)?)?,
+        ]));
     }
     let files = pictures_in(path)?;
     if stacking.is_none()
         && let Some(sides) = split_by_mark(&files)
     {
-        return Ok(ImageFiles::Cameras(sides.map(|files| CameraFiles { stamps_ns: stamps_in_names(&files), files })));
+        return Ok(ImageFiles::Cameras(
+            sides.map(|files| CameraFiles { stamps_ns: stamps_in_names(&files), files }),
+        ));
     }
     let stacking = match (stacking, files.first()) {
         (Some(stacking), _) => Some(stacking),
-        (None, Some(first)) => told_stacking(picture_size(first).map_err(InputError::image)?, center_px),
+        (None, Some(first)) => {
+            told_stacking(picture_size(first).map_err(InputError::image)?, center_px)
+        }
         (None, None) => None,
     };
     let stacking = stacking.ok_or_else(|| InputError::OneCamera { path: path.to_path_buf() })?;
     Ok(ImageFiles::Stacked(camera_files(path)?, stacking))
 }
 
-/// Two images lie in one where the calibration's principal point is near the middle of a half, and not of the whole.
+/// Two images lie in one where the calibration's principal point is near the middle of a half, and
+/// not of the whole.
 fn told_stacking(size: (usize, usize), [center_u_px, center_v_px]: [f64; 2]) -> Option<Stacking> {
     let central = |(width, height): (usize, usize)| {
         let off = |center_px: f64, side: usize| (center_px / side as f64 - 0.5).abs();

@@ -14,14 +14,19 @@ use std::path::{Path, PathBuf};
 /// Time between two frames of the tracking benchmark, s.
 const LABELS_INTERVAL_S: f64 = 0.1;
 
-/// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the `sequences` folder or one sequence.
+/// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the
+/// `sequences` folder or one sequence.
 pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let folder = odometry_folder(path, options.sequence.as_deref())?;
-    let number = folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let calibration =
-        KittiCalibration::read(&present(folder.join("calib.txt"), "Every sequence needs its calib.txt: copy it from the benchmark")?)?;
+    let number =
+        folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let calibration = KittiCalibration::read(&present(
+        folder.join("calib.txt"),
+        "Every sequence needs its calib.txt: copy it from the benchmark",
+    )?)?;
     // A street written through a lens brings the calibration of its raw images.
-    let own = Some(folder.join("calibration.toml")).filter(|file| file.is_file() && options.calibration.is_empty());
+    let own = Some(folder.join("calibration.toml"))
+        .filter(|file| file.is_file() && options.calibration.is_empty());
     let options = &OpenOptions {
         calibration: own.map_or_else(|| options.calibration.clone(), |file| vec![file]),
         ..options.clone()
@@ -51,10 +56,15 @@ pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
     let times = folder.join("times.txt");
     let times = if times.is_file() { Some((times.clone(), read_times(&times)?)) } else { None };
     let poses = match odometry_poses(&folder, &number) {
-        // The benchmark's poses are those of camera 0; the colour camera sees the same motion from its own place.
+        // The benchmark's poses are those of camera 0; the colour camera sees the same motion from
+        // its own place.
         Some(path) => {
             let t_camera_zero = Transform::from_translation(calibration.offset_m(left)?.into());
-            let poses = read_poses(&path)?.poses.iter().map(|pose| t_camera_zero * pose * t_camera_zero.inverse()).collect();
+            let poses = read_poses(&path)?
+                .poses
+                .iter()
+                .map(|pose| t_camera_zero * pose * t_camera_zero.inverse())
+                .collect();
             Some((path, poses))
         }
         None => None,
@@ -75,21 +85,31 @@ pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
     })
 }
 
-/// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing` folder.
+/// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing`
+/// folder.
 pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
-    let split = tracking_split(path).ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
+    let split = tracking_split(path)
+        .ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let names = tracking_sequences(&split)?;
     let name = chosen(path, options.sequence.as_deref(), &names)?;
     let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
-    let calibration =
-        KittiCalibration::read(&present(split.join("calib").join(format!("{name}.txt")), "Fetch the benchmark's calibration files")?)?;
+    let calibration = KittiCalibration::read(&present(
+        split.join("calib").join(format!("{name}.txt")),
+        "Fetch the benchmark's calibration files",
+    )?)?;
     let poses = split.join("poses").join(format!("{name}.txt"));
     let labels = split.join("label_02").join(format!("{name}.txt"));
     // Labels have a scale of their own: poses on it are preferred.
     let scaled = split.join("poses").join(format!("{name}.scaled.txt"));
-    let labels_poses = [&scaled, &poses].into_iter().find(|path| path.is_file() && labels.is_file());
+    let labels_poses =
+        [&scaled, &poses].into_iter().find(|path| path.is_file() && labels.is_file());
     let objects = match labels_poses {
-        Some(path) => labels::read_labels(&labels, &read_poses(path)?.poses, calibration.offset_m(2)?, LABELS_INTERVAL_S)?,
+        Some(path) => labels::read_labels(
+            &labels,
+            &read_poses(path)?.poses,
+            calibration.offset_m(2)?,
+            LABELS_INTERVAL_S,
+        )?,
         None => Vec::new(),
     };
     Sequence::from_parts(Parts {
@@ -101,7 +121,11 @@ pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
         rectified: options.rectified,
         cameras: options.cameras_or(|| calibration.rig(2, 3))?,
         times: None,
-        poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?.poses)) } else { None },
+        poses: if poses.is_file() {
+            Some((poses.clone(), read_poses(&poses)?.poses))
+        } else {
+            None
+        },
         numbered: true,
         notes: Vec::new(),
         instances: split.join("instances").join(&name),
@@ -123,16 +147,20 @@ pub fn odometry_root(path: &Path) -> Option<PathBuf> {
 
 /// Whether the folder is one sequence of the odometry benchmark.
 pub fn is_odometry_sequence(path: &Path) -> bool {
-    path.join("calib.txt").is_file() && ["image_0", "image_2"].iter().any(|camera| path.join(camera).is_dir())
+    path.join("calib.txt").is_file()
+        && ["image_0", "image_2"].iter().any(|camera| path.join(camera).is_dir())
 }
 
 /// The split (`training`, `testing`) of a tracking root, if it is one.
 pub fn tracking_split(path: &Path) -> Option<PathBuf> {
     let is_split = |folder: &Path| {
-        // Images directly below image_02 would be another layout: here each sequence has a folder of its own.
+        // Images directly below image_02 would be another layout: here each sequence has a folder
+        // of its own.
         folder.join("image_02").is_dir() && pictures_in(&folder.join("image_02")).is_err()
     };
-    [path.to_path_buf(), path.join("training"), path.join("testing")].into_iter().find(|folder| is_split(folder))
+    [path.to_path_buf(), path.join("training"), path.join("testing")]
+        .into_iter()
+        .find(|folder| is_split(folder))
 }
 
 /// Names of the sequences in a folder of folders.
@@ -157,7 +185,9 @@ fn odometry_folder(path: &Path, sequence: Option<&str>) -> Result<PathBuf, Input
     if let Some(root) = odometry_root(path) {
         return Ok(root.join(chosen(path, sequence, &sequences(&root)?)?));
     }
-    if let Some(wanted) = sequence.filter(|wanted| path.file_name().is_none_or(|name| name.to_string_lossy() != **wanted)) {
+    if let Some(wanted) = sequence
+        .filter(|wanted| path.file_name().is_none_or(|name| name.to_string_lossy() != **wanted))
+    {
         let known = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         return Err(InputError::Sequence {
             sequence: wanted.to_owned(),
@@ -170,7 +200,8 @@ fn odometry_folder(path: &Path, sequence: Option<&str>) -> Result<PathBuf, Input
 
 /// `poses/NN.txt` beside `sequences`, or `poses.txt` within the sequence.
 fn odometry_poses(folder: &Path, number: &str) -> Option<PathBuf> {
-    let beside = folder.parent()?.parent().map(|root| root.join("poses").join(format!("{number}.txt")));
+    let beside =
+        folder.parent()?.parent().map(|root| root.join("poses").join(format!("{number}.txt")));
     beside.into_iter().chain([folder.join("poses.txt")]).find(|path| path.is_file())
 }
 
@@ -181,7 +212,11 @@ pub fn chosen(root: &Path, wanted: Option<&str>, names: &[String]) -> Result<Str
         (Some(wanted), _) if names.iter().any(|name| name == wanted) => Ok(wanted.to_owned()),
         (Some(wanted), _) => {
             let known = if known.is_empty() { "none".to_owned() } else { known };
-            Err(InputError::Sequence { sequence: wanted.to_owned(), root: root.to_path_buf(), known })
+            Err(InputError::Sequence {
+                sequence: wanted.to_owned(),
+                root: root.to_path_buf(),
+                known,
+            })
         }
         (None, [only]) => Ok(only.clone()),
         (None, []) => Err(InputError::Layout { path: root.to_path_buf(), below: Vec::new() }),

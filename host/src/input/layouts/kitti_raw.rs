@@ -1,4 +1,5 @@
-//! KITTI's raw drives and KITTI-360: a folder a drive with `image_00` and `image_01`, their `timestamps.txt`, and one calibration for all.
+//! KITTI's raw drives and KITTI-360: a folder a drive with `image_00` and `image_01`, their
+//! `timestamps.txt`, and one calibration for all.
 
 use super::camera_folders::camera_in;
 use super::folder::name_of;
@@ -12,36 +13,57 @@ use std::path::{Path, PathBuf};
 /// Folder of all drives of KITTI-360.
 const DRIVES_360: &str = "data_2d_raw";
 
-/// Opens a drive of KITTI raw. `path` is the drive (`2011_09_26_drive_0001_sync`) or the day with its calibration.
+/// Opens a drive of KITTI raw. `path` is the drive (`2011_09_26_drive_0001_sync`) or the day with
+/// its calibration.
 pub fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
-    let drive = if is_drive(path) { path.to_path_buf() } else { path.join(chosen(path, options.sequence.as_deref(), &drives(path)?)?) };
+    let drive = if is_drive(path) {
+        path.to_path_buf()
+    } else {
+        path.join(chosen(path, options.sequence.as_deref(), &drives(path)?)?)
+    };
     let calibration = [drive.join("calib_cam_to_cam.txt"), drive.join("../calib_cam_to_cam.txt")];
     let found = calibration.iter().find(|file| file.is_file()).unwrap_or(&calibration[1]);
     // What was only extracted is raw: the same file says how to rectify it.
     let extracted = name_of(&drive).ends_with("_extract") && options.calibration.is_empty();
-    let options = if extracted { &OpenOptions { calibration: vec![found.clone()], ..options.clone() } } else { options };
+    let options = if extracted {
+        &OpenOptions { calibration: vec![found.clone()], ..options.clone() }
+    } else {
+        options
+    };
     open_drive(&drive, found, "kitti-raw", options)
 }
 
 /// Opens a drive of KITTI-360. `path` is the root of the data set or one drive in `data_2d_raw`.
 pub fn open_360(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let (root, drive) = match drives_360(path) {
-        Some(drives) => (path.to_path_buf(), drives.join(chosen(path, options.sequence.as_deref(), &sequences(&drives)?)?)),
+        Some(drives) => (
+            path.to_path_buf(),
+            drives.join(chosen(path, options.sequence.as_deref(), &sequences(&drives)?)?),
+        ),
         None => (path.join("../.."), path.to_path_buf()),
     };
     open_drive(&drive, &root.join("calibration/perspective.txt"), "kitti-360", options)
 }
 
-fn open_drive(drive: &Path, calibration: &Path, prefix: &str, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open_drive(
+    drive: &Path,
+    calibration: &Path,
+    prefix: &str,
+    options: &OpenOptions,
+) -> Result<Sequence, InputError> {
     let has = |cameras: [&str; 2]| cameras.iter().all(|camera| drive.join(camera).is_dir());
     let (left, right) = match options.cameras {
         CameraPair::Grey => (0, 1),
         CameraPair::Colour => (2, 3),
-        CameraPair::Auto if !has(["image_00", "image_01"]) && has(["image_02", "image_03"]) => (2, 3),
+        CameraPair::Auto if !has(["image_00", "image_01"]) && has(["image_02", "image_03"]) => {
+            (2, 3)
+        }
         CameraPair::Auto => (0, 1),
     };
-    let action = "A drive has image_00 and image_01, or image_02 and image_03: fetch the other half";
-    let camera = |number: usize| camera_in(&present(drive.join(format!("image_{number:02}")), action)?);
+    let action =
+        "A drive has image_00 and image_01, or image_02 and image_03: fetch the other half";
+    let camera =
+        |number: usize| camera_in(&present(drive.join(format!("image_{number:02}")), action)?);
     let cameras = [camera(left)?, camera(right)?];
     let own = || KittiCalibration::read(calibration)?.rig(left, right);
     Sequence::from_parts(Parts {

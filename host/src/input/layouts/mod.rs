@@ -1,5 +1,5 @@
-//! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360, Cityscapes, EuRoC
-//! and TUM VI, any folders of images; and the synthetic street.
+//! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360,
+//! Cityscapes, EuRoC and TUM VI, any folders of images; and the synthetic street.
 
 mod camera_folders;
 mod cityscapes;

@@ -32,7 +32,8 @@ pub enum Layout {
     Euroc,
     /// ROS 2: an MCAP file, or the folder of a recording with one.
     Mcap,
-    /// Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`.
+    /// Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and
+    /// `calib.txt`.
     Folder,
 }
 
@@ -55,9 +56,15 @@ impl Layout {
     pub fn describe(self, path: &Path) -> String {
         match self {
             Self::KittiOdometry => "KITTI odometry: image_0 to image_3 of each sequence".to_owned(),
-            Self::KittiTracking => "KITTI tracking: image_02 and image_03 of each sequence".to_owned(),
-            Self::KittiRaw => "KITTI raw: image_00 to image_03 of each drive, times of timestamps.txt".to_owned(),
-            Self::Kitti360 => "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned(),
+            Self::KittiTracking => {
+                "KITTI tracking: image_02 and image_03 of each sequence".to_owned()
+            }
+            Self::KittiRaw => {
+                "KITTI raw: image_00 to image_03 of each drive, times of timestamps.txt".to_owned()
+            }
+            Self::Kitti360 => {
+                "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned()
+            }
             Self::Cityscapes => "Cityscapes: left and right images of each sequence".to_owned(),
             Self::Euroc => "EuRoC or TUM VI: mav0/cam0 and mav0/cam1, times of data.csv".to_owned(),
             Self::Mcap => "ROS 2: an MCAP file, stamps and calibration of its messages".to_owned(),
@@ -74,7 +81,10 @@ impl Layout {
             return Ok(Self::Mcap);
         }
         if let Some(action) = bags::conversion(path) {
-            return Err(InputError::bag(path, format!("it is a recording of ROS in another format than MCAP. {action}")));
+            return Err(InputError::bag(
+                path,
+                format!("it is a recording of ROS in another format than MCAP. {action}"),
+            ));
         }
         if path.is_file() {
             return Err(InputError::File { path: path.to_path_buf() });
@@ -85,7 +95,8 @@ impl Layout {
                 return InputError::Within { path: path.to_path_buf(), root: root.to_path_buf() };
             }
             let entries = path.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
-            let mut below: Vec<_> = entries.filter(|folder| Self::of(folder).is_some()).take(HINTS).collect();
+            let mut below: Vec<_> =
+                entries.filter(|folder| Self::of(folder).is_some()).take(HINTS).collect();
             below.sort();
             InputError::Layout { path: path.to_path_buf(), below }
         })
@@ -100,7 +111,9 @@ impl Layout {
             Some(Self::Euroc)
         } else if kitti_raw::drives_360(path).is_some() || kitti_raw::is_drive_360(path) {
             Some(Self::Kitti360)
-        } else if kitti_raw::is_drive(path) || kitti_raw::drives(path).is_ok_and(|drives| !drives.is_empty()) {
+        } else if kitti_raw::is_drive(path)
+            || kitti_raw::drives(path).is_ok_and(|drives| !drives.is_empty())
+        {
             Some(Self::KittiRaw)
         } else if kitti::tracking_split(path).is_some() {
             Some(Self::KittiTracking)
@@ -123,7 +136,8 @@ pub struct OpenOptions {
     pub bits: Option<u32>,
     /// How both images of a pair lie in one file; told from the calibration where it is not said.
     pub stacking: Option<Stacking>,
-    /// Topics of the left and the right camera in a recording of ROS; told by their names where they are not said.
+    /// Topics of the left and the right camera in a recording of ROS; told by their names where
+    /// they are not said.
     pub topics: Option<Topics>,
     /// Files of a calibration in place of the recording's own; none for that one.
     pub calibration: Vec<PathBuf>,
@@ -136,8 +150,15 @@ impl OpenOptions {
     ///
     /// # Errors
     /// Neither can be used.
-    pub fn cameras_or(&self, own: impl FnOnce() -> Result<StereoRig, FormatError>) -> Result<CameraGeometry, FormatError> {
-        if self.calibration.is_empty() { own().map(CameraGeometry::Rectified) } else { CameraGeometry::read(&self.calibration, None) }
+    pub fn cameras_or(
+        &self,
+        own: impl FnOnce() -> Result<StereoRig, FormatError>,
+    ) -> Result<CameraGeometry, FormatError> {
+        if self.calibration.is_empty() {
+            own().map(CameraGeometry::Rectified)
+        } else {
+            CameraGeometry::read(&self.calibration, None)
+        }
     }
 }
 
@@ -173,11 +194,16 @@ pub struct Found {
 /// The names of the sequences at `path`; empty where the path is one sequence itself.
 pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputError> {
     match layout {
-        Layout::KittiOdometry => kitti::odometry_root(path).map_or(Ok(Vec::new()), |root| kitti::sequences(&root)),
-        Layout::KittiTracking => kitti::tracking_split(path).map_or(Ok(Vec::new()), |split| kitti::tracking_sequences(&split)),
+        Layout::KittiOdometry => {
+            kitti::odometry_root(path).map_or(Ok(Vec::new()), |root| kitti::sequences(&root))
+        }
+        Layout::KittiTracking => kitti::tracking_split(path)
+            .map_or(Ok(Vec::new()), |split| kitti::tracking_sequences(&split)),
         Layout::KittiRaw if kitti_raw::is_drive(path) => Ok(Vec::new()),
         Layout::KittiRaw => kitti_raw::drives(path),
-        Layout::Kitti360 => kitti_raw::drives_360(path).map_or(Ok(Vec::new()), |drives| kitti::sequences(&drives)),
+        Layout::Kitti360 => {
+            kitti_raw::drives_360(path).map_or(Ok(Vec::new()), |drives| kitti::sequences(&drives))
+        }
         Layout::Cityscapes => cityscapes::names(path),
         Layout::Euroc | Layout::Mcap | Layout::Folder => Ok(Vec::new()),
     }
@@ -187,9 +213,14 @@ pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputErr
 pub fn survey(path: &Path, layout: Option<Layout>) -> Result<(Layout, Vec<Found>), InputError> {
     let layout = layout.map_or_else(|| Layout::guess(path), Ok)?;
     let names = sequences_at(path, layout)?;
-    let names: Vec<Option<String>> = if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };
+    let names: Vec<Option<String>> =
+        if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };
     let found = |sequence: Option<String>| {
-        let options = OpenOptions { layout: Some(layout), sequence: sequence.clone(), ..OpenOptions::default() };
+        let options = OpenOptions {
+            layout: Some(layout),
+            sequence: sequence.clone(),
+            ..OpenOptions::default()
+        };
         Found { opened: open(path, &options), sequence }
     };
     Ok((layout, names.into_iter().map(found).collect()))

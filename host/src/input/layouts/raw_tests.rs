@@ -12,11 +12,15 @@ use std::path::Path;
 /// Position in r1405 of the first raw frame.
 const FIRST: usize = 45;
 
-#[dynvox_needs::clips("kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", "kitti-odometry/sequences/r1405")]
+#[dynvox_needs::clips(
+    "kitti-raw/2011_09_26/2011_09_26_drive_1405_extract",
+    "kitti-odometry/sequences/r1405"
+)]
 #[test]
 fn kitti_raw_rectifies_to_the_pictures_opencv_makes_of_it() {
-    let [raw, rectified] = ["kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", "kitti-odometry/sequences/r1405"]
-        .map(|path| Path::new(dynvox_needs::data_folder!()).join(path));
+    let [raw, rectified] =
+        ["kitti-raw/2011_09_26/2011_09_26_drive_1405_extract", "kitti-odometry/sequences/r1405"]
+            .map(|path| Path::new(dynvox_needs::data_folder!()).join(path));
     let source = open(&raw, &OpenOptions::default()).unwrap();
     let rectification = *source.rectification().expect("the calibration is found by itself");
     assert_eq!((source.len(), source.size()), (36, (1242, 375)));
@@ -52,6 +56,9 @@ fn kitti_raw_rectifies_to_the_pictures_opencv_makes_of_it() {
     }
     let mean = sum as f64 / count as f64;
     let share = near as f64 / count as f64;
-    println!("mean absolute difference {mean:.4}, within 2 {:.4} %, largest {worst}", 100.0 * share);
+    println!(
+        "mean absolute difference {mean:.4}, within 2 {:.4} %, largest {worst}",
+        100.0 * share
+    );
     assert!(mean <= 0.5 && share >= 0.999, "mean {mean}, within 2 {share}");
 }

@@ -1,4 +1,5 @@
-//! A sequence of image files: stereo pairs with a rig, times and, where known, poses. Every layout on disk ends up here.
+//! A sequence of image files: stereo pairs with a rig, times and, where known, poses. Every layout
+//! on disk ends up here.
 
 use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
@@ -6,7 +7,10 @@ use super::pairing::{CameraFiles, Pairing};
 use super::stacked::Stacking;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
-use crate::input::source::{AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState, require_size};
+use crate::input::source::{
+    AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState,
+    require_size,
+};
 use crate::input::stream::ASSUMED_HZ;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
@@ -76,10 +80,12 @@ pub(super) struct Parts {
     pub cameras: CameraGeometry,
     /// How large raw pairs are rectified.
     pub rectified: RectifiedSize,
-    /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or `None` without a file.
+    /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or
+    /// `None` without a file.
     pub times: Option<(PathBuf, Vec<u64>)>,
     pub poses: Option<(PathBuf, Vec<Transform>)>,
-    /// Whether file names are frame numbers, as in KITTI: row `n` of the tables then belongs to file `n`.
+    /// Whether file names are frame numbers, as in KITTI: row `n` of the tables then belongs to
+    /// file `n`.
     pub numbered: bool,
     pub notes: Vec<String>,
     /// Folder of instance PNGs, there or not.
@@ -94,7 +100,9 @@ impl Sequence {
     pub(super) fn from_parts(parts: Parts) -> Result<Self, InputError> {
         let mut notes = parts.notes;
         let (pairs, stacking, left, positions) = paired(parts.images, &mut notes)?;
-        let first = &pairs.first().ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
+        let first = &pairs
+            .first()
+            .ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
         let size = picture_size(first).map_err(InputError::image)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
         let geometry = parts.cameras.fitted(image_size, &parts.rectified)?;
@@ -103,7 +111,9 @@ impl Sequence {
             Some(bits) => Some(bits),
             None => detected_bits(&pairs, &mut notes)?,
         };
-        let number = |&at: &usize| if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at };
+        let number = |&at: &usize| {
+            if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at }
+        };
         let numbers: Vec<usize> = positions.iter().map(number).collect();
         let stamps_ns = match parts.times {
             Some((path, times)) => Some(rows_of(&times, &numbers).ok_or_else(|| InputError::Table {
@@ -119,11 +129,20 @@ impl Sequence {
         let truth = parts.poses.and_then(|(path, poses)| {
             let found = rows_of(&poses, &numbers);
             if found.is_none() {
-                notes.push(format!("{} has only {} poses for {} images: not used", path.display(), poses.len(), numbers.len()));
+                notes.push(format!(
+                    "{} has only {} poses for {} images: not used",
+                    path.display(),
+                    poses.len(),
+                    numbers.len()
+                ));
             }
             found
         });
-        let masks = if parts.instances.is_dir() { AvailableMasks::Folder(parts.instances) } else { AvailableMasks::Absent };
+        let masks = if parts.instances.is_dir() {
+            AvailableMasks::Folder(parts.instances)
+        } else {
+            AvailableMasks::Absent
+        };
         let objects = numbers.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
         Ok(Self {
             name: parts.name,
@@ -144,7 +163,9 @@ impl Sequence {
 
     /// The two images of a pair, both of the sequence's size.
     fn images(&self, [left, right]: &[PathBuf; 2]) -> Result<[Decoded; 2], InputError> {
-        let read = |path: &Path| Ok::<_, InputError>(read_picture(path).map_err(InputError::image)?.to_8_bit(self.bits));
+        let read = |path: &Path| {
+            Ok::<_, InputError>(read_picture(path).map_err(InputError::image)?.to_8_bit(self.bits))
+        };
         let images = match self.stacking {
             None => [read(left)?, read(right)?],
             Some(stacking) => stacking.split(&read(left)?).ok_or_else(|| InputError::Image {
@@ -152,7 +173,9 @@ impl Sequence {
                 reason: format!("it cannot be cut into two equal images {}", stacking.name()),
             })?,
         };
-        require_size(&images, self.image_size, |side| if side == 0 { left.clone() } else { right.clone() })?;
+        require_size(&images, self.image_size, |side| {
+            if side == 0 { left.clone() } else { right.clone() }
+        })?;
         Ok(images)
     }
 }
@@ -169,7 +192,8 @@ fn raw_note(cameras: &CameraGeometry, geometry: &FittedGeometry) -> Option<Strin
     ))
 }
 
-/// The pairs, how two images lie in one file, the left camera's files, and the position of each pair's left image among them.
+/// The pairs, how two images lie in one file, the left camera's files, and the position of each
+/// pair's left image among them.
 type Paired = (Vec<[PathBuf; 2]>, Option<Stacking>, CameraFiles, Vec<usize>);
 
 fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputError> {
@@ -190,14 +214,22 @@ fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputEr
         }
     })?;
     notes.extend(pairing.note());
-    let pairs = pairing.pairs.iter().map(|&(l, r)| [left.files[l].clone(), right.files[r].clone()]).collect();
+    let pairs = pairing
+        .pairs
+        .iter()
+        .map(|&(l, r)| [left.files[l].clone(), right.files[r].clone()])
+        .collect();
     let positions = pairing.pairs.iter().map(|&(at, _)| at).collect();
     Ok((pairs, None, left, positions))
 }
 
-/// How many bits of 16-bit images are significant, from pictures spread over the sequence; `None` where the first is of 8 bit. A picture that
-/// cannot be read is passed over: it is refused when its turn comes.
-fn detected_bits(pairs: &[[PathBuf; 2]], notes: &mut Vec<String>) -> Result<Option<u32>, InputError> {
+/// How many bits of 16-bit images are significant, from pictures spread over the sequence; `None`
+/// where the first is of 8 bit. A picture that cannot be read is passed over: it is refused when
+/// its turn comes.
+fn detected_bits(
+    pairs: &[[PathBuf; 2]],
+    notes: &mut Vec<String>,
+) -> Result<Option<u32>, InputError> {
     let step = pairs.len().div_ceil(RANGE_PICTURES).max(1);
     let mut largest = None;
     for (at, [path, _]) in pairs.iter().step_by(step).enumerate() {
@@ -262,8 +294,13 @@ impl FrameSource for Sequence {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let pair = self.images(self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?)?;
-        Ok(StereoImages { objects: self.objects.get(index).cloned(), ..StereoImages::of_pair(pair) })
+        let pair = self.images(
+            self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?,
+        )?;
+        Ok(StereoImages {
+            objects: self.objects.get(index).cloned(),
+            ..StereoImages::of_pair(pair)
+        })
     }
 
     fn has_lidar(&self, index: usize) -> bool {
@@ -271,7 +308,9 @@ impl FrameSource for Sequence {
     }
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
-        let Some((lidar, stem)) = self.lidar.as_ref().zip(self.stem(index)) else { return Ok(None) };
+        let Some((lidar, stem)) = self.lidar.as_ref().zip(self.stem(index)) else {
+            return Ok(None);
+        };
         lidar.read(&stem)
     }
 

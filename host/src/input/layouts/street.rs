@@ -2,7 +2,8 @@
 
 use crate::formats::Image;
 use crate::input::source::{
-    AvailableMasks, ExactFrame, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState, TrueObject,
+    AvailableMasks, ExactFrame, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth,
+    StereoImages, StreamState, TrueObject,
 };
 use crate::synth::{Street, StreetConfig, SynthFrame};
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -21,7 +22,8 @@ impl StreetFrames {
     /// The street of a configuration, `frames` of it.
     pub fn new(config: StreetConfig) -> Result<Self, InputError> {
         let frames = config.frames;
-        let street = Street::new(config).map_err(|error| InputError::Street { reason: error.to_string() })?;
+        let street = Street::new(config)
+            .map_err(|error| InputError::Street { reason: error.to_string() })?;
         Ok(Self {
             truth: (0..frames).map(|index| street.t_world_camera(index)).collect(),
             frames: frames as usize,
@@ -66,7 +68,8 @@ impl FrameSource for StreetFrames {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let frame = self.street.frame(index as u32);
-        let ((width, height), [image_width, image_height]) = ((frame.width, frame.height), frame.image_size);
+        let ((width, height), [image_width, image_height]) =
+            ((frame.width, frame.height), frame.image_size);
         let failed = || InputError::Street { reason: format!("frame {index} has no pixels") };
         let moving = (0..frame.depth_m.len()).map(|pixel| frame.is_moving(pixel)).collect();
         let objects = objects_truth(&frame);
@@ -99,7 +102,8 @@ impl FrameSource for StreetFrames {
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
         let t_camera_lidar = self.street.t_camera_lidar();
-        let point = |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
+        let point =
+            |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
         let points_m = self.street.lidar(index as u32).iter().map(point).collect();
         Ok((index < self.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
     }
@@ -112,25 +116,28 @@ impl FrameSource for StreetFrames {
 /// The truth of a frame: the cars with a pixel in the left image.
 fn objects_truth(frame: &SynthFrame) -> ObjectsTruth {
     let mut boxes = vec![None::<[i32; 4]>; frame.objects.len()];
-    for (pixel, &instance) in frame.instances.iter().enumerate().filter(|(_, instance)| **instance > 0) {
+    for (pixel, &instance) in
+        frame.instances.iter().enumerate().filter(|(_, instance)| **instance > 0)
+    {
         let (u, v) = ((pixel % frame.width) as i32, (pixel / frame.width) as i32);
         if let Some(found) = boxes.get_mut(usize::from(instance) - 1) {
             let [l, t, r, b] = found.unwrap_or([u, v, u, v]);
             *found = Some([l.min(u), t.min(v), r.max(u), b.max(v)]);
         }
     }
-    let seen = frame.objects.iter().zip(boxes).zip(1..).filter_map(|((object, found), instance)| {
-        let [left, top, right, bottom] = found?;
-        Some(TrueObject {
-            id: object.id,
-            instance,
-            pixels: PixelBox { left, top, width: right - left + 1, height: bottom - top + 1 },
-            t_world_object: object.t_world_object,
-            dimensions_m: object.dimensions_m,
-            moving: object.moving,
-            speed_m_s: object.speed_m_s,
-        })
-    });
+    let seen =
+        frame.objects.iter().zip(boxes).zip(1..).filter_map(|((object, found), instance)| {
+            let [left, top, right, bottom] = found?;
+            Some(TrueObject {
+                id: object.id,
+                instance,
+                pixels: PixelBox { left, top, width: right - left + 1, height: bottom - top + 1 },
+                t_world_object: object.t_world_object,
+                dimensions_m: object.dimensions_m,
+                moving: object.moving,
+                speed_m_s: object.speed_m_s,
+            })
+        });
     ObjectsTruth {
         t_world_camera: frame.t_world_camera,
         objects: seen.collect(),

@@ -64,7 +64,10 @@ impl FromStr for MaskChoice {
             });
         };
         if kind == "noisy" {
-            return rest.parse().map(Self::Noisy).map_err(|_| format!("{rest} is not a seed: give a whole number"));
+            return rest
+                .parse()
+                .map(Self::Noisy)
+                .map_err(|_| format!("{rest} is not a seed: give a whole number"));
         }
         if rest.is_empty() {
             return Err(format!("{text} does not name a file or folder"));

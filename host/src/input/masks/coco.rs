@@ -1,5 +1,6 @@
-//! COCO JSON: a file of annotations (`images`, `annotations`, `categories`) or a list of results (`image_id`, `category_id`, `score`). An object has a
-//! `segmentation`, polygons or run lengths, or a `bbox` alone.
+//! COCO JSON: a file of annotations (`images`, `annotations`, `categories`) or a list of results
+//! (`image_id`, `category_id`, `score`). An object has a `segmentation`, polygons or run lengths,
+//! or a `bbox` alone.
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
 use super::shapes::{Polygons, around_runs, mask_of_runs};
@@ -81,39 +82,58 @@ impl Coco {
     /// Reads the file, and tells how many of the frames it names.
     pub fn open(path: &Path, frames: Frames) -> Result<(Self, usize), InputError> {
         let file = serde_json::from_str(&read_text(path)?).map_err(|error| {
-            let reason = format!("it is neither COCO's annotations nor a list of results ({error})");
+            let reason =
+                format!("it is neither COCO's annotations nor a list of results ({error})");
             InputError::masks_format(FormatError::content(path, reason, ""))
         })?;
         let (images, list, classes) = match file {
-            File::Annotations { images, annotations, categories } => {
-                (images, annotations, Some(categories.into_iter().map(|one| (one.id, class_of(&one.name))).collect()))
-            }
+            File::Annotations { images, annotations, categories } => (
+                images,
+                annotations,
+                Some(categories.into_iter().map(|one| (one.id, class_of(&one.name))).collect()),
+            ),
             File::Results(results) => (Vec::new(), results, None),
         };
-        let stems: HashMap<u64, String> = images.into_iter().map(|image| (image.id, stem(&image.file_name))).collect();
-        let numbers: HashMap<usize, &String> = (0..frames.stems.len()).map(|index| (frames.number(index), &frames.stems[index])).collect();
+        let stems: HashMap<u64, String> =
+            images.into_iter().map(|image| (image.id, stem(&image.file_name))).collect();
+        let numbers: HashMap<usize, &String> = (0..frames.stems.len())
+            .map(|index| (frames.number(index), &frames.stems[index]))
+            .collect();
         let mut objects = BTreeMap::<String, Vec<Object>>::new();
         for object in list {
             let image = match &object.image_id {
                 ImageId::Name(name) => Some(stem(name)),
-                ImageId::Number(id) if stems.is_empty() => numbers.get(&(*id as usize)).map(|stem| (*stem).clone()),
+                ImageId::Number(id) if stems.is_empty() => {
+                    numbers.get(&(*id as usize)).map(|stem| (*stem).clone())
+                }
                 ImageId::Number(id) => stems.get(id).cloned(),
             };
             objects.entry(image.unwrap_or_default()).or_default().push(object);
         }
         // An image without objects is one in which nothing is seen.
-        let there = frames.stems.iter().filter(|name| objects.contains_key(*name) || stems.values().any(|known| known == *name)).count();
+        let there = frames
+            .stems
+            .iter()
+            .filter(|name| {
+                objects.contains_key(*name) || stems.values().any(|known| known == *name)
+            })
+            .count();
         let there = if stems.is_empty() && there > 0 { frames.stems.len() } else { there };
         Ok((Self { path: path.to_path_buf(), frames, objects, classes }, there))
     }
 
     fn add(&self, object: &Object, found: &mut Detections) -> Result<(), String> {
         let id = object.category_id;
-        let class = self.classes.as_ref().map_or_else(|| coco_category(id), |classes| classes.get(&id).copied().flatten());
+        let class = self
+            .classes
+            .as_ref()
+            .map_or_else(|| coco_category(id), |classes| classes.get(&id).copied().flatten());
         found.masks.refusals.unknown_class += u32::from(class.is_none());
         let (class, score) = (class.unwrap_or_default(), object.score.unwrap_or(1.0));
         match (&object.segmentation, object.bbox) {
-            (Some(Segmentation::Runs { size, counts }), _) => self.add_runs(class, score, *size, counts, found)?,
+            (Some(Segmentation::Runs { size, counts }), _) => {
+                self.add_runs(class, score, *size, counts, found)?
+            }
             (Some(Segmentation::Polygons(polygons)), _) if !polygons.is_empty() => {
                 let corners = |polygon: &Vec<f64>| polygon.as_chunks::<2>().0.to_vec();
                 let polygons: Vec<Vec<[f64; 2]>> = polygons.iter().map(corners).collect();
@@ -123,27 +143,44 @@ impl Coco {
                 }
             }
             (_, Some([left, top, width, height])) => {
-                found.boxes.push(DetectedBox { class, score, edges: [left, top, left + width, top + height] });
+                found.boxes.push(DetectedBox {
+                    class,
+                    score,
+                    edges: [left, top, left + width, top + height],
+                });
             }
             _ => found.masks.refusals.empty += 1,
         }
         Ok(())
     }
 
-    fn add_runs(&self, class: Class, score: f32, size: [usize; 2], counts: &Counts, found: &mut Detections) -> Result<(), String> {
+    fn add_runs(
+        &self,
+        class: Class,
+        score: f32,
+        size: [usize; 2],
+        counts: &Counts,
+        found: &mut Detections,
+    ) -> Result<(), String> {
         let (width, height) = self.frames.size;
         if size != [height, width] {
             let [found_height, found_width] = size;
-            return Err(format!("a mask is {found_width} x {found_height} px, but the images are {width} x {height} px"));
+            return Err(format!(
+                "a mask is {found_width} x {found_height} px, but the images are {width} x {height} px"
+            ));
         }
         let runs = match counts {
             Counts::Text(text) => rle::runs(text, width, height)?,
             Counts::Numbers(counts) => rle::runs_of_counts(counts, width, height)?,
         };
-        let mask = |pixels| -> Option<InstanceMask> { Some(mask_of_runs(class, score, pixels, &runs, height)) };
+        let mask = |pixels| -> Option<InstanceMask> {
+            Some(mask_of_runs(class, score, pixels, &runs, height))
+        };
         match around_runs(&runs, height) {
             None => found.masks.push(None),
-            Some(pixels) if found.masks.reserve(pixels.area() as usize) => found.masks.push(mask(pixels)),
+            Some(pixels) if found.masks.reserve(pixels.area() as usize) => {
+                found.masks.push(mask(pixels))
+            }
             Some(_) => {}
         }
         Ok(())

@@ -1,5 +1,6 @@
-//! PNGs of instance numbers without a list, `STEM.png`, 8 or 16 bit: k is instance k of this frame, of no class, taken as a car. Or Cityscapes'
-//! `*_instanceIds.png`: `label * 1000 + k` an instance, numbers below 1000 are regions without instances.
+//! PNGs of instance numbers without a list, `STEM.png`, 8 or 16 bit: k is instance k of this frame,
+//! of no class, taken as a car. Or Cityscapes' `*_instanceIds.png`: `label * 1000 + k` an instance,
+//! numbers below 1000 are regions without instances.
 
 use super::{Frames, MaskSource, read_labels};
 use crate::input::source::{FrameMasks, InputError, StereoImages, bounding_boxes};
@@ -39,8 +40,14 @@ impl Ids {
     /// The file of a frame, and whether its numbers are Cityscapes'.
     fn file(&self, stem: &str) -> Option<(PathBuf, bool)> {
         let cityscapes = stem.strip_suffix("_leftImg8bit").unwrap_or(stem);
-        let names = [(format!("{stem}.png"), false), (format!("{cityscapes}_gtFine_instanceIds.png"), true)];
-        names.into_iter().map(|(name, named)| (self.folder.join(name), named)).find(|(path, _)| path.is_file())
+        let names = [
+            (format!("{stem}.png"), false),
+            (format!("{cityscapes}_gtFine_instanceIds.png"), true),
+        ];
+        names
+            .into_iter()
+            .map(|(name, named)| (self.folder.join(name), named))
+            .find(|(path, _)| path.is_file())
     }
 }
 
@@ -56,7 +63,9 @@ impl MaskSource for Ids {
             let class = match label / PER_LABEL {
                 0 if cityscapes => continue,
                 _ if !cityscapes => Some(Class::Car),
-                number => number.checked_sub(24).and_then(|at| CITYSCAPES.get(usize::from(at))).copied(),
+                number => {
+                    number.checked_sub(24).and_then(|at| CITYSCAPES.get(usize::from(at))).copied()
+                }
             };
             masks.refusals.unknown_class += u32::from(class.is_none());
             named.push((label, class.unwrap_or_default(), 1.0));

@@ -1,5 +1,6 @@
-//! Instance PNGs: `NNNNNN.png`, 8 or 16 bit grey, 0 nothing, k instance k of this frame; beside it `NNNNNN.txt`, one row an instance:
-//! `id class score x1 y1 x2 y2`. Lines that begin with `#` are comments. The box is read but that of the mask is used.
+//! Instance PNGs: `NNNNNN.png`, 8 or 16 bit grey, 0 nothing, k instance k of this frame; beside it
+//! `NNNNNN.txt`, one row an instance: `id class score x1 y1 x2 y2`. Lines that begin with `#` are
+//! comments. The box is read but that of the mask is used.
 
 use super::{Frames, MaskSource, class_of, read_labels, read_text};
 use crate::input::source::{FrameMasks, InputError, StereoImages, bounding_boxes};
@@ -29,11 +30,14 @@ impl MaskSource for Indexed {
         }
         let labels = read_labels(&path, self.frames.size)?;
         let list = self.folder.join(format!("{stem}.txt"));
-        let text = read_text(&list)?.ok_or_else(|| InputError::masks(&path, format!("its list {} is missing", list.display())))?;
+        let text = read_text(&list)?.ok_or_else(|| {
+            InputError::masks(&path, format!("its list {} is missing", list.display()))
+        })?;
         let mut masks = FrameMasks::default();
         let boxes = bounding_boxes(&labels);
         let rows = rows(&text, &mut masks).map_err(|reason| InputError::masks(&list, reason))?;
-        masks.refusals.unnamed = boxes.keys().filter(|label| rows.iter().all(|(id, ..)| id != *label)).count() as u32;
+        masks.refusals.unnamed =
+            boxes.keys().filter(|label| rows.iter().all(|(id, ..)| id != *label)).count() as u32;
         masks.extract(&labels, &boxes, rows);
         Ok(masks)
     }
@@ -42,8 +46,12 @@ impl MaskSource for Indexed {
 /// The rows of a list: id, class, score.
 fn rows(text: &str, masks: &mut FrameMasks) -> Result<Vec<(u16, Class, f32)>, String> {
     let mut rows: Vec<(u16, Class, f32)> = Vec::new();
-    for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.trim().is_empty() && !row.trim_start().starts_with('#')) {
-        let (id, name, score) = parse(row).ok_or_else(|| format!("line {line} is not `id class score x1 y1 x2 y2`"))?;
+    for (line, row) in (1..)
+        .zip(text.lines())
+        .filter(|(_, row)| !row.trim().is_empty() && !row.trim_start().starts_with('#'))
+    {
+        let (id, name, score) =
+            parse(row).ok_or_else(|| format!("line {line} is not `id class score x1 y1 x2 y2`"))?;
         if rows.iter().any(|(known, ..)| *known == id) {
             return Err(format!("line {line} names instance {id} a second time"));
         }

@@ -1,7 +1,8 @@
-//! Dumps of MNC (Dai, He, Sun, *Instance-aware semantic segmentation via multi-task network cascades*, CVPR 2016), as the original of this
-//! mapper reads them: for detection n of an image `<image file>.<nnnn>.result.txt` with `[x1 y1 x2 y2 _], score, class`, the box inclusive and
-//! the class 1 to 20 in PASCAL VOC's order, and `<image file>.<nnnn>.mask.txt`, a matrix of 0 and 1 as large as the box. The first number
-//! without a file ends the list.
+//! Dumps of MNC (Dai, He, Sun, *Instance-aware semantic segmentation via multi-task network
+//! cascades*, CVPR 2016), as the original of this mapper reads them: for detection n of an image
+//! `<image file>.<nnnn>.result.txt` with `[x1 y1 x2 y2 _], score, class`, the box inclusive and the
+//! class 1 to 20 in PASCAL VOC's order, and `<image file>.<nnnn>.mask.txt`, a matrix of 0 and 1 as
+//! large as the box. The first number without a file ends the list.
 
 use super::{Frames, MaskSource, read_text};
 use crate::input::source::{FrameMasks, InputError, InstanceMask, StereoImages};
@@ -42,7 +43,8 @@ pub(super) struct Mnc {
 impl Mnc {
     /// The folder, and how many of the frames it has detections for.
     pub fn open(folder: &Path, frames: Frames) -> (Self, usize) {
-        let there = frames.stems.iter().filter(|stem| file(folder, stem, 0, "result").is_file()).count();
+        let there =
+            frames.stems.iter().filter(|stem| file(folder, stem, 0, "result").is_file()).count();
         (Self { folder: folder.to_path_buf(), frames }, there)
     }
 }
@@ -58,11 +60,16 @@ impl MaskSource for Mnc {
         loop {
             let path = file(&self.folder, stem, results.len(), "result");
             let Some(text) = read_text(&path)? else { break };
-            let result = result(&text).ok_or_else(|| InputError::masks(&path, "it is not `[x1 y1 x2 y2 _], score, class`".to_owned()))?;
+            let result = result(&text).ok_or_else(|| {
+                InputError::masks(&path, "it is not `[x1 y1 x2 y2 _], score, class`".to_owned())
+            })?;
             let (width, height) = self.frames.size;
             let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
             if result.0.area() == 0 || result.0.intersection(&image) != result.0 {
-                return Err(InputError::masks(&path, format!("its box does not lie within the images of {width} x {height} px")));
+                return Err(InputError::masks(
+                    &path,
+                    format!("its box does not lie within the images of {width} x {height} px"),
+                ));
             }
             results.push((result, results.len()));
         }
@@ -74,13 +81,16 @@ impl MaskSource for Mnc {
                 continue;
             }
             let path = file(&self.folder, stem, number, "mask");
-            let text = read_text(&path)?.ok_or_else(|| InputError::masks(&path, "it is missing".to_owned()))?;
+            let text = read_text(&path)?
+                .ok_or_else(|| InputError::masks(&path, "it is missing".to_owned()))?;
             let mask = matrix(&text, &pixels).map_err(|reason| InputError::masks(&path, reason))?;
             let class = class.checked_sub(1).and_then(|at| VOC.get(at));
             masks.refusals.unknown_class += u32::from(class.is_none());
             let at = |u: i32, v: i32| ((v - pixels.top) * pixels.width + u - pixels.left) as usize;
             let class = class.copied().unwrap_or_default();
-            masks.push(InstanceMask::from_predicate(class, score, pixels, |u, v| mask.get(at(u, v)).is_some_and(|&pixel| pixel)));
+            masks.push(InstanceMask::from_predicate(class, score, pixels, |u, v| {
+                mask.get(at(u, v)).is_some_and(|&pixel| pixel)
+            }));
         }
         Ok(masks)
     }
@@ -89,9 +99,12 @@ impl MaskSource for Mnc {
 /// Box, score and class of a detection.
 fn result(text: &str) -> Option<(PixelBox, f32, usize)> {
     let (numbers, rest) = text.split_once('[')?.1.split_once(']')?;
-    let words = numbers.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
+    let words =
+        numbers.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
     // The list is of integers, but numpy may have written them as 12.0 or 12.
-    let numbers: Option<Vec<i32>> = words.map(|word| Some(word.parse::<f64>().ok().filter(|value| value.abs() < 1e6)? as i32)).collect();
+    let numbers: Option<Vec<i32>> = words
+        .map(|word| Some(word.parse::<f64>().ok().filter(|value| value.abs() < 1e6)? as i32))
+        .collect();
     let [left, top, right, bottom, _] = numbers?[..] else { return None };
     let mut words = rest.split(',').map(str::trim).filter(|word| !word.is_empty());
     let (score, class) = (words.next()?.parse().ok()?, words.next()?.parse::<f64>().ok()?);
@@ -105,13 +118,23 @@ fn matrix(text: &str, pixels: &PixelBox) -> Result<Vec<bool>, String> {
     for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.trim().is_empty()) {
         let before = mask.len();
         for word in row.split_whitespace() {
-            let value: f64 = word.parse().map_err(|_| format!("line {line} holds `{word}`, which is no number"))?;
+            let value: f64 = word
+                .parse()
+                .map_err(|_| format!("line {line} holds `{word}`, which is no number"))?;
             mask.push(value >= 0.5);
         }
         if mask.len() - before != pixels.width as usize {
-            return Err(format!("line {line} has {} columns, but its box is {} px wide", mask.len() - before, pixels.width));
+            return Err(format!(
+                "line {line} has {} columns, but its box is {} px wide",
+                mask.len() - before,
+                pixels.width
+            ));
         }
         rows += 1;
     }
-    if rows == pixels.height { Ok(mask) } else { Err(format!("it has {rows} rows, but its box is {} px high", pixels.height)) }
+    if rows == pixels.height {
+        Ok(mask)
+    } else {
+        Err(format!("it has {rows} rows, but its box is {} px high", pixels.height))
+    }
 }

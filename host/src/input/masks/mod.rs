@@ -1,12 +1,16 @@
-//! Where masks come from: instance PNGs with a list beside them or without, KITTI-MOTS, COCO, YOLO, MNC dumps, boxes, the synthetic street's own
-//! truth, the same with a detector's faults, or nowhere.
+//! Where masks come from: instance PNGs with a list beside them or without, KITTI-MOTS, COCO, YOLO,
+//! MNC dumps, boxes, the synthetic street's own truth, the same with a detector's faults, or
+//! nowhere.
 //!
-//! A source gives, frame by frame, owned [`crate::input::InstanceMask`]s, which the core takes as `Detection`s. Where a source says something that cannot be
-//! a mask (a file of another size, a line that is not a row) the run ends with a sentence; where it says too much or nothing usable (an
-//! instance without a row, an empty mask, an unknown class, more than the limits) that is counted in
+//! A source gives, frame by frame, owned [`crate::input::InstanceMask`]s, which the core takes as
+//! `Detection`s. Where a source says something that cannot be a mask (a file of another size, a
+//! line that is not a row) the run ends with a sentence; where it says too much or nothing usable
+//! (an instance without a row, an empty mask, an unknown class, more than the limits) that is
+//! counted in
 //! [`crate::input::MaskRefusals`]. The core validates the scores.
 //!
-//! Memory: at most `MAX_MASKS` masks and `MAX_BYTES` bytes of them in a frame; masks beyond that are counted.
+//! Memory: at most `MAX_MASKS` masks and `MAX_BYTES` bytes of them in a frame; masks beyond that
+//! are counted.
 
 mod boxes;
 mod choice;
@@ -89,7 +93,11 @@ fn coco_class(index: usize) -> Option<Class> {
 fn read_labels(path: &Path, size: (usize, usize)) -> Result<Image<u16>, InputError> {
     let labels = read_png_u16(path).map_err(InputError::masks_format)?;
     let found = (labels.width(), labels.height());
-    if found == size { Ok(labels) } else { Err(InputError::masks_format(FormatError::other_size(path, found, size))) }
+    if found == size {
+        Ok(labels)
+    } else {
+        Err(InputError::masks_format(FormatError::other_size(path, found, size)))
+    }
 }
 
 /// A file's text, or `None` when there is no such file.

@@ -1,8 +1,10 @@
-//! KITTI-MOTS (Voigtlaender et al., *MOTS: Multi-Object Tracking and Segmentation*, CVPR 2019), as PNGs or as text.
+//! KITTI-MOTS (Voigtlaender et al., *MOTS: Multi-Object Tracking and Segmentation*, CVPR 2019), as
+//! PNGs or as text.
 //!
-//! A 16-bit PNG a frame: `class * 1000 + instance`, 0 nothing, 10000 a region to ignore. Or one text file a sequence, a row a
-//! mask: `frame id class height width runs`, with `id` as in the PNGs and [`crate::formats::rle`] for the runs. Class 1 is car, 2 pedestrian,
-//! 10 the region to ignore. There are no scores: all are 1. The tracks in the numbers are not used.
+//! A 16-bit PNG a frame: `class * 1000 + instance`, 0 nothing, 10000 a region to ignore. Or one
+//! text file a sequence, a row a mask: `frame id class height width runs`, with `id` as in the PNGs
+//! and [`crate::formats::rle`] for the runs. Class 1 is car, 2 pedestrian, 10 the region to ignore.
+//! There are no scores: all are 1. The tracks in the numbers are not used.
 
 use super::shapes::{around_runs, mask_of_runs};
 use super::{Frames, MaskSource, read_labels};
@@ -46,12 +48,15 @@ impl MotsPictures {
 impl MaskSource for MotsPictures {
     fn masks(&self, index: usize, _: &StereoImages) -> Result<FrameMasks, InputError> {
         let stem = self.frames.stems.get(index).map(|stem| self.folder.join(format!("{stem}.png")));
-        let Some(path) = stem.filter(|path| path.is_file()) else { return Ok(FrameMasks::missing()) };
+        let Some(path) = stem.filter(|path| path.is_file()) else {
+            return Ok(FrameMasks::missing());
+        };
         let labels = read_labels(&path, self.frames.size)?;
         let boxes = bounding_boxes(&labels);
         let mut masks = FrameMasks::default();
         let instances = boxes.keys().filter(|label| **label / PER_CLASS != IGNORE);
-        let named = instances.map(|&label| (label, class(label / PER_CLASS, &mut masks), 1.0)).collect();
+        let named =
+            instances.map(|&label| (label, class(label / PER_CLASS, &mut masks), 1.0)).collect();
         masks.extract(&labels, &boxes, named);
         Ok(masks)
     }
@@ -77,16 +82,26 @@ impl MotsText {
         let text = super::read_text(path)?.unwrap_or_default();
         let mut rows = BTreeMap::<usize, Vec<Row>>::new();
         for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.trim().is_empty()) {
-            let wrong = || InputError::masks(path, format!("line {line} is not `frame id class height width runs`"));
+            let wrong = || {
+                InputError::masks(
+                    path,
+                    format!("line {line} is not `frame id class height width runs`"),
+                )
+            };
             let words: Vec<&str> = row.split_whitespace().collect();
             let [frame, _, class, height, width, runs] = words[..] else { return Err(wrong()) };
-            let numbers: Option<Vec<usize>> = [frame, class, height, width].iter().map(|word| word.parse().ok()).collect();
-            let [frame, class, height, width] = numbers.ok_or_else(wrong)?[..] else { return Err(wrong()) };
+            let numbers: Option<Vec<usize>> =
+                [frame, class, height, width].iter().map(|word| word.parse().ok()).collect();
+            let [frame, class, height, width] = numbers.ok_or_else(wrong)?[..] else {
+                return Err(wrong());
+            };
             if (width, height) != frames.size {
                 let (w, h) = frames.size;
                 return Err(InputError::masks(
                     path,
-                    format!("the mask of line {line} is {width} x {height} px, but the images are {w} x {h} px"),
+                    format!(
+                        "the mask of line {line} is {width} x {height} px, but the images are {w} x {h} px"
+                    ),
                 ));
             }
             let class = u16::try_from(class).map_err(|_| wrong())?;
@@ -102,8 +117,9 @@ impl MaskSource for MotsText {
         let (width, height) = self.frames.size;
         let mut masks = FrameMasks::default();
         for row in self.rows.get(&number).into_iter().flatten().filter(|row| row.class != IGNORE) {
-            let runs = rle::runs(&row.runs, width, height)
-                .map_err(|reason| InputError::masks(&self.path, format!("line {}: {reason}", row.line)))?;
+            let runs = rle::runs(&row.runs, width, height).map_err(|reason| {
+                InputError::masks(&self.path, format!("line {}: {reason}", row.line))
+            })?;
             let class = class(row.class, &mut masks);
             let Some(pixels) = around_runs(&runs, height) else {
                 masks.refusals.empty += 1;

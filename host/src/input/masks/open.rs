@@ -3,9 +3,14 @@
 use super::boxes::{BoxFiles, BoxMasks, BoxTable, DetectionSource};
 #[cfg(feature = "onnx")]
 use super::network::Networks;
-use super::{Frames, MaskChoice, MaskSource, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures, mots::MotsText, noisy::Noisy};
+use super::{
+    Frames, MaskChoice, MaskSource, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures,
+    mots::MotsText, noisy::Noisy,
+};
 use super::{coco::Coco, ids::Ids, yolo::Yolo};
-use crate::input::source::{AvailableMasks, FrameMasks, FrameSource, InputError, Overlay, OverlaySource, StereoImages};
+use crate::input::source::{
+    AvailableMasks, FrameMasks, FrameSource, InputError, Overlay, OverlaySource, StereoImages,
+};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -13,8 +18,14 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// The source does not exist, has nothing for any frame, or does not fit the data set.
-pub fn attach(dataset: Box<dyn FrameSource>, choice: &MaskChoice, every: NonZeroUsize) -> Result<Box<dyn FrameSource>, InputError> {
-    let Some(OpenedSource { source, note, fits_scaled }) = open(dataset.as_ref(), choice)? else { return Ok(dataset) };
+pub fn attach(
+    dataset: Box<dyn FrameSource>,
+    choice: &MaskChoice,
+    every: NonZeroUsize,
+) -> Result<Box<dyn FrameSource>, InputError> {
+    let Some(OpenedSource { source, note, fits_scaled }) = open(dataset.as_ref(), choice)? else {
+        return Ok(dataset);
+    };
     let scale = dataset.size().0 as f64 / dataset.full_size().0 as f64;
     let shrink = (!fits_scaled && dataset.size() != dataset.full_size()).then_some(scale);
     Ok(Box::new(Overlay::new(dataset, MaskOverlay { source, shrink, every }, note)))
@@ -29,11 +40,18 @@ struct OpenedSource {
 }
 
 /// Opens the chosen source; `None` where there are no masks.
-fn open(dataset: &dyn FrameSource, choice: &MaskChoice) -> Result<Option<OpenedSource>, InputError> {
+fn open(
+    dataset: &dyn FrameSource,
+    choice: &MaskChoice,
+) -> Result<Option<OpenedSource>, InputError> {
     let opened = match choice {
         MaskChoice::None | MaskChoice::Motion => return Ok(None),
         MaskChoice::Exact => exact(dataset, Box::new(Exact), "exact masks")?,
-        MaskChoice::Noisy(seed) => exact(dataset, Box::new(Noisy { inner: Exact, seed: *seed }), "exact masks with a detector's faults")?,
+        MaskChoice::Noisy(seed) => exact(
+            dataset,
+            Box::new(Noisy { inner: Exact, seed: *seed }),
+            "exact masks with a detector's faults",
+        )?,
         MaskChoice::Auto => return Ok(available(dataset)),
         MaskChoice::Files(path)
         | MaskChoice::Mots(path)
@@ -48,9 +66,16 @@ fn open(dataset: &dyn FrameSource, choice: &MaskChoice) -> Result<Option<OpenedS
 }
 
 /// The synthetic street's own masks.
-fn exact(dataset: &dyn FrameSource, source: Box<dyn MaskSource>, note: &str) -> Result<OpenedSource, InputError> {
+fn exact(
+    dataset: &dyn FrameSource,
+    source: Box<dyn MaskSource>,
+    note: &str,
+) -> Result<OpenedSource, InputError> {
     if dataset.masks() != AvailableMasks::Exact {
-        return Err(InputError::masks(Path::new(dataset.name()), "only the synthetic street has exact masks".to_owned()));
+        return Err(InputError::masks(
+            Path::new(dataset.name()),
+            "only the synthetic street has exact masks".to_owned(),
+        ));
     }
     Ok(OpenedSource { source, note: note.to_owned(), fits_scaled: true })
 }
@@ -64,18 +89,26 @@ fn available(dataset: &dyn FrameSource) -> Option<OpenedSource> {
 }
 
 /// Masks, or boxes to make masks of, from files.
-fn given(dataset: &dyn FrameSource, choice: &MaskChoice, path: &Path) -> Result<OpenedSource, InputError> {
+fn given(
+    dataset: &dyn FrameSource,
+    choice: &MaskChoice,
+    path: &Path,
+) -> Result<OpenedSource, InputError> {
     if !path.exists() {
         return Err(InputError::masks(path, "there is no such file or folder".to_owned()));
     }
     let frames = frames(dataset);
-    let fits_scaled = matches!(choice, MaskChoice::Coco(_) | MaskChoice::Yolo(_) | MaskChoice::Boxes(_));
+    let fits_scaled =
+        matches!(choice, MaskChoice::Coco(_) | MaskChoice::Yolo(_) | MaskChoice::Boxes(_));
     let (source, there) = match choice {
-        MaskChoice::Mots(_) if path.is_file() => boxed((MotsText::open(path, frames)?, dataset.len())),
+        MaskChoice::Mots(_) if path.is_file() => {
+            boxed((MotsText::open(path, frames)?, dataset.len()))
+        }
         MaskChoice::Mots(_) => boxed(MotsPictures::open(path, frames)),
         MaskChoice::Mnc(_) => {
             let (dumps, there) = Mnc::open(path, frames);
-            // A frame without a dump is one in which nothing was found: only a folder without any is wrong.
+            // A frame without a dump is one in which nothing was found: only a folder without any
+            // is wrong.
             boxed((dumps, if there > 0 { dataset.len() } else { 0 }))
         }
         MaskChoice::Ids(_) => boxed(Ids::open(path, frames)),
@@ -84,13 +117,18 @@ fn given(dataset: &dyn FrameSource, choice: &MaskChoice, path: &Path) -> Result<
             let (yolo, there) = Yolo::open(path, frames)?;
             masked((yolo, if there > 0 { dataset.len() } else { 0 }), dataset)?
         }
-        MaskChoice::Boxes(_) if path.is_file() => masked((BoxTable::open(path, frames)?, dataset.len()), dataset)?,
+        MaskChoice::Boxes(_) if path.is_file() => {
+            masked((BoxTable::open(path, frames)?, dataset.len()), dataset)?
+        }
         MaskChoice::Boxes(_) => masked(BoxFiles::open(path, frames), dataset)?,
         _ => boxed(Indexed::open(path, frames)),
     };
     if there == 0 {
         let example = dataset.stem(0).unwrap_or_else(|| "000000".to_owned());
-        return Err(InputError::masks(path, format!("it has nothing for any frame; the first image is {example}.png")));
+        return Err(InputError::masks(
+            path,
+            format!("it has nothing for any frame; the first image is {example}.png"),
+        ));
     }
     Ok(OpenedSource { source, note: note(dataset, path, there), fits_scaled })
 }
@@ -100,19 +138,28 @@ fn given(dataset: &dyn FrameSource, choice: &MaskChoice, path: &Path) -> Result<
 fn networks(dataset: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, InputError> {
     let source = Box::new(BoxMasks::of_pictures(Networks::open(paths)?, dataset)?);
     let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-    Ok(OpenedSource { source, note: format!("masks of {}", names.join(" and ")), fits_scaled: true })
+    Ok(OpenedSource {
+        source,
+        note: format!("masks of {}", names.join(" and ")),
+        fits_scaled: true,
+    })
 }
 
 /// Networks in a program that was built without them.
 #[cfg(not(feature = "onnx"))]
 fn networks(_: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, InputError> {
     let path = paths.first().map_or_else(PathBuf::new, Clone::clone);
-    Err(InputError::network(&path, "this dynvox has no runtime for networks. Build it with one: `cargo build --release --features onnx`"))
+    Err(InputError::network(
+        &path,
+        "this dynvox has no runtime for networks. Build it with one: `cargo build --release --features onnx`",
+    ))
 }
 
 fn frames(dataset: &dyn FrameSource) -> Frames {
     Frames {
-        stems: (0..dataset.len()).map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}"))).collect(),
+        stems: (0..dataset.len())
+            .map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}")))
+            .collect(),
         size: dataset.full_size(),
     }
 }
@@ -120,7 +167,10 @@ fn frames(dataset: &dyn FrameSource) -> Frames {
 fn note(dataset: &dyn FrameSource, path: &Path, there: usize) -> String {
     match dataset.len() {
         all if all == there => format!("masks from {}", path.display()),
-        all => format!("masks from {} for {there} of {all} frames: in the others nothing is seen", path.display()),
+        all => format!(
+            "masks from {} for {there} of {all} frames: in the others nothing is seen",
+            path.display()
+        ),
     }
 }
 
@@ -147,7 +197,12 @@ struct MaskOverlay {
 }
 
 impl OverlaySource for MaskOverlay {
-    fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError> {
+    fn add(
+        &self,
+        dataset: &dyn FrameSource,
+        index: usize,
+        images: &mut StereoImages,
+    ) -> Result<(), InputError> {
         if !index.is_multiple_of(self.every.get()) {
             return Ok(());
         }

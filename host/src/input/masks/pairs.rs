@@ -11,18 +11,29 @@ pub type LabelPair = (String, [Image<u16>; 2]);
 /// The pictures of instances that two folders have under one name, by name.
 ///
 /// # Errors
-/// A folder cannot be read, or they share no picture. An item is an error where a picture cannot be read, or two differ in size.
+/// A folder cannot be read, or they share no picture. An item is an error where a picture cannot be
+/// read, or two differ in size.
 pub fn label_pairs<'f>(
     found: &'f Path,
     truth: &'f Path,
 ) -> Result<impl Iterator<Item = Result<LabelPair, InputError>> + use<'f>, InputError> {
-    let list = |folder: &Path| folder.read_dir().map_err(|source| InputError::masks(folder, format!("it cannot be read ({source})")));
+    let list = |folder: &Path| {
+        folder
+            .read_dir()
+            .map_err(|source| InputError::masks(folder, format!("it cannot be read ({source})")))
+    };
     let _ = list(truth)?;
-    let names = list(found)?.filter_map(Result::ok).filter_map(|entry| entry.file_name().into_string().ok());
-    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png") && truth.join(name).is_file()).collect();
+    let names = list(found)?
+        .filter_map(Result::ok)
+        .filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> =
+        names.filter(|name| name.ends_with(".png") && truth.join(name).is_file()).collect();
     names.sort();
     if names.is_empty() {
-        return Err(InputError::masks(found, format!("it shares no picture's name with {}", truth.display())));
+        return Err(InputError::masks(
+            found,
+            format!("it shares no picture's name with {}", truth.display()),
+        ));
     }
     Ok(names.into_iter().map(move |name| {
         let found = read_png_u16(&found.join(&name)).map_err(InputError::masks_format)?;

@@ -5,11 +5,17 @@ use crate::input::source::{InputError, InstanceMask};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes the masks of a frame as `STEM.png` and `STEM.txt` into a folder. Where masks overlap, the higher score is on top.
+/// Writes the masks of a frame as `STEM.png` and `STEM.txt` into a folder. Where masks overlap, the
+/// higher score is on top.
 ///
 /// # Errors
 /// A file cannot be written, or there are more masks than a picture has values.
-pub fn save_masks(folder: &Path, stem: &str, size: (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
+pub fn save_masks(
+    folder: &Path,
+    stem: &str,
+    size: (usize, usize),
+    masks: &[InstanceMask],
+) -> Result<(), InputError> {
     let mut order: Vec<(u16, &InstanceMask)> = (1..).zip(masks).collect();
     order.sort_by(|(_, a), (_, b)| a.score.total_cmp(&b.score));
     save(folder, stem, size, masks, &order)
@@ -19,7 +25,12 @@ pub fn save_masks(folder: &Path, stem: &str, size: (usize, usize), masks: &[Inst
 ///
 /// # Errors
 /// As of [`save_masks`].
-pub fn save_masks_in_order(folder: &Path, stem: &str, size: (usize, usize), masks: &[InstanceMask]) -> Result<(), InputError> {
+pub fn save_masks_in_order(
+    folder: &Path,
+    stem: &str,
+    size: (usize, usize),
+    masks: &[InstanceMask],
+) -> Result<(), InputError> {
     save(folder, stem, size, masks, &(1..).zip(masks).collect::<Vec<_>>())
 }
 
@@ -32,14 +43,23 @@ fn save(
     order: &[(u16, &InstanceMask)],
 ) -> Result<(), InputError> {
     if order.len() < masks.len() {
-        return Err(InputError::masks(folder, format!("{} masks in a frame are more than a picture has values", masks.len())));
+        return Err(InputError::masks(
+            folder,
+            format!("{} masks in a frame are more than a picture has values", masks.len()),
+        ));
     }
     let mut labels = vec![0u16; width * height];
     for &(label, mask) in order {
-        let rows = (mask.pixels.top.max(0)..).take(mask.pixels.height.max(0) as usize).take_while(|v| (*v as usize) < height);
+        let rows = (mask.pixels.top.max(0)..)
+            .take(mask.pixels.height.max(0) as usize)
+            .take_while(|v| (*v as usize) < height);
         for v in rows {
-            let pixels = labels.get_mut(v as usize * width..(v as usize + 1) * width).unwrap_or_default();
-            let columns = (0..).zip(pixels).skip(mask.pixels.left.max(0) as usize).take(mask.pixels.width.max(0) as usize);
+            let pixels =
+                labels.get_mut(v as usize * width..(v as usize + 1) * width).unwrap_or_default();
+            let columns = (0..)
+                .zip(pixels)
+                .skip(mask.pixels.left.max(0) as usize)
+                .take(mask.pixels.width.max(0) as usize);
             columns.filter(|(u, _)| mask.contains(*u, v)).for_each(|(_, pixel)| *pixel = label);
         }
     }
@@ -48,13 +68,30 @@ fn save(
         let [left, top] = [mask.pixels.left, mask.pixels.top];
         let (right, bottom) = (left + mask.pixels.width, top + mask.pixels.height);
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "{label} {} {} {left}.0 {top}.0 {right}.0 {bottom}.0", mask.class.name(), mask.score);
+        let _ = writeln!(
+            list,
+            "{label} {} {} {left}.0 {top}.0 {right}.0 {bottom}.0",
+            mask.class.name(),
+            mask.score
+        );
     }
     let picture = folder.join(format!("{stem}.png"));
     let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_ne_bytes()).collect();
-    image::save_buffer(&picture, &bytes, width as u32, height as u32, image::ExtendedColorType::L16).map_err(|error| {
-        InputError::masks_format(FormatError::content(&picture, error.to_string(), "Free the disk or choose another folder"))
+    image::save_buffer(
+        &picture,
+        &bytes,
+        width as u32,
+        height as u32,
+        image::ExtendedColorType::L16,
+    )
+    .map_err(|error| {
+        InputError::masks_format(FormatError::content(
+            &picture,
+            error.to_string(),
+            "Free the disk or choose another folder",
+        ))
     })?;
     let list_path = folder.join(format!("{stem}.txt"));
-    std::fs::write(&list_path, list).map_err(|error| InputError::masks(&list_path, format!("it cannot be written ({error})")))
+    std::fs::write(&list_path, list)
+        .map_err(|error| InputError::masks(&list_path, format!("it cannot be written ({error})")))
 }

@@ -25,10 +25,16 @@ fn rig() -> TempDir {
     for side in ["left", "right"] {
         fs::create_dir_all(root.path().join(side)).unwrap();
         for frame in 0..2 {
-            ImageBuffer::from_pixel(WIDTH, HEIGHT, Luma([90u8])).save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap();
+            ImageBuffer::from_pixel(WIDTH, HEIGHT, Luma([90u8]))
+                .save(root.path().join(side).join(format!("{frame:06}.png")))
+                .unwrap();
         }
     }
-    fs::write(root.path().join("calib.txt"), "focal_px 90\ncenter_u_px 20\ncenter_v_px 18\nbaseline_m 0.5\n").unwrap();
+    fs::write(
+        root.path().join("calib.txt"),
+        "focal_px 90\ncenter_u_px 20\ncenter_v_px 18\nbaseline_m 0.5\n",
+    )
+    .unwrap();
     root
 }
 
@@ -38,7 +44,12 @@ fn pixels_of(k: i32) -> PixelBox {
 }
 
 fn labels(path: &Path, values: &[u16], deep: bool) {
-    let at = |u: u32, v: u32| (1..).zip(values).find(|(k, _)| pixels_of(*k).contains(u as i32, v as i32)).map_or(0, |(_, value)| *value);
+    let at = |u: u32, v: u32| {
+        (1..)
+            .zip(values)
+            .find(|(k, _)| pixels_of(*k).contains(u as i32, v as i32))
+            .map_or(0, |(_, value)| *value)
+    };
     if deep {
         ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([at(u, v)])).save(path).unwrap();
     } else {
@@ -74,15 +85,32 @@ fn a_list_names_the_instances_of_the_picture_best_first() {
         listed(&[1, 2, 3], "# id class score x1 y1 x2 y2\n1 car 0.4 0 0 9 9\n3 person 0.9 1.5 2 3 4\n2 traffic light 0.7 0 0 1 1\n")
             .unwrap();
     let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels)).collect();
-    assert_eq!(of, [(Class::Person, 0.9, pixels_of(3)), (Class::Other, 0.7, pixels_of(2)), (Class::Car, 0.4, pixels_of(1))]);
-    assert!(masks.instances.iter().all(|one| one.mask.len() == 18 && one.mask.iter().all(|&pixel| pixel == 1)));
+    assert_eq!(
+        of,
+        [
+            (Class::Person, 0.9, pixels_of(3)),
+            (Class::Other, 0.7, pixels_of(2)),
+            (Class::Car, 0.4, pixels_of(1))
+        ]
+    );
+    assert!(
+        masks
+            .instances
+            .iter()
+            .all(|one| one.mask.len() == 18 && one.mask.iter().all(|&pixel| pixel == 1))
+    );
     assert_eq!(masks.refusals, MaskRefusals::default());
 }
 
 #[test]
 fn what_cannot_be_used_of_a_list_is_counted() {
-    let masks = listed(&[1, 2, 3], "1 car 0.4 0 0 9 9\n2 hovercraft 0.5 0 0 1 1\n9 car 0.9 0 0 1 1\n").unwrap();
-    assert_eq!(masks.refusals, MaskRefusals { unnamed: 1, unknown_class: 1, empty: 1, ..MaskRefusals::default() });
+    let masks =
+        listed(&[1, 2, 3], "1 car 0.4 0 0 9 9\n2 hovercraft 0.5 0 0 1 1\n9 car 0.9 0 0 1 1\n")
+            .unwrap();
+    assert_eq!(
+        masks.refusals,
+        MaskRefusals { unnamed: 1, unknown_class: 1, empty: 1, ..MaskRefusals::default() }
+    );
     assert_eq!(
         masks.instances.iter().map(|one| one.class).collect::<Vec<_>>(),
         [Class::Other, Class::Car],
@@ -106,7 +134,12 @@ fn a_list_that_is_none_is_refused_with_its_line() {
         ("1 car 0.4 0 0 9 9\n1 bus 0.4 0 0 9 9\n", "a second time"),
     ] {
         let message = refusal_of(listed(&[1], list));
-        assert!(message.contains(reason) && message.contains("000000.txt") && message.contains("--instances"), "{message}");
+        assert!(
+            message.contains(reason)
+                && message.contains("000000.txt")
+                && message.contains("--instances"),
+            "{message}"
+        );
     }
 }
 
@@ -120,7 +153,10 @@ fn masks_of_another_size_without_a_list_or_in_colour_are_refused() {
     assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("its list"));
     fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
     ImageBuffer::from_pixel(WIDTH - 1, HEIGHT, Luma([1u8])).save(&png).unwrap();
-    assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("39 x 36 px, but the images are 40 x 36 px"));
+    assert!(
+        refusal_of(first(root.path(), &MaskChoice::Auto))
+            .contains("39 x 36 px, but the images are 40 x 36 px")
+    );
     ImageBuffer::from_pixel(WIDTH, HEIGHT, image::Rgb([1u8, 2, 3])).save(&png).unwrap();
     assert!(refusal_of(first(root.path(), &MaskChoice::Auto)).contains("colour image"));
     fs::write(&png, "no picture").unwrap();
@@ -135,16 +171,24 @@ fn a_frame_without_a_file_has_no_masks_and_an_empty_folder_is_refused_only_if_gi
     labels(&folder.join("000001.png"), &[1], false);
     fs::write(folder.join("000001.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
     let dataset = laid_over(root.path(), &MaskChoice::Auto).unwrap();
-    assert!(dataset.notes().iter().any(|note| note.contains("for 1 of 2 frames")), "{:?}", dataset.notes());
+    assert!(
+        dataset.notes().iter().any(|note| note.contains("for 1 of 2 frames")),
+        "{:?}",
+        dataset.notes()
+    );
     assert_eq!(dataset.frame(0).unwrap().masks.refusals.missing, 1);
     assert_eq!(dataset.frame(1).unwrap().masks.instances.len(), 1);
     let empty = TempDir::new().unwrap();
-    let asked = |path: &Path| refusal_of(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
+    let asked =
+        |path: &Path| refusal_of(laid_over(root.path(), &MaskChoice::Files(path.to_path_buf())));
     assert!(asked(empty.path()).contains("nothing for any frame; the first image is 000000.png"));
     assert!(asked(&empty.path().join("no")).contains("no such file or folder"));
     fs::remove_file(folder.join("000001.png")).unwrap();
     assert!(first(root.path(), &MaskChoice::Auto).unwrap().instances.is_empty());
-    assert!(refusal_of(laid_over(root.path(), &MaskChoice::Exact)).contains("only the synthetic street"));
+    assert!(
+        refusal_of(laid_over(root.path(), &MaskChoice::Exact))
+            .contains("only the synthetic street")
+    );
 }
 
 #[test]
@@ -155,11 +199,14 @@ fn scaled_images_have_scaled_masks() {
     let square = |u: u32, v: u32| (8..24).contains(&u) && (12..20).contains(&v);
     let picture = ImageBuffer::from_fn(80, 72, |u, v| Luma([u8::from(square(u, v))]));
     for side in ["left", "right"] {
-        (0..2).for_each(|frame| picture.save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap());
+        (0..2).for_each(|frame| {
+            picture.save(root.path().join(side).join(format!("{frame:06}.png"))).unwrap()
+        });
     }
     picture.save(folder.join("000000.png")).unwrap();
     fs::write(folder.join("000000.txt"), "1 car 0.5 0 0 1 1\n").unwrap();
-    let half = input::Scaled::new(input::open(root.path(), &OpenOptions::default()).unwrap(), 0.5).unwrap();
+    let half = input::Scaled::new(input::open(root.path(), &OpenOptions::default()).unwrap(), 0.5)
+        .unwrap();
     let masks = attach(Box::new(half), &MaskChoice::Auto, EVERY).unwrap().frame(0).unwrap().masks;
     assert_eq!(masks.instances.len(), 1);
     assert_eq!(masks.instances[0].pixels, PixelBox { left: 4, top: 6, width: 8, height: 4 });
@@ -172,7 +219,10 @@ fn mots_pictures_give_classes_and_leave_out_what_is_to_be_ignored() {
     labels(&folder.path().join("000000.png"), &[1005, 2001, 10_000, 7_000], true);
     let masks = first(root.path(), &MaskChoice::Mots(folder.path().to_path_buf())).unwrap();
     let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.pixels)).collect();
-    assert_eq!(of, [(Class::Car, pixels_of(1)), (Class::Person, pixels_of(2)), (Class::Other, pixels_of(4))]);
+    assert_eq!(
+        of,
+        [(Class::Car, pixels_of(1)), (Class::Person, pixels_of(2)), (Class::Other, pixels_of(4))]
+    );
     assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
 }
 
@@ -193,8 +243,15 @@ fn mots_text_gives_the_masks_that_were_written() {
     let (w, h) = (WIDTH as usize, HEIGHT as usize);
     let runs = rle::encoded(ring, w, h);
     let ignored = rle::encoded(|u, _| u < 3, w, h);
-    let masks = mots_text(&format!("0 1001 1 {h} {w} {runs}\n1 2001 2 {h} {w} {ignored}\n0 10000 10 {h} {w} {ignored}\n")).unwrap();
-    assert_eq!(masks.instances.len(), 1, "one of this frame; one is of the next, one to be ignored");
+    let masks = mots_text(&format!(
+        "0 1001 1 {h} {w} {runs}\n1 2001 2 {h} {w} {ignored}\n0 10000 10 {h} {w} {ignored}\n"
+    ))
+    .unwrap();
+    assert_eq!(
+        masks.instances.len(),
+        1,
+        "one of this frame; one is of the next, one to be ignored"
+    );
     let one = &masks.instances[0];
     assert_eq!((one.class, one.score), (Class::Car, 1.0));
     assert!((0..h).all(|v| (0..w).all(|u| one.contains(u as i32, v as i32) == ring(u, v))));
@@ -207,9 +264,11 @@ fn run_lengths_are_those_of_the_published_tools() {
     // The example of COCO's documentation: 6, 1, 40, 4, 5, 4, 5, 4, 21.
     assert_eq!(rle::runs("61X13mN000`0", 10, 9).unwrap(), [(6, 1), (47, 4), (56, 4), (65, 4)]);
     for (width, height) in [(1, 1), (7, 5), (200, 90)] {
-        let mask = |u: usize, v: usize| (u * 31 + v * 17) % 7 < 3 || (u / 9 + v / 5).is_multiple_of(2);
+        let mask =
+            |u: usize, v: usize| (u * 31 + v * 17) % 7 < 3 || (u / 9 + v / 5).is_multiple_of(2);
         let mut pixels = vec![false; width * height];
-        for (start, length) in rle::runs(&rle::encoded(mask, width, height), width, height).unwrap() {
+        for (start, length) in rle::runs(&rle::encoded(mask, width, height), width, height).unwrap()
+        {
             pixels[start..start + length].fill(true);
         }
         assert!((0..width).all(|u| (0..height).all(|v| pixels[u * height + v] == mask(u, v))));
@@ -232,7 +291,10 @@ fn mots_text_that_is_none_is_refused_with_its_line() {
         ("0 1001 1 36 40 O1\n".to_owned(), "below 0"),
     ] {
         let message = refusal_of(mots_text(&rows));
-        assert!(message.contains(reason) && message.contains("line 1") | message.contains("mots.txt"), "{rows}: {message}");
+        assert!(
+            message.contains(reason) && message.contains("line 1") | message.contains("mots.txt"),
+            "{rows}: {message}"
+        );
     }
     let empty = rle::encoded(|_, _| false, w, h);
     assert_eq!(mots_text(&format!("0 1001 1 {h} {w} {empty}\n")).unwrap().refusals.empty, 1);
@@ -273,14 +335,22 @@ fn mnc(results: &[(&str, &str)]) -> Result<FrameMasks, InputError> {
     first(root.path(), &MaskChoice::Mnc(folder))
 }
 
-const FULL: &str = "1.000000000000000000e+00 0.000000000000000000e+00 1.000000000000000000e+00\n1 1 1\n";
+const FULL: &str =
+    "1.000000000000000000e+00 0.000000000000000000e+00 1.000000000000000000e+00\n1 1 1\n";
 
 #[test]
 fn mnc_dumps_are_read_best_first_with_boxes_inclusive() {
-    let masks =
-        mnc(&[("[4 6 6 7 0], 0.61, 7", FULL), ("[10, 2, 12, 3, 1], 0.93, 15\n", "0 1 1\n0 1 1\n"), ("[1. 1. 3. 2. 0.],0.7,99", FULL)])
-            .unwrap();
-    let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels, one.mask.clone())).collect();
+    let masks = mnc(&[
+        ("[4 6 6 7 0], 0.61, 7", FULL),
+        ("[10, 2, 12, 3, 1], 0.93, 15\n", "0 1 1\n0 1 1\n"),
+        ("[1. 1. 3. 2. 0.],0.7,99", FULL),
+    ])
+    .unwrap();
+    let of: Vec<_> = masks
+        .instances
+        .iter()
+        .map(|one| (one.class, one.score, one.pixels, one.mask.clone()))
+        .collect();
     let pixels = |left, top, width, height| PixelBox { left, top, width, height };
     assert_eq!(
         of,
@@ -314,23 +384,38 @@ fn mnc_dumps_that_are_none_are_refused() {
 }
 
 fn street() -> Box<dyn FrameSource> {
-    Box::new(StreetFrames::new(StreetConfig { width: 320, height: 96, frames: 40, ..StreetConfig::default() }).unwrap())
+    Box::new(
+        StreetFrames::new(StreetConfig {
+            width: 320,
+            height: 96,
+            frames: 40,
+            ..StreetConfig::default()
+        })
+        .unwrap(),
+    )
 }
 
 #[test]
 fn the_street_knows_every_car_it_draws_parked_ones_too() {
     let given = |choice: &MaskChoice| attach(street(), choice, EVERY).unwrap().frame(20).unwrap();
-    assert!(given(&MaskChoice::Auto).masks.instances.is_empty(), "exact masks are given only to those who ask for them");
+    assert!(
+        given(&MaskChoice::Auto).masks.instances.is_empty(),
+        "exact masks are given only to those who ask for them"
+    );
     let frame = given(&MaskChoice::Exact);
     let truth = frame.objects.unwrap();
     assert_eq!(frame.masks.instances.len(), truth.objects.len());
-    assert!(truth.objects.iter().any(|object| object.moving) && truth.objects.iter().any(|object| !object.moving));
+    assert!(
+        truth.objects.iter().any(|object| object.moving)
+            && truth.objects.iter().any(|object| !object.moving)
+    );
     let mut boxes: Vec<PixelBox> = frame.masks.instances.iter().map(|one| one.pixels).collect();
     let mut expected: Vec<PixelBox> = truth.objects.iter().map(|object| object.pixels).collect();
     boxes.sort();
     expected.sort();
     assert_eq!(boxes, expected);
-    let pixels: usize = frame.masks.instances.iter().flat_map(|one| &one.mask).filter(|&&pixel| pixel == 1).count();
+    let pixels: usize =
+        frame.masks.instances.iter().flat_map(|one| &one.mask).filter(|&&pixel| pixel == 1).count();
     assert_eq!(pixels, frame.exact.unwrap().instances.pixels().iter().filter(|&&k| k > 0).count());
 }
 
@@ -342,29 +427,48 @@ fn noise_is_a_detectors_and_the_same_again_for_the_same_seed() {
     let noisy = noisy(3);
     let (mut missed, mut false_ones, mut ragged, mut differs) = (0i64, 0, 0, 0);
     for index in (0..40).step_by(2) {
-        let [a, b, c, d] = [&noisy, &again, &other, &exact].map(|dataset| dataset.frame(index).unwrap().masks);
+        let [a, b, c, d] =
+            [&noisy, &again, &other, &exact].map(|dataset| dataset.frame(index).unwrap().masks);
         assert_eq!(a, b);
         differs += u32::from(a != c);
         missed += d.instances.len() as i64 - a.instances.len() as i64;
-        let overlap = |one: &InstanceMask| d.instances.iter().map(|other| other.pixels.overlap(&one.pixels)).fold(0.0, f32::max);
+        let overlap = |one: &InstanceMask| {
+            d.instances.iter().map(|other| other.pixels.overlap(&one.pixels)).fold(0.0, f32::max)
+        };
         false_ones += a.instances.iter().filter(|one| overlap(one) < 0.1).count();
-        ragged += a.instances.iter().filter(|one| d.instances.iter().all(|other| other.mask != one.mask)).count();
+        ragged += a
+            .instances
+            .iter()
+            .filter(|one| d.instances.iter().all(|other| other.mask != one.mask))
+            .count();
         assert!(a.instances.iter().all(|one| (0.3..1.0).contains(&one.score)));
     }
-    assert!(missed > 0 && false_ones > 0 && ragged > 10 && differs > 10, "{missed} {false_ones} {ragged} {differs}");
+    assert!(
+        missed > 0 && false_ones > 0 && ragged > 10 && differs > 10,
+        "{missed} {false_ones} {ragged} {differs}"
+    );
 }
 
 #[test]
 fn sources_are_named_on_the_command_line() {
     let choice = |text: &str| text.parse::<MaskChoice>();
     assert_eq!(choice("files:a/b"), Ok(MaskChoice::Files(PathBuf::from("a/b"))));
-    assert_eq!((choice("noisy"), choice("noisy:7")), (Ok(MaskChoice::Noisy(1)), Ok(MaskChoice::Noisy(7))));
-    assert_eq!(choice("onnx:a,b"), Ok(MaskChoice::Networks(vec![PathBuf::from("a"), PathBuf::from("b")])));
+    assert_eq!(
+        (choice("noisy"), choice("noisy:7")),
+        (Ok(MaskChoice::Noisy(1)), Ok(MaskChoice::Noisy(7)))
+    );
+    assert_eq!(
+        choice("onnx:a,b"),
+        Ok(MaskChoice::Networks(vec![PathBuf::from("a"), PathBuf::from("b")]))
+    );
     for wrong in ["", "files", "files:", "onnx:", "other:a", "noisy:x", "AUTO"] {
         assert!(choice(wrong).is_err(), "{wrong}");
     }
     let finds_motion = |text: &str| choice(text).unwrap().finds_motion();
-    assert_eq!(["auto", "motion", "none", "files:a", "exact"].map(finds_motion), [Some(true), Some(true), Some(false), None, None]);
+    assert_eq!(
+        ["auto", "motion", "none", "files:a", "exact"].map(finds_motion),
+        [Some(true), Some(true), Some(false), None, None]
+    );
 }
 
 #[dynvox_needs::clips(
@@ -376,12 +480,26 @@ fn sources_are_named_on_the_command_line() {
 #[test]
 fn masks_of_the_real_clips_are_read_whole() {
     let data = Path::new(dynvox_needs::data_folder!());
-    let clips = [("kitti-odometry", "06"), ("kitti-odometry", "r1405"), ("kitti-tracking", "0003"), ("kitti-tracking", "0005")];
+    let clips = [
+        ("kitti-odometry", "06"),
+        ("kitti-odometry", "r1405"),
+        ("kitti-tracking", "0003"),
+        ("kitti-tracking", "0005"),
+    ];
     for (root, sequence) in clips {
-        let clip = input::open(&data.join(root), &OpenOptions { sequence: Some(sequence.into()), ..OpenOptions::default() }).unwrap();
+        let clip = input::open(
+            &data.join(root),
+            &OpenOptions { sequence: Some(sequence.into()), ..OpenOptions::default() },
+        )
+        .unwrap();
         let clip = attach(clip, &MaskChoice::Auto, EVERY).unwrap();
-        let frames: Vec<FrameMasks> = [0, clip.len() / 2, clip.len() - 1].iter().map(|&at| clip.frame(at).unwrap().masks).collect();
+        let frames: Vec<FrameMasks> = [0, clip.len() / 2, clip.len() - 1]
+            .iter()
+            .map(|&at| clip.frame(at).unwrap().masks)
+            .collect();
         assert!(frames.iter().all(|masks| masks.instances.len() > 1 && masks.refusals == MaskRefusals::default()), "{root} {sequence}");
-        assert!(frames.iter().flat_map(|masks| &masks.instances).any(|one| one.class == Class::Car));
+        assert!(
+            frames.iter().flat_map(|masks| &masks.instances).any(|one| one.class == Class::Car)
+        );
     }
 }

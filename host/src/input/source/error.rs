@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum InputError {
     /// The path does not exist.
-    #[error("there is no data set at {path}. Check the path; `dynvox run` without one maps the synthetic street")]
+    #[error(
+        "there is no data set at {path}. Check the path; `dynvox run` without one maps the synthetic street"
+    )]
     Absent {
         /// Path as given.
         path: PathBuf,
@@ -33,7 +35,9 @@ pub enum InputError {
         path: PathBuf,
     },
     /// A folder inside a data set.
-    #[error("{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what it holds")]
+    #[error(
+        "{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what it holds"
+    )]
     Within {
         /// Folder looked at.
         path: PathBuf,
@@ -49,7 +53,9 @@ pub enum InputError {
         action: String,
     },
     /// The sequence does not exist.
-    #[error("there is no sequence {sequence} in {root}. It holds {known}; choose one with --sequence")]
+    #[error(
+        "there is no sequence {sequence} in {root}. It holds {known}; choose one with --sequence"
+    )]
     Sequence {
         /// Name asked for.
         sequence: String,
@@ -120,7 +126,9 @@ pub enum InputError {
         height: usize,
     },
     /// An image that cannot be decoded.
-    #[error("{path} cannot be read: {reason}. Fetch or convert this image anew, or leave such frames out with --skip-bad-frames")]
+    #[error(
+        "{path} cannot be read: {reason}. Fetch or convert this image anew, or leave such frames out with --skip-bad-frames"
+    )]
     Image {
         /// The image.
         path: PathBuf,
@@ -141,7 +149,9 @@ pub enum InputError {
     #[error(transparent)]
     Format(#[from] FormatError),
     /// Masks that cannot be used.
-    #[error("the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or run without: --instances none")]
+    #[error(
+        "the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or run without: --instances none"
+    )]
     Masks {
         /// The file or folder.
         path: PathBuf,
@@ -157,7 +167,9 @@ pub enum InputError {
         reason: String,
     },
     /// Depth that cannot be used.
-    #[error("the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas")]
+    #[error(
+        "the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas"
+    )]
     Depth {
         /// The file or folder.
         path: PathBuf,
@@ -189,7 +201,9 @@ pub enum InputError {
         frames: usize,
     },
     /// The synthetic street refuses its configuration.
-    #[error("the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>")]
+    #[error(
+        "the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>"
+    )]
     Street {
         /// What is wrong.
         reason: String,
@@ -213,7 +227,11 @@ pub enum InputError {
 /// Where to look instead.
 fn hint(below: &[PathBuf]) -> String {
     let shown: Vec<String> = below.iter().map(|path| path.display().to_string()).collect();
-    if shown.is_empty() { String::new() } else { format!(". Below it, these look like data sets: {}", shown.join(", ")) }
+    if shown.is_empty() {
+        String::new()
+    } else {
+        format!(". Below it, these look like data sets: {}", shown.join(", "))
+    }
 }
 
 /// A failed read of a folder.

@@ -8,31 +8,55 @@ use std::path::Path;
 /// A pose this far in time from a frame is not its own, s.
 const NEAR_S: f64 = 0.02;
 
-/// Reads `t_world_camera` of each of the chosen frames. KITTI's lines are numbered as the images are, or count from the first frame where
-/// there is one for each; TUM's belong to the frame whose time they are nearest to.
+/// Reads `t_world_camera` of each of the chosen frames. KITTI's lines are numbered as the images
+/// are, or count from the first frame where there is one for each; TUM's belong to the frame whose
+/// time they are nearest to.
 ///
 /// # Errors
 /// The file cannot be read as poses, or a frame has no pose.
-pub fn read_given_poses(path: &Path, source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Transform>, InputError> {
+pub fn read_given_poses(
+    path: &Path,
+    source: &dyn FrameSource,
+    indices: &[usize],
+) -> Result<Vec<Transform>, InputError> {
     let Trajectory { times_s, poses } = read_poses(path)?;
-    let refuse = |reason: String| InputError::Table {
+    let refuse = |reason: String| {
+        InputError::Table {
         path: path.to_path_buf(),
         reason,
         action:
             "Give KITTI or TUM poses that cover every frame mapped, map fewer frames with --frames, or estimate them: --egomotion stereo"
                 .into(),
+    }
     };
-    let number =
-        |index: usize| source.stem(index).and_then(|stem| stem.parse().ok()).filter(|_| poses.len() != source.len()).unwrap_or(index);
+    let number = |index: usize| {
+        source
+            .stem(index)
+            .and_then(|stem| stem.parse().ok())
+            .filter(|_| poses.len() != source.len())
+            .unwrap_or(index)
+    };
     let find = |&index: &usize| {
         let Some(times_s) = &times_s else {
-            let missing = || refuse(format!("it has {} poses, but frame {} is to be mapped", poses.len(), number(index)));
+            let missing = || {
+                refuse(format!(
+                    "it has {} poses, but frame {} is to be mapped",
+                    poses.len(),
+                    number(index)
+                ))
+            };
             return poses.get(number(index)).copied().ok_or_else(missing);
         };
         let time_s = source.time_s(index);
         let apart = |(row_s, _): &(&f64, &Transform)| (*row_s - time_s).abs();
-        let nearest = times_s.iter().zip(&poses).min_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|row| apart(row) <= NEAR_S);
-        nearest.map(|(_, pose)| *pose).ok_or_else(|| refuse(format!("it has no pose within {NEAR_S} s of frame {index}, at {time_s} s")))
+        let nearest = times_s
+            .iter()
+            .zip(&poses)
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+            .filter(|row| apart(row) <= NEAR_S);
+        nearest.map(|(_, pose)| *pose).ok_or_else(|| {
+            refuse(format!("it has no pose within {NEAR_S} s of frame {index}, at {time_s} s"))
+        })
     };
     indices.iter().map(find).collect()
 }

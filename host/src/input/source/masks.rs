@@ -6,7 +6,8 @@ use dynvox_core::tracking::{Class, Detection};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Masks kept of one frame at most; the core takes fewer. Of more the lowest scores go, and are counted.
+/// Masks kept of one frame at most; the core takes fewer. Of more the lowest scores go, and are
+/// counted.
 pub const MAX_MASKS: usize = 1_000;
 /// Bytes of masks kept of one frame at most.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -40,12 +41,21 @@ impl InstanceMask {
 
     /// Whether the mask holds a pixel.
     pub fn contains(&self, u: i32, v: i32) -> bool {
-        let at = || (v - self.pixels.top) as usize * self.pixels.width as usize + (u - self.pixels.left) as usize;
+        let at = || {
+            (v - self.pixels.top) as usize * self.pixels.width as usize
+                + (u - self.pixels.left) as usize
+        };
         self.pixels.contains(u, v) && self.mask.get(at()).is_some_and(|&pixel| pixel != 0)
     }
 
-    /// The mask of the pixels within `within` for which `holds` is true, its box shrunk to what it fills; `None` when that is nothing.
-    pub fn from_predicate(class: Class, score: f32, within: PixelBox, holds: impl Fn(i32, i32) -> bool) -> Option<Self> {
+    /// The mask of the pixels within `within` for which `holds` is true, its box shrunk to what it
+    /// fills; `None` when that is nothing.
+    pub fn from_predicate(
+        class: Class,
+        score: f32,
+        within: PixelBox,
+        holds: impl Fn(i32, i32) -> bool,
+    ) -> Option<Self> {
         let mut filled: Option<[i32; 4]> = None;
         let mut mask = Vec::with_capacity(within.area() as usize);
         for v in within.top..within.top + within.height {
@@ -61,26 +71,34 @@ impl InstanceMask {
         let [left, top, right, bottom] = filled?;
         let pixels = PixelBox { left, top, width: right - left + 1, height: bottom - top + 1 };
         if pixels != within {
-            let rows = mask.chunks_exact(within.width as usize).skip((top - within.top) as usize).take(pixels.height as usize);
+            let rows = mask
+                .chunks_exact(within.width as usize)
+                .skip((top - within.top) as usize)
+                .take(pixels.height as usize);
             let columns = (left - within.left) as usize..(right + 1 - within.left) as usize;
             mask = rows.flat_map(|row| &row[columns.clone()]).copied().collect();
         }
         Some(Self { class, score, pixels, mask })
     }
 
-    /// The same in an image scaled by `scale` to `size`: the pixel in the middle of each covered area decides.
+    /// The same in an image scaled by `scale` to `size`: the pixel in the middle of each covered
+    /// area decides.
     pub fn scaled(&self, scale: f64, size: (usize, usize)) -> Option<Self> {
         let image = PixelBox { left: 0, top: 0, width: size.0 as i32, height: size.1 as i32 };
         let from = |at: i32| (f64::from(at) * scale).floor() as i32 - 1;
         let side = |side: i32| (f64::from(side) * scale).ceil() as i32 + 3;
         let PixelBox { left, top, width, height } = self.pixels;
-        let around = PixelBox { left: from(left), top: from(top), width: side(width), height: side(height) };
+        let around =
+            PixelBox { left: from(left), top: from(top), width: side(width), height: side(height) };
         let middle = |at: i32| ((f64::from(at) + 0.5) / scale) as i32;
-        Self::from_predicate(self.class, self.score, around.intersection(&image), |u, v| self.contains(middle(u), middle(v)))
+        Self::from_predicate(self.class, self.score, around.intersection(&image), |u, v| {
+            self.contains(middle(u), middle(v))
+        })
     }
 }
 
-/// What a source said and could not be used, or not as it was said. Nothing is dropped without being counted.
+/// What a source said and could not be used, or not as it was said. Nothing is dropped without
+/// being counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MaskRefusals {
     /// Frames without a file of masks: nothing is seen in them.
@@ -140,7 +158,8 @@ impl FrameMasks {
 
     /// Whether a mask of so many bytes fits within the limits; if not it is counted.
     pub fn reserve(&mut self, bytes: usize) -> bool {
-        let fits = self.instances.len() < MAX_MASKS && self.bytes.saturating_add(bytes) <= MAX_BYTES;
+        let fits =
+            self.instances.len() < MAX_MASKS && self.bytes.saturating_add(bytes) <= MAX_BYTES;
         self.refusals.beyond += u32::from(!fits);
         fits
     }
@@ -157,7 +176,12 @@ impl FrameMasks {
     }
 
     /// Takes the instances out of an image of labels, best first.
-    pub fn extract(&mut self, labels: &Image<u16>, boxes: &BTreeMap<u16, PixelBox>, mut named: Vec<(u16, Class, f32)>) {
+    pub fn extract(
+        &mut self,
+        labels: &Image<u16>,
+        boxes: &BTreeMap<u16, PixelBox>,
+        mut named: Vec<(u16, Class, f32)>,
+    ) {
         named.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
         for (label, class, score) in named {
             let Some(pixels) = boxes.get(&label) else {
@@ -165,7 +189,9 @@ impl FrameMasks {
                 continue;
             };
             if self.reserve(pixels.area() as usize) {
-                self.push(InstanceMask::from_predicate(class, score, *pixels, |u, v| labels.get(u as usize, v as usize) == Some(label)));
+                self.push(InstanceMask::from_predicate(class, score, *pixels, |u, v| {
+                    labels.get(u as usize, v as usize) == Some(label)
+                }));
             }
         }
     }
@@ -192,6 +218,7 @@ pub fn bounding_boxes(labels: &Image<u16>) -> BTreeMap<u16, PixelBox> {
 /// The box around two.
 pub fn union(a: &PixelBox, b: &PixelBox) -> PixelBox {
     let (left, top) = (a.left.min(b.left), a.top.min(b.top));
-    let (right, bottom) = ((a.left + a.width).max(b.left + b.width), (a.top + a.height).max(b.top + b.height));
+    let (right, bottom) =
+        ((a.left + a.width).max(b.left + b.width), (a.top + a.height).max(b.top + b.height));
     PixelBox { left, top, width: right - left, height: bottom - top }
 }

@@ -14,7 +14,9 @@ pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
 pub use error::{InputError, read_failed};
 pub use given_poses::read_given_poses;
 pub use lidar::LidarScan;
-pub use masks::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union};
+pub use masks::{
+    FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union,
+};
 pub use overlay::{Overlay, OverlaySource};
 pub use scaled::Scaled;
 pub use stop::StopRequest;
@@ -68,7 +70,13 @@ pub(super) fn require_size(
     for (side, image) in pair.iter().enumerate() {
         let (found_width, found_height) = (image.grey.width(), image.grey.height());
         if (found_width, found_height) != (width, height) {
-            return Err(InputError::Size { path: path(side), found_width, found_height, width, height });
+            return Err(InputError::Size {
+                path: path(side),
+                found_width,
+                found_height,
+                width,
+                height,
+            });
         }
     }
     Ok(())
@@ -118,19 +126,22 @@ pub trait FrameSource: Send + Sync {
         self.len() == 0 && self.stream().is_none()
     }
 
-    /// What is known of a stream: frames come once, in order, and their number shows only when asking for one beyond the last is answered by
+    /// What is known of a stream: frames come once, in order, and their number shows only when
+    /// asking for one beyond the last is answered by
     /// [`InputError::PastEnd`]. `None` for a recording. Without a default, so that no source laid over a stream hides it.
     fn stream(&self) -> Option<StreamState>;
 
     /// Width and height of every image as it is mapped, px.
     fn size(&self) -> (usize, usize);
 
-    /// The same of the images as they are stored, before any scaling: masks in files have this size.
+    /// The same of the images as they are stored, before any scaling: masks in files have this
+    /// size.
     fn full_size(&self) -> (usize, usize) {
         self.size()
     }
 
-    /// Name of a frame's left image without its ending, where it is a file: masks in files have the same names.
+    /// Name of a frame's left image without its ending, where it is a file: masks in files have the
+    /// same names.
     fn stem(&self, _: usize) -> Option<String> {
         None
     }
@@ -143,8 +154,9 @@ pub trait FrameSource: Send + Sync {
     /// The rig, equal for all frames.
     fn rig(&self) -> StereoRig;
 
-    /// How the mapper is to rectify raw images; `None` where they come rectified. With one, [`FrameSource::size`] and [`FrameSource::rig`] are
-    /// those of the rectified pair, and a frame's images are raw. Without a default, so that no source laid over another loses it.
+    /// How the mapper is to rectify raw images; `None` where they come rectified. With one,
+    /// [`FrameSource::size`] and [`FrameSource::rig`] are those of the rectified pair, and a
+    /// frame's images are raw. Without a default, so that no source laid over another loses it.
     fn rectification(&self) -> Option<&Rectification>;
 
     /// When a frame was taken, ns since any moment that stays the same; `None` where nothing tells.
@@ -163,7 +175,8 @@ pub trait FrameSource: Send + Sync {
         self.masks() == AvailableMasks::Exact
     }
 
-    /// Whether there is a LiDAR scan for a frame. Without a default, so that no data set laid over another loses its scans.
+    /// Whether there is a LiDAR scan for a frame. Without a default, so that no data set laid over
+    /// another loses its scans.
     fn has_lidar(&self, index: usize) -> bool;
 
     /// The scan of a frame, where there is one. Nothing is read of it before.

@@ -10,7 +10,12 @@ pub trait OverlaySource: Send + Sync {
     ///
     /// # Errors
     /// What is to be added cannot be read.
-    fn add(&self, dataset: &dyn FrameSource, index: usize, images: &mut StereoImages) -> Result<(), InputError>;
+    fn add(
+        &self,
+        dataset: &dyn FrameSource,
+        index: usize,
+        images: &mut StereoImages,
+    ) -> Result<(), InputError>;
 }
 
 /// A data set whose frames get what `source` adds; everything else is the data set's own.

@@ -1,6 +1,10 @@
-//! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the rig shrinks with it.
+//! A data set at a smaller size: every pixel is the area average of the pixels it covers, and the
+//! rig shrinks with it.
 
-use super::{AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages, StreamState};
+use super::{
+    AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages,
+    StreamState,
+};
 use crate::formats::Image;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
@@ -36,8 +40,16 @@ impl Scaled {
             return Err(InputError::Scale { scale, width, height, least: LEAST_SIDE_PX });
         }
         let mut notes = inner.notes().to_vec();
-        notes.push(format!("images scaled from {width} x {height} to {} x {} px", side(width), side(height)));
-        let rectification = inner.rectification().map(|of| Rectification { width: side(width) as u32, height: side(height) as u32, ..*of });
+        notes.push(format!(
+            "images scaled from {width} x {height} to {} x {} px",
+            side(width),
+            side(height)
+        ));
+        let rectification = inner.rectification().map(|of| Rectification {
+            width: side(width) as u32,
+            height: side(height) as u32,
+            ..*of
+        });
         Ok(Self {
             rectification,
             columns: spans(side(width), width, scale),
@@ -57,12 +69,18 @@ impl Scaled {
                 for (sum, column) in sums.iter_mut().zip(&self.columns) {
                     let mut across = [0u32; N];
                     for (pixel, &share) in source.iter().skip(column.first).zip(&column.weights) {
-                        across.iter_mut().zip(pixel).for_each(|(total, &value)| *total += share * u32::from(value));
+                        across
+                            .iter_mut()
+                            .zip(pixel)
+                            .for_each(|(total, &value)| *total += share * u32::from(value));
                     }
                     sum.iter_mut().zip(across).for_each(|(total, value)| *total += weight * value);
                 }
             }
-            out.extend(sums.iter().map(|sum| sum.map(|total| ((total + ONE * ONE / 2) / (ONE * ONE)) as u8)));
+            out.extend(
+                sums.iter()
+                    .map(|sum| sum.map(|total| ((total + ONE * ONE / 2) / (ONE * ONE)) as u8)),
+            );
         }
         out
     }
@@ -74,7 +92,9 @@ impl Scaled {
 
     /// Disparities shrink with the image.
     fn depth(&self, depth: &GivenDepth) -> Option<GivenDepth> {
-        let disparity_q8 = self.nearest(&depth.disparity_q8)?.map(|&value| (f64::from(value) * self.scale).round() as u16);
+        let disparity_q8 = self
+            .nearest(&depth.disparity_q8)?
+            .map(|&value| (f64::from(value) * self.scale).round() as u16);
         Some(GivenDepth { disparity_q8, refused: depth.refused })
     }
 
@@ -87,15 +107,19 @@ impl Scaled {
     }
 }
 
-/// For each of `count` output pixels: the input pixels it covers and their shares, which sum to [`ONE`] exactly.
+/// For each of `count` output pixels: the input pixels it covers and their shares, which sum to
+/// [`ONE`] exactly.
 fn spans(count: usize, input: usize, scale: f64) -> Vec<Span> {
     let span = |at: usize| {
         let (from, to) = (at as f64 / scale, ((at + 1) as f64 / scale).min(input as f64));
         let first = from as usize;
         let last = (to.ceil() as usize).clamp(first + 1, input);
         // Shares from rounded running sums, so that nothing is lost to rounding.
-        let upto = |edge: f64| ((edge.clamp(from, to) - from) / (to - from) * f64::from(ONE)).round() as u32;
-        let weights = (first..last).map(|pixel| upto((pixel + 1) as f64) - upto(pixel as f64)).collect();
+        let upto = |edge: f64| {
+            ((edge.clamp(from, to) - from) / (to - from) * f64::from(ONE)).round() as u32
+        };
+        let weights =
+            (first..last).map(|pixel| upto((pixel + 1) as f64) - upto(pixel as f64)).collect();
         Span { first, weights }
     };
     (0..count).map(span).collect()
@@ -160,7 +184,8 @@ impl FrameSource for Scaled {
             return Ok(frame);
         }
         let (width, height) = self.inner.size();
-        let failed = || InputError::Scale { scale: self.scale, width, height, least: LEAST_SIDE_PX };
+        let failed =
+            || InputError::Scale { scale: self.scale, width, height, least: LEAST_SIDE_PX };
         let colour = frame.colour.map(|colour| {
             let pixels = self.shrink(colour.pixels(), colour.width());
             Image::new(self.columns.len(), self.rows.len(), pixels).ok_or_else(failed)
@@ -206,9 +231,16 @@ mod tests {
 
     #[test]
     fn shares_sum_to_one_and_a_half_is_the_mean_of_two() {
-        for (count, input, scale) in [(50, 100, 0.5), (75, 100, 0.75), (33, 100, 1.0 / 3.0), (100, 100, 1.0), (931, 1242, 0.75)] {
+        for (count, input, scale) in [
+            (50, 100, 0.5),
+            (75, 100, 0.75),
+            (33, 100, 1.0 / 3.0),
+            (100, 100, 1.0),
+            (931, 1242, 0.75),
+        ] {
             let spans = spans(count, input, scale);
-            assert!(spans.iter().all(|span| span.weights.iter().sum::<u32>() == ONE && span.first + span.weights.len() <= input));
+            assert!(spans.iter().all(|span| span.weights.iter().sum::<u32>() == ONE
+                && span.first + span.weights.len() <= input));
         }
         let half = spans(2, 4, 0.5);
         assert_eq!(

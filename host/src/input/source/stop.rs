@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Asks a run to end after the frame it is at. Clones ask the same run; a signal handler may set the word behind one.
+/// Asks a run to end after the frame it is at. Clones ask the same run; a signal handler may set
+/// the word behind one.
 #[derive(Clone, Debug, Default)]
 pub struct StopRequest(Arc<AtomicUsize>);
 

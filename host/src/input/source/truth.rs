@@ -37,9 +37,16 @@ impl ObjectsTruth {
     /// The same in an image scaled by `scale`.
     pub fn scaled(mut self, scale: f64) -> Self {
         let of = |px: i32| (f64::from(px) * scale) as i32;
-        for pixels in self.objects.iter_mut().map(|object| &mut object.pixels).chain(&mut self.unlabelled) {
+        for pixels in
+            self.objects.iter_mut().map(|object| &mut object.pixels).chain(&mut self.unlabelled)
+        {
             let PixelBox { left, top, width, height } = *pixels;
-            *pixels = PixelBox { left: of(left), top: of(top), width: of(width).max(1), height: of(height).max(1) };
+            *pixels = PixelBox {
+                left: of(left),
+                top: of(top),
+                width: of(width).max(1),
+                height: of(height).max(1),
+            };
         }
         self
     }

@@ -1,7 +1,9 @@
-//! Streams: frames that come once, in order, and whose number is unknown: from a camera, through a pipe, or from any iterator.
+//! Streams: frames that come once, in order, and whose number is unknown: from a camera, through a
+//! pipe, or from any iterator.
 //!
 //! [`Stream`] makes a source of frames from an iterator of pairs; [`netpbm`] is such an iterator over bytes. A thread takes pairs from the
-//! iterator into a queue of [`QUEUE`] pairs. Where it is full, the iterator waits, or the oldest pair is dropped and counted ([`WhenLate`]).
+//! iterator into a queue of [`QUEUE`] pairs. Where it is full, the iterator waits, or the oldest
+//! pair is dropped and counted ([`WhenLate`]).
 //!
 //! Memory: [`QUEUE`] pairs, the one being read, and the first until the second is asked for.
 
@@ -12,7 +14,9 @@ mod tests;
 
 pub use queue::WhenLate;
 
-use super::source::{FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState, require_size};
+use super::source::{
+    FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState, require_size,
+};
 use crate::formats::Decoded;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use dynvox_core::geometry::StereoRig;
@@ -37,7 +41,8 @@ pub struct StreamOptions {
     pub cameras: CameraGeometry,
     /// How large raw pairs are rectified.
     pub rectified: RectifiedSize,
-    /// Frames a second, where known: frames then bear time stamps by their number. Without it [`ASSUMED_HZ`] is assumed.
+    /// Frames a second, where known: frames then bear time stamps by their number. Without it
+    /// [`ASSUMED_HZ`] is assumed.
     pub rate_hz: Option<f64>,
     /// What becomes of frames that come while the mapper is busy.
     pub when_late: WhenLate,
@@ -66,10 +71,12 @@ struct Cursor {
 }
 
 impl Stream {
-    /// Begins to take pairs from `pairs` on a thread of its own, and waits for the first of them. `stop` ends the waiting for frames.
+    /// Begins to take pairs from `pairs` on a thread of its own, and waits for the first of them.
+    /// `stop` ends the waiting for frames.
     ///
     /// # Errors
-    /// There is no pair, the first cannot be read, or the calibration is for images of another size.
+    /// There is no pair, the first cannot be read, or the calibration is for images of another
+    /// size.
     pub fn begin<I>(options: StreamOptions, stop: StopRequest, pairs: I) -> Result<Self, InputError>
     where
         I: Iterator<Item = Result<Pair, InputError>> + Send + 'static,
@@ -91,7 +98,9 @@ impl Stream {
         let geometry = options.cameras.fitted(image_size, &options.rectified)?;
         let rate = match options.rate_hz {
             Some(rate_hz) => format!("a stream of {rate_hz} frames a second"),
-            None => format!("a stream: {ASSUMED_HZ} frames a second are assumed; --rate says otherwise"),
+            None => {
+                format!("a stream: {ASSUMED_HZ} frames a second are assumed; --rate says otherwise")
+            }
         };
         let cursor = Mutex::new(Cursor { taken: 0, number: first.number, first: Some(pair) });
         Ok(Self { geometry, image_size, queue, stop, cursor, notes: vec![rate], options })
@@ -102,7 +111,8 @@ impl Stream {
         number as f64 / self.options.rate_hz.unwrap_or(ASSUMED_HZ)
     }
 
-    /// Number of a frame among all that came, where it is the last one read; else as if none was dropped.
+    /// Number of a frame among all that came, where it is the last one read; else as if none was
+    /// dropped.
     fn number_of(&self, index: usize) -> u64 {
         let cursor = self.cursor.lock().unwrap_or_else(PoisonError::into_inner);
         if cursor.taken == index + 1 { cursor.number } else { index as u64 }
@@ -177,7 +187,9 @@ impl FrameSource for Stream {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let pair = self.pair(index)?;
-        require_size(&pair, self.image_size, |_| format!("frame {index} of the {}", self.options.name).into())?;
+        require_size(&pair, self.image_size, |_| {
+            format!("frame {index} of the {}", self.options.name).into()
+        })?;
         Ok(StereoImages::of_pair(pair))
     }
 

@@ -1,6 +1,8 @@
-//! Stereo pairs from a stream of netpbm images: binary PGM (P5) and PPM (P6), 8 and 16 bit, one behind the other.
+//! Stereo pairs from a stream of netpbm images: binary PGM (P5) and PPM (P6), 8 and 16 bit, one
+//! behind the other.
 //!
-//! The header of an image says where it ends, and nothing is read beyond: a frame is there as soon as its last byte is.
+//! The header of an image says where it ends, and nothing is read beyond: a frame is there as soon
+//! as its last byte is.
 
 use super::Pair;
 use crate::formats::{Decoded, decode_picture, significant_bits};
@@ -24,8 +26,9 @@ pub struct NetpbmPairs<R> {
 }
 
 impl<R: Read> NetpbmPairs<R> {
-    /// Images of both cameras in turn, the left one first, or both in one where `stacking` says how. `bits` are the significant bits of 16-bit
-    /// samples; the first image tells them where they are not given.
+    /// Images of both cameras in turn, the left one first, or both in one where `stacking` says
+    /// how. `bits` are the significant bits of 16-bit samples; the first image tells them where
+    /// they are not given.
     pub fn new(bytes: R, stacking: Option<Stacking>, bits: Option<u32>) -> Self {
         Self { bytes, stacking, bits, images: 0, ended: false }
     }
@@ -42,14 +45,21 @@ impl<R: Read> NetpbmPairs<R> {
             let second = self.image()?.ok_or_else(|| self.error(alone))?;
             return Ok(Some([first, second]));
         };
-        let uneven = || self.error(format!("the image cannot be cut into two equal images {}", stacking.name()));
+        let uneven = || {
+            self.error(format!("the image cannot be cut into two equal images {}", stacking.name()))
+        };
         stacking.split(&first).map(Some).ok_or_else(uneven)
     }
 
     fn image(&mut self) -> Result<Option<Decoded>, InputError> {
         let Some((mut image, len)) = self.header()? else { return Ok(None) };
         // Memory is taken as bytes come, not as the header promises.
-        let read = self.bytes.by_ref().take(len as u64).read_to_end(&mut image).map_err(|error| self.error(error.to_string()))?;
+        let read = self
+            .bytes
+            .by_ref()
+            .take(len as u64)
+            .read_to_end(&mut image)
+            .map_err(|error| self.error(error.to_string()))?;
         if read < len {
             return Err(self.error("the stream stopped inside it"));
         }
@@ -77,8 +87,13 @@ impl<R: Read> NetpbmPairs<R> {
             *number = self.number(&mut header)?;
         }
         let [width, height, largest] = numbers;
-        if !(1..=LARGEST_PX).contains(&width) || !(1..=LARGEST_PX).contains(&height) || !(1..=65_535).contains(&largest) {
-            return Err(self.error(format!("its header says {width} x {height} px with values up to {largest}")));
+        if !(1..=LARGEST_PX).contains(&width)
+            || !(1..=LARGEST_PX).contains(&height)
+            || !(1..=65_535).contains(&largest)
+        {
+            return Err(self.error(format!(
+                "its header says {width} x {height} px with values up to {largest}"
+            )));
         }
         let sample = if largest > 255 { 2 } else { 1 };
         Ok(Some((header, width * height * channels * sample)))
@@ -94,7 +109,14 @@ impl<R: Read> NetpbmPairs<R> {
                 return Err(self.error("its header does not end"));
             }
             match (byte, number) {
-                (b'0'..=b'9', _) => number = Some(number.unwrap_or(0).saturating_mul(10).saturating_add(usize::from(byte - b'0'))),
+                (b'0'..=b'9', _) => {
+                    number = Some(
+                        number
+                            .unwrap_or(0)
+                            .saturating_mul(10)
+                            .saturating_add(usize::from(byte - b'0')),
+                    )
+                }
                 (b'#', None) => while self.push_byte(header)? != b'\n' {},
                 (byte, Some(number)) if byte.is_ascii_whitespace() => return Ok(number),
                 (byte, None) if byte.is_ascii_whitespace() => {}
@@ -106,7 +128,11 @@ impl<R: Read> NetpbmPairs<R> {
     fn push_byte(&mut self, header: &mut Vec<u8>) -> Result<u8, InputError> {
         let byte = self.byte_within()?;
         header.push(byte);
-        if header.len() > LONGEST_HEADER { Err(self.error("its header does not end")) } else { Ok(byte) }
+        if header.len() > LONGEST_HEADER {
+            Err(self.error("its header does not end"))
+        } else {
+            Ok(byte)
+        }
     }
 
     /// The next byte inside an image.

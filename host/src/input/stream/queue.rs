@@ -55,10 +55,14 @@ impl Queue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a pair, or waits until there is space for it; an error is added in any case. Returns whether a next one is wanted.
+    /// Adds a pair, or waits until there is space for it; an error is added in any case. Returns
+    /// whether a next one is wanted.
     pub fn push(&self, pair: Result<Pair, InputError>) -> bool {
         let mut state = self.lock();
-        while self.when_late == WhenLate::Wait && state.waiting.len() >= self.most && !state.abandoned {
+        while self.when_late == WhenLate::Wait
+            && state.waiting.len() >= self.most
+            && !state.abandoned
+        {
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         if state.waiting.len() >= self.most && pair.is_ok() {
@@ -98,7 +102,11 @@ impl Queue {
             if state.closed {
                 return None;
             }
-            state = self.changed.wait_timeout(state, LOOK_EVERY).unwrap_or_else(PoisonError::into_inner).0;
+            state = self
+                .changed
+                .wait_timeout(state, LOOK_EVERY)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
         }
     }
 

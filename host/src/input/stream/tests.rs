@@ -8,11 +8,17 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 fn pgm(width: usize, height: usize, grey: u8) -> Vec<u8> {
-    [format!("P5\n# a comment\n{width} {height}\n255\n").into_bytes(), vec![grey; width * height]].concat()
+    [format!("P5\n# a comment\n{width} {height}\n255\n").into_bytes(), vec![grey; width * height]]
+        .concat()
 }
 
 fn greys(pairs: NetpbmPairs<&[u8]>) -> Vec<Result<[u8; 2], String>> {
-    pairs.map(|pair| pair.map(|pair| pair.map(|image| image.grey.pixels()[0])).map_err(|error| error.to_string())).collect()
+    pairs
+        .map(|pair| {
+            pair.map(|pair| pair.map(|image| image.grey.pixels()[0]))
+                .map_err(|error| error.to_string())
+        })
+        .collect()
 }
 
 #[test]
@@ -23,9 +29,14 @@ fn images_come_as_pairs_and_the_stream_ends_between_two() {
     let halves = [&b"P5 4 1 255\n"[..], &[7, 7, 9, 9]].concat();
     assert_eq!(greys(NetpbmPairs::new(&halves, Some(Stacking::SideBySide), None)), [Ok([7, 9])]);
     let deep = [&b"P5 2 1 65535\n"[..], &1_600u16.to_be_bytes(), &4_000u16.to_be_bytes()].concat();
-    assert_eq!(greys(NetpbmPairs::new(&deep, Some(Stacking::SideBySide), None)), [Ok([100, 250])], "12 bits are significant");
+    assert_eq!(
+        greys(NetpbmPairs::new(&deep, Some(Stacking::SideBySide), None)),
+        [Ok([100, 250])],
+        "12 bits are significant"
+    );
     let colour = [&b"P6 1 2 255\n"[..], &[10, 10, 10, 20, 20, 20]].concat();
-    let pair = NetpbmPairs::new(&colour[..], Some(Stacking::TopBottom), None).next().unwrap().unwrap();
+    let pair =
+        NetpbmPairs::new(&colour[..], Some(Stacking::TopBottom), None).next().unwrap().unwrap();
     assert_eq!(pair[1].colour.as_ref().unwrap().pixels(), [[20, 20, 20]]);
 }
 
@@ -47,7 +58,12 @@ fn a_stream_that_breaks_says_where_and_ends_there() {
         assert!(read[1].as_ref().unwrap_err().contains(sentence), "{read:?}");
     }
     let endless = [&b"P5 #"[..], &[b'x'; 10_000]].concat();
-    assert!(greys(NetpbmPairs::new(&endless, None, None))[0].as_ref().unwrap_err().contains("does not end"));
+    assert!(
+        greys(NetpbmPairs::new(&endless, None, None))[0]
+            .as_ref()
+            .unwrap_err()
+            .contains("does not end")
+    );
 }
 
 fn pair(grey: u8) -> Pair {
@@ -76,12 +92,24 @@ fn pairs(receiver: Receiver<u8>) -> impl Iterator<Item = Result<Pair, InputError
 
 #[test]
 fn any_iterator_is_a_source_of_frames_and_its_length_is_not_needed() {
-    let stream = Stream::begin(options(WhenLate::Wait), StopRequest::default(), (0..9).map(|grey| Ok(pair(grey)))).unwrap();
-    assert_eq!((stream.len(), stream.is_empty(), stream.size(), stream.stamp_ns(0)), (0, false, (40, 40), None));
+    let stream = Stream::begin(
+        options(WhenLate::Wait),
+        StopRequest::default(),
+        (0..9).map(|grey| Ok(pair(grey))),
+    )
+    .unwrap();
+    assert_eq!(
+        (stream.len(), stream.is_empty(), stream.size(), stream.stamp_ns(0)),
+        (0, false, (40, 40), None)
+    );
     assert_eq!((grey(&stream, 0), grey(&stream, 0)), (0, 0), "the first may be looked at before");
     assert_eq!((grey(&stream, 1), grey(&stream, 4), stream.time_s(4)), (1, 4, 0.4));
     std::thread::sleep(Duration::from_millis(50));
-    assert_eq!((5..9).map(|index| grey(&stream, index)).collect::<Vec<_>>(), [5, 6, 7, 8], "nothing is lost");
+    assert_eq!(
+        (5..9).map(|index| grey(&stream, index)).collect::<Vec<_>>(),
+        [5, 6, 7, 8],
+        "nothing is lost"
+    );
     assert!(matches!(stream.frame(9), Err(InputError::PastEnd { frames: 9 })));
     assert_eq!(stream.stream(), Some(StreamState { dropped: 0 }));
     let empty = Stream::begin(options(WhenLate::Wait), StopRequest::default(), std::iter::empty());
@@ -92,13 +120,18 @@ fn any_iterator_is_a_source_of_frames_and_its_length_is_not_needed() {
 fn late_frames_are_dropped_oldest_first_counted_and_known_by_their_time() {
     let (camera, receiver) = channel();
     camera.send(0).unwrap();
-    let stream = Stream::begin(options(WhenLate::Drop), StopRequest::default(), pairs(receiver)).unwrap();
+    let stream =
+        Stream::begin(options(WhenLate::Drop), StopRequest::default(), pairs(receiver)).unwrap();
     assert_eq!(grey(&stream, 0), 0);
     (1..=7).for_each(|grey| camera.send(grey).unwrap());
     while stream.stream().unwrap().dropped < 5 {
         std::thread::yield_now();
     }
-    assert_eq!((grey(&stream, 1), stream.stamp_ns(1)), (6, Some(600_000_000)), "frame 1 of the run is the seventh that came");
+    assert_eq!(
+        (grey(&stream, 1), stream.stamp_ns(1)),
+        (6, Some(600_000_000)),
+        "frame 1 of the run is the seventh that came"
+    );
     assert_eq!((grey(&stream, 2), stream.stamp_ns(2)), (7, Some(700_000_000)));
     drop(camera);
     assert!(matches!(stream.frame(3), Err(InputError::PastEnd { frames: 3 })));

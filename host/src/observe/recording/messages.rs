@@ -1,4 +1,5 @@
-//! Messages of a recording. Frames of reference: `world` is the first camera's, `left` the left camera's.
+//! Messages of a recording. Frames of reference: `world` is the first camera's, `left` the left
+//! camera's.
 
 use crate::observe::{FrameRow, PlanningLayers, pictures, state_name};
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -64,8 +65,14 @@ pub fn image(stamp: Stamp, jpeg: &[u8]) -> Value {
     json!({ "timestamp": stamp.json(), "frame_id": LEFT, "format": "jpeg", "data": STANDARD.encode(jpeg) })
 }
 
-/// How a picture of the left camera projects, which may be smaller than the images that were matched.
-pub fn calibration(stamp: Stamp, rig: &StereoRig, (full_width, _): (usize, usize), (width, height): (u32, u32)) -> Value {
+/// How a picture of the left camera projects, which may be smaller than the images that were
+/// matched.
+pub fn calibration(
+    stamp: Stamp,
+    rig: &StereoRig,
+    (full_width, _): (usize, usize),
+    (width, height): (u32, u32),
+) -> Value {
     let share = f64::from(width) / full_width as f64;
     let [f, u, v] = [rig.focal_px, rig.center_u_px, rig.center_v_px].map(|px| px * share);
     json!({
@@ -77,11 +84,19 @@ pub fn calibration(stamp: Stamp, rig: &StereoRig, (full_width, _): (usize, usize
 
 /// The box of each object, in the colour of its state. Every message replaces those before.
 pub fn objects(stamp: Stamp, mapper: &Mapper<'_>) -> Value {
-    let entity = |(summary, object): (&dynvox_core::objects::ObjectSummary, &dynvox_core::objects::Object<'_>)| {
+    let entity = |(summary, object): (
+        &dynvox_core::objects::ObjectSummary,
+        &dynvox_core::objects::Object<'_>,
+    )| {
         let ([low, high], t_world_object) = (box_of(object.volume())?, summary.t_world_object);
-        let middle = Transform::from_translation([0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis])));
-        let [r, g, b] = pictures::state_colour(summary.state).map(|channel| f64::from(channel) / 255.0);
-        let metadata = [("class", summary.class.name().to_owned()), ("state", state_name(summary.state).to_owned())];
+        let middle =
+            Transform::from_translation([0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis])));
+        let [r, g, b] =
+            pictures::state_colour(summary.state).map(|channel| f64::from(channel) / 255.0);
+        let metadata = [
+            ("class", summary.class.name().to_owned()),
+            ("state", state_name(summary.state).to_owned()),
+        ];
         Some(json!({
             "timestamp": stamp.json(), "frame_id": WORLD, "id": format!("{}-{}", summary.id, summary.segment_id),
             "lifetime": { "sec": 0, "nsec": 0 }, "frame_locked": true,
@@ -100,10 +115,18 @@ pub fn objects(stamp: Stamp, mapper: &Mapper<'_>) -> Value {
 /// The box around a volume's blocks, m; `None` of an empty one.
 fn box_of(volume: &Volume<'_>) -> Option<[[f64; 3]; 2]> {
     let side_m = f64::from(volume.config().voxel_size_m) * BLOCK_SIDE as f64;
-    let coords = volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).map(|at| [at.x, at.y, at.z].map(f64::from));
-    let bounds = coords.map(|at| [at, at.map(|steps| steps + 1.0)]).reduce(|[low, high], [from, to]| {
-        [[0, 1, 2].map(|axis| low[axis].min(from[axis])), [0, 1, 2].map(|axis| high[axis].max(to[axis]))]
-    })?;
+    let coords = volume
+        .pool()
+        .live()
+        .filter_map(|slot| volume.blocks().coord(slot))
+        .map(|at| [at.x, at.y, at.z].map(f64::from));
+    let bounds =
+        coords.map(|at| [at, at.map(|steps| steps + 1.0)]).reduce(|[low, high], [from, to]| {
+            [
+                [0, 1, 2].map(|axis| low[axis].min(from[axis])),
+                [0, 1, 2].map(|axis| high[axis].max(to[axis])),
+            ]
+        })?;
     Some(bounds.map(|corner| corner.map(|steps| steps * side_m)))
 }
 
@@ -118,7 +141,8 @@ pub fn figures(stamp: Stamp, row: &FrameRow) -> Value {
     })
 }
 
-/// What a raycast of every [`POINT_EVERY`] pixels shows as coloured points in the camera's frame; `None` before the first raycast.
+/// What a raycast of every [`POINT_EVERY`] pixels shows as coloured points in the camera's frame;
+/// `None` before the first raycast.
 pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Value> {
     let (depth_m, colour) = (seen.depth_m()?, seen.colour()?);
     let mut data = Vec::new();
@@ -126,8 +150,11 @@ pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Valu
         for u in 0..depth_m.width() {
             let z = depth_m.get(u, v).unwrap_or_default();
             if z > 0.0 {
-                let from_center = |at: usize, center_px: f64| ((at * POINT_EVERY) as f32 - center_px as f32) / rig.focal_px as f32;
-                let (x, y) = (from_center(u, rig.center_u_px) * z, from_center(v, rig.center_v_px) * z);
+                let from_center = |at: usize, center_px: f64| {
+                    ((at * POINT_EVERY) as f32 - center_px as f32) / rig.focal_px as f32
+                };
+                let (x, y) =
+                    (from_center(u, rig.center_u_px) * z, from_center(v, rig.center_v_px) * z);
                 data.extend([x, y, z].iter().flat_map(|value| value.to_le_bytes()));
                 data.extend(colour.get(u, v).unwrap_or_default());
                 data.push(255);
@@ -153,7 +180,9 @@ pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Valu
 pub fn planning(stamp: Stamp, layers: &PlanningLayers) -> Value {
     let [columns, _] = layers.size;
     let mut data = Vec::with_capacity(CELL_BYTES * layers.occupancy.len());
-    for ((distance_m, height_m), occupancy) in layers.distance_m.iter().zip(&layers.height_m).zip(&layers.occupancy) {
+    for ((distance_m, height_m), occupancy) in
+        layers.distance_m.iter().zip(&layers.height_m).zip(&layers.occupancy)
+    {
         data.extend([distance_m, height_m].into_iter().flat_map(|value| value.to_le_bytes()));
         data.extend([occupancy.to_le_bytes()[0], 0, 0, 0]);
     }

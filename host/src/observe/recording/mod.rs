@@ -1,11 +1,13 @@
-//! The run as an MCAP recording, written frame by frame: images, disparity, poses, objects, what the map shows, the planner's window, and figures, in Foxglove's
-//! schemas as JSON. Memory: one chunk of the file, and 100 bytes for each chunk before.
+//! The run as an MCAP recording, written frame by frame: images, disparity, poses, objects, what
+//! the map shows, the planner's window, and figures, in Foxglove's schemas as JSON. Memory: one
+//! chunk of the file, and 100 bytes for each chunk before.
 
 mod messages;
 mod schemas;
 
 use super::{
-    EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup, frame_pictures, frame_pictures::Shown, pictures,
+    EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup,
+    frame_pictures, frame_pictures::Shown, pictures,
 };
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::RaycastView;
@@ -34,7 +36,9 @@ pub struct RecordingObserver {
 
 impl std::fmt::Debug for RecordingObserver {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        out.debug_struct("RecordingObserver").field("failure", &self.failure).finish_non_exhaustive()
+        out.debug_struct("RecordingObserver")
+            .field("failure", &self.failure)
+            .finish_non_exhaustive()
     }
 }
 
@@ -54,16 +58,30 @@ impl Recording {
         let mut writer = mcap::WriteOptions::new().library("dynvox").create(file)?;
         let mut channels = [0; TOPICS.len()];
         for (channel, topic) in channels.iter_mut().zip(TOPICS) {
-            let schema = writer.add_schema(topic.schema(), "jsonschema", topic.json_schema().to_string().as_bytes())?;
+            let schema = writer.add_schema(
+                topic.schema(),
+                "jsonschema",
+                topic.json_schema().to_string().as_bytes(),
+            )?;
             *channel = writer.add_channel(schema, topic.name(), "json", &Default::default())?;
         }
         Ok(Self { writer, channels, sequence: 0, poses_every: 1, poses: Vec::new() })
     }
 
-    fn write(&mut self, topic: Topic, time_ns: u64, message: &Value) -> Result<(), mcap::McapError> {
+    fn write(
+        &mut self,
+        topic: Topic,
+        time_ns: u64,
+        message: &Value,
+    ) -> Result<(), mcap::McapError> {
         self.sequence += 1;
         let channel_id = self.channels[topic as usize];
-        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time_ns, publish_time: time_ns };
+        let header = MessageHeader {
+            channel_id,
+            sequence: self.sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
         self.writer.write_to_known_channel(&header, message.to_string().as_bytes())
     }
 
@@ -78,7 +96,11 @@ impl Recording {
         }
     }
 
-    fn frame(&mut self, frame: &mut FrameContext<'_, '_>, setup: &Setup<'_>) -> Result<(), mcap::McapError> {
+    fn frame(
+        &mut self,
+        frame: &mut FrameContext<'_, '_>,
+        setup: &Setup<'_>,
+    ) -> Result<(), mcap::McapError> {
         let (time_ns, t_world_camera) = (frame.row.time_ns(), frame.row.report.t_world_camera);
         let stamp = Stamp(time_ns);
         self.note_pose(frame.position, &t_world_camera);
@@ -88,7 +110,12 @@ impl Recording {
             self.write(
                 Topic::Calibration,
                 time_ns,
-                &messages::calibration(stamp, &setup.config.rig, setup.dataset.size(), left.dimensions()),
+                &messages::calibration(
+                    stamp,
+                    &setup.config.rig,
+                    setup.dataset.size(),
+                    left.dimensions(),
+                ),
             )?;
             self.write(Topic::Left, time_ns, &messages::image(stamp, &pictures::jpeg(&left)))?;
         }
@@ -97,7 +124,8 @@ impl Recording {
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
         if frame.position.is_multiple_of(MAP_EVERY)
-            && let Some(seen) = frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
+            && let Some(seen) =
+                frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
             && let Some(cloud) = messages::cloud(stamp, seen, &setup.config.rig)
         {
             self.write(Topic::Map, time_ns, &cloud)?;
@@ -119,13 +147,18 @@ impl RecordingObserver {
     }
 
     /// Does something with the recording, begun here if need be, unless it has failed.
-    fn with(&mut self, setup: &Setup<'_>, write: impl FnOnce(&mut Recording) -> Result<(), mcap::McapError>) {
+    fn with(
+        &mut self,
+        setup: &Setup<'_>,
+        write: impl FnOnce(&mut Recording) -> Result<(), mcap::McapError>,
+    ) {
         if !setup.record || self.failure.is_some() {
             return;
         }
         let done = match &mut self.recording {
             Some(recording) => write(recording),
-            None => Recording::begin(setup).and_then(|recording| write(self.recording.insert(recording))),
+            None => Recording::begin(setup)
+                .and_then(|recording| write(self.recording.insert(recording))),
         };
         if let Err(error) = done {
             self.recording = None;
@@ -140,7 +173,11 @@ impl Observer for RecordingObserver {
     /// Why there is no recording, if so.
     type Section = Option<String>;
 
-    fn frame(&mut self, setup: &Setup<'_>, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
+    fn frame(
+        &mut self,
+        setup: &Setup<'_>,
+        frame: &mut FrameContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         self.with(setup, |recording| recording.frame(frame, setup));
         Ok(())
     }

@@ -82,7 +82,9 @@ impl Topic {
                 "frame_id": text(), "width": integer(), "height": integer(), "distortion_model": text(),
                 "D": array(&number()), "K": array(&number()), "R": array(&number()), "P": array(&number()),
             }),
-            Self::Left | Self::Disparity => json!({ "frame_id": text(), "data": bytes(), "format": text() }),
+            Self::Left | Self::Disparity => {
+                json!({ "frame_id": text(), "data": bytes(), "format": text() })
+            }
             Self::Objects => {
                 json!({ "deletions": array(&object(&json!({ "type": integer(), "id": text() }))), "entities": array(&entity()) })
             }

@@ -26,10 +26,17 @@ struct BlockColumns {
     fate: BlockFate,
 }
 
-/// The rows of some blocks: coordinates, the frame each was last visible in, and what became of it; with the header before the first.
+/// The rows of some blocks: coordinates, the frame each was last visible in, and what became of it;
+/// with the header before the first.
 ///
 /// # Errors
 /// A value cannot be written as a cell.
-pub fn block_rows(rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>, first: bool) -> io::Result<Vec<u8>> {
-    csv_text(first, rows.map(|([x, y, z], last_frame, fate)| BlockColumns { x, y, z, last_frame, fate }))
+pub fn block_rows(
+    rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>,
+    first: bool,
+) -> io::Result<Vec<u8>> {
+    csv_text(
+        first,
+        rows.map(|([x, y, z], last_frame, fate)| BlockColumns { x, y, z, last_frame, fate }),
+    )
 }

@@ -150,7 +150,13 @@ pub struct FrameDigests {
 /// # Errors
 /// A value cannot be written as a cell.
 pub fn frame_row(row: &FrameRow, first: bool) -> io::Result<Vec<u8>> {
-    let columns = (frame_columns(row), block_columns(row), object_columns(row), time_columns(row), digest_columns(&row.report.digests));
+    let columns = (
+        frame_columns(row),
+        block_columns(row),
+        object_columns(row),
+        time_columns(row),
+        digest_columns(&row.report.digests),
+    );
     csv_text(first, std::iter::once(columns))
 }
 
@@ -237,7 +243,9 @@ fn object_columns(row: &FrameRow) -> ObjectColumns {
 }
 
 fn time_columns(row: &FrameRow) -> TimeColumns {
-    let of = |stage: Stage, value: fn(&StageTime) -> f64| rounded(value(&row.times.stages[stage as usize]), 4);
+    let of = |stage: Stage, value: fn(&StageTime) -> f64| {
+        rounded(value(&row.times.stages[stage as usize]), 4)
+    };
     let wall = |stage: Stage| of(stage, |time| time.wall_ms);
     let cpu = |stage: Stage| of(stage, |time| time.cpu_ms);
     TimeColumns {

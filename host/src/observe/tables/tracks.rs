@@ -35,7 +35,8 @@ pub fn track_rows(frame: usize, tracks: &[TrackRow], first: bool) -> io::Result<
 
 fn track_columns(frame: usize, track: &TrackRow) -> TrackColumns {
     let pixels = &track.pixels;
-    let [speed, sigma] = [0, 1].map(|at| track.speed_m_s.map(|speeds| rounded(f64::from(speeds[at]), 3)));
+    let [speed, sigma] =
+        [0, 1].map(|at| track.speed_m_s.map(|speeds| rounded(f64::from(speeds[at]), 3)));
     TrackColumns {
         frame,
         id: track.id,

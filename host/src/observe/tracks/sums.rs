@@ -37,11 +37,14 @@ impl TrackSums {
     /// Adds a frame with its number and its position in the run.
     pub fn add(&mut self, frame: usize, position: usize, row: &TrackRow) {
         let state = index(row.state);
-        (self.class, self.last_frame, self.blocks) = (row.class, frame, self.blocks.max(row.blocks));
+        (self.class, self.last_frame, self.blocks) =
+            (row.class, frame, self.blocks.max(row.blocks));
         self.states[state] += 1;
         let speed_m_s = row.speed_m_s.map(|[speed, _]| speed);
         speed_m_s.iter().for_each(|speed| self.speeds_m_s[state].add(f64::from(*speed)));
-        let like = |last: &&mut TrackSpan| last.to == position && (last.state, last.measured) == (row.state, row.measured);
+        let like = |last: &&mut TrackSpan| {
+            last.to == position && (last.state, last.measured) == (row.state, row.measured)
+        };
         match self.spans.last_mut().filter(like) {
             Some(last) => (last.to, last.speed_m_s) = (position + 1, speed_m_s),
             None => self.spans.push(TrackSpan {

@@ -28,11 +28,18 @@ pub struct Boxes<'a> {
     pub boxes: Vec<Option<[f64; 5]>>,
 }
 
-/// Draws boxes side by side and curves over them, a place for each label; nothing where there is no number.
-pub fn boxes_and_curves(title: &str, labels: &[String], boxes: &[Boxes<'_>], curves: &[Curve<'_>]) -> Markup {
+/// Draws boxes side by side and curves over them, a place for each label; nothing where there is no
+/// number.
+pub fn boxes_and_curves(
+    title: &str,
+    labels: &[String],
+    boxes: &[Boxes<'_>],
+    curves: &[Curve<'_>],
+) -> Markup {
     let of_boxes = boxes.iter().flat_map(|one| one.boxes.iter().flatten().flatten().copied());
     let all = of_boxes.chain(curves.iter().flat_map(|one| one.numbers.iter().flatten().copied()));
-    let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let (low, high) =
+        all.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
     if low > high || labels.is_empty() {
         return html! {};
     }
@@ -50,11 +57,20 @@ pub fn boxes_and_curves(title: &str, labels: &[String], boxes: &[Boxes<'_>], cur
         }
         @for one in curves { (draw_curve(&plot, one, x)) }
     };
-    let names = boxes.iter().map(|one| (one.name, one.colour)).chain(curves.iter().map(|one| (one.name, one.colour)));
+    let names = boxes
+        .iter()
+        .map(|one| (one.name, one.colour))
+        .chain(curves.iter().map(|one| (one.name, one.colour)));
     html! { div.figure { (plot.svg(title, &drawn)) (legend(names)) } }
 }
 
-fn draw_box(plot: &Plot, centre: f64, width: f64, colour: &str, &[first, low, middle, high, last]: &[f64; 5]) -> Markup {
+fn draw_box(
+    plot: &Plot,
+    centre: f64,
+    width: f64,
+    colour: &str,
+    &[first, low, middle, high, last]: &[f64; 5],
+) -> Markup {
     let y = |value: f64| px(plot.y(value));
     let left = px(centre - width / 2.0);
     let centre = px(centre);
@@ -68,9 +84,16 @@ fn draw_box(plot: &Plot, centre: f64, width: f64, colour: &str, &[first, low, mi
 
 /// A curve with a mark at each number, interrupted where one is unknown.
 fn draw_curve(plot: &Plot, curve: &Curve<'_>, x: impl Fn(usize) -> f64) -> Markup {
-    let marks: Vec<(usize, f64)> = curve.numbers.iter().enumerate().filter_map(|(at, number)| Some((at, (*number)?))).collect();
+    let marks: Vec<(usize, f64)> = curve
+        .numbers
+        .iter()
+        .enumerate()
+        .filter_map(|(at, number)| Some((at, (*number)?)))
+        .collect();
     let stretches = marks.chunk_by(|a, b| a.0 + 1 == b.0);
-    let path: String = stretches.map(|marks| polyline(marks.iter().map(|&(at, number)| (x(at), plot.y(number))))).collect();
+    let path: String = stretches
+        .map(|marks| polyline(marks.iter().map(|&(at, number)| (x(at), plot.y(number)))))
+        .collect();
     html! {
         path d=(path) fill="none" stroke=(curve.colour) stroke-width="1.8" stroke-dasharray=[curve.dashed.then_some("5 4")] {}
         @for &(at, number) in &marks { circle cx=(px(x(at))) cy=(px(plot.y(number))) r="3.2" fill=(curve.colour) {} }

@@ -36,8 +36,15 @@ pub struct Lane {
     pub truth: Vec<Bar>,
 }
 
-/// Lanes over so many frames; `frames` are the numbers of some of them, evenly spread; `styles` are explained in the legend.
-pub fn lanes(frames: &[usize], count: usize, lanes: &[Lane], label: &str, styles: &[&'static str]) -> Markup {
+/// Lanes over so many frames; `frames` are the numbers of some of them, evenly spread; `styles` are
+/// explained in the legend.
+pub fn lanes(
+    frames: &[usize],
+    count: usize,
+    lanes: &[Lane],
+    label: &str,
+    styles: &[&'static str],
+) -> Markup {
     let count = count.max(1) as f64;
     let per_number = (count / frames.len().max(1) as f64).ceil() as usize;
     let x = |at: usize| LEFT + (WHOLE - LEFT - RIGHT) * at as f64 / count;

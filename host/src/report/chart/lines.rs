@@ -4,7 +4,8 @@ use super::plot::{LEFT, Plot, RIGHT, WIDTH, legend, nice_step, polyline, x_label
 use crate::evaluate::quantile::quantile;
 use maud::{Markup, html};
 
-/// Points a line is drawn with at most: longer ones are thinned to the largest value of each interval.
+/// Points a line is drawn with at most: longer ones are thinned to the largest value of each
+/// interval.
 pub(super) const POINTS: usize = 560;
 
 /// One line of a chart.
@@ -19,9 +20,12 @@ pub struct Series<'a> {
 
 /// Lines over frames; the y axis begins at 0 and reaches at least `least_top`.
 pub fn lines(frames: &[usize], series: &[Series<'_>], title: &str, least_top: f64) -> Markup {
-    let finite = series.iter().flat_map(|one| &one.values).copied().filter(|value| value.is_finite());
+    let finite =
+        series.iter().flat_map(|one| &one.values).copied().filter(|value| value.is_finite());
     let plot = Plot::from_zero(finite.fold(least_top, f64::max));
-    let path = |one: &Series<'_>| polyline(thinned(&one.values).iter().map(|&(at, value)| (x(frames, at), plot.y(value))));
+    let path = |one: &Series<'_>| {
+        polyline(thinned(&one.values).iter().map(|&(at, value)| (x(frames, at), plot.y(value))))
+    };
     let drawn = html! {
         (frame_labels(frames))
         @for one in series {
@@ -37,15 +41,23 @@ pub fn stacked(frames: &[usize], series: &[Series<'_>], title: &str) -> Markup {
     let mut areas = Vec::new();
     for one in series {
         let below = sums.clone();
-        sums.iter_mut().zip(&one.values).for_each(|(sum, value)| *sum += if value.is_finite() { *value } else { 0.0 });
+        sums.iter_mut()
+            .zip(&one.values)
+            .for_each(|(sum, value)| *sum += if value.is_finite() { *value } else { 0.0 });
         areas.push((one.colour, below, sums.clone()));
     }
-    // One slow frame should not flatten all others: the axis ends a little above the 99th percentile.
+    // One slow frame should not flatten all others: the axis ends a little above the 99th
+    // percentile.
     sums.sort_by(f64::total_cmp);
     let plot = Plot::from_zero(1.15 * quantile(&sums, 0.99).unwrap_or(1.0));
     let outline = |below: &[f64], above: &[f64]| {
         let (upper, lower) = (thinned(above), thinned(below));
-        polyline(upper.iter().chain(lower.iter().rev()).map(|&(at, value)| (x(frames, at), plot.y(value))))
+        polyline(
+            upper
+                .iter()
+                .chain(lower.iter().rev())
+                .map(|&(at, value)| (x(frames, at), plot.y(value))),
+        )
     };
     let drawn = html! {
         (frame_labels(frames))

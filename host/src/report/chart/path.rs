@@ -23,11 +23,15 @@ pub struct Path<'a> {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Paths at one scale, with a scale bar. A path that leads forward is turned so that forward is to the right.
+/// Paths at one scale, with a scale bar. A path that leads forward is turned so that forward is to
+/// the right.
 pub fn from_above(paths: &[Path<'_>]) -> Markup {
     let all = || paths.iter().flat_map(|path| &path.points);
-    let range =
-        |of: fn(&(f64, f64)) -> f64| all().map(of).fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        all()
+            .map(of)
+            .fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
+    };
     let ((x0, x1), (z0, z1)) = (range(|point| point.0), range(|point| point.1));
     if x0 > x1 {
         return html! {};
@@ -40,7 +44,8 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
     let height = ((across + 2.0 * margin) * scale).max(90.0) + BAR;
     let middle = ((x0 + x1) / 2.0, (z0 + z1) / 2.0);
     let to_page = |&(x, z): &(f64, f64)| {
-        let (right, up) = if turned { (z - middle.1, x - middle.0) } else { (x - middle.0, middle.1 - z) };
+        let (right, up) =
+            if turned { (z - middle.1, x - middle.0) } else { (x - middle.0, middle.1 - z) };
         (WHOLE / 2.0 + right * scale, (height - BAR) / 2.0 + up * scale)
     };
     let d = |points: &[(f64, f64)]| {

@@ -36,12 +36,14 @@ impl Plot {
 
     /// The height of a value in the drawing; values beyond the scale stay at its end.
     pub fn y(&self, value: f64) -> f64 {
-        TOP + (HEIGHT - TOP - BOTTOM) * (1.0 - ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0))
+        TOP + (HEIGHT - TOP - BOTTOM)
+            * (1.0 - ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0))
     }
 
     /// The drawing: title, grid, and what is on it.
     pub fn svg(&self, title: &str, content: &Markup) -> Markup {
-        let ticks = (0..=((self.high - self.low) / self.step).round() as usize).map(|tick| self.low + tick as f64 * self.step);
+        let ticks = (0..=((self.high - self.low) / self.step).round() as usize)
+            .map(|tick| self.low + tick as f64 * self.step);
         html! {
             svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img" aria-label=(title) {
                 text x=(LEFT) y="14" { (title) }
@@ -73,7 +75,9 @@ pub(super) fn legend<'a>(entries: impl Iterator<Item = (&'a str, &'a str)>) -> M
 
 /// A path through points.
 pub(super) fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
-    let point = |(at, (x, y)): (usize, (f64, f64))| format!("{}{x:.1} {y:.1}", if at == 0 { 'M' } else { 'L' });
+    let point = |(at, (x, y)): (usize, (f64, f64))| {
+        format!("{}{x:.1} {y:.1}", if at == 0 { 'M' } else { 'L' })
+    };
     points.enumerate().map(point).collect()
 }
 
@@ -85,9 +89,17 @@ pub(super) fn px(value: f64) -> String {
 /// 1, 2 or 5 times a power of ten, at least `least`.
 pub(super) fn nice_step(least: f64) -> f64 {
     let power = 10f64.powf(least.max(1e-12).log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|factor| factor * power).find(|step| *step >= least * 0.999).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|step| *step >= least * 0.999)
+        .unwrap_or(10.0 * power)
 }
 
 fn number(value: f64) -> String {
-    if value >= 10_000.0 { format!("{} k", (value / 1_000.0 * 10.0).round() / 10.0) } else { format!("{}", (value * 1e4).round() / 1e4) }
+    if value >= 10_000.0 {
+        format!("{} k", (value / 1_000.0 * 10.0).round() / 10.0)
+    } else {
+        format!("{}", (value * 1e4).round() / 1e4)
+    }
 }

@@ -17,7 +17,9 @@ fn charts_of_nothing_and_of_one_point_are_drawn() {
     let series = |values: Vec<f64>| [Series { name: "a", colour: "red", values }];
     for values in [vec![], vec![0.0], vec![f64::NAN, 3.0]] {
         let frames: Vec<usize> = (0..values.len()).collect();
-        assert!(lines(&frames, &series(values.clone()), "ms", 0.0).into_string().ends_with("</div>"));
+        assert!(
+            lines(&frames, &series(values.clone()), "ms", 0.0).into_string().ends_with("</div>")
+        );
         assert!(!stacked(&frames, &series(values), "ms").into_string().contains("NaN"));
     }
     let path = Path { name: "a", colour: "red", dashed: false, points: vec![(0.0, 0.0)] };
@@ -41,12 +43,15 @@ fn boxes_and_curves_leave_gaps_where_a_number_is_unknown() {
 fn names_are_escaped() {
     let series = [Series { name: "a<b>&\"", colour: "red", values: vec![1.0] }];
     let drawn = lines(&[0], &series, "<ms>", 0.0).into_string();
-    assert!(drawn.contains("a&lt;b&gt;&amp;") && drawn.contains("&lt;ms&gt;") && !drawn.contains("<b>"));
+    assert!(
+        drawn.contains("a&lt;b&gt;&amp;") && drawn.contains("&lt;ms&gt;") && !drawn.contains("<b>")
+    );
 }
 
 #[test]
 fn lanes_have_a_bar_for_each_stretch_and_text_only_where_it_fits() {
-    let bar = |from, to| Bar { from, to, style: "dynamic", pale: false, text: Some("3 m/s".to_owned()) };
+    let bar =
+        |from, to| Bar { from, to, style: "dynamic", pale: false, text: Some("3 m/s".to_owned()) };
     let lane = Lane { name: "car 1".to_owned(), bars: vec![bar(0, 1), bar(10, 90)], truth: vec![] };
     let frames: Vec<usize> = (0..100).collect();
     let drawn = lanes(&frames, 100, &[lane], "tracks over frames", &["dynamic"]).into_string();

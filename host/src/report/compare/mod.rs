@@ -16,7 +16,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// It is not a run folder.
-    #[error("{path} is not a run folder: its {file} cannot be read ({source}). Give a folder that `dynvox run` wrote")]
+    #[error(
+        "{path} is not a run folder: its {file} cannot be read ({source}). Give a folder that `dynvox run` wrote"
+    )]
     NoRun {
         /// Path as given.
         path: PathBuf,
@@ -42,7 +44,9 @@ pub enum CompareError {
         reason: String,
     },
     /// The runs have no frame in common.
-    #[error("the runs share no frame: one has frames {a}, the other {b}. Compare runs with the same --start and --stride")]
+    #[error(
+        "the runs share no frame: one has frames {a}, the other {b}. Compare runs with the same --start and --stride"
+    )]
     NothingShared {
         /// Frames of the first.
         a: String,
@@ -107,7 +111,10 @@ impl Comparison {
     pub fn prefix(&self) -> Option<usize> {
         let [a, b] = self.frames;
         let begins = |short: [usize; 3], long: [usize; 3]| {
-            short[2] == self.shared && long[2] > self.shared && short[0] == long[0] && short[1] < long[1]
+            short[2] == self.shared
+                && long[2] > self.shared
+                && short[0] == long[0]
+                && short[1] < long[1]
         };
         let which = if begins(a, b) { Some(0) } else { begins(b, a).then_some(1) };
         which.filter(|_| self.divergence.is_none())
@@ -121,19 +128,29 @@ impl RunDigests {
     /// It is not a run folder, is damaged, or an older build wrote it.
     pub fn read(folder: &Path) -> Result<Self, CompareError> {
         let text = |file: &'static str| {
-            std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun { path: folder.to_path_buf(), file, source })
+            std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun {
+                path: folder.to_path_buf(),
+                file,
+                source,
+            })
         };
-        let (frames, config, summary) = (text(FRAMES_FILE)?, text(SETTINGS_FILE)?, text(SUMMARY_FILE)?);
-        let damaged = |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
-        let mut settings = settings(&config).map_err(|error| damaged(SETTINGS_FILE, error.message().to_owned()))?;
-        let summary: serde_json::Value = serde_json::from_str(&summary).map_err(|error| damaged(SUMMARY_FILE, error.to_string()))?;
+        let (frames, config, summary) =
+            (text(FRAMES_FILE)?, text(SETTINGS_FILE)?, text(SUMMARY_FILE)?);
+        let damaged =
+            |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
+        let mut settings = settings(&config)
+            .map_err(|error| damaged(SETTINGS_FILE, error.message().to_owned()))?;
+        let summary: serde_json::Value = serde_json::from_str(&summary)
+            .map_err(|error| damaged(SUMMARY_FILE, error.to_string()))?;
         for key in ["dataset", "profile"] {
             if let Some(value) = summary.get(key).and_then(serde_json::Value::as_str) {
                 settings.insert(format!("({key})"), value.to_owned());
             }
         }
         let mut rows = read_rows(&frames, &folder.join(FRAMES_FILE))?;
-        let poses = read_poses(&folder.join(TRAJECTORY_FILE)).map(|trajectory| trajectory.poses).unwrap_or_default();
+        let poses = read_poses(&folder.join(TRAJECTORY_FILE))
+            .map(|trajectory| trajectory.poses)
+            .unwrap_or_default();
         if poses.len() == rows.len() {
             rows.values_mut().zip(poses).for_each(|(row, pose)| row.outcome.pose = Some(pose));
         }
@@ -141,7 +158,12 @@ impl RunDigests {
     }
 
     fn frames(&self) -> [usize; 3] {
-        let ends = self.rows.keys().next().zip(self.rows.keys().next_back()).map_or([0, 0], |(first, last)| [*first, *last]);
+        let ends = self
+            .rows
+            .keys()
+            .next()
+            .zip(self.rows.keys().next_back())
+            .map_or([0, 0], |(first, last)| [*first, *last]);
         [ends[0], ends[1], self.rows.len()]
     }
 }
@@ -151,9 +173,15 @@ impl RunDigests {
 /// # Errors
 /// They share none.
 pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareError> {
-    let shared = || a.rows.iter().filter_map(|(frame, row)| Some((*frame, row, b.rows.get(frame)?)));
-    let divergence = shared().find(|(_, one, other)| (one.digest, one.stages) != (other.digest, other.stages));
-    let most = || shared().map(|(_, one, other)| Distance::between(&one.outcome, &other.outcome)).fold(Distance::default(), Distance::max);
+    let shared =
+        || a.rows.iter().filter_map(|(frame, row)| Some((*frame, row, b.rows.get(frame)?)));
+    let divergence =
+        shared().find(|(_, one, other)| (one.digest, one.stages) != (other.digest, other.stages));
+    let most = || {
+        shared()
+            .map(|(_, one, other)| Distance::between(&one.outcome, &other.outcome))
+            .fold(Distance::default(), Distance::max)
+    };
     let comparison = Comparison {
         settings: differing(&a.settings, &b.settings),
         divergence: divergence.map(|(frame, one, other)| Divergence {
@@ -166,7 +194,9 @@ pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareErro
         frames: [a.frames(), b.frames()],
     };
     if comparison.shared == 0 {
-        let range = |[first, last, count]: [usize; 3]| if count == 0 { "none".to_owned() } else { format!("{first} to {last}") };
+        let range = |[first, last, count]: [usize; 3]| {
+            if count == 0 { "none".to_owned() } else { format!("{first} to {last}") }
+        };
         return Err(CompareError::NothingShared { a: range(a.frames()), b: range(b.frames()) });
     }
     Ok(comparison)
@@ -183,7 +213,8 @@ fn read_rows(text: &str, path: &Path) -> Result<BTreeMap<usize, Row>, CompareErr
         }),
     })?;
     let row = |(at, row): (usize, &FrameDigests)| {
-        let digests = row_of(row).ok_or_else(|| damaged(format!("line {} cannot be read", at + 2)))?;
+        let digests =
+            row_of(row).ok_or_else(|| damaged(format!("line {} cannot be read", at + 2)))?;
         Ok((row.frame, digests))
     };
     rows.iter().enumerate().map(row).collect()
@@ -230,10 +261,16 @@ mod tests {
     use super::*;
     use dynvox_core::geometry::Transform;
 
-    fn run(frames: std::ops::Range<usize>, change: impl Fn(usize, &mut StageDigests)) -> RunDigests {
+    fn run(
+        frames: std::ops::Range<usize>,
+        change: impl Fn(usize, &mut StageDigests),
+    ) -> RunDigests {
         let rows = frames.map(|frame| {
-            let objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter());
-            let mut stages = StageDigests { input: frame as u64, tracks: 5, objects, ..StageDigests::default() };
+            let objects = ObjectDigests::of(
+                [ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter(),
+            );
+            let mut stages =
+                StageDigests { input: frame as u64, tracks: 5, objects, ..StageDigests::default() };
             change(frame, &mut stages);
             (frame, Row { digest: stages.whole(frame as u32), stages, outcome: Outcome::default() })
         });
@@ -279,13 +316,24 @@ mod tests {
         let mut still = clean;
         still.rows.values_mut().for_each(|row| row.outcome.pose = Some(Transform::IDENTITY));
         let found = compare(&still, &drifting).unwrap().divergence.unwrap();
-        assert_eq!((found.frame, found.there.position_m, found.most.position_m, found.most.blocks), (2, 2.0, 4.0, 10));
-        assert!(found.there.to_string().starts_with("pose 2.0000 m, 0.0000 deg; mean disparity 0.000 px"), "{}", found.there);
+        assert_eq!(
+            (found.frame, found.there.position_m, found.most.position_m, found.most.blocks),
+            (2, 2.0, 4.0, 10)
+        );
+        assert!(
+            found
+                .there
+                .to_string()
+                .starts_with("pose 2.0000 m, 0.0000 deg; mean disparity 0.000 px"),
+            "{}",
+            found.there
+        );
     }
 
     #[test]
     fn tells_a_beginning_from_an_end_and_both_from_the_same() {
-        let (whole, start, end) = (run(0..5, |_, _| {}), run(0..3, |_, _| {}), run(2..5, |_, _| {}));
+        let (whole, start, end) =
+            (run(0..5, |_, _| {}), run(0..3, |_, _| {}), run(2..5, |_, _| {}));
         let of = |a: &RunDigests, b: &RunDigests| {
             let found = compare(a, b).unwrap();
             (found.equal(), found.prefix(), found.shared)
@@ -295,14 +343,23 @@ mod tests {
             [(true, None, 5), (false, Some(0), 3), (false, Some(1), 3)]
         );
         assert_eq!([of(&end, &whole), of(&start, &end)], [(false, None, 3), (false, None, 1)]);
-        assert!(compare(&run(0..2, |_, _| {}), &end).unwrap_err().to_string().contains("0 to 1, the other 2 to 4"));
+        assert!(
+            compare(&run(0..2, |_, _| {}), &end)
+                .unwrap_err()
+                .to_string()
+                .contains("0 to 1, the other 2 to 4")
+        );
     }
 
     #[test]
     fn settings_that_differ_are_named() {
         let (a, mut b) = (run(0..1, |_, _| {}), run(0..1, |_, _| {}));
-        b.settings = BTreeMap::from([("volume.far_m".to_owned(), "30".to_owned()), ("volume.near_m".to_owned(), "1".to_owned())]);
-        let keys: Vec<String> = compare(&a, &b).unwrap().settings.into_iter().map(|setting| setting.key).collect();
+        b.settings = BTreeMap::from([
+            ("volume.far_m".to_owned(), "30".to_owned()),
+            ("volume.near_m".to_owned(), "1".to_owned()),
+        ]);
+        let keys: Vec<String> =
+            compare(&a, &b).unwrap().settings.into_iter().map(|setting| setting.key).collect();
         assert_eq!(keys, ["volume.far_m", "volume.near_m"]);
     }
 }

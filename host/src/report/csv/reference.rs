@@ -5,8 +5,9 @@ use crate::evaluate::reference::{ACCEPTANCE_RULES, Counts, EvaluatedFrame, Regio
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// `points = error + missing + correct` for input and map and every rule; columns `alone` count each source by itself. `rule_px` is the
-/// largest error that counts as correct; with `rule_share` above 0 an error up to that share of the true disparity is correct as well.
+/// `points = error + missing + correct` for input and map and every rule; columns `alone` count
+/// each source by itself. `rule_px` is the largest error that counts as correct; with `rule_share`
+/// above 0 an error up to that share of the true disparity is correct as well.
 #[derive(Serialize)]
 struct ReferenceColumns {
     frame: usize,
@@ -33,13 +34,23 @@ struct ReferenceColumns {
 /// The disk refuses.
 pub fn write_reference(out: &mut impl Write, frames: &[EvaluatedFrame]) -> io::Result<()> {
     let rules = ACCEPTANCE_RULES.iter().enumerate();
-    let regions = |frame: &EvaluatedFrame| Region::ALL.into_iter().zip(frame.regions).collect::<Vec<_>>();
-    let counts = frames.iter().flat_map(|frame| regions(frame).into_iter().map(move |(region, counts)| (frame, region, counts)));
-    let row = |(frame, region, counts)| rules.clone().map(move |rule| columns(frame, region, &counts, rule));
+    let regions =
+        |frame: &EvaluatedFrame| Region::ALL.into_iter().zip(frame.regions).collect::<Vec<_>>();
+    let counts = frames.iter().flat_map(|frame| {
+        regions(frame).into_iter().map(move |(region, counts)| (frame, region, counts))
+    });
+    let row = |(frame, region, counts)| {
+        rules.clone().map(move |rule| columns(frame, region, &counts, rule))
+    };
     write_rows(out, counts.flat_map(row))
 }
 
-fn columns(frame: &EvaluatedFrame, region: Region, counts: &Counts, (at, rule): (usize, &Rule)) -> ReferenceColumns {
+fn columns(
+    frame: &EvaluatedFrame,
+    region: Region,
+    counts: &Counts,
+    (at, rule): (usize, &Rule),
+) -> ReferenceColumns {
     let ([input, map], scan) = (&counts.sources, &frame.count);
     ReferenceColumns {
         frame: frame.frame,

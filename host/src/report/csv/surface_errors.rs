@@ -1,4 +1,5 @@
-//! `surface_errors.csv`: how far the static map is off, cell by cell of the surface that was compared with the reference.
+//! `surface_errors.csv`: how far the static map is off, cell by cell of the surface that was
+//! compared with the reference.
 
 use super::write_rows;
 use crate::evaluate::reference::SurfaceErrors;
@@ -24,7 +25,13 @@ pub fn write_surface_errors(out: &mut impl Write, errors: &SurfaceErrors) -> io:
         out,
         errors.cells().map(|cell| {
             let [x_m, y_m, z_m] = cell.center_m.map(|metres| rounded(metres, 2));
-            SurfaceErrorColumns { x_m, y_m, z_m, points: cell.points, error_m: rounded(cell.mean_m, 4) }
+            SurfaceErrorColumns {
+                x_m,
+                y_m,
+                z_m,
+                points: cell.points,
+                error_m: rounded(cell.mean_m, 4),
+            }
         }),
     )
 }

@@ -7,8 +7,9 @@ use crate::observe::{TracksSection, state_name};
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// Errors are empty where no motion was estimated or the object was not seen before. `settled` counts the frames since the track began and
-/// since the true state last changed; `view` is whole, small or cut.
+/// Errors are empty where no motion was estimated or the object was not seen before. `settled`
+/// counts the frames since the track began and since the true state last changed; `view` is whole,
+/// small or cut.
 #[derive(Serialize)]
 struct TruthColumns {
     frame: usize,
@@ -30,7 +31,9 @@ struct TruthColumns {
 /// # Errors
 /// The disk refuses.
 pub fn write_tracks_truth(out: &mut impl Write, tracks: &TracksSection) -> io::Result<()> {
-    let columns = |(id, one): &(u32, TrackComparison)| Some(truth_columns(*tracks.compared_frames.get(one.at)?, *id, one));
+    let columns = |(id, one): &(u32, TrackComparison)| {
+        Some(truth_columns(*tracks.compared_frames.get(one.at)?, *id, one))
+    };
     write_rows(out, tracks.comparisons.iter().filter_map(columns))
 }
 

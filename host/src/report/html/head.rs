@@ -25,14 +25,21 @@ pub fn section(run: &RunRecord) -> Markup {
 fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
     let sections = &run.sections;
     let mut cards = vec![(format!("{:.1} fps", run.fps()), "mapping and reading images")];
-    if let Some(figures) = sections.reference.as_ref().and_then(|reference| reference.figures.as_ref()) {
+    if let Some(figures) =
+        sections.reference.as_ref().and_then(|reference| reference.figures.as_ref())
+    {
         let map = &figures.still.fused;
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         if let Some(depth) = figures.map_depth_error {
-            cards.push((format!("{:.1} cm", 100.0 * depth.median_error_m), "median depth error of the static map"));
+            cards.push((
+                format!("{:.1} cm", 100.0 * depth.median_error_m),
+                "median depth error of the static map",
+            ));
         }
         cards.extend(map.accuracy.map(|share| (percent(share), "accuracy of the static map")));
-        cards.extend(map.completeness.map(|share| (percent(share), "completeness of the static map")));
+        cards.extend(
+            map.completeness.map(|share| (percent(share), "completeness of the static map")),
+        );
     }
     if let Some(errors) = &sections.trajectory.errors {
         cards.push(match errors.t_err_percent {
@@ -42,8 +49,14 @@ fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
         cards.push((format!("{:.3} m", errors.ate_m), "absolute trajectory error"));
     }
     let (peak, blocks) = (sections.blocks.totals.peak, run.header.capacity.blocks);
-    cards.push((format!("{:.1} MiB", run.header.slab_bytes as f64 / MIB), "slab: all memory of the core"));
-    cards.push((format!("{:.0} %", 100.0 * f64::from(peak) / blocks as f64), "peak use of the block pool"));
+    cards.push((
+        format!("{:.1} MiB", run.header.slab_bytes as f64 / MIB),
+        "slab: all memory of the core",
+    ));
+    cards.push((
+        format!("{:.0} %", 100.0 * f64::from(peak) / blocks as f64),
+        "peak use of the block pool",
+    ));
     cards.push((grouped(sections.blocks.mesh.static_triangles()), "triangles of the static map"));
     cards
 }

@@ -11,11 +11,19 @@ pub fn section(run: &RunRecord) -> Markup {
     let frames = frames(run);
     let matches = lines(
         &frames,
-        &[series(run, "matches", COLOURS[5], Charted::Matches), series(run, "inliers", COLOURS[0], Charted::Inliers)],
+        &[
+            series(run, "matches", COLOURS[5], Charted::Matches),
+            series(run, "inliers", COLOURS[0], Charted::Inliers),
+        ],
         "matches",
         0.0,
     );
-    let density = lines(&frames, &[series(run, "pixels with a disparity", COLOURS[3], Charted::Density)], "%", 100.0);
+    let density = lines(
+        &frames,
+        &[series(run, "pixels with a disparity", COLOURS[3], Charted::Density)],
+        "%",
+        100.0,
+    );
     html! {
         section {
             h2 { "Health" }
@@ -41,7 +49,8 @@ fn blocks(run: &RunRecord) -> Markup {
 
 /// Everything that is counted, over all frames.
 fn counters(run: &RunRecord) -> Vec<Vec<String>> {
-    let (blocks, health, trajectory) = (&run.sections.blocks, &run.sections.health, &run.sections.trajectory);
+    let (blocks, health, trajectory) =
+        (&run.sections.blocks, &run.sections.health, &run.sections.trajectory);
     let totals = &blocks.totals;
     let rows = [
         ("peak of blocks in use", u64::from(totals.peak)),

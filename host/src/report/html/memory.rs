@@ -47,7 +47,9 @@ pub fn section(run: &RunRecord) -> Markup {
 fn bounds_table(run: &RunRecord) -> Vec<Vec<String>> {
     let rows = run.sections.bounds.uses.rows(&run.header.capacity);
     let cells = |(name, bound, of): (&str, usize, BoundUse)| {
-        std::iter::once(name.to_owned()).chain([bound as u64, of.needed as u64, of.refused].map(grouped)).collect()
+        std::iter::once(name.to_owned())
+            .chain([bound as u64, of.needed as u64, of.refused].map(grouped))
+            .collect()
     };
     rows.into_iter().map(cells).collect()
 }

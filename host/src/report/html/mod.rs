@@ -1,4 +1,5 @@
-//! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is fetched, and only the viewer has a script.
+//! `report.html`: the run on one page, in one file. Pictures and drawings are inside; nothing is
+//! fetched, and only the viewer has a script.
 
 mod head;
 mod health;
@@ -77,7 +78,8 @@ fn image(jpeg: &[u8], alt: &str) -> Markup {
     html! { img alt=(alt) src={ "data:image/jpeg;base64," (STANDARD.encode(jpeg)) }; }
 }
 
-/// A table that scrolls where the page is narrow: heads with whether their column holds numbers, then rows of cells.
+/// A table that scrolls where the page is narrow: heads with whether their column holds numbers,
+/// then rows of cells.
 fn table(heads: &[(&str, bool)], rows: &[Vec<String>]) -> Markup {
     html! {
         div.scroll { table {

@@ -22,8 +22,13 @@ pub fn section(run: &RunRecord) -> Markup {
         return html! {};
     }
     let shown = shown(tracks);
-    let refused: Vec<String> =
-        health.mask_refusals.named().iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} {name}")).collect();
+    let refused: Vec<String> = health
+        .mask_refusals
+        .named()
+        .iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(name, count)| format!("{count} {name}"))
+        .collect();
     html! {
         section {
             h2 { "Objects and tracks" }
@@ -64,13 +69,17 @@ fn truth(figures: &ObjectFigures) -> Markup {
         ("moving at 20 to 32 m", &figures.moving_far),
         ("static within 20 m", &figures.standing_near),
     ];
-    let motions: Vec<String> =
-        motions.iter().filter_map(|(name, of)| Some(format!("{name}: {} in {} motions", motion_error(of)?, of.frames))).collect();
-    let confusion = figures
-        .confusion
+    let motions: Vec<String> = motions
         .iter()
-        .zip(["static", "moving"])
-        .map(|(counts, name)| std::iter::once(name.to_owned()).chain(counts.iter().map(ToString::to_string)).collect::<Vec<_>>());
+        .filter_map(|(name, of)| {
+            Some(format!("{name}: {} in {} motions", motion_error(of)?, of.frames))
+        })
+        .collect();
+    let confusion = figures.confusion.iter().zip(["static", "moving"]).map(|(counts, name)| {
+        std::iter::once(name.to_owned())
+            .chain(counts.iter().map(ToString::to_string))
+            .collect::<Vec<_>>()
+    });
     html! {
         p.small {
             "Against ground truth: " (figures.tracks) " tracks. Within 20 m: " (late(&figures.late_near)) ". At 20 to 32 m: "
@@ -113,15 +122,19 @@ fn lanes_of(shown: &[&TrackRecord]) -> Vec<Lane> {
             to: span.to,
             style: state_name(span.state),
             pale: !span.measured,
-            text: span.speed_m_s.filter(|_| span.state != MotionState::Static).map(|speed| format!("{speed:.1} m/s")),
+            text: span
+                .speed_m_s
+                .filter(|_| span.state != MotionState::Static)
+                .map(|speed| format!("{speed:.1} m/s")),
         });
-        let truth = record.errors.iter().flat_map(|errors| &errors.moving).map(|&(at, moving)| Bar {
-            from: at,
-            to: at + 1,
-            style: state_name(if moving { MotionState::Dynamic } else { MotionState::Static }),
-            pale: false,
-            text: None,
-        });
+        let truth =
+            record.errors.iter().flat_map(|errors| &errors.moving).map(|&(at, moving)| Bar {
+                from: at,
+                to: at + 1,
+                style: state_name(if moving { MotionState::Dynamic } else { MotionState::Static }),
+                pale: false,
+                text: None,
+            });
         Lane {
             name: format!("{} {}", record.class.name(), record.id),
             truth: truth.collect(),
@@ -158,7 +171,9 @@ fn track_table(shown: &[&TrackRecord]) -> Markup {
 }
 
 fn track_row(track: &TrackRecord) -> Vec<String> {
-    let number = |value: Option<f64>, digits: usize| value.map_or(String::new(), |value| format!("{value:.digits$}"));
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or(String::new(), |value| format!("{value:.digits$}"))
+    };
     let whole = |value: Option<u64>| value.map_or(String::new(), |value| value.to_string());
     let errors = track.errors.as_ref();
     let [uncertain, still, moving] = track.states.map(|frames| frames.to_string());
@@ -186,7 +201,8 @@ fn track_row(track: &TrackRecord) -> Vec<String> {
 
 /// Meshes with a thumbnail.
 fn gallery(objects: &[ReconstructedObject]) -> Markup {
-    let shown: Vec<&ReconstructedObject> = objects.iter().filter(|object| !object.thumbnail_jpeg.is_empty()).collect();
+    let shown: Vec<&ReconstructedObject> =
+        objects.iter().filter(|object| !object.thumbnail_jpeg.is_empty()).collect();
     if shown.is_empty() {
         return html! {};
     }
@@ -212,7 +228,10 @@ fn gallery(objects: &[ReconstructedObject]) -> Markup {
 
 /// A mesh against the true surface.
 fn surface(figures: &SurfaceFigures) -> String {
-    let median = figures.median_m.map_or_else(|| "beyond two voxels".to_owned(), |median_m| format!("{:.1} cm", 100.0 * median_m));
+    let median = figures.median_m.map_or_else(
+        || "beyond two voxels".to_owned(),
+        |median_m| format!("{:.1} cm", 100.0 * median_m),
+    );
     format!(
         "; median distance to the true surface {median}, {:.0} % of the seen surface reconstructed, nearest at {:.0} m",
         100.0 * figures.completeness,

@@ -1,7 +1,10 @@
-//! Input and map against LiDAR or exact depth: a table, charts over the frames, pictures of the errors.
+//! Input and map against LiDAR or exact depth: a table, charts over the frames, pictures of the
+//! errors.
 
 use super::{image, table};
-use crate::evaluate::reference::{ACCEPTANCE_RULES, EvaluatedFrame, PairFigures, ReferenceFigures, Region, SourceFigures};
+use crate::evaluate::reference::{
+    ACCEPTANCE_RULES, EvaluatedFrame, PairFigures, ReferenceFigures, Region, SourceFigures,
+};
 use crate::observe::{ReferenceSection, pictures};
 use crate::report::chart::{COLOURS, Series, lines};
 use crate::report::text::grouped;
@@ -62,7 +65,9 @@ fn table_of(figures: &ReferenceFigures) -> Markup {
     ];
     let mut rows = Vec::new();
     let dynamic = figures.dynamic.iter().map(|of| ("dynamic objects", of));
-    for (name, PairFigures { input, fused, .. }) in std::iter::once(("static", &figures.still)).chain(dynamic) {
+    for (name, PairFigures { input, fused, .. }) in
+        std::iter::once(("static", &figures.still)).chain(dynamic)
+    {
         rows.push(row(name, "input", input));
         rows.push(row("", "map", fused));
     }
@@ -81,9 +86,11 @@ fn charts(frames: &[EvaluatedFrame]) -> Markup {
     let numbers: Vec<usize> = frames.iter().map(|frame| frame.frame).collect();
     let percent = |value: Option<f64>| value.map_or(f64::NAN, |value| 100.0 * value);
     let chart = |title: &str, value: &dyn Fn(&EvaluatedFrame, usize) -> f64| {
-        let of = |source: usize| frames.iter().map(|frame| value(frame, source)).collect::<Vec<f64>>();
+        let of =
+            |source: usize| frames.iter().map(|frame| value(frame, source)).collect::<Vec<f64>>();
         let [input, map] = [("input", COLOURS[5], 0), ("map", COLOURS[0], 1)];
-        let series = [input, map].map(|(name, colour, source)| Series { name, colour, values: of(source) });
+        let series =
+            [input, map].map(|(name, colour, source)| Series { name, colour, values: of(source) });
         lines(&numbers, &series, title, 100.0)
     };
     let region = Region::Static as usize;
@@ -110,9 +117,18 @@ fn error_pictures(section: &ReferenceSection, name: &str) -> Markup {
 }
 
 fn legend() -> Markup {
-    let names = ["error up to a quarter of what is right", "up to half", "right", "wrong: up to twice", "up to four times", "more"];
+    let names = [
+        "error up to a quarter of what is right",
+        "up to half",
+        "right",
+        "wrong: up to twice",
+        "up to four times",
+        "more",
+    ];
     let errors = pictures::ERRORS.iter().zip(names).map(|((_, colour), name)| (*colour, name));
-    let spots: Vec<([u8; 3], &str)> = errors.chain([(pictures::MISSING, "no estimate"), (pictures::IGNORED, "in no figure")]).collect();
+    let spots: Vec<([u8; 3], &str)> = errors
+        .chain([(pictures::MISSING, "no estimate"), (pictures::IGNORED, "in no figure")])
+        .collect();
     html! {
         span.legend {
             @for ([r, g, b], name) in spots { span { i style=(format!("background:rgb({r},{g},{b})")) {} (name) } " " }

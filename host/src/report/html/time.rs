@@ -39,5 +39,7 @@ pub fn section(run: &RunRecord) -> Markup {
 /// A line for each stage within the step.
 fn stages(run: &RunRecord, of: fn(Stage) -> Charted) -> Vec<Series<'static>> {
     let within = Stage::ALL.iter().enumerate().filter(|(_, stage)| **stage != Stage::Raycast);
-    within.map(|(at, stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], of(*stage))).collect()
+    within
+        .map(|(at, stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], of(*stage)))
+        .collect()
 }

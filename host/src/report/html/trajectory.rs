@@ -49,11 +49,21 @@ fn errors_of(errors: &TrajectoryErrors) -> Markup {
         .per_length
         .iter()
         .map(|(length_m, percent, deg_per_m, segments)| {
-            vec![length_m.to_string(), format!("{percent:.3}"), format!("{deg_per_m:.5}"), segments.to_string()]
+            vec![
+                length_m.to_string(),
+                format!("{percent:.3}"),
+                format!("{deg_per_m:.5}"),
+                segments.to_string(),
+            ]
         })
         .collect();
     if let (Some(percent), Some(deg_per_m)) = (errors.t_err_percent, errors.r_err_deg_per_m) {
-        rows.push(vec!["all".to_owned(), format!("{percent:.3}"), format!("{deg_per_m:.5}"), String::new()]);
+        rows.push(vec![
+            "all".to_owned(),
+            format!("{percent:.3}"),
+            format!("{deg_per_m:.5}"),
+            String::new(),
+        ]);
     }
     html! {
         p.small.apart {

@@ -1,4 +1,5 @@
-//! Points as a layer of their own: planes of their positions (16 bits of the cloud's box) and colours, as in [`super::tiles`], deflated.
+//! Points as a layer of their own: planes of their positions (16 bits of the cloud's box) and
+//! colours, as in [`super::tiles`], deflated.
 
 use super::planes::{longest_side, morton, push_byte_differences, push_word_differences};
 use crate::scene::{IndexedMesh, PlanningCell, PlanningWindow, Scene};
@@ -12,14 +13,16 @@ const MOST_POINTS: usize = 60_000;
 const STEPS: f32 = 65_535.0;
 /// What pruning took.
 const PRUNED_COLOUR: [u8; 3] = [214, 51, 132];
-/// Share of a block's side that stands for one that pruning took, so that blocks beside each other are told apart.
+/// Share of a block's side that stands for one that pruning took, so that blocks beside each other
+/// are told apart.
 const PRUNED_SHARE: f32 = 0.5;
 /// An obstacle of the planner's window.
 const OBSTACLE_COLOUR: [u8; 3] = [33, 37, 41];
 /// Free ground beside an obstacle, and at [`CLEAR_M`] from the nearest.
 const FREE_COLOURS: [[u8; 3]; 2] = [[250, 82, 82], [64, 192, 87]];
 const CLEAR_M: f32 = 3.0;
-/// How far above the ground the window is drawn, m: what is measured of the ground would hide half of it.
+/// How far above the ground the window is drawn, m: what is measured of the ground would hide half
+/// of it.
 const LIFT_M: f32 = 0.1;
 
 /// What a cloud is, for the page's script.
@@ -56,7 +59,8 @@ pub fn clouds(scene: &Scene) -> io::Result<Vec<Cloud>> {
     let pruned: Vec<_> = blocks.pruned_m.iter().map(|&at| (at, PRUNED_COLOUR)).collect();
     let name = format!("pruned blocks ({})", pruned.len());
     let planning = &scene.planning;
-    let window: Vec<_> = planning.cells.iter().map(|cell| (lifted(planning, cell), planning_colour(cell))).collect();
+    let window: Vec<_> =
+        planning.cells.iter().map(|cell| (lifted(planning, cell), planning_colour(cell))).collect();
     let clouds = [
         cloud("pruned", name, &pruned, PRUNED_SHARE * blocks.side_m)?,
         cloud("planning", "planning window".to_owned(), &window, planning.cell_m)?,
@@ -77,18 +81,30 @@ fn planning_colour(cell: &PlanningCell) -> [u8; 3] {
     [0, 1, 2].map(|channel| (near[channel] + share * (clear[channel] - near[channel])) as u8)
 }
 
-fn cloud(layer: &'static str, name: String, points: &[([f32; 3], [u8; 3])], side_m: f32) -> io::Result<Option<Cloud>> {
+fn cloud(
+    layer: &'static str,
+    name: String,
+    points: &[([f32; 3], [u8; 3])],
+    side_m: f32,
+) -> io::Result<Option<Cloud>> {
     let every = points.len().div_ceil(MOST_POINTS).max(1);
     let mut points: Vec<_> = points.iter().step_by(every).copied().collect();
     let positions_m = points.iter().map(|(at, _)| *at).collect();
-    let Some(bounds_m) = IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m() else { return Ok(None) };
+    let Some(bounds_m) = IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m() else {
+        return Ok(None);
+    };
     points.sort_by_key(|(at, _)| morton(*at, bounds_m));
     let (low_m, size_m) = (bounds_m[0], longest_side(bounds_m).max(1e-3));
     let mut planes = Vec::with_capacity(9 * points.len());
     for axis in 0..3 {
-        push_word_differences(&mut planes, points.iter().map(|(at, _)| ((at[axis] - low_m[axis]) / size_m * STEPS).round() as u16));
+        push_word_differences(
+            &mut planes,
+            points.iter().map(|(at, _)| ((at[axis] - low_m[axis]) / size_m * STEPS).round() as u16),
+        );
     }
-    (0..3).for_each(|channel| push_byte_differences(&mut planes, points.iter().map(|(_, colour)| colour[channel])));
+    (0..3).for_each(|channel| {
+        push_byte_differences(&mut planes, points.iter().map(|(_, colour)| colour[channel]))
+    });
     let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
     deflated.write_all(&planes)?;
     let head = CloudHead { layer, name, low_m, size_m, side_m, points: points.len() };
@@ -103,13 +119,20 @@ mod tests {
     #[test]
     fn a_cloud_is_thinned_out_and_keeps_places_and_colours() {
         assert!(cloud("a", String::new(), &[], 1.0).unwrap().is_none());
-        let points: Vec<_> = (0..3 * MOST_POINTS).map(|at| ([(at % 200) as f32, 5.0, (at / 200) as f32], [1, 2, 3])).collect();
+        let points: Vec<_> = (0..3 * MOST_POINTS)
+            .map(|at| ([(at % 200) as f32, 5.0, (at / 200) as f32], [1, 2, 3]))
+            .collect();
         let Cloud { head, bytes } = cloud("a", "b".to_owned(), &points, 0.4).unwrap().unwrap();
         assert_eq!((head.points, head.low_m, head.size_m), (MOST_POINTS, [0.0, 5.0, 0.0], 899.0));
         let mut planes = Vec::new();
         flate2::read::ZlibDecoder::new(&bytes[..]).read_to_end(&mut planes).unwrap();
         assert_eq!(planes.len(), 9 * MOST_POINTS);
-        let sums = [6, 7, 8].map(|plane| planes[plane * MOST_POINTS..][..MOST_POINTS].iter().map(|&byte| u32::from(byte)).sum::<u32>());
+        let sums = [6, 7, 8].map(|plane| {
+            planes[plane * MOST_POINTS..][..MOST_POINTS]
+                .iter()
+                .map(|&byte| u32::from(byte))
+                .sum::<u32>()
+        });
         assert_eq!(sums, [1, 2, 3], "one colour: no difference but the first");
     }
 }

@@ -33,7 +33,8 @@ pub struct Head<'s> {
     pictures: &'s [usize],
     /// Triangles of the static map on disk.
     static_triangles: u64,
-    /// Heights of the static map below which five of a hundred vertices lie, and above which five of a hundred do: y, m.
+    /// Heights of the static map below which five of a hundred vertices lie, and above which five
+    /// of a hundred do: y, m.
     heights_m: [f32; 2],
     /// Values of the surface; null where no vertex has one.
     values: [Option<ValueHead>; VALUES],
@@ -72,7 +73,11 @@ impl<'s> Head<'s> {
             frames: frames.iter().map(|frame| frame.row.frame).collect(),
             times_s: frames.iter().map(|frame| rounded(frame.row.time_s, 3)).collect(),
             poses: frames.iter().map(|frame| numbers(&frame.t_world_camera)).collect(),
-            truth: scene.truth.iter().map(|pose| pose.translation_m.map(|metres| rounded(metres, POSITION_DIGITS))).collect(),
+            truth: scene
+                .truth
+                .iter()
+                .map(|pose| pose.translation_m.map(|metres| rounded(metres, POSITION_DIGITS)))
+                .collect(),
             charts: charts(frames),
             tracks: frames.iter().map(|frame| frame.tracks.iter().map(track).collect()).collect(),
             objects: scene
@@ -102,7 +107,11 @@ fn track(track: &TrackColumns) -> TrackHead<'_> {
 }
 
 fn charts(frames: &[SceneFrame]) -> Vec<Chart> {
-    let chart = |name, unit, value: fn(&SceneFrame) -> f64| Chart { name, unit, values: frames.iter().map(value).collect() };
+    let chart = |name, unit, value: fn(&SceneFrame) -> f64| Chart {
+        name,
+        unit,
+        values: frames.iter().map(value).collect(),
+    };
     vec![
         chart("step", "ms", |frame| rounded(frame.row.step_ms, 1)),
         chart("egomotion inliers", "", |frame| f64::from(frame.row.inliers)),
@@ -114,8 +123,10 @@ fn charts(frames: &[SceneFrame]) -> Vec<Chart> {
 }
 
 fn numbers(pose: &Transform) -> [f64; 7] {
-    let ([x, y, z], [i, j, k, w]) =
-        (pose.translation_m.map(|metres| rounded(metres, POSITION_DIGITS)), pose.rotation.map(|part| rounded(part, ROTATION_DIGITS)));
+    let ([x, y, z], [i, j, k, w]) = (
+        pose.translation_m.map(|metres| rounded(metres, POSITION_DIGITS)),
+        pose.rotation.map(|part| rounded(part, ROTATION_DIGITS)),
+    );
     [x, y, z, i, j, k, w]
 }
 

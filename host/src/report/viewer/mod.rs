@@ -1,7 +1,9 @@
-//! The viewer: map, objects, paths, pictures and charts of a run over a time line, inside one page that fetches nothing.
+//! The viewer: map, objects, paths, pictures and charts of a run over a time line, inside one page
+//! that fetches nothing.
 //!
-//! Meshes and tables are deflated and in base64, in elements that the page's script reads one after the other; pictures are read when they are
-//! shown. Without WebGL 2 or scripts the page shows a picture and says so.
+//! Meshes and tables are deflated and in base64, in elements that the page's script reads one after
+//! the other; pictures are read when they are shown. Without WebGL 2 or scripts the page shows a
+//! picture and says so.
 
 mod clouds;
 mod head;
@@ -39,9 +41,12 @@ const SCRIPT: [&str; 8] = [
 pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
     let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
     let values = SurfaceValues::of(scene);
-    let mut tiles = tiles::tiles(&scene.static_map, &values.of_static(&scene.static_map), None).map_err(failed)?;
+    let mut tiles = tiles::tiles(&scene.static_map, &values.of_static(&scene.static_map), None)
+        .map_err(failed)?;
     for (at, object) in scene.objects.iter().enumerate() {
-        tiles.extend(tiles::tiles(&object.mesh, &values.of_object(object), Some(at)).map_err(failed)?);
+        tiles.extend(
+            tiles::tiles(&object.mesh, &values.of_object(object), Some(at)).map_err(failed)?,
+        );
     }
     let mut head = Head::of(name, scene, values.heads());
     let mut elements = Vec::new();
@@ -77,7 +82,11 @@ fn deflated(head: &Head<'_>) -> io::Result<Vec<u8>> {
 
 /// Pictures as they are in the run folder. One that is missing there is missing here.
 fn pictures(folder: &Path, scene: &Scene) -> Vec<(String, String)> {
-    let names = scene.pictures.frames.iter().flat_map(|&frame| PictureKind::ALL.map(|kind| kind.file(frame)));
+    let names = scene
+        .pictures
+        .frames
+        .iter()
+        .flat_map(|&frame| PictureKind::ALL.map(|kind| kind.file(frame)));
     names.filter_map(|name| Some((format!("dynvox-{name}"), picture(folder, &name)?))).collect()
 }
 

@@ -1,11 +1,15 @@
 //! A mesh in tiles: compact pieces with indices of 16 bits, deflated.
 //!
-//! A tile's bytes are planes, one after the other, each a byte of every vertex or corner: positions (x, y, z as 16 bits of the tile's box, low
-//! bytes before high ones), normals (two bytes, octahedral), colours (red, green, blue), values, corners (16 bits, low bytes before high ones).
-//! Positions, colours and values are differences from the vertex before. A corner is the number of vertices named so far less its own number, so
-//! that a vertex named for the first time is 0. Such planes deflate to about a third.
+//! A tile's bytes are planes, one after the other, each a byte of every vertex or corner: positions
+//! (x, y, z as 16 bits of the tile's box, low bytes before high ones), normals (two bytes,
+//! octahedral), colours (red, green, blue), values, corners (16 bits, low bytes before high ones).
+//! Positions, colours and values are differences from the vertex before. A corner is the number of
+//! vertices named so far less its own number, so that a vertex named for the first time is 0. Such
+//! planes deflate to about a third.
 
-use super::planes::{longest_side, morton, push_byte_differences, push_word_differences, push_words};
+use super::planes::{
+    longest_side, morton, push_byte_differences, push_word_differences, push_words,
+};
 use super::values::{VALUES, ValueBytes};
 use crate::scene::IndexedMesh;
 use flate2::{Compression, write::ZlibEncoder};
@@ -14,7 +18,8 @@ use std::io::{self, Write};
 
 /// Triangles of a tile: it cannot have more vertices than 16 bits count.
 const TRIANGLES: usize = 16_384;
-/// Steps along the longest side of the largest tile. All tiles of a mesh share one step, so that no crack opens between them.
+/// Steps along the longest side of the largest tile. All tiles of a mesh share one step, so that no
+/// crack opens between them.
 const STEPS: f32 = 65_534.0;
 
 /// What a tile is, for the page's script.
@@ -53,15 +58,28 @@ struct Surface<'m> {
 ///
 /// # Errors
 /// None in memory: the encoder's.
-pub fn tiles(mesh: &IndexedMesh, values: &[ValueBytes], object: Option<usize>) -> io::Result<Vec<Tile>> {
+pub fn tiles(
+    mesh: &IndexedMesh,
+    values: &[ValueBytes],
+    object: Option<usize>,
+) -> io::Result<Vec<Tile>> {
     let Some(bounds_m) = mesh.bounds_m() else { return Ok(Vec::new()) };
     let surface = Surface { mesh, normals: mesh.normals(), values };
-    let mut order: Vec<(u32, usize)> =
-        mesh.triangles.iter().enumerate().map(|(at, [first, ..])| (morton(mesh.positions_m[*first as usize], bounds_m), at)).collect();
+    let mut order: Vec<(u32, usize)> = mesh
+        .triangles
+        .iter()
+        .enumerate()
+        .map(|(at, [first, ..])| (morton(mesh.positions_m[*first as usize], bounds_m), at))
+        .collect();
     order.sort_unstable();
-    let chunks: Vec<Vec<[u32; 3]>> =
-        order.chunks(TRIANGLES).map(|chunk| chunk.iter().map(|(_, at)| mesh.triangles[*at]).collect()).collect();
-    let longest_m = chunks.iter().map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten()))).fold(1e-3, f32::max);
+    let chunks: Vec<Vec<[u32; 3]>> = order
+        .chunks(TRIANGLES)
+        .map(|chunk| chunk.iter().map(|(_, at)| mesh.triangles[*at]).collect())
+        .collect();
+    let longest_m = chunks
+        .iter()
+        .map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten())))
+        .fold(1e-3, f32::max);
     chunks.iter().map(|chunk| tile(&surface, chunk, (object, longest_m / STEPS))).collect()
 }
 
@@ -72,9 +90,14 @@ fn box_of<'c>(mesh: &IndexedMesh, corners: impl Iterator<Item = &'c u32>) -> [[f
 }
 
 /// Encodes some triangles, positions to multiples of `step_m`.
-fn tile(surface: &Surface<'_>, triangles: &[[u32; 3]], (object, step_m): (Option<usize>, f32)) -> io::Result<Tile> {
+fn tile(
+    surface: &Surface<'_>,
+    triangles: &[[u32; 3]],
+    (object, step_m): (Option<usize>, f32),
+) -> io::Result<Tile> {
     let Surface { mesh, normals, values } = surface;
-    let (mut numbers, mut vertices, mut corners) = (hashbrown::HashMap::new(), Vec::<usize>::new(), Vec::new());
+    let (mut numbers, mut vertices, mut corners) =
+        (hashbrown::HashMap::new(), Vec::<usize>::new(), Vec::new());
     for &corner in triangles.iter().flatten() {
         let next = vertices.len() as u16;
         let number = *numbers.entry(corner).or_insert(next);
@@ -85,14 +108,20 @@ fn tile(surface: &Surface<'_>, triangles: &[[u32; 3]], (object, step_m): (Option
     }
     let [low_m, high_m] = box_of(mesh, triangles.iter().flatten());
     let lowest = low_m.map(|metres| (f64::from(metres) / f64::from(step_m)).floor());
-    let steps = |at: usize, axis: usize| (f64::from(mesh.positions_m[at][axis]) / f64::from(step_m)).round() - lowest[axis];
+    let steps = |at: usize, axis: usize| {
+        (f64::from(mesh.positions_m[at][axis]) / f64::from(step_m)).round() - lowest[axis]
+    };
     let quantised = |axis: usize| vertices.iter().map(move |&at| steps(at, axis) as u16);
     let mut planes = Vec::with_capacity((11 + VALUES) * vertices.len() + 2 * corners.len());
     (0..3).for_each(|axis| push_word_differences(&mut planes, quantised(axis)));
     let octahedral: Vec<[i8; 2]> = vertices.iter().map(|&at| octahedral(normals[at])).collect();
     (0..2).for_each(|axis| planes.extend(octahedral.iter().map(|normal| normal[axis] as u8)));
-    (0..3).for_each(|channel| push_byte_differences(&mut planes, vertices.iter().map(|&at| mesh.colours[at][channel])));
-    (0..VALUES).for_each(|value| push_byte_differences(&mut planes, vertices.iter().map(|&at| values[at][value])));
+    (0..3).for_each(|channel| {
+        push_byte_differences(&mut planes, vertices.iter().map(|&at| mesh.colours[at][channel]))
+    });
+    (0..VALUES).for_each(|value| {
+        push_byte_differences(&mut planes, vertices.iter().map(|&at| values[at][value]))
+    });
     push_words(&mut planes, &corners);
     let mut deflated = ZlibEncoder::new(Vec::new(), Compression::default());
     deflated.write_all(&planes)?;
@@ -113,7 +142,8 @@ fn octahedral(normal: [f32; 3]) -> [i8; 2] {
     let sum = normal.iter().map(|value| value.abs()).sum::<f32>().max(1e-6);
     let [x, y, z] = normal.map(|value| value / sum);
     let signed = |magnitude: f32, of: f32| if of < 0.0 { -magnitude } else { magnitude };
-    let [x, y] = if z < 0.0 { [signed(1.0 - y.abs(), x), signed(1.0 - x.abs(), y)] } else { [x, y] };
+    let [x, y] =
+        if z < 0.0 { [signed(1.0 - y.abs(), x), signed(1.0 - x.abs(), y)] } else { [x, y] };
     [x, y].map(|value| (127.0 * value).round() as i8)
 }
 
@@ -135,9 +165,11 @@ mod tests {
         for axis in 0..3 {
             let mut at = 0u16;
             for (vertex, position) in positions.iter_mut().enumerate() {
-                let word = u16::from(bytes[2 * axis * count + vertex]) | u16::from(bytes[(2 * axis + 1) * count + vertex]) << 8;
+                let word = u16::from(bytes[2 * axis * count + vertex])
+                    | u16::from(bytes[(2 * axis + 1) * count + vertex]) << 8;
                 at = at.wrapping_add(word >> 1 ^ (word & 1).wrapping_neg());
-                position[axis] = tile.head.low_m[axis] + f32::from(at) / 65_535.0 * tile.head.size_m;
+                position[axis] =
+                    tile.head.low_m[axis] + f32::from(at) / 65_535.0 * tile.head.size_m;
             }
         }
         for channel in 0..4 {
@@ -149,7 +181,8 @@ mod tests {
         }
         let (mut named, mut triangles) = (0, vec![[0; 3]; tile.head.triangles]);
         for at in 0..corners {
-            let word = usize::from(bytes[(11 + VALUES) * count + at]) | usize::from(bytes[(11 + VALUES) * count + corners + at]) << 8;
+            let word = usize::from(bytes[(11 + VALUES) * count + at])
+                | usize::from(bytes[(11 + VALUES) * count + corners + at]) << 8;
             triangles[at / 3][at % 3] = named - word;
             named += usize::from(word == 0);
         }
@@ -167,21 +200,30 @@ mod tests {
             values.push([(x * y) as u8; VALUES]);
         }
         for (x, y) in (0..side * side).map(|at| (at % side, at / side)) {
-            mesh.triangles.extend([[at(x, y), at(x + 1, y), at(x, y + 1)], [at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]]);
+            mesh.triangles.extend([
+                [at(x, y), at(x + 1, y), at(x, y + 1)],
+                [at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)],
+            ]);
         }
         let tiles = tiles(&mesh, &values, Some(3)).unwrap();
         assert!(tiles.len() == 3 && tiles.iter().all(|tile| tile.head.object == Some(3)));
-        let key =
-            |corners: [([f32; 3], [u8; 4]); 3]| corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour));
+        let key = |corners: [([f32; 3], [u8; 4]); 3]| {
+            corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour))
+        };
         let vertex = |at: u32| {
             let [red, green, blue] = mesh.colours[at as usize];
             (mesh.positions_m[at as usize], [red, green, blue, values[at as usize][0]])
         };
-        let mut given: Vec<_> = mesh.triangles.iter().map(|triangle| key(triangle.map(vertex))).collect();
+        let mut given: Vec<_> =
+            mesh.triangles.iter().map(|triangle| key(triangle.map(vertex))).collect();
         let mut found = Vec::new();
         for tile in &tiles {
             let (positions, colours, triangles) = decoded(tile);
-            found.extend(triangles.iter().map(|triangle| key(triangle.map(|at| (positions[at], colours[at])))));
+            found.extend(
+                triangles
+                    .iter()
+                    .map(|triangle| key(triangle.map(|at| (positions[at], colours[at])))),
+            );
         }
         given.sort();
         found.sort();

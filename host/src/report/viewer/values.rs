@@ -1,11 +1,13 @@
-//! What the surface can be coloured by besides its photo: a byte of each value for each vertex, and what the bytes mean.
+//! What the surface can be coloured by besides its photo: a byte of each value for each vertex, and
+//! what the bytes mean.
 
 use crate::scene::{BlockHistory, IndexedMesh, Scene, SceneObject, SurfaceErrorMap};
 use serde::Serialize;
 
 /// Values of a vertex.
 pub const VALUES: usize = 3;
-/// A byte of each value: 0 where it is not known, otherwise 1 for the least to 255 for the greatest.
+/// A byte of each value: 0 where it is not known, otherwise 1 for the least to 255 for the
+/// greatest.
 pub type ValueBytes = [u8; VALUES];
 
 /// A value for the page's script.
@@ -37,7 +39,8 @@ impl Scale {
 pub struct SurfaceValues<'s> {
     blocks: &'s BlockHistory,
     errors: &'s SurfaceErrorMap,
-    /// From one observation to what nearly all of the static map is below; `None` where no weight is known.
+    /// From one observation to what nearly all of the static map is below; `None` where no weight
+    /// is known.
     weight: Option<Scale>,
     /// From the first frame to the last; `None` where it is not known when a place was seen.
     last_seen: Option<Scale>,
@@ -51,12 +54,16 @@ impl<'s> SurfaceValues<'s> {
         let mut weights = scene.static_map.weights.clone();
         weights.sort_unstable();
         let most = weights.get(weights.len() * 19 / 20).copied().unwrap_or_default();
-        let frames = scene.frames.first().zip(scene.frames.last()).filter(|_| !scene.blocks.is_empty());
+        let frames =
+            scene.frames.first().zip(scene.frames.last()).filter(|_| !scene.blocks.is_empty());
         Self {
             blocks: &scene.blocks,
             errors: &scene.errors,
             weight: (most > 0).then(|| Scale { low: 1.0, high: most.into() }),
-            last_seen: frames.map(|(first, last)| Scale { low: first.row.frame as f32, high: last.row.frame as f32 }),
+            last_seen: frames.map(|(first, last)| Scale {
+                low: first.row.frame as f32,
+                high: last.row.frame as f32,
+            }),
             error_m: scene.errors.most_m().map(|high| Scale { low: 0.0, high }),
         }
     }
@@ -84,11 +91,19 @@ impl<'s> SurfaceValues<'s> {
     /// The bytes of the static map's vertices.
     pub fn of_static(&self, mesh: &IndexedMesh) -> Vec<ValueBytes> {
         let at = |vertex: usize| mesh.positions_m[vertex];
-        self.bytes(mesh, |vertex| self.blocks.last_frame(at(vertex)), |vertex| self.errors.error_m(at(vertex)))
+        self.bytes(
+            mesh,
+            |vertex| self.blocks.last_frame(at(vertex)),
+            |vertex| self.errors.error_m(at(vertex)),
+        )
     }
 
-    /// The bytes of the vertices of an object, which was last seen as a whole. No reference is kept for it.
-    pub fn of_object(&self, SceneObject { mesh, t_world_object, .. }: &SceneObject) -> Vec<ValueBytes> {
+    /// The bytes of the vertices of an object, which was last seen as a whole. No reference is kept
+    /// for it.
+    pub fn of_object(
+        &self,
+        SceneObject { mesh, t_world_object, .. }: &SceneObject,
+    ) -> Vec<ValueBytes> {
         let last = t_world_object.last().map(|(frame, _)| *frame);
         self.bytes(mesh, |_| last, |_| None)
     }
@@ -99,10 +114,18 @@ impl<'s> SurfaceValues<'s> {
         last_frame: impl Fn(usize) -> Option<usize>,
         error_m: impl Fn(usize) -> Option<f32>,
     ) -> Vec<ValueBytes> {
-        let byte = |scale: Option<Scale>, value: Option<f32>| scale.zip(value).map_or(0, |(scale, value)| scale.byte(value));
+        let byte = |scale: Option<Scale>, value: Option<f32>| {
+            scale.zip(value).map_or(0, |(scale, value)| scale.byte(value))
+        };
         let weight = |at: usize| Some(mesh.weights[at]).filter(|&weight| weight > 0).map(f32::from);
         let last_seen = |at: usize| last_frame(at).map(|frame| frame as f32);
-        let values = |at: usize| [byte(self.weight, weight(at)), byte(self.last_seen, last_seen(at)), byte(self.error_m, error_m(at))];
+        let values = |at: usize| {
+            [
+                byte(self.weight, weight(at)),
+                byte(self.last_seen, last_seen(at)),
+                byte(self.error_m, error_m(at)),
+            ]
+        };
         (0..mesh.positions_m.len()).map(values).collect()
     }
 }

@@ -33,7 +33,9 @@ pub enum ResumeError {
         taken: u32,
     },
     /// Another dynvox of the same snapshot version wrote it.
-    #[error("{path} was written by another dynvox: {reason}. Resume with that one, or start the run again with --overwrite")]
+    #[error(
+        "{path} was written by another dynvox: {reason}. Resume with that one, or start the run again with --overwrite"
+    )]
     Otherwise {
         /// The snapshot.
         path: PathBuf,
@@ -55,7 +57,9 @@ pub enum ResumeError {
         differences: String,
     },
     /// The command line cannot be stored.
-    #[error("{what} is not Unicode, and a snapshot stores the command line. Rename it, or run without --snapshot-every")]
+    #[error(
+        "{what} is not Unicode, and a snapshot stores the command line. Rename it, or run without --snapshot-every"
+    )]
     NotUnicode {
         /// The word, as well as it can be shown.
         what: String,

@@ -28,9 +28,16 @@ impl RunManifest {
     ///
     /// # Errors
     /// They are not Unicode.
-    pub fn of(plan: &Plan, arguments: impl Iterator<Item = OsString>, working_dir: &Path) -> Result<Self, ResumeError> {
-        let text =
-            |word: OsString| word.into_string().map_err(|word| ResumeError::NotUnicode { what: word.to_string_lossy().into_owned() });
+    pub fn of(
+        plan: &Plan,
+        arguments: impl Iterator<Item = OsString>,
+        working_dir: &Path,
+    ) -> Result<Self, ResumeError> {
+        let text = |word: OsString| {
+            word.into_string().map_err(|word| ResumeError::NotUnicode {
+                what: word.to_string_lossy().into_owned(),
+            })
+        };
         Ok(Self {
             arguments: arguments.map(text).collect::<Result<_, _>>()?,
             working_dir: text(working_dir.to_path_buf().into_os_string())?,
@@ -63,7 +70,8 @@ impl RunManifest {
             return Ok(());
         }
         let sentence = |one: &Setting| {
-            let [then, now] = one.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
+            let [then, now] =
+                one.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
             format!("{} was {then} and is {now}", one.key)
         };
         let mut sentences: Vec<String> = all.iter().take(MOST_DIFFERENCES).map(sentence).collect();
@@ -84,15 +92,25 @@ fn fingerprint(plan: &Plan) -> BTreeMap<String, String> {
         values.for_each(|value| digest.f64(value));
         format!("{:016x}", digest.finish())
     };
-    let poses = plan.poses.iter().flatten().flat_map(|pose| pose.rotation.into_iter().chain(pose.translation_m));
+    let poses = plan
+        .poses
+        .iter()
+        .flatten()
+        .flat_map(|pose| pose.rotation.into_iter().chain(pose.translation_m));
     let (width, height) = dataset.size();
     let rows = [
         ("name", dataset.name().to_owned()),
         ("rig", format!("{:?}", dataset.rig())),
         ("image size", format!("{width} x {height} px")),
         ("number of frames", plan.frames.listed().len().to_string()),
-        ("digest of the frames' numbers", digest(&mut plan.frames.listed().iter().map(|&index| index as f64))),
-        ("digest of the frames' times", digest(&mut plan.frames.listed().iter().map(|&index| dataset.time_s(index)))),
+        (
+            "digest of the frames' numbers",
+            digest(&mut plan.frames.listed().iter().map(|&index| index as f64)),
+        ),
+        (
+            "digest of the frames' times",
+            digest(&mut plan.frames.listed().iter().map(|&index| dataset.time_s(index))),
+        ),
         ("digest of the given poses", digest(&mut poses.collect::<Vec<_>>().into_iter())),
     ];
     fingerprint.extend(rows.map(|(name, value)| (format!("the data set's {name}"), value)));

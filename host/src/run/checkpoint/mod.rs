@@ -1,4 +1,5 @@
-//! Checkpoints: every so many frames the state of a run is written into its folder, so that an interrupted run can be resumed.
+//! Checkpoints: every so many frames the state of a run is written into its folder, so that an
+//! interrupted run can be resumed.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -9,11 +10,14 @@
 //! | | the mapper's: [`dynvox_core::mapper::snapshot`] |
 //! | 4 | CRC-32 of all bytes before |
 //!
-//! The checkpoint before the last one stays: where the last is damaged, the run is resumed from that one.
+//! The checkpoint before the last one stays: where the last is damaged, the run is resumed from
+//! that one.
 //!
-//! Evicted blocks and rows are not copied: their files only ever grow, so the length and a checksum of each describe it.
+//! Evicted blocks and rows are not copied: their files only ever grow, so the length and a checksum
+//! of each describe it.
 //!
-//! Memory: the host's part, while it is written or read. It grows with the tracks and objects seen, and with what is compared with ground truth.
+//! Memory: the host's part, while it is written or read. It grows with the tracks and objects seen,
+//! and with what is compared with ground truth.
 
 mod error;
 mod manifest;
@@ -71,7 +75,8 @@ pub(super) fn write(
     let last = folder.snapshot();
     write_whole(&last, |file| {
         let mut part = Vec::new();
-        ciborium::into_writer(&Part { manifest, blocks, state }, &mut part).map_err(io::Error::other)?;
+        ciborium::into_writer(&Part { manifest, blocks, state }, &mut part)
+            .map_err(io::Error::other)?;
         let mut checksum = crc32fast::Hasher::new();
         let mut write = |bytes: &[u8]| {
             checksum.update(bytes);
@@ -81,7 +86,11 @@ pub(super) fn write(
         write(&part)?;
         mapper.save(&mut write)?;
         file.write_all(&checksum.finalize().to_le_bytes())?;
-        if last.is_file() { std::fs::rename(&last, folder.file(PREVIOUS_SNAPSHOT_FILE)) } else { Ok(()) }
+        if last.is_file() {
+            std::fs::rename(&last, folder.file(PREVIOUS_SNAPSHOT_FILE))
+        } else {
+            Ok(())
+        }
     })
 }
 
@@ -93,14 +102,16 @@ fn head(len: u64) -> [u8; HEAD] {
     head
 }
 
-/// Opens a checkpoint of this version with no byte changed: the file behind its head, and the lengths of its two parts.
+/// Opens a checkpoint of this version with no byte changed: the file behind its head, and the
+/// lengths of its two parts.
 fn open(path: &Path) -> Result<(BufReader<File>, [u64; 2]), ResumeError> {
     let failed = |source| ResumeError::Read { path: path.to_path_buf(), source };
     let damaged = || ResumeError::Damaged { path: path.to_path_buf() };
     let mut file = File::open(path).map_err(failed)?;
     let len = file.metadata().map_err(failed)?.len();
     let mut head = [0; HEAD];
-    file.read_exact(&mut head[..8]).map_err(|_| ResumeError::Foreign { path: path.to_path_buf() })?;
+    file.read_exact(&mut head[..8])
+        .map_err(|_| ResumeError::Foreign { path: path.to_path_buf() })?;
     if head[..8] != MAGIC {
         return Err(ResumeError::Foreign { path: path.to_path_buf() });
     }
@@ -134,7 +145,8 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Reads the last checkpoint in a run's folder that is whole, but for the mapper's part. With it comes what is wrong with a later one.
+    /// Reads the last checkpoint in a run's folder that is whole, but for the mapper's part. With
+    /// it comes what is wrong with a later one.
     ///
     /// # Errors
     /// The last checkpoint is missing, of another version, or damaged, and so is the one before it.
@@ -153,9 +165,13 @@ impl Checkpoint {
     fn of_file(path: PathBuf) -> Result<Self, ResumeError> {
         let (mut file, [part_len, mapper_len]) = open(&path)?;
         let mut part = vec![0; part_len as usize];
-        file.read_exact(&mut part).map_err(|source| ResumeError::Read { path: path.clone(), source })?;
+        file.read_exact(&mut part)
+            .map_err(|source| ResumeError::Read { path: path.clone(), source })?;
         let part: Part<RunManifest, RunState> =
-            ciborium::from_reader(&part[..]).map_err(|error| ResumeError::Otherwise { path: path.clone(), reason: error.to_string() })?;
+            ciborium::from_reader(&part[..]).map_err(|error| ResumeError::Otherwise {
+                path: path.clone(),
+                reason: error.to_string(),
+            })?;
         let Part { manifest, blocks, state } = part;
         Ok(Self { path, manifest, blocks, state, rest: file.take(mapper_len) })
     }
@@ -171,18 +187,35 @@ impl Checkpoint {
     }
 
     /// Restores the mapper in `slab`.
-    pub(super) fn mapper<'s>(&mut self, plan: &Plan, slab: &'s mut [u8]) -> Result<Mapper<'s>, ResumeError> {
+    pub(super) fn mapper<'s>(
+        &mut self,
+        plan: &Plan,
+        slab: &'s mut [u8],
+    ) -> Result<Mapper<'s>, ResumeError> {
         let (path, rest) = (&self.path, &mut self.rest);
-        let restored = Mapper::restore(&plan.capacity, &plan.config, slab, &mut |bytes: &mut [u8]| rest.read_exact(bytes));
+        let restored =
+            Mapper::restore(&plan.capacity, &plan.config, slab, &mut |bytes: &mut [u8]| {
+                rest.read_exact(bytes)
+            });
         let otherwise = |reason: String| ResumeError::Otherwise { path: path.clone(), reason };
         let mapper = restored.map_err(|error| match error {
-            RestoreError::Foreign | RestoreError::Damaged => ResumeError::Damaged { path: path.clone() },
-            RestoreError::Source(source) if source.kind() == io::ErrorKind::UnexpectedEof => ResumeError::Damaged { path: path.clone() },
+            RestoreError::Foreign | RestoreError::Damaged => {
+                ResumeError::Damaged { path: path.clone() }
+            }
+            RestoreError::Source(source) if source.kind() == io::ErrorKind::UnexpectedEof => {
+                ResumeError::Damaged { path: path.clone() }
+            }
             RestoreError::Source(source) => ResumeError::Read { path: path.clone(), source },
-            RestoreError::Version(found) => otherwise(format!("its mapper snapshot has version {found}")),
-            RestoreError::Capacity => otherwise(format!("profile {} has other capacities", plan.profile)),
+            RestoreError::Version(found) => {
+                otherwise(format!("its mapper snapshot has version {found}"))
+            }
+            RestoreError::Capacity => {
+                otherwise(format!("profile {} has other capacities", plan.profile))
+            }
             RestoreError::Config => otherwise("its mapper has other settings".to_owned()),
-            RestoreError::New(error) => otherwise(format!("the core refuses its settings: {error}")),
+            RestoreError::New(error) => {
+                otherwise(format!("the core refuses its settings: {error}"))
+            }
             other => otherwise(other.to_string()),
         })?;
         match rest.read(&mut [0]) {

@@ -6,12 +6,16 @@ use dynvox_core::geometry::StereoRig;
 use dynvox_core::{Capacity, Config};
 use std::collections::BTreeMap;
 
-const RIG: StereoRig = StereoRig { focal_px: 90.0, center_u_px: 79.5, center_v_px: 31.5, baseline_m: 0.5 };
+const RIG: StereoRig =
+    StereoRig { focal_px: 90.0, center_u_px: 79.5, center_v_px: 31.5, baseline_m: 0.5 };
 
 fn manifest() -> RunManifest {
     ciborium::Value::serialized(&BTreeMap::from([("arguments", vec!["--frames", "3"])]))
         .and_then(|mut value| {
-            let more = [("working_dir", ciborium::Value::from("/")), ("fingerprint", ciborium::Value::Map(Vec::new()))];
+            let more = [
+                ("working_dir", ciborium::Value::from("/")),
+                ("fingerprint", ciborium::Value::Map(Vec::new())),
+            ];
             value.as_map_mut().unwrap().extend(more.map(|(key, value)| (key.into(), value)));
             value.deserialized()
         })
@@ -24,7 +28,8 @@ fn written(root: &tempfile::TempDir) -> RunFolder {
     let mut slab = HostSlab::map(Capacity::TINY.bytes()).unwrap();
     let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(RIG), slab.bytes_mut()).unwrap();
     for taken in 1..=2 {
-        write(&folder, &manifest(), None, &RunState { taken, ..RunState::default() }, &mut mapper).unwrap();
+        write(&folder, &manifest(), None, &RunState { taken, ..RunState::default() }, &mut mapper)
+            .unwrap();
     }
     folder
 }
@@ -35,15 +40,24 @@ fn every_flipped_byte_is_refused_by_name() {
     let folder = written(&root);
     std::fs::remove_file(folder.file(PREVIOUS_SNAPSHOT_FILE)).unwrap();
     let (read, damage) = Checkpoint::read(&folder).unwrap();
-    assert_eq!((read.manifest(), read.frames(), read.state.taken, damage.is_none()), (&manifest(), 0, 2, true));
+    assert_eq!(
+        (read.manifest(), read.frames(), read.state.taken, damage.is_none()),
+        (&manifest(), 0, 2, true)
+    );
     let mut file = File::options().read(true).write(true).open(folder.snapshot()).unwrap();
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).unwrap();
     let part = HEAD + u64::from_le_bytes(bytes[12..HEAD].try_into().unwrap()) as usize;
     assert!(part > 100 && part < bytes.len());
-    let mut put = |at: usize, byte: u8| file.seek(SeekFrom::Start(at as u64)).and_then(|_| file.write_all(&[byte])).unwrap();
+    let mut put = |at: usize, byte: u8| {
+        file.seek(SeekFrom::Start(at as u64)).and_then(|_| file.write_all(&[byte])).unwrap()
+    };
     // All of the host's part and every 1,009th byte of the mapper's.
-    for (at, &byte) in bytes.iter().enumerate().filter(|(at, _)| *at < part || at % 1_009 == 0 || at + 5 > bytes.len()) {
+    for (at, &byte) in bytes
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| *at < part || at % 1_009 == 0 || at + 5 > bytes.len())
+    {
         put(at, byte ^ 1 << (at % 8));
         let refused = Checkpoint::read(&folder).err();
         let named = match at {
@@ -64,11 +78,16 @@ fn the_checkpoint_before_a_damaged_or_missing_one_is_taken() {
     let last = std::fs::read(folder.snapshot()).unwrap();
     std::fs::write(folder.snapshot(), &last[..last.len() / 2]).unwrap();
     let (read, damage) = Checkpoint::read(&folder).unwrap();
-    assert!(read.state.taken == 1 && matches!(damage, Some(ResumeError::Damaged { path }) if path == folder.snapshot()));
+    assert!(
+        read.state.taken == 1
+            && matches!(damage, Some(ResumeError::Damaged { path }) if path == folder.snapshot())
+    );
     std::fs::remove_file(folder.snapshot()).unwrap();
     assert!(folder.has_snapshot());
     let (read, damage) = Checkpoint::read(&folder).unwrap();
     assert!(read.state.taken == 1 && matches!(damage, Some(ResumeError::Read { .. })));
     std::fs::write(folder.file(PREVIOUS_SNAPSHOT_FILE), "").unwrap();
-    assert!(matches!(Checkpoint::read(&folder), Err(ResumeError::Read { path, .. }) if path == folder.snapshot()));
+    assert!(
+        matches!(Checkpoint::read(&folder), Err(ResumeError::Read { path, .. }) if path == folder.snapshot())
+    );
 }

@@ -20,13 +20,20 @@ fn an_abandoned_run_folder_leaves_nothing_and_a_finished_one_stands_whole() {
     let folder = RunFolder::begin(&target, true).unwrap();
     fs::write(folder.file("summary.json"), "{2}").unwrap();
     drop(folder);
-    assert_eq!(fs::read_to_string(target.join("summary.json")).unwrap(), "{}", "a failed run does not touch the one before");
+    assert_eq!(
+        fs::read_to_string(target.join("summary.json")).unwrap(),
+        "{}",
+        "a failed run does not touch the one before"
+    );
     let folder = RunFolder::begin(&target, true).unwrap();
     fs::write(folder.file("new"), "").unwrap();
     folder.commit(&[]).unwrap();
     assert!(target.join("new").exists() && !target.join("summary.json").exists());
     assert_eq!(fs::read_dir(root.path().join("a")).unwrap().count(), 1);
-    assert!(RunFolder::begin(&target, true).unwrap_err().to_string().contains("is not a run folder"), "another's folder is left alone");
+    assert!(
+        RunFolder::begin(&target, true).unwrap_err().to_string().contains("is not a run folder"),
+        "another's folder is left alone"
+    );
 }
 
 #[test]
@@ -63,7 +70,10 @@ fn results_that_cannot_be_moved_stay_complete_where_they_are() {
     fs::create_dir(&target).unwrap();
     fs::write(target.join("foreign"), "").unwrap();
     let message = folder.commit(&[]).unwrap_err().to_string();
-    assert!(message.contains(&partial.display().to_string()) && message.contains("Move the folder"), "{message}");
+    assert!(
+        message.contains(&partial.display().to_string()) && message.contains("Move the folder"),
+        "{message}"
+    );
     assert!(partial.join("summary.json").is_file() && target.join("foreign").is_file());
 }
 

@@ -1,10 +1,12 @@
 //! Where the records of a store begin, in memory that does not grow with the blocks.
 //!
-//! Space is cut into tiles of 32 blocks a side. Each record names the one before it in its tile, so of a tile only the newest record is
-//! remembered; the places of all its blocks are read up along that chain when the camera comes back to it, and forgotten again when it has
-//! been away. A camera that only moves ahead never reads.
+//! Space is cut into tiles of 32 blocks a side. Each record names the one before it in its tile, so
+//! of a tile only the newest record is remembered; the places of all its blocks are read up along
+//! that chain when the camera comes back to it, and forgotten again when it has been away. A camera
+//! that only moves ahead never reads.
 //!
-//! Memory: about 20 bytes per tile of the path (12.8 m a side at 5 cm), and 24 bytes or so per block of the [`OPEN_TILES`] read last.
+//! Memory: about 20 bytes per tile of the path (12.8 m a side at 5 cm), and 24 bytes or so per
+//! block of the [`OPEN_TILES`] read last.
 
 use dynvox_core::volume::BlockCoord;
 use hashbrown::HashMap;
@@ -63,7 +65,8 @@ impl BlockIndexOnDisk {
     /// Opens a tile with the places read up; the one unused for longest is forgotten for it.
     pub fn open(&mut self, tile: Tile, records: HashMap<BlockCoord, u64>) {
         if self.open.len() >= OPEN_TILES
-            && let Some(oldest) = self.open.iter().min_by_key(|(_, open)| open.last_use).map(|(tile, _)| *tile)
+            && let Some(oldest) =
+                self.open.iter().min_by_key(|(_, open)| open.last_use).map(|(tile, _)| *tile)
         {
             self.open.remove(&oldest);
         }

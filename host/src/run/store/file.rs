@@ -1,10 +1,12 @@
 //! An append-only file of blocks.
 //!
-//! A block stored again gets a new record; the newest counts, the older ones stay: a camera that goes to and fro writes a record for each
-//! eviction. The file of a crashed run is scanned once: every complete record is taken, the rest is truncated and reported. A write that
-//! fails (a full disk) ends the storing, not the run.
+//! A block stored again gets a new record; the newest counts, the older ones stay: a camera that
+//! goes to and fro writes a record for each eviction. The file of a crashed run is scanned once:
+//! every complete record is taken, the rest is truncated and reported. A write that fails (a full
+//! disk) ends the storing, not the run.
 //!
-//! Memory: that of [`super::block_index`], two buffers of a record and a window of [`WINDOW`] bytes.
+//! Memory: that of [`super::block_index`], two buffers of a record and a window of [`WINDOW`]
+//! bytes.
 
 use super::block_index::{BlockIndexOnDisk, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
@@ -44,13 +46,17 @@ pub enum StoreError {
         path: PathBuf,
     },
     /// It existed at the checkpoint.
-    #[error("{path} is missing: it has the evicted blocks of the run. Restore it, or start the run again with --overwrite")]
+    #[error(
+        "{path} is missing: it has the evicted blocks of the run. Restore it, or start the run again with --overwrite"
+    )]
     Missing {
         /// The store.
         path: PathBuf,
     },
     /// It was changed after the checkpoint.
-    #[error("{path} is not as the run left it: its first {bytes} bytes are truncated or changed. Start the run again with --overwrite")]
+    #[error(
+        "{path} is not as the run left it: its first {bytes} bytes are truncated or changed. Start the run again with --overwrite"
+    )]
     Changed {
         /// The store.
         path: PathBuf,
@@ -85,7 +91,8 @@ pub struct Opened {
     pub cut_bytes: u64,
 }
 
-/// The end of a store at a checkpoint. Records are only ever appended, so everything before it stays as it was.
+/// The end of a store at a checkpoint. Records are only ever appended, so everything before it
+/// stays as it was.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Position {
     /// Bytes of the file.
@@ -119,9 +126,19 @@ pub struct BlockFile<F> {
 
 impl BlockFile<File> {
     /// Opens the store at `path`, or makes one, for maps of that voxel size and truncation.
-    pub fn open(path: &Path, voxel_m: f32, truncation_m: f32) -> Result<(Self, Opened), StoreError> {
+    pub fn open(
+        path: &Path,
+        voxel_m: f32,
+        truncation_m: f32,
+    ) -> Result<(Self, Opened), StoreError> {
         let at = |source| StoreError::Io { path: path.to_owned(), source };
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(at)?;
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .map_err(at)?;
         let len = file.metadata().map_err(at)?.len();
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
@@ -131,7 +148,11 @@ impl BlockFile<File> {
             }
             store.file.set_len(0).map_err(at)?;
             let preamble = preamble(voxel_m, truncation_m);
-            store.file.seek(SeekFrom::Start(0)).and_then(|_| store.file.write_all(&preamble)).map_err(at)?;
+            store
+                .file
+                .seek(SeekFrom::Start(0))
+                .and_then(|_| store.file.write_all(&preamble))
+                .map_err(at)?;
             return Ok((store, Opened { records: 0, cut_bytes: len }));
         }
         store.require(path, voxel_m, truncation_m)?;
@@ -141,13 +162,22 @@ impl BlockFile<File> {
         Ok((store, opened))
     }
 
-    /// Opens the store of a resumed run, as it was at `position`; records stored since are truncated.
-    pub fn reopen(path: &Path, voxel_m: f32, truncation_m: f32, position: &Position) -> Result<Self, StoreError> {
+    /// Opens the store of a resumed run, as it was at `position`; records stored since are
+    /// truncated.
+    pub fn reopen(
+        path: &Path,
+        voxel_m: f32,
+        truncation_m: f32,
+        position: &Position,
+    ) -> Result<Self, StoreError> {
         let at = |source| StoreError::Io { path: path.to_owned(), source };
-        let file = OpenOptions::new().read(true).write(true).open(path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => StoreError::Missing { path: path.to_owned() },
-            _ => at(source),
-        })?;
+        let file =
+            OpenOptions::new().read(true).write(true).open(path).map_err(|source| match source
+                .kind()
+            {
+                io::ErrorKind::NotFound => StoreError::Missing { path: path.to_owned() },
+                _ => at(source),
+            })?;
         let mut store = Self::over(file);
         let parted = || StoreError::Changed { path: path.to_owned(), bytes: position.bytes };
         if store.file.metadata().map_err(at)?.len() < PREAMBLE as u64 {
@@ -156,7 +186,9 @@ impl BlockFile<File> {
         store.require(path, voxel_m, truncation_m)?;
         store.scan(position.bytes).map_err(at)?;
         let checksum = store.checksum.clone().finalize();
-        if (store.end, store.records, checksum) != (position.bytes, position.records, position.checksum) {
+        if (store.end, store.records, checksum)
+            != (position.bytes, position.records, position.checksum)
+        {
             return Err(parted());
         }
         store.file.set_len(store.end).map_err(at)?;
@@ -179,12 +211,16 @@ impl BlockFile<File> {
 
     /// Refuses a file that is not a store, or one of other voxels.
     fn require(&mut self, path: &Path, voxel_m: f32, truncation_m: f32) -> Result<(), StoreError> {
-        let found = self.head(PREAMBLE as u64).map_err(|source| StoreError::Io { path: path.to_owned(), source })?;
+        let found = self
+            .head(PREAMBLE as u64)
+            .map_err(|source| StoreError::Io { path: path.to_owned(), source })?;
         if found[..8] != MAGIC {
             return Err(StoreError::Foreign { path: path.to_owned() });
         }
         if found != preamble(voxel_m, truncation_m) {
-            let float = |at: usize| f32::from_le_bytes([found[at], found[at + 1], found[at + 2], found[at + 3]]);
+            let float = |at: usize| {
+                f32::from_le_bytes([found[at], found[at + 1], found[at + 2], found[at + 3]])
+            };
             return Err(StoreError::OtherVoxels {
                 path: path.to_owned(),
                 found_voxel_m: float(8),
@@ -266,7 +302,8 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     /// The blocks stored in a tile, ascending.
     pub fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
         self.load_index(tile);
-        let mut coords: Vec<_> = self.index.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
+        let mut coords: Vec<_> =
+            self.index.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
         coords.sort_unstable();
         coords
     }
@@ -291,7 +328,12 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     /// Follows a tile's records from the newest back.
-    fn walk(&mut self, tile: Tile, newest: u64, records: &mut HashMap<BlockCoord, u64>) -> io::Result<()> {
+    fn walk(
+        &mut self,
+        tile: Tile,
+        newest: u64,
+        records: &mut HashMap<BlockCoord, u64>,
+    ) -> io::Result<()> {
         let (mut window, mut first) = (Vec::new(), 0);
         let mut at = newest;
         while at != 0 {
@@ -302,9 +344,13 @@ impl<F: Read + Write + Seek> BlockFile<F> {
                 self.file.seek(SeekFrom::Start(first))?;
                 self.file.read_exact(&mut window)?;
             }
-            let header = window.get((at - first) as usize..).and_then(|bytes| bytes.first_chunk()).and_then(Header::read);
+            let header = window
+                .get((at - first) as usize..)
+                .and_then(|bytes| bytes.first_chunk())
+                .and_then(Header::read);
             // Each record lies before the one that names it, so the walk ends.
-            let header = header.filter(|header| tile_of(header.coord) == tile && header.previous < at);
+            let header =
+                header.filter(|header| tile_of(header.coord) == tile && header.previous < at);
             let header = header.ok_or(io::ErrorKind::InvalidData)?;
             records.entry(header.coord).or_insert(at);
             at = header.previous;
@@ -350,7 +396,9 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         let mut header = [0; HEADER];
         self.file.seek(SeekFrom::Start(at))?;
         self.file.read_exact(&mut header)?;
-        let Some(read) = Header::read(&header).filter(|read| read.coord == coord) else { return Ok(false) };
+        let Some(read) = Header::read(&header).filter(|read| read.coord == coord) else {
+            return Ok(false);
+        };
         self.record.resize(read.len, 0);
         self.file.read_exact(&mut self.record)?;
         Ok(read.fits(&header, &self.record))
@@ -388,9 +436,11 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        // The record stays: should the run end before the block is evicted again, it is still stored.
+        // The record stays: should the run end before the block is evicted again, it is still
+        // stored.
         let Some(at) = self.newest_record(block.coord) else { return false };
-        let came = self.fetch(block.coord, at).unwrap_or(false) && record::read(&self.record, block, &mut self.scratch);
+        let came = self.fetch(block.coord, at).unwrap_or(false)
+            && record::read(&self.record, block, &mut self.scratch);
         self.unreadable += u64::from(!came);
         came
     }

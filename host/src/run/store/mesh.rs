@@ -1,4 +1,5 @@
-//! A map outside a pool as triangles, cube by cube: in memory at once are a cube of 8 blocks a side and the layer behind it.
+//! A map outside a pool as triangles, cube by cube: in memory at once are a cube of 8 blocks a side
+//! and the layer behind it.
 
 use super::{BlockFile, Tile};
 use dynvox_core::Capacity;
@@ -24,7 +25,10 @@ const fn cube_capacity(colour: bool) -> Capacity {
     }
 }
 
-const _: () = assert!(Volume::bytes(&cube_capacity(true)) < Capacity::TINY.bytes(), "any profile's slab is large enough for a cube");
+const _: () = assert!(
+    Volume::bytes(&cube_capacity(true)) < Capacity::TINY.bytes(),
+    "any profile's slab is large enough for a cube"
+);
 
 /// Blocks that are read tile by tile.
 pub trait BlockSource: BlockStore {
@@ -50,8 +54,9 @@ pub fn slab_bytes(colour: bool) -> usize {
     Volume::bytes(&cube_capacity(colour))
 }
 
-/// Hands the triangles of all blocks in `store` but those in `without` to `sink`, in an order that depends on the blocks alone. `slab` holds
-/// a cube at a time: any profile's is large enough. Returns the number of triangles.
+/// Hands the triangles of all blocks in `store` but those in `without` to `sink`, in an order that
+/// depends on the blocks alone. `slab` holds a cube at a time: any profile's is large enough.
+/// Returns the number of triangles.
 ///
 /// # Errors
 ///
@@ -80,7 +85,11 @@ pub fn triangles(
             for coord in behind(cube) {
                 volume.load(coord, store);
             }
-            count += volume.mesh(mesh, |coord| cube_of(&coord) == cube && !without.contains(&coord), sink);
+            count += volume.mesh(
+                mesh,
+                |coord| cube_of(&coord) == cube && !without.contains(&coord),
+                sink,
+            );
             // Empties the volume: its blocks are still in the store.
             volume.stream_out(&mut NoStore);
         }

@@ -1,4 +1,5 @@
-//! A map that is partly in memory and partly on disk, read as one: a block of the pool is newer than its records.
+//! A map that is partly in memory and partly on disk, read as one: a block of the pool is newer
+//! than its records.
 //!
 //! Memory: about 30 bytes for each block of the pool.
 
@@ -24,7 +25,8 @@ impl<'a, 's, F: Read + Write + Seek> PoolAndFile<'a, 's, F> {
         let (mut slots, mut by_tile) = (HashMap::new(), HashMap::<_, Vec<_>>::new());
         let blocks = volume.blocks();
         for slot in volume.pool().live() {
-            let holds_any = blocks.weight(slot).is_some_and(|weight| weight.iter().any(|&weight| weight > 0));
+            let holds_any =
+                blocks.weight(slot).is_some_and(|weight| weight.iter().any(|&weight| weight > 0));
             if let Some(coord) = blocks.coord(slot).filter(|_| holds_any) {
                 slots.insert(coord, slot);
                 by_tile.entry(tile_of(coord)).or_default().push(coord);
@@ -60,7 +62,9 @@ impl<F: Read + Write + Seek> BlockStore for PoolAndFile<'_, '_, F> {
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         let Some(&slot) = self.slots.get(&block.coord) else { return self.file.load(block) };
         let blocks = self.volume.blocks();
-        let (Some(sdf), Some(weight)) = (blocks.sdf(slot), blocks.weight(slot)) else { return false };
+        let (Some(sdf), Some(weight)) = (blocks.sdf(slot), blocks.weight(slot)) else {
+            return false;
+        };
         (*block.sdf, *block.weight) = (*sdf, *weight);
         if let (Some(to), Some(from)) = (block.colour, blocks.colour(slot)) {
             *to = *from;

@@ -1,7 +1,9 @@
 //! One block as bytes: a header with a checksum, then the voxels, compressed.
 //!
-//! Header, 24 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), where the last record of the same tile begins (`u64`, 0
-//! none), length of the payload (`u32`), CRC-32 of the first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with colour three planes of 512 bytes.
+//! Header, 24 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), where the last
+//! record of the same tile begins (`u64`, 0 none), length of the payload (`u32`), CRC-32 of the
+//! first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with
+//! colour three planes of 512 bytes.
 
 use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, EvictedBlock, LoadedBlock};
 
@@ -29,7 +31,9 @@ impl Header {
     /// Reads a header; `None` when it cannot be one.
     pub fn read(bytes: &[u8; HEADER]) -> Option<Self> {
         let half = |at: usize| i16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        let word = |at: usize| {
+            u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+        };
         let header = Self {
             coord: BlockCoord { x: half(0), y: half(2), z: half(4) },
             flags: half(6) as u16,
@@ -53,19 +57,28 @@ fn checksum(header: &[u8; HEADER], payload: &[u8]) -> u32 {
     crc.finalize()
 }
 
-/// Writes a block into `record`, header and all, as the one after `previous` in its tile. `scratch` is working space.
-pub(super) fn write(block: &EvictedBlock<'_>, previous: u64, scratch: &mut Vec<u8>, record: &mut Vec<u8>) {
+/// Writes a block into `record`, header and all, as the one after `previous` in its tile. `scratch`
+/// is working space.
+pub(super) fn write(
+    block: &EvictedBlock<'_>,
+    previous: u64,
+    scratch: &mut Vec<u8>,
+    record: &mut Vec<u8>,
+) {
     scratch.clear();
     scratch.extend(block.sdf.iter().flat_map(|sdf| sdf.to_le_bytes()));
     scratch.extend_from_slice(block.weight);
     block.colour.into_iter().flatten().for_each(|plane| scratch.extend_from_slice(plane));
     record.clear();
     record.resize(HEADER + LONGEST, 0);
-    let len = lz4_flex::block::compress_into(scratch, &mut record[HEADER..]).expect("LONGEST is LZ4's worst case");
+    let len = lz4_flex::block::compress_into(scratch, &mut record[HEADER..])
+        .expect("LONGEST is LZ4's worst case");
     record.truncate(HEADER + len);
     let flags = if block.colour.is_some() { HAS_COLOUR } else { 0 };
     let mut header = [0; HEADER];
-    for (at, value) in [block.coord.x, block.coord.y, block.coord.z, flags as i16].into_iter().enumerate() {
+    for (at, value) in
+        [block.coord.x, block.coord.y, block.coord.z, flags as i16].into_iter().enumerate()
+    {
         header[2 * at..2 * at + 2].copy_from_slice(&value.to_le_bytes());
     }
     header[8..16].copy_from_slice(&previous.to_le_bytes());
@@ -75,7 +88,8 @@ pub(super) fn write(block: &EvictedBlock<'_>, previous: u64, scratch: &mut Vec<u
     record[..HEADER].copy_from_slice(&header);
 }
 
-/// Fills a block from a payload; `false`, and the block as it was, when the payload is not that of such a block.
+/// Fills a block from a payload; `false`, and the block as it was, when the payload is not that of
+/// such a block.
 pub(super) fn read(payload: &[u8], block: LoadedBlock<'_>, scratch: &mut Vec<u8>) -> bool {
     let wanted = if block.colour.is_some() { COLOURED } else { PLAIN };
     scratch.clear();
@@ -85,7 +99,11 @@ pub(super) fn read(payload: &[u8], block: LoadedBlock<'_>, scratch: &mut Vec<u8>
     }
     let (sdf, rest) = scratch.split_at(2 * BLOCK_VOXELS);
     let (weight, colour) = rest.split_at(BLOCK_VOXELS);
-    block.sdf.iter_mut().zip(sdf.as_chunks().0).for_each(|(to, from)| *to = i16::from_le_bytes(*from));
+    block
+        .sdf
+        .iter_mut()
+        .zip(sdf.as_chunks().0)
+        .for_each(|(to, from)| *to = i16::from_le_bytes(*from));
     block.weight.copy_from_slice(weight);
     if let Some(planes) = block.colour {
         planes.as_flattened_mut().copy_from_slice(colour);

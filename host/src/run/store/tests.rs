@@ -15,11 +15,15 @@ struct Content {
 
 /// A block that differs with its seed in every part, and does not compress to nothing.
 fn content(seed: u32) -> Content {
-    let value = |i: usize, salt: u32| (seed + salt).wrapping_mul(2_654_435_761).wrapping_add((i as u32).wrapping_mul(40_503)) >> 9;
+    let value = |i: usize, salt: u32| {
+        (seed + salt).wrapping_mul(2_654_435_761).wrapping_add((i as u32).wrapping_mul(40_503)) >> 9
+    };
     Content {
         sdf: std::array::from_fn(|i| value(i, 1) as i16),
         weight: std::array::from_fn(|i| value(i, 2) as u8),
-        colour: std::array::from_fn(|plane| std::array::from_fn(|i| value(i, plane as u32 + 3) as u8)),
+        colour: std::array::from_fn(|plane| {
+            std::array::from_fn(|i| value(i, plane as u32 + 3) as u8)
+        }),
     }
 }
 
@@ -67,7 +71,8 @@ fn keeps_blocks_over_a_restart_and_the_newest_counts() {
     assert_eq!(opened, Opened { records: 51, cut_bytes: 0 });
     (0..50).for_each(|i| assert!(is_loaded(&mut store, i, if i == 7 { 1_007 } else { i })));
     assert!(!is_loaded(&mut store, 99, 99), "what was never kept does not come back");
-    let blocks: Vec<BlockCoord> = store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
+    let blocks: Vec<BlockCoord> =
+        store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
     assert!(blocks.len() == 50 && (0..50).all(|i| blocks.contains(&coord(i))), "each block once");
 }
 
@@ -85,13 +90,20 @@ fn opens_after_being_torn_at_every_byte_of_its_last_record() {
         fs::write(&path, &whole[..torn]).unwrap();
         let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
         assert_eq!(opened, Opened { records: 3, cut_bytes: torn as u64 - whole_len });
-        assert!(is_loaded(&mut store, 2, 2) && store_block(&mut store, 3, 3) && is_loaded(&mut store, 3, 3));
+        assert!(
+            is_loaded(&mut store, 2, 2)
+                && store_block(&mut store, 3, 3)
+                && is_loaded(&mut store, 3, 3)
+        );
         drop(store);
         assert_eq!(fs::read(&path).unwrap(), whole, "and goes on as if nothing had been");
     }
     for torn in 0..16 {
         fs::write(&path, &whole[..torn]).unwrap();
-        assert_eq!(BlockFile::open(&path, 0.05, 0.75).unwrap().1, Opened { records: 0, cut_bytes: torn as u64 });
+        assert_eq!(
+            BlockFile::open(&path, 0.05, 0.75).unwrap().1,
+            Opened { records: 0, cut_bytes: torn as u64 }
+        );
     }
 }
 
@@ -119,7 +131,12 @@ fn refuses_other_files_and_other_voxels_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.blocks");
     fs::write(&path, b"ply\nformat binary").unwrap();
-    assert!(BlockFile::open(&path, 0.05, 0.75).unwrap_err().to_string().contains("is not a block store"));
+    assert!(
+        BlockFile::open(&path, 0.05, 0.75)
+            .unwrap_err()
+            .to_string()
+            .contains("is not a block store")
+    );
     fs::write(&path, b"ply").unwrap();
     assert!(BlockFile::open(&path, 0.05, 0.75).is_err());
     fs::remove_file(&path).unwrap();
@@ -149,7 +166,11 @@ impl Seek for SmallDisk {
 impl Write for SmallDisk {
     fn write(&mut self, from: &[u8]) -> io::Result<usize> {
         let space = self.space.saturating_sub(self.bytes.position() as usize).min(from.len());
-        if space == 0 { Err(io::ErrorKind::StorageFull.into()) } else { self.bytes.write(&from[..space]) }
+        if space == 0 {
+            Err(io::ErrorKind::StorageFull.into())
+        } else {
+            self.bytes.write(&from[..space])
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -183,7 +204,10 @@ fn a_store_is_reopened_at_its_mark_and_later_records_are_removed() {
     drop(store);
     let whole = fs::read(&path).unwrap();
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
-    assert_eq!((store.records(), store.bytes(), fs::metadata(&path).unwrap().len()), (5, marked.bytes, marked.bytes));
+    assert_eq!(
+        (store.records(), store.bytes(), fs::metadata(&path).unwrap().len()),
+        (5, marked.bytes, marked.bytes)
+    );
     assert!(is_loaded(&mut store, 3, 3) && !store.holds(coord(9)));
     // Storing the same blocks again gives the same file.
     assert!(store_block(&mut store, 3, 30) && store_block(&mut store, 9, 9));
@@ -194,15 +218,24 @@ fn a_store_is_reopened_at_its_mark_and_later_records_are_removed() {
         let mut changed = whole.clone();
         changed[at] ^= 1 << (at % 8);
         fs::write(&path, &changed).unwrap();
-        assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Changed { .. })), "byte {at}");
+        assert!(
+            matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Changed { .. })),
+            "byte {at}"
+        );
         assert!(fs::read(&path).unwrap() == changed, "it stays as it is");
     }
     fs::write(&path, &whole[..marked.bytes as usize - 1]).unwrap();
-    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Changed { .. })));
+    assert!(matches!(
+        BlockFile::reopen(&path, 0.05, 0.3, &marked),
+        Err(StoreError::Changed { .. })
+    ));
     fs::write(&path, &whole).unwrap();
     assert_eq!(BlockFile::reopen(&path, 0.05, 0.3, &empty).unwrap().records(), 0);
     fs::remove_file(&path).unwrap();
-    assert!(matches!(BlockFile::reopen(&path, 0.05, 0.3, &marked), Err(StoreError::Missing { .. })));
+    assert!(matches!(
+        BlockFile::reopen(&path, 0.05, 0.3, &marked),
+        Err(StoreError::Missing { .. })
+    ));
     assert!(!path.exists(), "no file is made");
 }
 

@@ -21,10 +21,12 @@ pub struct Binary {
 }
 
 impl Binary {
-    /// Appends bytes as a view of their own: of vertices `stride` bytes apart, of indices, or of neither. Returns its number.
+    /// Appends bytes as a view of their own: of vertices `stride` bytes apart, of indices, or of
+    /// neither. Returns its number.
     pub fn view(&mut self, bytes: &[u8], target: Option<u32>, stride: Option<usize>) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
+        let mut view =
+            json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
         if let Some(target) = target {
             view["target"] = target.into();
         }
@@ -37,8 +39,16 @@ impl Binary {
     }
 
     /// Describes a view: so many values of a kind (`SCALAR`, `VEC3`). Returns its number.
-    pub fn accessor(&mut self, view: usize, component: u32, kind: &str, count: usize, more: &Value) -> usize {
-        let mut accessor = json!({ "bufferView": view, "componentType": component, "type": kind, "count": count });
+    pub fn accessor(
+        &mut self,
+        view: usize,
+        component: u32,
+        kind: &str,
+        count: usize,
+        more: &Value,
+    ) -> usize {
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": component, "type": kind, "count": count });
         for (key, value) in more.as_object().into_iter().flatten() {
             accessor[key] = value.clone();
         }
@@ -48,7 +58,8 @@ impl Binary {
 
     /// Vectors of floats for an animation.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]], kind: &str) -> usize {
-        let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
+        let bytes: Vec<u8> =
+            values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes, None, None);
         self.accessor(view, F32, kind, values.len(), &Value::Null)
     }
@@ -57,6 +68,12 @@ impl Binary {
     pub fn times(&mut self, times_s: &[f32]) -> usize {
         let bytes: Vec<u8> = times_s.iter().flat_map(|time_s| time_s.to_le_bytes()).collect();
         let view = self.view(&bytes, None, None);
-        self.accessor(view, F32, "SCALAR", times_s.len(), &json!({ "min": [times_s.first()], "max": [times_s.last()] }))
+        self.accessor(
+            view,
+            F32,
+            "SCALAR",
+            times_s.len(),
+            &json!({ "min": [times_s.first()], "max": [times_s.last()] }),
+        )
     }
 }

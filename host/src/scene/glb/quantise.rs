@@ -11,18 +11,23 @@ const CLAY: [u8; 3] = [205, 205, 200];
 /// Bytes from one vertex's position, normal and colour to the next one's.
 const STRIDES: [usize; 3] = [8, 4, 8];
 
-/// Appends a mesh and returns its primitive, and the least corner and the longest side of its box, m. Nothing for an empty mesh.
+/// Appends a mesh and returns its primitive, and the least corner and the longest side of its box,
+/// m. Nothing for an empty mesh.
 pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32; 3], f32)> {
     let [low_m, high_m] = mesh.bounds_m()?;
     let size_m = (0..3).map(|axis| high_m[axis] - low_m[axis]).fold(1e-3, f32::max);
-    let step = |at: &[f32; 3]| [0, 1, 2].map(|axis| ((at[axis] - low_m[axis]) / size_m * MOST).round() as u16);
+    let step = |at: &[f32; 3]| {
+        [0, 1, 2].map(|axis| ((at[axis] - low_m[axis]) / size_m * MOST).round() as u16)
+    };
     let count = mesh.positions_m.len();
     let (mut positions, mut normals, mut colours) = (Vec::new(), Vec::new(), Vec::new());
     for at in &mesh.positions_m {
         positions.extend(step(at).into_iter().chain([0]).flat_map(u16::to_le_bytes));
     }
     for normal in mesh.normals() {
-        normals.extend(unit(normal).map(|value| (127.0 * value).round() as i8 as u8).into_iter().chain([0]));
+        normals.extend(
+            unit(normal).map(|value| (127.0 * value).round() as i8 as u8).into_iter().chain([0]),
+        );
     }
     for &colour in &mesh.colours {
         let shown = if colour == [0; 3] { CLAY } else { colour };
@@ -42,7 +47,11 @@ pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32
         "NORMAL": binary.accessor(normal, I8, "VEC3", count, &normalized),
         "COLOR_0": binary.accessor(colour, U16, "VEC3", count, &normalized),
     });
-    Some((json!({ "attributes": attributes, "indices": indices(binary, mesh), "material": 0 }), low_m, size_m))
+    Some((
+        json!({ "attributes": attributes, "indices": indices(binary, mesh), "material": 0 }),
+        low_m,
+        size_m,
+    ))
 }
 
 /// Appends the corners of the triangles, of 16 bits where that is enough.
@@ -66,6 +75,7 @@ fn unit(normal: [f32; 3]) -> [f32; 3] {
 /// The linear value of an sRGB channel, in 16 bits.
 fn linear(channel: u8) -> u16 {
     let value = f32::from(channel) / 255.0;
-    let linear = if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
+    let linear =
+        if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
     (linear * MOST).round() as u16
 }

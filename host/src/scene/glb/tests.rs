@@ -45,25 +45,48 @@ fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
     let floats = |accessor: &Value| -> Vec<f32> {
         let accessor = &json["accessors"][accessor.as_u64().unwrap() as usize];
         let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-        let [from, len] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
-        bytes[from..from + len].chunks_exact(4).map(|value| f32::from_le_bytes(value.try_into().unwrap())).collect()
+        let [from, len] =
+            ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
+        bytes[from..from + len]
+            .chunks_exact(4)
+            .map(|value| f32::from_le_bytes(value.try_into().unwrap()))
+            .collect()
     };
     let animation = &json["animations"][0];
     let channel = &animation["channels"][0];
     let node = &json["nodes"][channel["target"]["node"].as_u64().unwrap() as usize];
-    assert_eq!((&node["name"], &node["translation"]), (&json!("object 7"), &json!([30.0, 0.0, 0.0])), "where it was last seen");
+    assert_eq!(
+        (&node["name"], &node["translation"]),
+        (&json!("object 7"), &json!([30.0, 0.0, 0.0])),
+        "where it was last seen"
+    );
     let times = floats(&animation["samplers"][0]["input"]);
-    assert!(times.len() == 2 && (times[0] - 0.1).abs() < 1e-6 && (times[1] - 0.3).abs() < 1e-6, "{times:?}");
+    assert!(
+        times.len() == 2 && (times[0] - 0.1).abs() < 1e-6 && (times[1] - 0.3).abs() < 1e-6,
+        "{times:?}"
+    );
     assert_eq!(floats(&animation["samplers"][0]["output"]), [10.0, 0.0, 0.0, 30.0, 0.0, 0.0]);
-    let map = json["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "static map").unwrap();
-    assert_eq!((&map["translation"], &map["scale"]), (&json!([1.0, 2.0, 3.0]), &json!([4.0, 4.0, 4.0])));
+    let map =
+        json["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "static map").unwrap();
+    assert_eq!(
+        (&map["translation"], &map["scale"]),
+        (&json!([1.0, 2.0, 3.0]), &json!([4.0, 4.0, 4.0]))
+    );
     let root = json["nodes"].as_array().unwrap().last().unwrap();
-    assert_eq!((root["children"].as_array().unwrap().len(), &root["rotation"]), (3, &json!([1.0, 0.0, 0.0, 0.0])), "map, path, object");
+    assert_eq!(
+        (root["children"].as_array().unwrap().len(), &root["rotation"]),
+        (3, &json!([1.0, 0.0, 0.0, 0.0])),
+        "map, path, object"
+    );
     assert_eq!(json["buffers"][0]["byteLength"], bytes.len());
 }
 
 #[test]
 fn an_empty_scene_is_a_file_too() {
     let (json, bytes) = parsed(&Scene::default());
-    assert!(bytes.is_empty() && json["nodes"].as_array().unwrap().len() == 1 && json.get("meshes").is_none());
+    assert!(
+        bytes.is_empty()
+            && json["nodes"].as_array().unwrap().len() == 1
+            && json.get("meshes").is_none()
+    );
 }

@@ -1,4 +1,5 @@
-//! The fixture, its bounds and its settings, as `dynvox fixtures pack FIXTURE --out CLIP --rust CONSTANTS` writes them.
+//! The fixture, its bounds and its settings, as
+//! `dynvox fixtures pack FIXTURE --out CLIP --rust CONSTANTS` writes them.
 
 include!(env!("DYNVOX_CONSTANTS"));
 

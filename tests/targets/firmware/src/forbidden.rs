@@ -1,5 +1,5 @@
-//! What must not be reachable: the heap and panics. Both end in undefined functions, so that a program that could come to one of
-//! them cannot be linked.
+//! What must not be reachable: the heap and panics. Both end in undefined functions, so that a
+//! program that could come to one of them cannot be linked.
 
 use core::{
     alloc::{GlobalAlloc, Layout},
@@ -27,7 +27,8 @@ unsafe impl GlobalAlloc for NoHeap {
     }
 }
 
-// hashbrown names the alloc crate, which names an allocator; the core's table gets its memory from the slab.
+// hashbrown names the alloc crate, which names an allocator; the core's table gets its memory from
+// the slab.
 #[global_allocator]
 static HEAP: NoHeap = NoHeap;
 

@@ -17,7 +17,14 @@ impl Counting {
     /// Writes the ticks of each stage since the last time.
     pub fn put(&self) {
         for (stage, ticks) in Stage::ALL.iter().zip(&self.ticks) {
-            platform::put(&Line::new().str("ticks ").str(stage.name()).str(" ").decimal(ticks.swap(0, Relaxed)).str("\n"));
+            platform::put(
+                &Line::new()
+                    .str("ticks ")
+                    .str(stage.name())
+                    .str(" ")
+                    .decimal(ticks.swap(0, Relaxed))
+                    .str("\n"),
+            );
         }
     }
 }

@@ -43,7 +43,8 @@ impl Line {
 
     fn push(&mut self, byte: u8) {
         // The last byte stays zero.
-        if let Some(slot) = self.bytes.split_last_mut().and_then(|(_, text)| text.get_mut(self.len)) {
+        if let Some(slot) = self.bytes.split_last_mut().and_then(|(_, text)| text.get_mut(self.len))
+        {
             *slot = byte;
             self.len += 1;
         }

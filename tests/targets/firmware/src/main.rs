@@ -1,5 +1,6 @@
-//! Replays a fixture on a machine of any kind. Prints a line per frame: the digests as they stand in the fixture's file, then the blocks in
-//! use and, where the stack can be painted, the bytes a step took of it. The exit code is 0 when every line is the one on file.
+//! Replays a fixture on a machine of any kind. Prints a line per frame: the digests as they stand
+//! in the fixture's file, then the blocks in use and, where the stack can be painted, the bytes a
+//! step took of it. The exit code is 0 when every line is the one on file.
 #![cfg_attr(not(feature = "hosted"), no_std, no_main)]
 
 #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
@@ -37,10 +38,12 @@ static SLAB: ConstStaticCell<Slab<{ reach::SLAB_BYTES }>> = ConstStaticCell::new
 /// Most that everything may take of the stack, making the mapper included, bytes.
 const STACK: u32 = 32 * 1024;
 
-/// Replays; returns the exit code: 0, or what of a digest (1), the fixture (2), the stack (3) was wrong.
+/// Replays; returns the exit code: 0, or what of a digest (1), the fixture (2), the stack (3) was
+/// wrong.
 fn run() -> u8 {
     let (Some(slab), Ok(clip)) = (SLAB.try_take(), Clip::new(fixture::CLIP)) else { return 2 };
-    let mut expected = Lines(fixture::DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
+    let mut expected =
+        Lines(fixture::DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
     let mut paint = Paint::below();
     let (mut wrong, mut most, mut step) = (0u32, 0, 0);
     #[cfg(not(feature = "instructions"))]
@@ -56,7 +59,12 @@ fn run() -> u8 {
         let same = expected.next().is_some_and(|line| line == digests.text());
         wrong += u32::from(!same);
         platform::put(
-            &digests.str(if same { " blocks " } else { " WRONG, blocks " }).decimal(frame.blocks).str(" stack ").decimal(bytes).str("\n"),
+            &digests
+                .str(if same { " blocks " } else { " WRONG, blocks " })
+                .decimal(frame.blocks)
+                .str(" stack ")
+                .decimal(bytes)
+                .str("\n"),
         );
         #[cfg(feature = "instructions")]
         executor.put();
@@ -70,7 +78,14 @@ fn run() -> u8 {
         platform::put(&Line::new().str("snapshot ").hex(snapshot).str("\n"));
         wrong += u32::from(snapshot == 0);
     }
-    platform::put(&Line::new().str("stack of a step ").decimal(step).str(", of everything ").decimal(most).str("\n"));
+    platform::put(
+        &Line::new()
+            .str("stack of a step ")
+            .decimal(step)
+            .str(", of everything ")
+            .decimal(most)
+            .str("\n"),
+    );
     #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
     platform::put(&Line::new().hex(faults::all(fixture::CLIP.len())).str("\n"));
     match (done, wrong + missing) {
@@ -99,7 +114,14 @@ impl<'t> Iterator for Lines<'t> {
 fn written(frame: &FrameDigests) -> Line {
     let stages = &frame.stages;
     let mut line = Line::new().decimal(frame.frame).str(" ").hex(frame.digest).str(" ");
-    for stage in [stages.input, stages.disparity, stages.matches, stages.egomotion, stages.tracks, stages.background] {
+    for stage in [
+        stages.input,
+        stages.disparity,
+        stages.matches,
+        stages.egomotion,
+        stages.tracks,
+        stages.background,
+    ] {
         line = line.hex(stage).str(" ");
     }
     let mut between = "";

@@ -1,5 +1,5 @@
-//! What the fixture does not come to: every other way into the core, so that the proofs see it, and its bits are compared from machine to
-//! machine as well.
+//! What the fixture does not come to: every other way into the core, so that the proofs see it, and
+//! its bits are compared from machine to machine as well.
 
 use crate::fixture;
 use core::hint::black_box;
@@ -28,7 +28,11 @@ const CAPACITY: Capacity = Capacity {
     ..fixture::CAPACITY
 };
 /// Bytes of slab for the fixture and for this.
-pub const SLAB_BYTES: usize = if CAPACITY.bytes() > fixture::CAPACITY.bytes() { CAPACITY.bytes() } else { fixture::CAPACITY.bytes() };
+pub const SLAB_BYTES: usize = if CAPACITY.bytes() > fixture::CAPACITY.bytes() {
+    CAPACITY.bytes()
+} else {
+    fixture::CAPACITY.bytes()
+};
 const PIXELS: usize = CAPACITY.pixels();
 
 static COLOUR: [[u8; 3]; PIXELS] = [[200, 100, 50]; PIXELS];
@@ -75,11 +79,18 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
         let frame = StereoFrame {
             colour: if late { View::new(&COLOUR, width, height) } else { None },
             class: late.then_some(seen.left),
-            disparity_q8: if index == FRAMES - 1 { View::new(&DISPARITY_Q8, width, height) } else { None },
+            disparity_q8: if index == FRAMES - 1 {
+                View::new(&DISPARITY_Q8, width, height)
+            } else {
+                None
+            },
             t_world_camera: late.then(|| *mapper.t_world_camera()),
             ..seen
         };
-        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, &mut blocks, &mut objects) else { return 0 };
+        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, &mut blocks, &mut objects)
+        else {
+            return 0;
+        };
         digest.u64(report.digest);
         digest.u64(report.severity() as u64);
     }
@@ -97,9 +108,11 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
 fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let pose = *mapper.t_world_camera();
     let mut hash_view = |seen: Option<&Raycaster<'_>>| {
-        let depth_m = seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
+        let depth_m =
+            seen.and_then(Raycaster::depth_m).into_iter().flat_map(|image| image.rows()).flatten();
         depth_m.for_each(|&depth_m| digest.f64(f64::from(depth_m)));
-        let normals = seen.and_then(Raycaster::normal).into_iter().flat_map(|image| image.rows()).flatten();
+        let normals =
+            seen.and_then(Raycaster::normal).into_iter().flat_map(|image| image.rows()).flatten();
         normals.for_each(|normal| digest.bytes(&normal.map(|x| x as u8)));
     };
     hash_view(mapper.raycast(&pose, &Serial).ok());
@@ -107,7 +120,11 @@ fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     hash_view(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
     plan(mapper, digest);
     let triangles = mapper.triangles(&mut |triangle| {
-        triangle.vertices.iter().flat_map(|vertex| vertex.position_m).for_each(|x| digest.f64(f64::from(x)));
+        triangle
+            .vertices
+            .iter()
+            .flat_map(|vertex| vertex.position_m)
+            .for_each(|x| digest.f64(f64::from(x)));
     });
     digest.u64(triangles);
     mapper.tracks().for_each(|track| digest.u64(u64::from(track.id)));
@@ -128,6 +145,7 @@ fn plan(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let robot = Sweep { radius_m: 0.4, low_m: -1.0, high_m: 0.5, unknown_ends: true };
     digest.f64(planning.sweep(volume, black_box(&[camera, ahead]), &robot).free_m);
     let cell = planning.origin();
-    let gradients = [planning.slice_gradient(cell).map(|[x, y]| [x, y, 0.0]), planning.cell_gradient(cell)];
+    let gradients =
+        [planning.slice_gradient(cell).map(|[x, y]| [x, y, 0.0]), planning.cell_gradient(cell)];
     gradients.into_iter().flatten().flatten().for_each(|slope| digest.f64(f64::from(slope)));
 }

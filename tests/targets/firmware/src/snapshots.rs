@@ -1,12 +1,14 @@
-//! A snapshot's bytes, and what comes of a mapper made of them, to be compared from machine to machine. Not in every build: a snapshot names
-//! its configuration by a text, and `core::fmt`, which writes it, brings panics along.
+//! A snapshot's bytes, and what comes of a mapper made of them, to be compared from machine to
+//! machine. Not in every build: a snapshot names its configuration by a text, and `core::fmt`,
+//! which writes it, brings panics along.
 
 use crate::fixture::{CAPACITY, CONFIG};
 use dynvox_clip::{Clip, Frame};
 use dynvox_core::{Mapper, Serial, digest::Digest};
 use static_cell::ConstStaticCell;
 
-/// Frames before the snapshot: tracks, an object, a full pruning window and blocks that left are in it.
+/// Frames before the snapshot: tracks, an object, a full pruning window and blocks that left are in
+/// it.
 const FRAMES: usize = 14;
 /// Space for a snapshot of a map whose pool is full.
 const MOST_BYTES: usize = 6 << 20;

@@ -1,4 +1,5 @@
-//! The tracker's parts by themselves: which levels there are, what is paired with what, and which motions are no estimates.
+//! The tracker's parts by themselves: which levels there are, what is paired with what, and which
+//! motions are no estimates.
 
 use super::*;
 
@@ -43,21 +44,28 @@ fn disparities_of_one_surface_within_the_limits_are_averaged() {
     let mut disparity_q8 = [0u16; 32];
     for (at, (block, _)) in blocks.iter().enumerate() {
         let first = at / 4 * 16 + at % 4 * 2;
-        [0, 1, 8, 9].iter().zip(block).for_each(|(offset, value)| disparity_q8[first + offset] = px(*value));
+        [0, 1, 8, 9]
+            .iter()
+            .zip(block)
+            .for_each(|(offset, value)| disparity_q8[first + offset] = px(*value));
     }
     let mut memory = [7.0; 32];
-    let pyramid = Pyramid::build(&RIG, limits_m, View::new(&disparity_q8, 8, 4).unwrap(), 1, &mut memory);
+    let pyramid =
+        Pyramid::build(&RIG, limits_m, View::new(&disparity_q8, 8, 4).unwrap(), 1, &mut memory);
     let (_, level) = pyramid.coarse_to_fine().next().unwrap();
     assert_eq!(level.pixels(), blocks.map(|(_, mean)| mean));
 }
 
 #[test]
 fn a_coarser_level_averages_the_finer_one_and_bridges_no_edge() {
-    // Columns of 20 px, then of 40 from the 33rd column of the finest level on: an edge within a block of the coarser one.
-    let disparity_q8: Vec<u16> =
-        (0..256 * 80).map(|at| if at % 256 < 66 { 20 << 8 } else { (40 << 8) + 128 * (at / 512 % 2) as u16 }).collect();
+    // Columns of 20 px, then of 40 from the 33rd column of the finest level on: an edge within a
+    // block of the coarser one.
+    let disparity_q8: Vec<u16> = (0..256 * 80)
+        .map(|at| if at % 256 < 66 { 20 << 8 } else { (40 << 8) + 128 * (at / 512 % 2) as u16 })
+        .collect();
     let mut memory = vec![0.0; 256 * 80];
-    let pyramid = Pyramid::build(&RIG, LIMITS_M, View::new(&disparity_q8, 256, 80).unwrap(), 2, &mut memory);
+    let pyramid =
+        Pyramid::build(&RIG, LIMITS_M, View::new(&disparity_q8, 256, 80).unwrap(), 2, &mut memory);
     let both: Vec<_> = pyramid.coarse_to_fine().map(|(_, level)| level).collect();
     for v in 0..20 {
         for u in 0..64 {
@@ -66,7 +74,11 @@ fn a_coarser_level_averages_the_finer_one_and_bridges_no_edge() {
         }
     }
     for (v, expected) in [(0, 40.0), (1, 40.5), (2, 40.0), (39, 40.5)] {
-        assert_eq!((both[1].get(32, v), both[1].get(33, v)), (Some(20.0), Some(expected)), "row {v}");
+        assert_eq!(
+            (both[1].get(32, v), both[1].get(33, v)),
+            (Some(20.0), Some(expected)),
+            "row {v}"
+        );
     }
 }
 
@@ -89,18 +101,37 @@ fn a_point_is_paired_with_the_surface_at_the_nearest_pixel() {
     map.0[0] = 0.0;
     let config = IcpConfig::default();
     let pairing = Pairing::new(&config, &RIG, 0);
-    let at = |u: f64, v: f64| pairing.associate(&(Vector3::from(RIG.ray(u, v)) * 6.0), &picture(&map));
+    let at =
+        |u: f64, v: f64| pairing.associate(&(Vector3::from(RIG.ray(u, v)) * 6.0), &picture(&map));
     let surface = |u: f64, v: f64, depth: f64| Vector3::from(RIG.ray(u, v)) * depth;
     for (u, v) in [(7.0, 3.0), (7.49, 3.49), (6.51, 2.51)] {
-        assert_eq!(at(u, v), Some((surface(7.0, 3.0, 8.0), Vector3::new(0.0, 1.0, 0.0))), "{u} {v}");
+        assert_eq!(
+            at(u, v),
+            Some((surface(7.0, 3.0, 8.0), Vector3::new(0.0, 1.0, 0.0))),
+            "{u} {v}"
+        );
     }
     assert_eq!(at(7.51, 3.0), Some((surface(8.0, 3.0, 5.0), Vector3::new(1.0, 0.0, -1.0))));
     assert_eq!(at(7.0, 2.49), Some((surface(7.0, 2.0, 5.0), Vector3::new(1.0, 0.0, -1.0))));
     assert_eq!(at(0.0, 0.0), None, "nothing is shown there");
     // The image ends half a pixel beyond the middles of its outermost pixels.
-    assert!(at(-0.49, 9.0).is_some() && at(-0.51, 9.0).is_none() && at(9.0, -0.49).is_some() && at(9.0, -0.51).is_none());
-    assert!(at(639.49, 9.0).is_some() && at(639.51, 9.0).is_none() && at(9.0, 191.49).is_some() && at(9.0, 191.51).is_none());
-    assert_eq!(pairing.associate(&Vector3::new(0.0, 0.0, -6.0), &picture(&map)), None, "behind the camera");
+    assert!(
+        at(-0.49, 9.0).is_some()
+            && at(-0.51, 9.0).is_none()
+            && at(9.0, -0.49).is_some()
+            && at(9.0, -0.51).is_none()
+    );
+    assert!(
+        at(639.49, 9.0).is_some()
+            && at(639.51, 9.0).is_none()
+            && at(9.0, 191.49).is_some()
+            && at(9.0, 191.51).is_none()
+    );
+    assert_eq!(
+        pairing.associate(&Vector3::new(0.0, 0.0, -6.0), &picture(&map)),
+        None,
+        "behind the camera"
+    );
 }
 
 #[test]
@@ -108,26 +139,41 @@ fn a_pair_counts_by_its_distance_from_the_plane_and_its_noise() {
     let config = IcpConfig { distance_m: 0.1, noise_px: 0.5, ..IcpConfig::default() };
     let map = wall(6.0, [0, 0, -127]);
     for level in [0, 1] {
-        let (width, height, stride) = (WIDTH >> (level + 1), HEIGHT >> (level + 1), f64::from(2u32 << level));
+        let (width, height, stride) =
+            (WIDTH >> (level + 1), HEIGHT >> (level + 1), f64::from(2u32 << level));
         let pairing = Pairing::new(&config, &RIG, level);
         for (disparity, within) in [(30.0, true), (29.0, true), (26.0, level == 1), (15.0, false)] {
             let mut disparity_px = vec![0.0f32; width * height];
             let (u, v) = (width / 2, height / 2 + 3);
             disparity_px[v * width + u] = disparity;
-            let sums = pairing.sums(&Transform::IDENTITY, View::new(&disparity_px, width, height).unwrap(), &picture(&map));
+            let sums = pairing.sums(
+                &Transform::IDENTITY,
+                View::new(&disparity_px, width, height).unwrap(),
+                &picture(&map),
+            );
             let depth = 180.0 / f64::from(disparity);
             let noise_m = 0.5 / 180.0 * depth * depth;
             // The point's pixel in the image, and the middle of the pixel that is nearest to it.
-            let [from, to]: [[f64; 2]; 2] = [[(u as f64 + 0.5) * stride - 0.5, (v as f64 + 0.5) * stride - 0.5]; 2];
+            let [from, to]: [[f64; 2]; 2] =
+                [[(u as f64 + 0.5) * stride - 0.5, (v as f64 + 0.5) * stride - 0.5]; 2];
             let to = to.map(|px| libm::floor(px + 0.5));
-            let away = Vector3::from(RIG.ray(from[0], from[1])) * depth - Vector3::from(RIG.ray(to[0], to[1])) * 6.0;
+            let away = Vector3::from(RIG.ray(from[0], from[1])) * depth
+                - Vector3::from(RIG.ray(to[0], to[1])) * 6.0;
             let reach_m = (0.1 + 3.0 * noise_m) * stride / 2.0;
             assert_eq!(away.norm() < reach_m, within, "{away:?} {reach_m}");
-            assert_eq!((sums.points, sums.pairs), (1, u32::from(within)), "level {level}, {disparity} px");
-            let (squared, weight) = ((6.0 - depth) * (6.0 - depth), 1.0 / (0.02 * 0.02 + noise_m * noise_m));
+            assert_eq!(
+                (sums.points, sums.pairs),
+                (1, u32::from(within)),
+                "level {level}, {disparity} px"
+            );
+            let (squared, weight) =
+                ((6.0 - depth) * (6.0 - depth), 1.0 / (0.02 * 0.02 + noise_m * noise_m));
             let expected = if within { [squared, weight, weight * squared] } else { [0.0; 3] };
             let found = [sums.squared_m2, sums.equations.weight, sums.equations.error];
-            assert!((0..3).all(|at| (found[at] - expected[at]).abs() <= 1e-9 * (1.0 + expected[at])), "{found:?} {expected:?}");
+            assert!(
+                (0..3).all(|at| (found[at] - expected[at]).abs() <= 1e-9 * (1.0 + expected[at])),
+                "{found:?} {expected:?}"
+            );
         }
     }
 }
@@ -160,15 +206,20 @@ fn each_test_of_a_motion_decides_by_itself() {
         (f64::NAN, 0.0, IcpStatus::TooFar),
     ] {
         let motion = walk([0.0, -turn_rad, 0.0], [way_m, 0.0, 0.0]);
-        assert_eq!(status(&|report| report.t_current_previous = motion), expected, "{way_m} m, {turn_rad} rad");
+        assert_eq!(
+            status(&|report| report.t_current_previous = motion),
+            expected,
+            "{way_m} m, {turn_rad} rad"
+        );
     }
 }
 
 #[test]
 fn steps_end_where_they_come_to_rest_or_are_as_many_as_allowed() {
     let motion = walk([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]);
-    let steps =
-        |levels: u8, steps: u8, motion: &Transform| tracked(&IcpConfig { levels, steps, ..IcpConfig::default() }, &SCENE, motion).steps;
+    let steps = |levels: u8, steps: u8, motion: &Transform| {
+        tracked(&IcpConfig { levels, steps, ..IcpConfig::default() }, &SCENE, motion).steps
+    };
     assert_eq!((steps(1, 1, &motion), steps(3, 1, &motion)), (1, 3));
     assert!(steps(3, 50, &motion) < 60, "of 150");
     assert!(steps(1, 50, &Transform::IDENTITY) <= 4);
@@ -177,8 +228,14 @@ fn steps_end_where_they_come_to_rest_or_are_as_many_as_allowed() {
 
 #[test]
 fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
-    let all =
-        [IcpStatus::Tracked, IcpStatus::TooFewPairs, IcpStatus::NotHeld, IcpStatus::OffTheMap, IcpStatus::TooFar, IcpStatus::Contradicted];
+    let all = [
+        IcpStatus::Tracked,
+        IcpStatus::TooFewPairs,
+        IcpStatus::NotHeld,
+        IcpStatus::OffTheMap,
+        IcpStatus::TooFar,
+        IcpStatus::Contradicted,
+    ];
     let motion = walk([0.0; 3], [1.0, 2.0, 3.0]);
     for status in all {
         let report = IcpReport { status, t_current_previous: motion, ..IcpReport::default() };
@@ -186,10 +243,18 @@ fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
     }
     assert_eq!(
         all.map(IcpStatus::name),
-        ["tracked", "too few pairs", "direction not held", "off the map", "too far", "contradicted by the images"]
+        [
+            "tracked",
+            "too few pairs",
+            "direction not held",
+            "off the map",
+            "too far",
+            "contradicted by the images"
+        ]
     );
     assert_eq!(IcpReport::unpaired().motion(), None);
-    let mut off = IcpReport { status: IcpStatus::OffTheMap, matches: [0, 100], ..IcpReport::default() };
+    let mut off =
+        IcpReport { status: IcpStatus::OffTheMap, matches: [0, 100], ..IcpReport::default() };
     off.check_matches(&IcpConfig::default());
     assert_eq!(off.status, IcpStatus::OffTheMap, "what failed before keeps its reason");
 }

@@ -45,7 +45,8 @@ impl Patch {
         }
     }
 
-    /// Column and row within the patch of a pixel of the left (0) or right (1) image, if the pixel shows it.
+    /// Column and row within the patch of a pixel of the left (0) or right (1) image, if the pixel
+    /// shows it.
     fn offset(&self, [u, v]: [i32; 2], camera: i32) -> Option<[i32; 2]> {
         let [du, dv] = [u + camera * self.disparity - self.at[0], v - self.at[1]];
         (du >= 0 && dv >= 0 && du < self.size[0] && dv < self.size[1]).then_some([du, dv])
@@ -57,7 +58,9 @@ impl Patch {
             let holes = below(random, 4);
             Box {
                 pixels: [self.at[0], self.at[1], self.size[0], self.size[1]],
-                mask: (0..self.size[0] * self.size[1]).map(|_| u8::from(below(random, 8) >= holes)).collect(),
+                mask: (0..self.size[0] * self.size[1])
+                    .map(|_| u8::from(below(random, 8) >= holes))
+                    .collect(),
                 class: self.class,
                 score: 0.5 + 0.05 * below(random, 10) as f32,
             }
@@ -68,7 +71,9 @@ impl Patch {
 /// A texture without borders.
 fn texture(u: i32, v: i32, seed: u32) -> u8 {
     let hash = |u: i32, v: i32| {
-        let x = (u as u32).wrapping_mul(0x9E37_79B9) ^ (v as u32).wrapping_mul(0x85EB_CA6B) ^ seed.wrapping_mul(0xC2B2_AE35);
+        let x = (u as u32).wrapping_mul(0x9E37_79B9)
+            ^ (v as u32).wrapping_mul(0x85EB_CA6B)
+            ^ seed.wrapping_mul(0xC2B2_AE35);
         let x = (x ^ x >> 15).wrapping_mul(0x2C1B_3C6D);
         ((x ^ x >> 12) & 0xFF) as i32
     };
@@ -105,18 +110,27 @@ fn image(patches: &[Patch], shift: i32, seed: u64, camera: i32) -> Vec<u8> {
     pixels.map(|(u, v)| value(u, v)).collect()
 }
 
-/// A run of [`FRAMES`] frames, all of it from one seed: the camera's motion, the patches', what the detector misses or makes up.
+/// A run of [`FRAMES`] frames, all of it from one seed: the camera's motion, the patches', what the
+/// detector misses or makes up.
 pub(super) fn run(seed: u64) -> Vec<Frame> {
     let mut random = Random::new(seed);
-    let mut patches: Vec<Patch> = (0..1 + below(&mut random, 3)).map(|_| Patch::random(&mut random)).collect();
-    let (given, coloured, speed) = (below(&mut random, 3) == 0, below(&mut random, 2) == 0, below(&mut random, 3));
+    let mut patches: Vec<Patch> =
+        (0..1 + below(&mut random, 3)).map(|_| Patch::random(&mut random)).collect();
+    let (given, coloured, speed) =
+        (below(&mut random, 3) == 0, below(&mut random, 2) == 0, below(&mut random, 3));
     (0..FRAMES as i32)
         .map(|at| {
             // Now and then a camera sees nothing.
             let black = below(&mut random, 12) == 0;
-            let images =
-                [0, 1].map(|camera| if black { std::vec![0; SIZE[0] * SIZE[1]] } else { image(&patches, at * speed, seed, camera) });
-            let mut seen: Vec<Box> = patches.iter().filter_map(|patch| patch.detection(&mut random)).collect();
+            let images = [0, 1].map(|camera| {
+                if black {
+                    std::vec![0; SIZE[0] * SIZE[1]]
+                } else {
+                    image(&patches, at * speed, seed, camera)
+                }
+            });
+            let mut seen: Vec<Box> =
+                patches.iter().filter_map(|patch| patch.detection(&mut random)).collect();
             if below(&mut random, 4) == 0 {
                 seen.push(false_detection(&mut random));
             }
@@ -125,10 +139,17 @@ pub(super) fn run(seed: u64) -> Vec<Frame> {
             }
             let [left, right] = images;
             Frame {
-                colour: coloured.then(|| left.iter().map(|&grey| [grey, grey / 2, 255 - grey]).collect()),
+                colour: coloured
+                    .then(|| left.iter().map(|&grey| [grey, grey / 2, 255 - grey]).collect()),
                 left,
                 right,
-                t_world_camera: given.then(|| Transform::from_translation([0.05 * f64::from(at * speed), 0.0, 0.1 * f64::from(at)])),
+                t_world_camera: given.then(|| {
+                    Transform::from_translation([
+                        0.05 * f64::from(at * speed),
+                        0.0,
+                        0.1 * f64::from(at),
+                    ])
+                }),
                 seen,
             }
         })

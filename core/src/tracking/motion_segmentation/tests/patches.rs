@@ -16,14 +16,24 @@ fn with_matcher<R>(test: impl FnOnce(&mut FlowMatcher<'_>) -> R) -> R {
 }
 
 impl World {
-    /// What a camera so far to the right sees: textures that lie still on the background and on each car.
+    /// What a camera so far to the right sees: textures that lie still on the background and on
+    /// each car.
     fn image(&self, right_m: f64, frame: u32) -> Vec<u8> {
         let pixel = |at: usize| {
             let [u, v] = [at % WIDTH, at / WIDTH].map(|at| at as f64);
             let (z, number) = self.cast_from(right_m, frame, [u, v]);
-            let [x, y] = [(u - RIG.center_u_px) / RIG.focal_px * z + right_m, (v - RIG.center_v_px) / RIG.focal_px * z];
-            let [car_x, car_z] = number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].at_frame(frame));
-            test_scene::grey(Point3::new(x - car_x, y, z + self.camera_z(frame) - car_z + 20.0 * number as f64)).round() as u8
+            let [x, y] = [
+                (u - RIG.center_u_px) / RIG.focal_px * z + right_m,
+                (v - RIG.center_v_px) / RIG.focal_px * z,
+            ];
+            let [car_x, car_z] =
+                number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].at_frame(frame));
+            test_scene::grey(Point3::new(
+                x - car_x,
+                y,
+                z + self.camera_z(frame) - car_z + 20.0 * number as f64,
+            ))
+            .round() as u8
         };
         (0..WIDTH * HEIGHT).map(pixel).collect()
     }
@@ -52,7 +62,11 @@ fn a_car_with_too_few_matches_is_found_by_patches_of_its_mask_and_a_parked_one_i
         for (frame, tracks) in (0..).zip(&world.tracks(matches_on_car, true)).skip(3) {
             assert_eq!(tracks.len(), 1, "frame {frame} of {matches_on_car} matches");
             let overlap = world.overlap(frame, &tracks[0].pixels);
-            assert!(overlap > 0.6, "frame {frame} of {matches_on_car} matches: {overlap} {:?}", tracks[0].pixels);
+            assert!(
+                overlap > 0.6,
+                "frame {frame} of {matches_on_car} matches: {overlap} {:?}",
+                tracks[0].pixels
+            );
         }
     }
 }
@@ -72,17 +86,39 @@ fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_el
             let config = SegmentationConfig::default();
             let model = StaticModel::new(&config, &RIG, &t_current_previous, [0.25, 0.0]);
             let shape = Shape { lattice: Lattice::new(&RIG, disparity_q8), ground: None };
-            let mut search = PatchSearch::new(GuidedMatching { matcher, disparity_q8 }, &t_current_previous, &shape);
+            let mut search = PatchSearch::new(
+                GuidedMatching { matcher, disparity_q8 },
+                &t_current_previous,
+                &shape,
+            );
             let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
-            let (mut members, mut values) = (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
-            let extent = groups::Extent { low: [1.8, 0.4, extent_z_m - 0.1], high: [3.2, 1.4, extent_z_m + 0.1] };
+            let (mut members, mut values) =
+                (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
+            let extent = groups::Extent {
+                low: [1.8, 0.4, extent_z_m - 0.1],
+                high: [3.2, 1.4, extent_z_m + 0.1],
+            };
             let mut is_found = |motion_m: [f64; 3], known: bool| {
-                let mut memory = PatchMemory { cells: &mut cells, queue: &mut queue, members: &mut members, values: &mut values };
-                search.verify(&model, &Seed::new(&extent, motion_m.into()).known(known), &mut memory).is_some()
+                let mut memory = PatchMemory {
+                    cells: &mut cells,
+                    queue: &mut queue,
+                    members: &mut members,
+                    values: &mut values,
+                };
+                search
+                    .verify(&model, &Seed::new(&extent, motion_m.into()).known(known), &mut memory)
+                    .is_some()
             };
             for known in [false, true] {
-                assert_eq!(is_found([0.0, 0.0, 1.4], known), moves, "of a car that moves: {moves}, known: {known}");
-                assert!(!is_found([1.4, 0.0, 0.0], known), "of a car that does not move to the side, known: {known}");
+                assert_eq!(
+                    is_found([0.0, 0.0, 1.4], known),
+                    moves,
+                    "of a car that moves: {moves}, known: {known}"
+                );
+                assert!(
+                    !is_found([1.4, 0.0, 0.0], known),
+                    "of a car that does not move to the side, known: {known}"
+                );
             }
         });
     }

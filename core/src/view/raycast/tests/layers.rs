@@ -9,7 +9,11 @@ use super::{
 type Pixel = (f32, [i8; 3], [u8; 3], u8);
 
 fn pixels(caster: &Raycaster<'_>) -> Vec<Pixel> {
-    let images = caster.depth_m.iter().zip(caster.normal.iter()).zip(caster.colour.iter().zip(caster.weight.iter()));
+    let images = caster
+        .depth_m
+        .iter()
+        .zip(caster.normal.iter())
+        .zip(caster.colour.iter().zip(caster.weight.iter()));
     images.map(|((depth, normal), (colour, weight))| (*depth, *normal, *colour, *weight)).collect()
 }
 
@@ -22,7 +26,8 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
     let sheet = filled([0, -7, 2], [1, 7, 5], true_distances(&near));
     let camera = at([0.1, -0.4, 0.2], [0.9, -0.3, 0.2]);
     let moved = |rotation: [f64; 3], shift: [f64; 3]| Viewpoint {
-        t_world_camera: Transform::new(Vector3::from(rotation), Vector3::from(shift)) * camera.t_world_camera,
+        t_world_camera: Transform::new(Vector3::from(rotation), Vector3::from(shift))
+            * camera.t_world_camera,
         ..camera
     };
     // The ball twice: once before, once behind the ground and the other ball in part.
@@ -33,7 +38,8 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
     ];
     let mut caster = raycaster(6_000, &RaycastConfig::default());
     caster.cast(&ground, &camera, &Serial).unwrap();
-    let mut nearest: Vec<(Pixel, u8)> = pixels(&caster).into_iter().map(|pixel| (pixel, 0)).collect();
+    let mut nearest: Vec<(Pixel, u8)> =
+        pixels(&caster).into_iter().map(|pixel| (pixel, 0)).collect();
     let mut threaded = raycaster(6_000, &RaycastConfig::default());
     threaded.cast(&ground, &camera, &TwoThreads).unwrap();
     for (layer, (map, view)) in (1..).zip(&maps) {
@@ -50,17 +56,24 @@ fn several_maps_in_one_picture_show_what_is_nearest_of_each_alone() {
         threaded.cast_over(map, view, layer, &TwoThreads).unwrap();
     }
     for caster in [&caster, &threaded] {
-        let composed: Vec<(Pixel, u8)> = pixels(caster).into_iter().zip(caster.layer.iter().copied()).collect();
+        let composed: Vec<(Pixel, u8)> =
+            pixels(caster).into_iter().zip(caster.layer.iter().copied()).collect();
         assert!(composed == nearest);
     }
     for layer in 0..=3 {
-        assert!(nearest.iter().filter(|(pixel, shown)| *shown == layer && pixel.0 > 0.0).count() > 300, "map {layer} is seen");
+        assert!(
+            nearest.iter().filter(|(pixel, shown)| *shown == layer && pixel.0 > 0.0).count() > 300,
+            "map {layer} is seen"
+        );
     }
     let other_size = Viewpoint { width: 80, ..camera };
     assert_eq!(caster.cast_over(&ball, &other_size, 9, &Serial), Err(RaycastError::ImageSize));
     let absurd = Viewpoint { rig: StereoRig { focal_px: 0.0, ..RIG }, ..camera };
     assert_eq!(caster.cast_over(&ball, &absurd, 9, &Serial), Err(RaycastError::Viewpoint));
-    assert!(pixels(&caster).iter().zip(&nearest).all(|(pixel, (known, _))| pixel == known), "a refused map changes nothing");
+    assert!(
+        pixels(&caster).iter().zip(&nearest).all(|(pixel, (known, _))| pixel == known),
+        "a refused map changes nothing"
+    );
     assert_eq!(
         raycaster(10, &RaycastConfig::default()).cast_over(&ball, &camera, 1, &Serial),
         Err(RaycastError::ImageSize),

@@ -1,4 +1,5 @@
-//! camodocal: one YAML file a camera, and `extrinsics.yaml`, whose transform maps left camera coordinates to right ones.
+//! camodocal: one YAML file a camera, and `extrinsics.yaml`, whose transform maps left camera
+//! coordinates to right ones.
 
 use super::{
     Placement, StereoCalibration, lens,
@@ -10,7 +11,9 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Reads two camera files; the extrinsics from a third, or from `extrinsics.yaml` beside the first.
 pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
-    let (&[left, right], rest) = roots.split_first_chunk::<2>().ok_or_else(|| super::euroc::two_files(roots, "camera file"))?;
+    let (&[left, right], rest) = roots
+        .split_first_chunk::<2>()
+        .ok_or_else(|| super::euroc::two_files(roots, "camera file"))?;
     let beside = match rest.first() {
         Some(_) => None,
         None => Some(Tree::read(&left.path().with_file_name("extrinsics.yaml"))?),
@@ -19,8 +22,12 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let extrinsics = extrinsics.unwrap_or(left);
     let transform = extrinsics.need("transform")?;
     let number = |key| transform.need(key)?.number();
-    let r_right_left = rotation([number("q_x")?, number("q_y")?, number("q_z")?, number("q_w")?]).ok_or_else(|| {
-        transform.refuse("the quaternion does not have length 1", "Copy q_x, q_y, q_z, q_w from the calibration's output")
+    let r_right_left = rotation([number("q_x")?, number("q_y")?, number("q_z")?, number("q_w")?])
+        .ok_or_else(|| {
+        transform.refuse(
+            "the quaternion does not have length 1",
+            "Copy q_x, q_y, q_z, q_w from the calibration's output",
+        )
     })?;
     Ok(StereoCalibration {
         left: camera(left)?,
@@ -63,22 +70,38 @@ fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     };
     let (pinhole, model) = match node.need("model_type")?.text()? {
         "PINHOLE" => {
-            let coefficients = parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
-            (parameters(projection, ["fx", "fy", "cx", "cy"])?, lens::radial_tangential(node, &coefficients)?)
+            let coefficients =
+                parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
+            (
+                parameters(projection, ["fx", "fy", "cx", "cy"])?,
+                lens::radial_tangential(node, &coefficients)?,
+            )
         }
         "KANNALA_BRANDT" => {
             let radial = parameters(projection, ["k2", "k3", "k4", "k5"])?;
             (parameters(projection, ["mu", "mv", "u0", "v0"])?, LensModel::Equidistant { radial })
         }
         "MEI" => {
-            let coefficients = parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
+            let coefficients =
+                parameters(node.need("distortion_parameters")?, ["k1", "k2", "p1", "p2"])?;
             let xi = node.need("mirror_parameters")?.need("xi")?.number()?;
-            lens::unified(node, xi, parameters(projection, ["gamma1", "gamma2", "u0", "v0"])?, &coefficients)?
+            lens::unified(
+                node,
+                xi,
+                parameters(projection, ["gamma1", "gamma2", "u0", "v0"])?,
+                &coefficients,
+            )?
         }
         other => {
             let reason = format!("the camera model {other} is not known");
-            return Err(node.refuse(&reason, "Known are PINHOLE, KANNALA_BRANDT, and MEI without distortion"));
+            return Err(node
+                .refuse(&reason, "Known are PINHOLE, KANNALA_BRANDT, and MEI without distortion"));
         }
     };
-    lens::camera(node, pinhole, model, [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?])
+    lens::camera(
+        node,
+        pinhole,
+        model,
+        [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?],
+    )
 }

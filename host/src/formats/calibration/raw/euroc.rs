@@ -1,4 +1,5 @@
-//! EuRoC's `sensor.yaml`, one a camera: `T_BS` maps camera coordinates to the body's. TUM VI's files are alike.
+//! EuRoC's `sensor.yaml`, one a camera: `T_BS` maps camera coordinates to the body's. TUM VI's
+//! files are alike.
 
 use super::{Placement, StereoCalibration, kalibr, tree::Node};
 use crate::formats::FormatError;
@@ -24,9 +25,13 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
 
 /// A format that has a file a camera.
 pub fn two_files(roots: &[Node<'_>], name: &str) -> FormatError {
-    let reason = format!("{} {name} of a pair that has two", if roots.len() == 1 { "it is one" } else { "it is among more than two" });
+    let reason = format!(
+        "{} {name} of a pair that has two",
+        if roots.len() == 1 { "it is one" } else { "it is among more than two" }
+    );
     let action = "Give --calibration twice: the left camera's file, then the right one's";
-    roots
-        .first()
-        .map_or_else(|| FormatError::content(std::path::Path::new(""), "there is no file", action), |root| root.refuse(&reason, action))
+    roots.first().map_or_else(
+        || FormatError::content(std::path::Path::new(""), "there is no file", action),
+        |root| root.refuse(&reason, action),
+    )
 }

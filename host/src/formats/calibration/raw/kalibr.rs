@@ -1,4 +1,5 @@
-//! Kalibr's `camchain.yaml`: `cam0` is left, `cam1` right; `T_cn_cnm1` maps coordinates of the first to the second.
+//! Kalibr's `camchain.yaml`: `cam0` is left, `cam1` right; `T_cn_cnm1` maps coordinates of the
+//! first to the second.
 
 use super::{Placement, StereoCalibration, lens, tree::Node};
 use crate::formats::FormatError;
@@ -27,7 +28,8 @@ pub fn rigid(node: Node<'_>) -> Result<(Matrix3<f64>, Vector3<f64>), FormatError
 pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     let size = node.need("resolution")?.size()?;
     let intrinsics = node.need("intrinsics")?;
-    let coefficients = node.get("distortion_coeffs").or_else(|| node.get("distortion_coefficients"));
+    let coefficients =
+        node.get("distortion_coeffs").or_else(|| node.get("distortion_coefficients"));
     let coefficients = coefficients.map_or(Ok(Vec::new()), |node| node.numbers())?;
     let name = node.get("distortion_model").map_or(Ok("none"), |node| node.text())?;
     let (pinhole, model) = match node.need("camera_model")?.text()?.to_ascii_lowercase().as_str() {
@@ -52,15 +54,21 @@ pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     lens::camera(node, pinhole, model, size)
 }
 
-/// The calibration as a `camchain.yaml`; `None` for a lens Kalibr does not have. A rectification that the calibration gives is left out: Kalibr
-/// knows the motion between the cameras alone.
+/// The calibration as a `camchain.yaml`; `None` for a lens Kalibr does not have. A rectification
+/// that the calibration gives is left out: Kalibr knows the motion between the cameras alone.
 pub fn to_kalibr(calibration: &StereoCalibration) -> Option<String> {
     let RawRig { r_right_left: r, t_right_left_m: t, .. } = calibration.raw_rig();
     let mut text = String::from("cam0:\n");
     text.push_str(&camera_keys(&calibration.left)?);
     text.push_str("cam1:\n  T_cn_cnm1:\n");
     for row in 0..3 {
-        text.push_str(&format!("  - [{}, {}, {}, {}]\n", r[(row, 0)], r[(row, 1)], r[(row, 2)], t[row]));
+        text.push_str(&format!(
+            "  - [{}, {}, {}, {}]\n",
+            r[(row, 0)],
+            r[(row, 1)],
+            r[(row, 2)],
+            t[row]
+        ));
     }
     text.push_str("  - [0.0, 0.0, 0.0, 1.0]\n");
     text.push_str(&camera_keys(&calibration.right)?);
@@ -71,9 +79,10 @@ fn camera_keys(camera: &RawCamera) -> Option<String> {
     let ([fx, fy], [cx, cy]) = (camera.lens.focal_px(), camera.lens.center_px());
     let list = |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
     let (model, name, coefficients, before) = match *camera.lens.model() {
-        LensModel::RadialTangential { radial: [k1, k2, 0.0, 0.0, 0.0, 0.0], tangential: [p1, p2] } => {
-            ("pinhole", "radtan", vec![k1, k2, p1, p2], vec![])
-        }
+        LensModel::RadialTangential {
+            radial: [k1, k2, 0.0, 0.0, 0.0, 0.0],
+            tangential: [p1, p2],
+        } => ("pinhole", "radtan", vec![k1, k2, p1, p2], vec![]),
         LensModel::RadialTangential { .. } => return None,
         LensModel::Equidistant { radial } => ("pinhole", "equidistant", radial.to_vec(), vec![]),
         LensModel::DoubleSphere { xi, alpha } => ("ds", "none", vec![], vec![xi, alpha]),

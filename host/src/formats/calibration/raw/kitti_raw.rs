@@ -1,5 +1,6 @@
-//! KITTI raw's `calib_cam_to_cam.txt`: lenses (`K_00`, `D_00`, `S_00`) and the benchmark's own rectification (`R_rect_00`, `P_rect_00`,
-//! `S_rect_00`) of cameras 0 (left) and 1 (right), the grey pair; of 2 and 3, the colour pair, where there is no grey one.
+//! KITTI raw's `calib_cam_to_cam.txt`: lenses (`K_00`, `D_00`, `S_00`) and the benchmark's own
+//! rectification (`R_rect_00`, `P_rect_00`, `S_rect_00`) of cameras 0 (left) and 1 (right), the
+//! grey pair; of 2 and 3, the colour pair, where there is no grey one.
 
 use super::{
     Placement, StereoCalibration, lens, ros,
@@ -16,18 +17,30 @@ pub fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
     read_pair(text, path, pair)
 }
 
-/// Names of one camera's lines: size, matrix, distortion; then rectified size, rotation, projection.
+/// Names of one camera's lines: size, matrix, distortion; then rectified size, rotation,
+/// projection.
 type Names = [&'static str; 6];
-const GREY: [Names; 2] =
-    [["S_00", "K_00", "D_00", "S_rect_00", "R_rect_00", "P_rect_00"], ["S_01", "K_01", "D_01", "S_rect_01", "R_rect_01", "P_rect_01"]];
-const COLOUR: [Names; 2] =
-    [["S_02", "K_02", "D_02", "S_rect_02", "R_rect_02", "P_rect_02"], ["S_03", "K_03", "D_03", "S_rect_03", "R_rect_03", "P_rect_03"]];
+const GREY: [Names; 2] = [
+    ["S_00", "K_00", "D_00", "S_rect_00", "R_rect_00", "P_rect_00"],
+    ["S_01", "K_01", "D_01", "S_rect_01", "R_rect_01", "P_rect_01"],
+];
+const COLOUR: [Names; 2] = [
+    ["S_02", "K_02", "D_02", "S_rect_02", "R_rect_02", "P_rect_02"],
+    ["S_03", "K_03", "D_03", "S_rect_03", "R_rect_03", "P_rect_03"],
+];
 
-fn read_pair(text: &str, path: &Path, [left, right]: [Names; 2]) -> Result<StereoCalibration, FormatError> {
+fn read_pair(
+    text: &str,
+    path: &Path,
+    [left, right]: [Names; 2],
+) -> Result<StereoCalibration, FormatError> {
     let tree = Tree::of_lines(text, path);
     let root = tree.root();
-    let rotation = |names: Names| Ok::<_, FormatError>(Matrix3::from_row_slice(&root.need(names[4])?.array::<9>()?));
-    let rig = ros::rectified_rig(root, &root.need(left[5])?.array()?, &root.need(right[5])?.array()?)?;
+    let rotation = |names: Names| {
+        Ok::<_, FormatError>(Matrix3::from_row_slice(&root.need(names[4])?.array::<9>()?))
+    };
+    let rig =
+        ros::rectified_rig(root, &root.need(left[5])?.array()?, &root.need(right[5])?.array()?)?;
     Ok(StereoCalibration {
         left: camera(root, left)?,
         right: camera(root, right)?,

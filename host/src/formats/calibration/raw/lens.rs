@@ -5,7 +5,12 @@ use crate::formats::FormatError;
 use dynvox_core::rectify::{Lens, LensModel, LensProblem, RawCamera};
 
 /// A camera from focal lengths and centre (`fx fy cx cy`), model and size.
-pub fn camera(at: Node<'_>, [fx, fy, cx, cy]: [f64; 4], model: LensModel, [width, height]: [u32; 2]) -> Result<RawCamera, FormatError> {
+pub fn camera(
+    at: Node<'_>,
+    [fx, fy, cx, cy]: [f64; 4],
+    model: LensModel,
+    [width, height]: [u32; 2],
+) -> Result<RawCamera, FormatError> {
     let lens = Lens::new([fx, fy], [cx, cy], model).map_err(|problem| {
         let action = match problem {
             LensProblem::Focal => "Focal lengths are in pixels, above 0: look at the camera matrix",
@@ -13,25 +18,35 @@ pub fn camera(at: Node<'_>, [fx, fy, cx, cy]: [f64; 4], model: LensModel, [width
         };
         at.refuse(&problem.to_string(), action)
     })?;
-    let inside = |center: f64, side: u32| center > -0.5 * f64::from(side) && center < 1.5 * f64::from(side);
+    let inside =
+        |center: f64, side: u32| center > -0.5 * f64::from(side) && center < 1.5 * f64::from(side);
     if !(inside(cx, width) && inside(cy, height)) {
-        let reason = format!("the principal point ({cx}, {cy}) px does not fit images of {width} x {height} px");
+        let reason = format!(
+            "the principal point ({cx}, {cy}) px does not fit images of {width} x {height} px"
+        );
         return Err(at.refuse(&reason, "Check the image size and the order of the parameters"));
     }
     Ok(RawCamera { lens, width, height })
 }
 
-/// Radial and tangential distortion in OpenCV's order: k1 k2 p1 p2 [k3 [k4 k5 k6]]. More (thin prism, tilt) must be 0.
+/// Radial and tangential distortion in OpenCV's order: k1 k2 p1 p2 [k3 [k4 k5 k6]]. More (thin
+/// prism, tilt) must be 0.
 pub fn radial_tangential(at: Node<'_>, coefficients: &[f64]) -> Result<LensModel, FormatError> {
     let get = |index: usize| coefficients.get(index).copied().unwrap_or(0.0);
     if !matches!(coefficients.len(), 0 | 4 | 5 | 8 | 12 | 14) {
         return Err(at.refuse(
-            &format!("{} distortion coefficients are not k1 k2 p1 p2 [k3 [k4 k5 k6]]", coefficients.len()),
+            &format!(
+                "{} distortion coefficients are not k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+                coefficients.len()
+            ),
             "Give 4, 5 or 8 of them",
         ));
     }
     if (8..14).any(|index| get(index) != 0.0) {
-        return Err(at.refuse("thin prism or tilt coefficients are not 0", "Calibrate again without them: they are not served"));
+        return Err(at.refuse(
+            "thin prism or tilt coefficients are not 0",
+            "Calibrate again without them: they are not served",
+        ));
     }
     Ok(LensModel::RadialTangential {
         radial: [get(0), get(1), get(4), get(5), get(6), get(7)],
@@ -43,12 +58,19 @@ pub fn radial_tangential(at: Node<'_>, coefficients: &[f64]) -> Result<LensModel
 pub fn equidistant(at: Node<'_>, coefficients: &[f64]) -> Result<LensModel, FormatError> {
     match *coefficients {
         [k1, k2, k3, k4] => Ok(LensModel::Equidistant { radial: [k1, k2, k3, k4] }),
-        _ => Err(at.refuse(&format!("the equidistant model has 4 coefficients, not {}", coefficients.len()), "Give k1 k2 k3 k4")),
+        _ => Err(at.refuse(
+            &format!("the equidistant model has 4 coefficients, not {}", coefficients.len()),
+            "Give k1 k2 k3 k4",
+        )),
     }
 }
 
 /// The distortion model of a pinhole by its name.
-pub fn distortion(at: Node<'_>, name: &str, coefficients: &[f64]) -> Result<LensModel, FormatError> {
+pub fn distortion(
+    at: Node<'_>,
+    name: &str,
+    coefficients: &[f64],
+) -> Result<LensModel, FormatError> {
     match name.to_ascii_lowercase().replace(['-', ' '], "_").as_str() {
         "radtan" | "radial_tangential" | "plumb_bob" | "rational_polynomial" | "opencv" => radial_tangential(at, coefficients),
         "equidistant" | "equi" | "fisheye" | "kannala_brandt" => equidistant(at, coefficients),
@@ -60,8 +82,14 @@ pub fn distortion(at: Node<'_>, name: &str, coefficients: &[f64]) -> Result<Lens
     }
 }
 
-/// The unified model of Mei without distortion as an extended unified one: the same rays, other names.
-pub fn unified(at: Node<'_>, xi: f64, [fx, fy, cx, cy]: [f64; 4], distortion: &[f64]) -> Result<([f64; 4], LensModel), FormatError> {
+/// The unified model of Mei without distortion as an extended unified one: the same rays, other
+/// names.
+pub fn unified(
+    at: Node<'_>,
+    xi: f64,
+    [fx, fy, cx, cy]: [f64; 4],
+    distortion: &[f64],
+) -> Result<([f64; 4], LensModel), FormatError> {
     if distortion.iter().any(|k| *k != 0.0) {
         return Err(at.refuse(
             "the unified (MEI, omni) model with distortion is not served",

@@ -10,7 +10,8 @@
 //! | camodocal | two camera files, and `extrinsics.yaml` as a third or beside them | `model_type` |
 //! | OpenCV | one or two files, YAML or XML | `M1 D1 M2 D2 R T`, or the long names |
 //!
-//! The result of every format is checked here: baseline, sizes, rotations. Units are metres and pixels.
+//! The result of every format is checked here: baseline, sizes, rotations. Units are metres and
+//! pixels.
 
 mod camodocal;
 mod euroc;
@@ -29,7 +30,9 @@ pub use own::to_toml;
 
 use crate::formats::{FormatError, read_text};
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::{RawCamera, RawRig, Rectification, RectifyProblem, Sizing, TurnedCamera};
+use dynvox_core::rectify::{
+    RawCamera, RawRig, Rectification, RectifyProblem, Sizing, TurnedCamera,
+};
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 use tree::{Node, Tree};
@@ -76,30 +79,44 @@ pub struct StereoCalibration {
 }
 
 impl StereoCalibration {
-    /// Reads the calibration in one, two or three files. `image_size` is the raw images' where it is known: some formats do not say it.
+    /// Reads the calibration in one, two or three files. `image_size` is the raw images' where it
+    /// is known: some formats do not say it.
     ///
     /// # Errors
     /// What is wrong with which file, and what to do.
     pub fn read(paths: &[&Path], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
         let (Some(&first), 1..=3) = (paths.first(), paths.len()) else {
-            let action = "Give one file with both cameras, or --calibration LEFT --calibration RIGHT";
-            return Err(FormatError::content(paths.first().copied().unwrap_or(Path::new("")), "a calibration is 1 to 3 files", action));
+            let action =
+                "Give one file with both cameras, or --calibration LEFT --calibration RIGHT";
+            return Err(FormatError::content(
+                paths.first().copied().unwrap_or(Path::new("")),
+                "a calibration is 1 to 3 files",
+                action,
+            ));
         };
-        let ending = first.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let ending = first
+            .extension()
+            .map(|ending| ending.to_string_lossy().to_ascii_lowercase())
+            .unwrap_or_default();
         let calibration = match ending.as_str() {
             "toml" => own::read(&read_text(first)?, first)?,
             "txt" => kitti_raw::read(&read_text(first)?, first)?,
-            _ => Self::from_trees(&paths.iter().map(|path| Tree::read(path)).collect::<Result<Vec<_>, _>>()?, image_size)?,
+            _ => Self::from_trees(
+                &paths.iter().map(|path| Tree::read(path)).collect::<Result<Vec<_>, _>>()?,
+                image_size,
+            )?,
         };
         calibration.checked(first)
     }
 
-    /// Of a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path` names their source in errors.
+    /// Of a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path` names
+    /// their source in errors.
     ///
     /// # Errors
     /// As [`StereoCalibration::read`].
     pub fn of_camera_infos(path: &Path, texts: &[String; 2]) -> Result<Self, FormatError> {
-        let trees = texts.iter().map(|text| Tree::of_yaml(text, path)).collect::<Result<Vec<_>, _>>()?;
+        let trees =
+            texts.iter().map(|text| Tree::of_yaml(text, path)).collect::<Result<Vec<_>, _>>()?;
         Self::from_trees(&trees, None)?.checked(path)
     }
 
@@ -134,7 +151,9 @@ impl StereoCalibration {
     pub fn angle_deg(&self) -> f64 {
         let r = match &self.placement {
             Placement::Motion { r_right_left, .. } => *r_right_left,
-            Placement::Rectified { r_rectified_left, r_rectified_right, .. } => r_rectified_right.transpose() * r_rectified_left,
+            Placement::Rectified { r_rectified_left, r_rectified_right, .. } => {
+                r_rectified_right.transpose() * r_rectified_left
+            }
         };
         let rig = RawRig {
             left: self.left,
@@ -145,15 +164,17 @@ impl StereoCalibration {
         rig.angle_rad().to_degrees()
     }
 
-    /// How pairs are rectified: as the calibration gives it, unless it gives none or another size is asked for.
+    /// How pairs are rectified: as the calibration gives it, unless it gives none or another size
+    /// is asked for.
     ///
     /// # Errors
     /// The cameras cannot be rectified.
     pub fn rectify(&self, sizing: Sizing) -> Result<(Rectification, StereoRig), RectifyProblem> {
         match (self.placement, sizing) {
-            (Placement::Rectified { r_rectified_left, r_rectified_right, rig, size }, Sizing::Automatic { max_width, max_height })
-                if size[0] <= max_width && size[1] <= max_height =>
-            {
+            (
+                Placement::Rectified { r_rectified_left, r_rectified_right, rig, size },
+                Sizing::Automatic { max_width, max_height },
+            ) if size[0] <= max_width && size[1] <= max_height => {
                 let left = TurnedCamera { raw: self.left, r_rectified_raw: r_rectified_left };
                 let right = TurnedCamera { raw: self.right, r_rectified_raw: r_rectified_right };
                 Ok((Rectification::given(left, right, size)?, rig))
@@ -183,9 +204,14 @@ impl StereoCalibration {
             return refuse(reason, "Translations are in metres: divide them by 1000");
         }
         if baseline_m.is_finite() && baseline_m > 0.0 && baseline_m < SHORTEST_BASELINE_M {
-            return refuse(format!("the cameras are {} mm apart", 1e3 * baseline_m), "Translations are in metres: correct their unit");
+            return refuse(
+                format!("the cameras are {} mm apart", 1e3 * baseline_m),
+                "Translations are in metres: correct their unit",
+            );
         }
-        if let Err(problem) = self.rectify(Sizing::Automatic { max_width: 4_096, max_height: 4_096 }) {
+        if let Err(problem) =
+            self.rectify(Sizing::Automatic { max_width: 4_096, max_height: 4_096 })
+        {
             let action = match problem {
                 RectifyProblem::NotARotation => {
                     "A rotation has three rows of length 1 at right angles: copy it whole from the calibration tool"
@@ -195,7 +221,9 @@ impl StereoCalibration {
                 RectifyProblem::NotSideBySide => {
                     "Pairs above or behind each other cannot be matched: check the order of rotation and translation"
                 }
-                RectifyProblem::Diverging => "Check the rotation between the cameras, and which way it maps",
+                RectifyProblem::Diverging => {
+                    "Check the rotation between the cameras, and which way it maps"
+                }
                 RectifyProblem::RawSize => "Correct width and height",
                 _ => "Check focal lengths, principal points and image sizes",
             };
@@ -216,7 +244,9 @@ impl StereoCalibration {
         let [known_width, known_height] = known;
         Err(FormatError::content(
             path,
-            format!("it is for images of {known_width} x {known_height} px, but these are {width} x {height} px"),
+            format!(
+                "it is for images of {known_width} x {known_height} px, but these are {width} x {height} px"
+            ),
             "Give the calibration of these images, or the images as the camera delivers them",
         ))
     }

@@ -1,5 +1,6 @@
-//! OpenCV's files, YAML or XML: both cameras and `R`, `T` under the short names of its stereo sample (`M1 D1 M2 D2`, in one file or with
-//! `R T` in a second), the long ones (`cameraMatrix1 distCoeffs1 ...`), or a file a camera (`cameraMatrix distCoeffs`, also
+//! OpenCV's files, YAML or XML: both cameras and `R`, `T` under the short names of its stereo
+//! sample (`M1 D1 M2 D2`, in one file or with `R T` in a second), the long ones
+//! (`cameraMatrix1 distCoeffs1 ...`), or a file a camera (`cameraMatrix distCoeffs`, also
 //! `camera_matrix distortion_coefficients`) with `R` and `T` in one of them.
 
 use super::{Placement, StereoCalibration, lens, tree::Node};
@@ -13,12 +14,21 @@ const PAIRS: [[[&str; 2]; 2]; 6] = [
     [["K1", "D1"], ["K2", "D2"]],
     [["cameraMatrix1", "distCoeffs1"], ["cameraMatrix2", "distCoeffs2"]],
     [["cameraMatrixL", "distCoeffsL"], ["cameraMatrixR", "distCoeffsR"]],
-    [["camera_matrix_1", "distortion_coefficients_1"], ["camera_matrix_2", "distortion_coefficients_2"]],
-    [["left_camera_matrix", "left_distortion_coefficients"], ["right_camera_matrix", "right_distortion_coefficients"]],
+    [
+        ["camera_matrix_1", "distortion_coefficients_1"],
+        ["camera_matrix_2", "distortion_coefficients_2"],
+    ],
+    [
+        ["left_camera_matrix", "left_distortion_coefficients"],
+        ["right_camera_matrix", "right_distortion_coefficients"],
+    ],
 ];
 /// The same in files of one camera.
-const SINGLE: [[&str; 2]; 3] =
-    [["cameraMatrix", "distCoeffs"], ["camera_matrix", "distortion_coefficients"], ["Camera_Matrix", "Distortion_Coefficients"]];
+const SINGLE: [[&str; 2]; 3] = [
+    ["cameraMatrix", "distCoeffs"],
+    ["camera_matrix", "distortion_coefficients"],
+    ["Camera_Matrix", "Distortion_Coefficients"],
+];
 
 /// Whether the files look like it.
 pub fn is_one(roots: &[Node<'_>]) -> bool {
@@ -27,18 +37,31 @@ pub fn is_one(roots: &[Node<'_>]) -> bool {
 }
 
 /// Reads the pair.
-pub fn read(roots: &[Node<'_>], image_size: Option<[u32; 2]>, first: Node<'_>) -> Result<StereoCalibration, FormatError> {
+pub fn read(
+    roots: &[Node<'_>],
+    image_size: Option<[u32; 2]>,
+    first: Node<'_>,
+) -> Result<StereoCalibration, FormatError> {
     let find = |key: &'static str| roots.iter().find_map(|root| root.get(key));
     let needed = |keys: &[&'static str]| {
         keys.iter().find_map(|key| find(key)).ok_or_else(|| {
-            first.refuse(&format!("{} is missing", keys.join(" or ")), "Give the file that holds it as a second --calibration")
+            first.refuse(
+                &format!("{} is missing", keys.join(" or ")),
+                "Give the file that holds it as a second --calibration",
+            )
         })
     };
-    let r_right_left = Matrix3::from_row_slice(&needed(&["R", "rotation", "Rotation"])?.array::<9>()?);
+    let r_right_left =
+        Matrix3::from_row_slice(&needed(&["R", "rotation", "Rotation"])?.array::<9>()?);
     let t_right_left_m = Vector3::from(needed(&["T", "translation", "Translation"])?.array::<3>()?);
     let size = size(roots, image_size, first)?;
-    let cameras = if let Some([[m1, d1], [m2, d2]]) = PAIRS.iter().find(|[[matrix, _], _]| find(matrix).is_some()) {
-        [camera(needed(&[m1])?, needed(&[d1])?, roots, size)?, camera(needed(&[m2])?, needed(&[d2])?, roots, size)?]
+    let cameras = if let Some([[m1, d1], [m2, d2]]) =
+        PAIRS.iter().find(|[[matrix, _], _]| find(matrix).is_some())
+    {
+        [
+            camera(needed(&[m1])?, needed(&[d1])?, roots, size)?,
+            camera(needed(&[m2])?, needed(&[d2])?, roots, size)?,
+        ]
     } else {
         let singles: Vec<_> = roots.iter().filter_map(single).collect();
         let [(m1, Some(d1)), (m2, Some(d2))] = *singles.as_slice() else {
@@ -61,13 +84,22 @@ fn single<'t>(root: &Node<'t>) -> Option<(Node<'t>, Option<Node<'t>>)> {
     Some((root.get(matrix)?, root.get(distortion)))
 }
 
-fn size(roots: &[Node<'_>], image_size: Option<[u32; 2]>, first: Node<'_>) -> Result<[u32; 2], FormatError> {
+fn size(
+    roots: &[Node<'_>],
+    image_size: Option<[u32; 2]>,
+    first: Node<'_>,
+) -> Result<[u32; 2], FormatError> {
     let find = |key: &'static str| roots.iter().find_map(|root| root.get(key));
-    let sides = [["image_width", "image_height"], ["imageWidth", "imageHeight"], ["width", "height"]];
-    if let Some((width, height)) = sides.iter().find_map(|[width, height]| Some((find(width)?, find(height)?))) {
+    let sides =
+        [["image_width", "image_height"], ["imageWidth", "imageHeight"], ["width", "height"]];
+    if let Some((width, height)) =
+        sides.iter().find_map(|[width, height]| Some((find(width)?, find(height)?)))
+    {
         return Ok([width.pixels()?, height.pixels()?]);
     }
-    if let Some(list) = ["image_size", "imageSize", "size", "image_Size"].iter().find_map(|key| find(key)) {
+    if let Some(list) =
+        ["image_size", "imageSize", "size", "image_Size"].iter().find_map(|key| find(key))
+    {
         return list.size();
     }
     let action = "Add image_width and image_height, or give the calibration together with the images: --calibration FILE PATH";
@@ -75,12 +107,27 @@ fn size(roots: &[Node<'_>], image_size: Option<[u32; 2]>, first: Node<'_>) -> Re
 }
 
 /// A camera; four coefficients under a model that names the fisheye are equidistant.
-fn camera(matrix: Node<'_>, distortion: Node<'_>, roots: &[Node<'_>], size: [u32; 2]) -> Result<RawCamera, FormatError> {
+fn camera(
+    matrix: Node<'_>,
+    distortion: Node<'_>,
+    roots: &[Node<'_>],
+    size: [u32; 2],
+) -> Result<RawCamera, FormatError> {
     let [fx, _, cx, _, fy, cy, ..] = matrix.array::<9>()?;
-    let named = ["fisheye_model", "fisheye"].iter().find_map(|key| roots.iter().find_map(|root| root.get(key)));
-    let by_name = roots.iter().find_map(|root| root.get("distortion_model")).and_then(|node| node.text().ok());
-    let fisheye = named.is_some_and(|node| node.number().is_ok_and(|flag| flag != 0.0)) || by_name.is_some_and(|name| name == "fisheye");
+    let named = ["fisheye_model", "fisheye"]
+        .iter()
+        .find_map(|key| roots.iter().find_map(|root| root.get(key)));
+    let by_name = roots
+        .iter()
+        .find_map(|root| root.get("distortion_model"))
+        .and_then(|node| node.text().ok());
+    let fisheye = named.is_some_and(|node| node.number().is_ok_and(|flag| flag != 0.0))
+        || by_name.is_some_and(|name| name == "fisheye");
     let coefficients = distortion.numbers()?;
-    let model = if fisheye { lens::equidistant(distortion, &coefficients)? } else { lens::radial_tangential(distortion, &coefficients)? };
+    let model = if fisheye {
+        lens::equidistant(distortion, &coefficients)?
+    } else {
+        lens::radial_tangential(distortion, &coefficients)?
+    };
     lens::camera(matrix, [fx, fy, cx, cy], model, size)
 }

@@ -69,7 +69,9 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 impl LensTable {
     fn of(model: &LensModel) -> Self {
         match *model {
-            LensModel::RadialTangential { radial, tangential } => Self::RadialTangential { radial, tangential },
+            LensModel::RadialTangential { radial, tangential } => {
+                Self::RadialTangential { radial, tangential }
+            }
             LensModel::Equidistant { radial } => Self::Equidistant { radial },
             LensModel::DoubleSphere { xi, alpha } => Self::DoubleSphere { xi, alpha },
             LensModel::ExtendedUnified { alpha, beta } => Self::ExtendedUnified { alpha, beta },
@@ -78,7 +80,9 @@ impl LensTable {
 
     fn model(&self) -> LensModel {
         match *self {
-            Self::RadialTangential { radial, tangential } => LensModel::RadialTangential { radial, tangential },
+            Self::RadialTangential { radial, tangential } => {
+                LensModel::RadialTangential { radial, tangential }
+            }
             Self::Equidistant { radial } => LensModel::Equidistant { radial },
             Self::DoubleSphere { xi, alpha } => LensModel::DoubleSphere { xi, alpha },
             Self::ExtendedUnified { alpha, beta } => LensModel::ExtendedUnified { alpha, beta },
@@ -98,8 +102,10 @@ impl Camera {
     }
 
     fn raw(&self, path: &Path) -> Result<RawCamera, FormatError> {
-        let lens = Lens::new(self.focal_px, self.center_px, self.lens.model())
-            .map_err(|problem| FormatError::content(path, problem.to_string(), "Correct the lens's numbers"))?;
+        let lens =
+            Lens::new(self.focal_px, self.center_px, self.lens.model()).map_err(|problem| {
+                FormatError::content(path, problem.to_string(), "Correct the lens's numbers")
+            })?;
         Ok(RawCamera { lens, width: self.width_px, height: self.height_px })
     }
 }
@@ -149,9 +155,10 @@ pub(super) fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatE
 /// The calibration as a file of our own.
 pub fn to_toml(calibration: &StereoCalibration) -> String {
     let (motion, rectified) = match &calibration.placement {
-        Placement::Motion { r_right_left, t_right_left_m } => {
-            (Some(Motion { rotation: rows(r_right_left), translation_m: (*t_right_left_m).into() }), None)
-        }
+        Placement::Motion { r_right_left, t_right_left_m } => (
+            Some(Motion { rotation: rows(r_right_left), translation_m: (*t_right_left_m).into() }),
+            None,
+        ),
         Placement::Rectified { r_rectified_left, r_rectified_right, rig, size } => {
             let given = Rectified {
                 width_px: size[0],

@@ -1,4 +1,5 @@
-//! ROS `CameraInfo` as `camera_calibration` writes it: one YAML file a camera, with the rectification and its projection.
+//! ROS `CameraInfo` as `camera_calibration` writes it: one YAML file a camera, with the
+//! rectification and its projection.
 
 use super::{Placement, StereoCalibration, euroc, lens, tree::Node};
 use crate::formats::FormatError;
@@ -11,8 +12,13 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let [left, right] = *roots else {
         return Err(euroc::two_files(roots, "CameraInfo file"));
     };
-    let rotation = |node: Node<'_>| Ok::<_, FormatError>(Matrix3::from_row_slice(&node.need("rectification_matrix")?.array::<9>()?));
-    let [p_left, p_right]: [[f64; 12]; 2] = [left.need("projection_matrix")?.array()?, right.need("projection_matrix")?.array()?];
+    let rotation = |node: Node<'_>| {
+        Ok::<_, FormatError>(Matrix3::from_row_slice(
+            &node.need("rectification_matrix")?.array::<9>()?,
+        ))
+    };
+    let [p_left, p_right]: [[f64; 12]; 2] =
+        [left.need("projection_matrix")?.array()?, right.need("projection_matrix")?.array()?];
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
@@ -27,9 +33,14 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
 }
 
 /// The rig of two projection matrices with one focal length and centre.
-pub fn rectified_rig(at: Node<'_>, p_left: &[f64; 12], p_right: &[f64; 12]) -> Result<StereoRig, FormatError> {
+pub fn rectified_rig(
+    at: Node<'_>,
+    p_left: &[f64; 12],
+    p_right: &[f64; 12],
+) -> Result<StereoRig, FormatError> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-    let shared = [0, 5, 2, 6].iter().all(|&entry| near(p_left[entry], p_right[entry])) && near(p_left[0], p_left[5]);
+    let shared = [0, 5, 2, 6].iter().all(|&entry| near(p_left[entry], p_right[entry]))
+        && near(p_left[0], p_left[5]);
     if !shared {
         let reason = "the two projection matrices differ in focal length or principal point";
         return Err(
@@ -50,5 +61,10 @@ fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     let name = node.get("distortion_model").map_or(Ok("plumb_bob"), |node| node.text())?;
     let coefficients = node.need("distortion_coefficients")?.numbers()?;
     let model = lens::distortion(node, name, &coefficients)?;
-    lens::camera(node, [fx, fy, cx, cy], model, [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?])
+    lens::camera(
+        node,
+        [fx, fy, cx, cy],
+        model,
+        [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?],
+    )
 }

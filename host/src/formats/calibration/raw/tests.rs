@@ -24,7 +24,8 @@ fn euroc(x: f64) -> String {
 const MATRIX: &str = "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1. ]\n";
 const COEFFICIENTS: &str = "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0.0002, 0.00002, 0. ]\n";
 const R: &str = "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\n";
-const T: &str = "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ -0.11, 0., 0. ]\n";
+const T: &str =
+    "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ -0.11, 0., 0. ]\n";
 
 fn opencv_short() -> [String; 2] {
     [
@@ -34,13 +35,17 @@ fn opencv_short() -> [String; 2] {
 }
 
 fn opencv_long() -> [String; 2] {
-    let one = format!("%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncameraMatrix: {MATRIX}distCoeffs: {COEFFICIENTS}");
+    let one = format!(
+        "%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncameraMatrix: {MATRIX}distCoeffs: {COEFFICIENTS}"
+    );
     [one.clone(), format!("{one}{R}{T}")]
 }
 
 fn opencv_xml() -> String {
     let matrix = |name: &str, rows: u32, data: &str| {
-        format!("<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>3</cols><dt>d</dt><data>\n {data}</data></{name}>\n")
+        format!(
+            "<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>3</cols><dt>d</dt><data>\n {data}</data></{name}>\n"
+        )
     };
     let camera = |number: u32| {
         matrix(&format!("M{number}"), 3, "458.6 0. 367.2 0. 457.2 248.3 0. 0. 1.")
@@ -69,8 +74,7 @@ fn camodocal() -> String {
         .to_owned()
 }
 
-const EXTRINSICS: &str =
-    "%YAML:1.0\n---\ntransform:\n   q_x: 0.\n   q_y: 0.\n   q_z: 0.\n   q_w: 1.\n   t_x: -0.11\n   t_y: 0.\n   t_z: 0.\n";
+const EXTRINSICS: &str = "%YAML:1.0\n---\ntransform:\n   q_x: 0.\n   q_y: 0.\n   q_z: 0.\n   q_w: 1.\n   t_x: -0.11\n   t_y: 0.\n   t_z: 0.\n";
 
 const KITTI: &str = "calib_time: 09-Jan-2012 13:57:47\nS_00: 7.52e+02 4.80e+02\nK_00: 458.6 0 367.2 0 457.2 248.3 0 0 1\nD_00: -0.28 0.07 0.0002 0.00002 0\n\
     S_rect_00: 700 400\nR_rect_00: 1 0 0 0 1 0 0 0 1\nP_rect_00: 400 0 370 0 0 400 250 0 0 0 1 0\nS_01: 752 480\nK_01: 458.6 0 367.2 0 457.2 248.3 0 0 1\n\
@@ -115,7 +119,10 @@ fn all_formats_tell_of_the_same_rig() {
         ),
         (
             "ROS CameraInfo",
-            vec![("left.yaml", Box::leak(ros(0.0).into_boxed_str())), ("right.yaml", Box::leak(ros(-44.0).into_boxed_str()))],
+            vec![
+                ("left.yaml", Box::leak(ros(0.0).into_boxed_str())),
+                ("right.yaml", Box::leak(ros(-44.0).into_boxed_str())),
+            ],
         ),
         (
             "camodocal",
@@ -126,7 +133,13 @@ fn all_formats_tell_of_the_same_rig() {
             ],
         ),
         ("KITTI raw", vec![("calib_cam_to_cam.txt", KITTI)]),
-        ("dynvox", vec![("own.toml", Box::leak(to_toml(&read(&[("camchain.yaml", KALIBR)]).unwrap()).into_boxed_str()))]),
+        (
+            "dynvox",
+            vec![(
+                "own.toml",
+                Box::leak(to_toml(&read(&[("camchain.yaml", KALIBR)]).unwrap()).into_boxed_str()),
+            )],
+        ),
     ];
     for (format, files) in files {
         let calibration = read(&files).unwrap_or_else(|error| panic!("{format}: {error}"));
@@ -136,14 +149,24 @@ fn all_formats_tell_of_the_same_rig() {
                 ([camera.width, camera.height], camera.lens.focal_px(), camera.lens.center_px()),
                 ([752, 480], [458.6, 457.2], [367.2, 248.3])
             );
-            let same = LensModel::RadialTangential { radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0], tangential: [0.0002, 0.00002] };
+            let same = LensModel::RadialTangential {
+                radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0],
+                tangential: [0.0002, 0.00002],
+            };
             assert_eq!(*camera.lens.model(), same, "{format}");
         }
-        assert!((calibration.baseline_m() - 0.11).abs() < 1e-12 && calibration.angle_deg() < 1e-9, "{format}");
-        let (rectification, rig) = calibration.rectify(Sizing::Automatic { max_width: 800, max_height: 600 }).unwrap();
+        assert!(
+            (calibration.baseline_m() - 0.11).abs() < 1e-12 && calibration.angle_deg() < 1e-9,
+            "{format}"
+        );
+        let (rectification, rig) =
+            calibration.rectify(Sizing::Automatic { max_width: 800, max_height: 600 }).unwrap();
         assert!((rig.baseline_m - 0.11).abs() < 1e-12);
         let given = matches!(format, "ROS CameraInfo" | "KITTI raw").then_some(400.0);
-        assert!(given.is_none_or(|focal| rig.focal_px == focal), "{format} gives its own rectification");
+        assert!(
+            given.is_none_or(|focal| rig.focal_px == focal),
+            "{format} gives its own rectification"
+        );
         assert_eq!(rectification.left.raw, calibration.left);
     }
 }
@@ -160,7 +183,10 @@ fn own_files_keep_every_bit() {
 #[test]
 fn a_written_camchain_is_read_again() {
     let models = [
-        LensModel::RadialTangential { radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0], tangential: [2e-4, -3e-4] },
+        LensModel::RadialTangential {
+            radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0],
+            tangential: [2e-4, -3e-4],
+        },
         LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] },
         LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 },
         LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 },
@@ -171,12 +197,23 @@ fn a_written_camchain_is_read_again() {
             lens: Lens::new(camera.lens.focal_px(), camera.lens.center_px(), model).unwrap(),
             ..camera
         };
-        let calibration = StereoCalibration { left: camera(plain.left), right: camera(plain.right), ..plain };
-        assert_eq!(read(&[("camchain.yaml", &to_kalibr(&calibration).unwrap())]).unwrap(), calibration);
+        let calibration =
+            StereoCalibration { left: camera(plain.left), right: camera(plain.right), ..plain };
+        assert_eq!(
+            read(&[("camchain.yaml", &to_kalibr(&calibration).unwrap())]).unwrap(),
+            calibration
+        );
     }
-    let rational = LensModel::RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [0.0; 2] };
+    let rational = LensModel::RadialTangential {
+        radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05],
+        tangential: [0.0; 2],
+    };
     let lens = Lens::new([400.0; 2], [300.0; 2], rational).unwrap();
-    assert_eq!(to_kalibr(&StereoCalibration { left: RawCamera { lens, ..plain.left }, ..plain }), None, "Kalibr has no rational model");
+    assert_eq!(
+        to_kalibr(&StereoCalibration { left: RawCamera { lens, ..plain.left }, ..plain }),
+        None,
+        "Kalibr has no rational model"
+    );
 }
 
 #[test]
@@ -210,7 +247,11 @@ fn bad_files_of_kitti_are_answered_by_a_sentence() {
     contains("K_01", "K_0l", "K_01");
     contains("458.6", "nan", "finite");
     contains("458.6", "0.0", "focal length");
-    contains("R_rect_00: 1 0 0 0 1 0 0 0 1", "R_rect_00: 1 0 0 0 0 0 0 0 1", "not a rotation matrix");
+    contains(
+        "R_rect_00: 1 0 0 0 1 0 0 0 1",
+        "R_rect_00: 1 0 0 0 0 0 0 0 1",
+        "not a rotation matrix",
+    );
     contains("P_rect_01: 400 0 370 -44 ", "P_rect_01: 400 0 370 -440000 ", "Is it in millimetres?");
 }
 
@@ -223,9 +264,15 @@ fn every_lens_of_kalibr_is_read() {
             .replace("[458.6, 457.2, 367.2, 248.3]", intrinsics)
             .replace("[-0.28, 0.07, 0.0002, 0.00002]", coefficients)
     };
-    let model = |text: &str| read(&[("camchain.yaml", text)]).map(|calibration| *calibration.left.lens.model());
-    let fisheye = with("pinhole", "equidistant", "[190, 190, 376, 240]", "[0.003, 0.0007, -0.002, 0.0002]");
-    assert_eq!(model(&fisheye).unwrap(), LensModel::Equidistant { radial: [0.003, 0.0007, -0.002, 0.0002] });
+    let model = |text: &str| {
+        read(&[("camchain.yaml", text)]).map(|calibration| *calibration.left.lens.model())
+    };
+    let fisheye =
+        with("pinhole", "equidistant", "[190, 190, 376, 240]", "[0.003, 0.0007, -0.002, 0.0002]");
+    assert_eq!(
+        model(&fisheye).unwrap(),
+        LensModel::Equidistant { radial: [0.003, 0.0007, -0.002, 0.0002] }
+    );
     let double = with("ds", "none", "[-0.2, 0.59, 350, 350, 376, 240]", "[]");
     assert_eq!(model(&double).unwrap(), LensModel::DoubleSphere { xi: -0.2, alpha: 0.59 });
     let extended = with("eucm", "none", "[0.6, 1.1, 350, 350, 376, 240]", "[]");
@@ -241,8 +288,12 @@ fn every_lens_of_kalibr_is_read() {
 #[test]
 fn a_truncated_file_is_refused_wherever_it_ends() {
     let long = opencv_long();
-    for (name, text) in [("camchain.yaml", KALIBR), ("calib_cam_to_cam.txt", KITTI), ("stereo.xml", &opencv_xml()), ("one.yaml", &long[1])]
-    {
+    for (name, text) in [
+        ("camchain.yaml", KALIBR),
+        ("calib_cam_to_cam.txt", KITTI),
+        ("stereo.xml", &opencv_xml()),
+        ("one.yaml", &long[1]),
+    ] {
         for end in (0..text.len().saturating_sub(60)).step_by(37) {
             let message = refusal(&[(name, &text[..end])]);
             assert!(message.contains(name) && message.contains(". "), "{message}");
@@ -261,32 +312,65 @@ fn damaged_numbers_are_named_with_the_next_action() {
             assert!(message.contains(word), "{word}: {message}");
         }
     };
-    contains_all(kalibr("458.6", ".nan"), &["non-finite", "line 5", "Check that the file is whole"]);
+    contains_all(
+        kalibr("458.6", ".nan"),
+        &["non-finite", "line 5", "Check that the file is whole"],
+    );
     contains_all(kalibr("458.6", "0.0"), &["focal length is not a positive number", "above 0"]);
     contains_all(
-        kalibr("intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1", "resolution: [752, 480]\ncam1"),
+        kalibr(
+            "intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1",
+            "resolution: [752, 480]\ncam1",
+        ),
         &["intrinsics is missing in cam0"],
     );
-    contains_all(kalibr("[1.0, 0.0, 0.0, -0.11]", "[0.0, 0.0, 0.0, -0.11]"), &["not a rotation matrix", "copy it whole"]);
-    contains_all(kalibr("-0.11]", "-537.0]"), &["537 m apart. Is it in millimetres?", "divide them by 1000"]);
-    contains_all(kalibr("-0.11]", "0.11]"), &["right camera stands to the left", "Exchange the two cameras"]);
+    contains_all(
+        kalibr("[1.0, 0.0, 0.0, -0.11]", "[0.0, 0.0, 0.0, -0.11]"),
+        &["not a rotation matrix", "copy it whole"],
+    );
+    contains_all(
+        kalibr("-0.11]", "-537.0]"),
+        &["537 m apart. Is it in millimetres?", "divide them by 1000"],
+    );
+    contains_all(
+        kalibr("-0.11]", "0.11]"),
+        &["right camera stands to the left", "Exchange the two cameras"],
+    );
     contains_all(kalibr("-0.11]", "0.0]"), &["distance between the cameras is 0"]);
-    contains_all(kalibr("resolution: [752, 480]", "resolution: [75, 48]"), &["does not fit images of 75 x 48 px"]);
-    contains_all(kalibr("resolution: [752, 480]", "resolution: [752.5, 480]"), &["not a width and a height"]);
+    contains_all(
+        kalibr("resolution: [752, 480]", "resolution: [75, 48]"),
+        &["does not fit images of 75 x 48 px"],
+    );
+    contains_all(
+        kalibr("resolution: [752, 480]", "resolution: [752.5, 480]"),
+        &["not a width and a height"],
+    );
     contains_all(kalibr("T_cn_cnm1", "T_cn_cnm2"), &["T_cn_cnm1 is missing in cam1"]);
     contains_all(refusal(&[("a.yaml", "a: 1\n")]), &["no known calibration", "Known are EuRoC"]);
     contains_all(refusal(&[("a.yaml", "- 1\n")]), &["it holds no keys"]);
     contains_all(refusal(&[("a.yaml", &euroc(0.0))]), &["one sensor.yaml", "--calibration twice"]);
     contains_all(refusal(&[("a.toml", "[left]\n")]), &["not a calibration"]);
     contains_all(
-        refusal(&[("c.txt", &KITTI.replace("1 0 0 0 1 0 0 0 1\nP_rect_00", "1 0 0 0 1 0 0 1\nP_rect_00"))]),
+        refusal(&[(
+            "c.txt",
+            &KITTI.replace("1 0 0 0 1 0 0 0 1\nP_rect_00", "1 0 0 0 1 0 0 1\nP_rect_00"),
+        )]),
         &["R_rect_00 has 8 numbers, not 9"],
     );
     let short = opencv_short();
-    contains_all(refusal(&[("intrinsics.yml", &short[0])]), &["R or rotation", "second --calibration"]);
+    contains_all(
+        refusal(&[("intrinsics.yml", &short[0])]),
+        &["R or rotation", "second --calibration"],
+    );
     let sizeless = short[1].replace("size: [752, 480]\n", "");
-    contains_all(refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]), &["does not say the size"]);
-    contains_all(refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]), &["extrinsics.yaml", "cannot be read"]);
+    contains_all(
+        refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]),
+        &["does not say the size"],
+    );
+    contains_all(
+        refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]),
+        &["extrinsics.yaml", "cannot be read"],
+    );
 }
 
 #[test]
@@ -298,23 +382,44 @@ fn images_of_another_size_do_not_fit() {
     let (short, sizeless) = (opencv_short(), opencv_short()[1].replace("size: [752, 480]\n", ""));
     let (_folder, paths) = written(&[("i.yml", &short[0]), ("e.yml", &sizeless)]);
     let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-    assert_eq!(StereoCalibration::read(&paths, Some([752, 480])).unwrap().left.width, 752, "told by the images");
+    assert_eq!(
+        StereoCalibration::read(&paths, Some([752, 480])).unwrap().left.width,
+        752,
+        "told by the images"
+    );
 }
 
 #[test]
 fn the_rectified_size_is_the_calibrations_or_a_given_one() {
     let (_folder, paths) = written(&[("calib_cam_to_cam.txt", KITTI)]);
-    let fitted = |rectified: RectifiedSize| CameraGeometry::read(&paths, None).unwrap().fitted((752, 480), &rectified);
+    let fitted = |rectified: RectifiedSize| {
+        CameraGeometry::read(&paths, None).unwrap().fitted((752, 480), &rectified)
+    };
     let own = fitted(RectifiedSize::default()).unwrap();
     assert_eq!((own.size, own.rig.focal_px), ((700, 400), 400.0));
     let size = RectifiedSize { width_px: Some(320), height_px: Some(200), focal_px: None };
     let given = fitted(size).unwrap();
-    assert!(given.size == (320, 200) && given.rig.focal_px < 458.6, "the least focal length without invalid pixels");
+    assert!(
+        given.size == (320, 200) && given.rig.focal_px < 458.6,
+        "the least focal length without invalid pixels"
+    );
     let closer = fitted(RectifiedSize { focal_px: Some(500.0), ..size }).unwrap();
     assert_eq!((closer.size, closer.rig.focal_px), ((320, 200), 500.0));
     let refused = |rectified: RectifiedSize| fitted(rectified).unwrap_err().to_string();
-    assert!(refused(RectifiedSize { height_px: None, ..size }).contains("needs width and height. Give --rectified WxH"));
-    assert!(refused(RectifiedSize { width_px: Some(8), ..size }).contains("8 x 200 px must lie within 32 to 4096"));
-    assert!(refused(RectifiedSize { focal_px: Some(f64::NAN), ..size }).contains("must be a positive number"));
-    assert!(refused(RectifiedSize { focal_px: Some(500.0), ..RectifiedSize::default() }).contains("needs a rectified size"));
+    assert!(
+        refused(RectifiedSize { height_px: None, ..size })
+            .contains("needs width and height. Give --rectified WxH")
+    );
+    assert!(
+        refused(RectifiedSize { width_px: Some(8), ..size })
+            .contains("8 x 200 px must lie within 32 to 4096")
+    );
+    assert!(
+        refused(RectifiedSize { focal_px: Some(f64::NAN), ..size })
+            .contains("must be a positive number")
+    );
+    assert!(
+        refused(RectifiedSize { focal_px: Some(500.0), ..RectifiedSize::default() })
+            .contains("needs a rectified size")
+    );
 }

@@ -22,7 +22,8 @@ impl Tree {
     /// Reads XML where the file ends so, else YAML.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
         let text = read_text(path)?;
-        let xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) || text.trim_start().starts_with("<?xml");
+        let xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
+            || text.trim_start().starts_with("<?xml");
         let value = if xml { from_xml(&text, path)? } else { from_yaml(&text, path)? };
         Ok(Self { path: path.to_path_buf(), value })
     }
@@ -55,19 +56,38 @@ const CHECK_WHOLE: &str = "Check that the file is whole and of the format its en
 fn from_yaml(text: &str, path: &Path) -> Result<Value, FormatError> {
     // OpenCV writes `%YAML:1.0`, which is no directive of YAML.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let body = if text.starts_with("%YAML") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { text };
+    let body = if text.starts_with("%YAML") {
+        text.split_once('\n').map_or("", |(_, rest)| rest)
+    } else {
+        text
+    };
     let value: Value = serde_saphyr::from_str(body).map_err(|error| {
-        let first = error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        let first = error
+            .to_string()
+            .lines()
+            .next()
+            .unwrap_or_default()
+            .trim_start_matches("error: ")
+            .to_owned();
         FormatError::content(path, format!("it is not YAML: {first}"), CHECK_WHOLE)
     })?;
-    if value.is_object() { Ok(value) } else { Err(FormatError::content(path, "it holds no keys", CHECK_WHOLE)) }
+    if value.is_object() {
+        Ok(value)
+    } else {
+        Err(FormatError::content(path, "it holds no keys", CHECK_WHOLE))
+    }
 }
 
 fn from_xml(text: &str, path: &Path) -> Result<Value, FormatError> {
     let refuse = |reason: String| FormatError::content(path, reason, CHECK_WHOLE);
-    let document = roxmltree::Document::parse(text).map_err(|error| refuse(format!("it is not XML: {error}")))?;
+    let document = roxmltree::Document::parse(text)
+        .map_err(|error| refuse(format!("it is not XML: {error}")))?;
     let root = document.root_element();
-    if root.has_tag_name("opencv_storage") { Ok(element(root, 0)) } else { Err(refuse("it has no opencv_storage".to_owned())) }
+    if root.has_tag_name("opencv_storage") {
+        Ok(element(root, 0))
+    } else {
+        Err(refuse("it has no opencv_storage".to_owned()))
+    }
 }
 
 /// Deepest nesting that is read; calibrations have three levels.
@@ -123,7 +143,9 @@ impl<'t> Node<'t> {
 
     /// The text of a value.
     pub fn text(&self) -> Result<&'t str, FormatError> {
-        self.value.as_str().ok_or_else(|| self.refuse(&format!("{} is not a word", self.key), CHECK_WHOLE))
+        self.value
+            .as_str()
+            .ok_or_else(|| self.refuse(&format!("{} is not a word", self.key), CHECK_WHOLE))
     }
 
     /// A number.
@@ -145,10 +167,10 @@ impl<'t> Node<'t> {
         };
         match number {
             Some(number) if number.is_finite() => Ok(number),
-            _ => {
-                Err(self
-                    .refuse(&format!("{} holds {value}, which is not a finite number", self.key), "Calibrate again, or correct the number"))
-            }
+            _ => Err(self.refuse(
+                &format!("{} holds {value}, which is not a finite number", self.key),
+                "Calibrate again, or correct the number",
+            )),
         }
     }
 
@@ -156,7 +178,9 @@ impl<'t> Node<'t> {
     pub fn numbers(&self) -> Result<Vec<f64>, FormatError> {
         let list = self.value.get("data").unwrap_or(self.value);
         let Value::Array(rows) = list else { return Ok(vec![self.as_number(list)?]) };
-        let flat = rows.iter().flat_map(|row| row.as_array().map_or(std::slice::from_ref(row), Vec::as_slice));
+        let flat = rows
+            .iter()
+            .flat_map(|row| row.as_array().map_or(std::slice::from_ref(row), Vec::as_slice));
         flat.map(|value| self.as_number(value)).collect()
     }
 
@@ -164,7 +188,9 @@ impl<'t> Node<'t> {
     pub fn array<const N: usize>(&self) -> Result<[f64; N], FormatError> {
         let numbers = self.numbers()?;
         let found = numbers.len();
-        numbers.try_into().map_err(|_| self.refuse(&format!("{} has {found} numbers, not {N}", self.key), CHECK_WHOLE))
+        numbers.try_into().map_err(|_| {
+            self.refuse(&format!("{} has {found} numbers, not {N}", self.key), CHECK_WHOLE)
+        })
     }
 
     /// A whole number of pixels.
@@ -173,7 +199,10 @@ impl<'t> Node<'t> {
         if is_side(number) {
             Ok(number as u32)
         } else {
-            Err(self.refuse(&format!("{} is {number}, which is not a number of pixels", self.key), "Correct the image size"))
+            Err(self.refuse(
+                &format!("{} is {number}, which is not a number of pixels", self.key),
+                "Correct the image size",
+            ))
         }
     }
 
@@ -183,7 +212,10 @@ impl<'t> Node<'t> {
         if is_side(width) && is_side(height) {
             Ok([width as u32, height as u32])
         } else {
-            Err(self.refuse(&format!("{} is not a width and a height", self.key), "Correct the image size"))
+            Err(self.refuse(
+                &format!("{} is not a width and a height", self.key),
+                "Correct the image size",
+            ))
         }
     }
 

@@ -21,18 +21,28 @@ fn save_frames(path: impl Fn(u32, usize) -> PathBuf) {
 
 /// KITTI's calibration file with the keys of the raw data.
 fn rectified_calibration() -> String {
-    CALIB.replace("P0", "P_rect_00").replace("P1", "P_rect_01").replace("P2", "P_rect_02").replace("P3", "P_rect_03")
+    CALIB
+        .replace("P0", "P_rect_00")
+        .replace("P1", "P_rect_01")
+        .replace("P2", "P_rect_02")
+        .replace("P3", "P_rect_03")
 }
 
 /// The two cameras of a KITTI recording, with the images in `data` and the times as dates.
 fn write_cameras(recording: &Path, data: &str) {
     save_frames(|at, camera| recording.join(format!("image_0{camera}/{data}/{at:010}.png")));
-    let dates: String = (0..4).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * STEP_NS)).collect();
-    ["image_00", "image_01"].iter().for_each(|camera| write(recording.join(camera).join("timestamps.txt"), &dates));
+    let dates: String =
+        (0..4).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * STEP_NS)).collect();
+    ["image_00", "image_01"]
+        .iter()
+        .for_each(|camera| write(recording.join(camera).join("timestamps.txt"), &dates));
 }
 
 fn write_kitti_raw(root: &Path) {
-    write(root.join("calib_cam_to_cam.txt"), &format!("calib_time: 09-Jan-2012\nS_rect_00: 40 32\n{}", rectified_calibration()));
+    write(
+        root.join("calib_cam_to_cam.txt"),
+        &format!("calib_time: 09-Jan-2012\nS_rect_00: 40 32\n{}", rectified_calibration()),
+    );
     write_cameras(&root.join("2011_09_26_drive_0001_sync"), "data");
 }
 
@@ -76,7 +86,8 @@ fn every_data_set_gives_the_same_frames_rig_and_times() {
         assert_eq!(Layout::guess(root.path()).unwrap(), layout);
         let (found, sequences) = survey(root.path(), None).unwrap();
         assert_eq!((found, sequences.len()), (layout, 1), "{layout:?}");
-        let dataset = open(root.path(), &OpenOptions::default()).unwrap_or_else(|error| panic!("{layout:?}: {error}"));
+        let dataset = open(root.path(), &OpenOptions::default())
+            .unwrap_or_else(|error| panic!("{layout:?}: {error}"));
         assert_eq!(
             (dataset.len(), dataset.size(), dataset.rig().focal_px, dataset.rig().baseline_m),
             (4, (40, 32), 50.0, 0.5),
@@ -85,8 +96,16 @@ fn every_data_set_gives_the_same_frames_rig_and_times() {
         for at in 0..4 {
             let frame = dataset.frame(at).unwrap();
             let expected = pair(at as u32).map(|image| image.into_raw());
-            assert_eq!([frame.left.pixels(), frame.right.pixels()], expected.each_ref().map(Vec::as_slice), "{layout:?} frame {at}");
-            let ns = if layout == Layout::Cityscapes { at as u64 * 1_000_000_000 / 17 } else { START_NS + at as u64 * STEP_NS };
+            assert_eq!(
+                [frame.left.pixels(), frame.right.pixels()],
+                expected.each_ref().map(Vec::as_slice),
+                "{layout:?} frame {at}"
+            );
+            let ns = if layout == Layout::Cityscapes {
+                at as u64 * 1_000_000_000 / 17
+            } else {
+                START_NS + at as u64 * STEP_NS
+            };
             assert_eq!(dataset.stamp_ns(at), Some(ns), "{layout:?} frame {at}");
         }
     }

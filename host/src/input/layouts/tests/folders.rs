@@ -21,15 +21,31 @@ fn every_arrangement_and_format_gives_the_same_frames() {
         ("two folders, Left and Right", |root, at, [l, r]| {
             let deep = |image: &GrayImage, path: PathBuf| {
                 fs::create_dir_all(path.parent().unwrap()).unwrap();
-                ImageBuffer::from_fn(40, 32, |u, v| Luma([u16::from(image.get_pixel(u, v)[0]) << 8])).save(path).unwrap();
+                ImageBuffer::from_fn(40, 32, |u, v| {
+                    Luma([u16::from(image.get_pixel(u, v)[0]) << 8])
+                })
+                .save(path)
+                .unwrap();
             };
             deep(l, root.join(format!("Left/{at}.png")));
             deep(r, root.join(format!("Right/{at}.png")));
         }),
         ("two folders, image_0 and image_1", |root, at, [l, r]| {
             // The right camera is a millisecond late.
-            save(l, root.join(format!("image_0/{}.png", 1_403_636_579_000_000_000 + u64::from(at) * 50_000_000)));
-            save(r, root.join(format!("image_1/{}.png", 1_403_636_579_001_000_000 + u64::from(at) * 50_000_000)));
+            save(
+                l,
+                root.join(format!(
+                    "image_0/{}.png",
+                    1_403_636_579_000_000_000 + u64::from(at) * 50_000_000
+                )),
+            );
+            save(
+                r,
+                root.join(format!(
+                    "image_1/{}.png",
+                    1_403_636_579_001_000_000 + u64::from(at) * 50_000_000
+                )),
+            );
         }),
         ("one folder, the camera in the files' names", |root, at, [l, r]| {
             save(l, root.join(format!("left_{}.png", at + 8)));
@@ -40,10 +56,20 @@ fn every_arrangement_and_format_gives_the_same_frames() {
             save(r, root.join(format!("{at:03}_1.ppm")));
         }),
         ("one folder, both images in one file", |root, at, [l, r]| {
-            save(&GrayImage::from_fn(80, 32, |u, v| *if u < 40 { l } else { r }.get_pixel(u % 40, v)), root.join(format!("{at}.png")));
+            save(
+                &GrayImage::from_fn(80, 32, |u, v| {
+                    *if u < 40 { l } else { r }.get_pixel(u % 40, v)
+                }),
+                root.join(format!("{at}.png")),
+            );
         }),
         ("one folder, both images in one file", |root, at, [l, r]| {
-            save(&GrayImage::from_fn(40, 64, |u, v| *if v < 32 { l } else { r }.get_pixel(u, v % 32)), root.join(format!("{at}.png")));
+            save(
+                &GrayImage::from_fn(40, 64, |u, v| {
+                    *if v < 32 { l } else { r }.get_pixel(u, v % 32)
+                }),
+                root.join(format!("{at}.png")),
+            );
         }),
     ];
     for (arrangement, write) in arrangements {
@@ -51,12 +77,17 @@ fn every_arrangement_and_format_gives_the_same_frames() {
         fs::write(root.path().join("calib.txt"), CALIB).unwrap();
         (0..4).for_each(|at| write(root.path(), at, &pair(at)));
         assert_eq!(folder::describe(root.path()), arrangement);
-        let dataset = open(root.path(), &OpenOptions::default()).unwrap_or_else(|error| panic!("{arrangement}: {error}"));
+        let dataset = open(root.path(), &OpenOptions::default())
+            .unwrap_or_else(|error| panic!("{arrangement}: {error}"));
         assert_eq!((dataset.len(), dataset.size()), (4, (40, 32)), "{arrangement}");
         for at in 0..4 {
             let frame = dataset.frame(at).unwrap();
             let expected = pair(at as u32).map(|image| image.into_raw());
-            assert_eq!([frame.left.pixels(), frame.right.pixels()], expected.each_ref().map(Vec::as_slice), "{arrangement} frame {at}");
+            assert_eq!(
+                [frame.left.pixels(), frame.right.pixels()],
+                expected.each_ref().map(Vec::as_slice),
+                "{arrangement} frame {at}"
+            );
         }
     }
 }

@@ -23,28 +23,45 @@ impl FrameDisparity {
     pub fn new(dataset: &dyn FrameSource) -> Result<Self, InputError> {
         let refused = |reason: &str| InputError::masks(Path::new(dataset.name()), reason);
         if dataset.rectification().is_some() {
-            return Err(refused("boxes are made masks on rectified images, and these are raw. Rectify them first, or give masks"));
+            return Err(refused(
+                "boxes are made masks on rectified images, and these are raw. Rectify them first, or give masks",
+            ));
         }
         let (image_width, image_height) = dataset.size();
         let capacity = Capacity { image_width, image_height, ..Capacity::TINY };
-        let slab = HostSlab::map(StereoMatcher::bytes(&capacity)).ok_or_else(|| refused("there is no memory for stereo matching"))?;
+        let slab = HostSlab::map(StereoMatcher::bytes(&capacity))
+            .ok_or_else(|| refused("there is no memory for stereo matching"))?;
         Ok(Self { capacity, slab: Mutex::new(slab) })
     }
 
-    /// Calls `read` with the disparity of a frame, in 1/256 px: the given one, else that of the core's stereo matching.
+    /// Calls `read` with the disparity of a frame, in 1/256 px: the given one, else that of the
+    /// core's stereo matching.
     ///
     /// # Errors
     /// The images are not of the data set's size.
-    pub fn with<R>(&self, images: &StereoImages, read: impl FnOnce(View<'_, u16>) -> R) -> Result<R, InputError> {
+    pub fn with<R>(
+        &self,
+        images: &StereoImages,
+        read: impl FnOnce(View<'_, u16>) -> R,
+    ) -> Result<R, InputError> {
         if let Some(given) = images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()) {
             return Ok(read(given));
         }
         let mut slab = self.slab.lock().unwrap_or_else(PoisonError::into_inner);
-        let matched = Carver::new(slab.bytes_mut(), StereoMatcher::bytes(&self.capacity)).ok().and_then(|mut carver| {
-            let mut matcher = StereoMatcher::new_in(&self.capacity, &mut carver);
-            matcher.compute(&StereoConfig::default(), images.left.view()?, images.right.view()?, &Serial);
-            Some(read(matcher.disparity_q8()))
-        });
-        matched.ok_or_else(|| InputError::masks(Path::new("boxes"), "the images of the frame are empty"))
+        let matched = Carver::new(slab.bytes_mut(), StereoMatcher::bytes(&self.capacity))
+            .ok()
+            .and_then(|mut carver| {
+                let mut matcher = StereoMatcher::new_in(&self.capacity, &mut carver);
+                matcher.compute(
+                    &StereoConfig::default(),
+                    images.left.view()?,
+                    images.right.view()?,
+                    &Serial,
+                );
+                Some(read(matcher.disparity_q8()))
+            });
+        matched.ok_or_else(|| {
+            InputError::masks(Path::new("boxes"), "the images of the frame are empty")
+        })
     }
 }

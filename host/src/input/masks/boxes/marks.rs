@@ -21,7 +21,12 @@ impl Marks {
         let columns = || component.iter().map(|(u, _)| *u);
         let rows = || component.iter().map(|(_, v)| *v);
         let (left, top) = (columns().min()?, rows().min()?);
-        let pixels = PixelBox { left, top, width: columns().max()? + 1 - left, height: rows().max()? + 1 - top };
+        let pixels = PixelBox {
+            left,
+            top,
+            width: columns().max()? + 1 - left,
+            height: rows().max()? + 1 - top,
+        };
         let mut marks = Self { pixels, marks: vec![false; pixels.area() as usize] };
         for (u, v) in component {
             marks.marks[((v - top) * pixels.width + u - left) as usize] = true;
@@ -31,11 +36,16 @@ impl Marks {
 
     /// Whether a pixel is marked.
     pub fn holds(&self, u: i32, v: i32) -> bool {
-        self.pixels.contains(u, v) && self.marks[((v - self.pixels.top) * self.pixels.width + u - self.pixels.left) as usize]
+        self.pixels.contains(u, v)
+            && self.marks
+                [((v - self.pixels.top) * self.pixels.width + u - self.pixels.left) as usize]
     }
 
     /// The components, by their first pixels, row by row; neighbours are connected where `is_next`.
-    pub fn components(&self, is_next: impl Fn((i32, i32), (i32, i32)) -> bool) -> Vec<Vec<(i32, i32)>> {
+    pub fn components(
+        &self,
+        is_next: impl Fn((i32, i32), (i32, i32)) -> bool,
+    ) -> Vec<Vec<(i32, i32)>> {
         let PixelBox { left, top, width, .. } = self.pixels;
         let mut left_over = self.marks.clone();
         let mut components = Vec::new();
@@ -61,8 +71,9 @@ impl Marks {
         components
     }
 
-    /// Marks what lies between two marked pixels of a row, and then of a column, at most `most` pixels apart and where `may` is true: panes and
-    /// reflections have disparities of what is behind them.
+    /// Marks what lies between two marked pixels of a row, and then of a column, at most `most`
+    /// pixels apart and where `may` is true: panes and reflections have disparities of what is
+    /// behind them.
     pub fn fill_gaps(&mut self, most: usize, may: impl Fn(i32, i32) -> bool) {
         let PixelBox { left, top, width, height } = self.pixels;
         let (columns, rows) = (width as usize, height as usize);
@@ -74,7 +85,8 @@ impl Marks {
                 }
                 if let Some(last) = last.filter(|last| index - last - 1 <= most) {
                     for at in (last + 1..index).map(|gap| first + gap * step) {
-                        self.marks[at] |= may(left + (at % columns) as i32, top + (at / columns) as i32);
+                        self.marks[at] |=
+                            may(left + (at % columns) as i32, top + (at / columns) as i32);
                     }
                 }
                 last = Some(index);

@@ -24,7 +24,8 @@ const DEPTH_ERROR: f64 = 0.0012;
 const STEP_PX: f64 = 1.2;
 /// Gaps up to this share of a box's width are filled.
 const GAP: f64 = 0.1;
-/// The left image's first columns, as many as the disparity and these, are beyond the right image's edge or too close to it to match, px.
+/// The left image's first columns, as many as the disparity and these, are beyond the right image's
+/// edge or too close to it to match, px.
 const UNMATCHED_EDGE_PX: f64 = 6.0;
 /// Least share of a box that a mask fills: less is another object's, and the box is shrunk only.
 const FILLED_MIN: f64 = 0.25;
@@ -58,7 +59,11 @@ pub(super) struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    pub fn new(rig: &'a StereoRig, disparity_q8: View<'a, u16>, regions: Option<&'a Image<u8>>) -> Self {
+    pub fn new(
+        rig: &'a StereoRig,
+        disparity_q8: View<'a, u16>,
+        regions: Option<&'a Image<u8>>,
+    ) -> Self {
         Self { rig, disparity_q8, ground: Ground::of(rig, disparity_q8), regions }
     }
 
@@ -68,7 +73,10 @@ impl<'a> Scene<'a> {
 
     /// Disparity of a pixel, px.
     fn disparity_px(&self, u: i32, v: i32) -> Option<f64> {
-        let q8 = self.disparity_q8.get(usize::try_from(u).ok()?, usize::try_from(v).ok()?).filter(|q8| *q8 > 0)?;
+        let q8 = self
+            .disparity_q8
+            .get(usize::try_from(u).ok()?, usize::try_from(v).ok()?)
+            .filter(|q8| *q8 > 0)?;
         Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
     }
 
@@ -76,10 +84,13 @@ impl<'a> Scene<'a> {
     pub fn mask(&self, one: &DetectedBox) -> Option<InstanceMask> {
         let pixels = one.pixels(0.0, self.size());
         let grown = (pixels.area() >= SMALL_PX).then(|| self.grown(one, &pixels)).flatten();
-        let count = |mask: &InstanceMask| mask.mask.iter().filter(|pixel| **pixel > 0).count() as f64;
+        let count =
+            |mask: &InstanceMask| mask.mask.iter().filter(|pixel| **pixel > 0).count() as f64;
         grown.filter(|mask| count(mask) >= FILLED_MIN * pixels.area() as f64).or_else(|| {
             let shrunk = one.pixels(SHRUNK, self.size());
-            (shrunk.area() > 0).then(|| InstanceMask::from_predicate(one.class, one.score, shrunk, |_, _| true)).flatten()
+            (shrunk.area() > 0)
+                .then(|| InstanceMask::from_predicate(one.class, one.score, shrunk, |_, _| true))
+                .flatten()
         })
     }
 
@@ -99,7 +110,9 @@ impl<'a> Scene<'a> {
                 (f64::from(v) - self.rig.center_v_px) * per_px,
                 self.rig.focal_px * per_px,
             ];
-            agrees(u, v) && (near_m..=far_m).contains(&point[2]) && self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
+            agrees(u, v)
+                && (near_m..=far_m).contains(&point[2])
+                && self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
         };
         let components = Marks::new(*pixels, is_own).components(|a, b| self.is_next(a, b));
         // Of equals the first.
@@ -108,7 +121,8 @@ impl<'a> Scene<'a> {
         self.filled(one.class, one.score, &to_edge, |_, _| true)
     }
 
-    /// A component with what is left of it up to a box's left edge, in rows where the right camera cannot see that: it has no disparity.
+    /// A component with what is left of it up to a box's left edge, in rows where the right camera
+    /// cannot see that: it has no disparity.
     fn with_unmatched_edge(&self, component: Vec<(i32, i32)>, left: i32) -> Vec<(i32, i32)> {
         let mut first_of_rows = BTreeMap::new();
         for &(u, v) in &component {
@@ -118,7 +132,8 @@ impl<'a> Scene<'a> {
         let mut whole = component;
         for (v, first) in first_of_rows {
             let edge = self.disparity_px(first, v).unwrap_or_default() + UNMATCHED_EDGE_PX;
-            if f64::from(first) <= edge && (left..first).all(|u| self.disparity_px(u, v).is_none()) {
+            if f64::from(first) <= edge && (left..first).all(|u| self.disparity_px(u, v).is_none())
+            {
                 whole.extend((left..first).map(|u| (u, v)));
             }
         }
@@ -132,32 +147,48 @@ impl<'a> Scene<'a> {
     }
 
     /// The mask of a component, its gaps filled where `may` is true.
-    fn filled(&self, class: Class, score: f32, component: &[(i32, i32)], may: impl Fn(i32, i32) -> bool) -> Option<InstanceMask> {
+    fn filled(
+        &self,
+        class: Class,
+        score: f32,
+        component: &[(i32, i32)],
+        may: impl Fn(i32, i32) -> bool,
+    ) -> Option<InstanceMask> {
         let mut marks = Marks::of(component)?;
         marks.fill_gaps((GAP * f64::from(marks.pixels.width)) as usize + 2, may);
         InstanceMask::from_predicate(class, score, marks.pixels, |u, v| marks.holds(u, v))
     }
 
-    /// The masks of regions that none of `masks` covers: their components in disparity. They have the score of a certain detection.
+    /// The masks of regions that none of `masks` covers: their components in disparity. They have
+    /// the score of a certain detection.
     pub fn uncovered(&self, masks: &[InstanceMask]) -> Vec<InstanceMask> {
         let Some(regions) = self.regions else { return Vec::new() };
         let (width, height) = self.size();
         let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
-        let class = |u: i32, v: i32| Class::from_code(u32::from(regions.get(u as usize, v as usize).unwrap_or_default()));
-        let is_free = |u: i32, v: i32| class(u, v) != Class::Other && !masks.iter().any(|mask| mask.contains(u, v));
+        let class = |u: i32, v: i32| {
+            Class::from_code(u32::from(regions.get(u as usize, v as usize).unwrap_or_default()))
+        };
+        let is_free = |u: i32, v: i32| {
+            class(u, v) != Class::Other && !masks.iter().any(|mask| mask.contains(u, v))
+        };
         let free = Marks::new(image, is_free);
-        let agrees = |a: (i32, i32), b: (i32, i32)| class(a.0, a.1).agrees_with(class(b.0, b.1)) && self.is_next(a, b);
+        let agrees = |a: (i32, i32), b: (i32, i32)| {
+            class(a.0, a.1).agrees_with(class(b.0, b.1)) && self.is_next(a, b)
+        };
         let components = free.components(agrees);
         let large = components.iter().filter(|component| component.len() as i64 >= REGION_MIN_PX);
         let mask = |component: &Vec<(i32, i32)>| {
             let (u, v) = component[component.len() / 2];
             let own = class(u, v);
-            self.filled(own, REGION_SCORE, component, |u, v| free.holds(u, v) && class(u, v).agrees_with(own))
+            self.filled(own, REGION_SCORE, component, |u, v| {
+                free.holds(u, v) && class(u, v).agrees_with(own)
+            })
         };
         large.filter_map(mask).collect()
     }
 
-    /// Whether the semantic map has a class at a pixel that can be the box's; true without a map, and where it has hardly any of that class.
+    /// Whether the semantic map has a class at a pixel that can be the box's; true without a map,
+    /// and where it has hardly any of that class.
     fn agrees<'b>(&'b self, class: Class, pixels: &PixelBox) -> impl Fn(i32, i32) -> bool + 'b {
         let at = move |u: i32, v: i32| {
             self.regions.is_none_or(|regions| {
@@ -166,7 +197,10 @@ impl<'a> Scene<'a> {
             })
         };
         let rows = pixels.top..pixels.top + pixels.height;
-        let count = rows.flat_map(|v| (pixels.left..pixels.left + pixels.width).map(move |u| (u, v))).filter(|(u, v)| at(*u, *v)).count();
+        let count = rows
+            .flat_map(|v| (pixels.left..pixels.left + pixels.width).map(move |u| (u, v)))
+            .filter(|(u, v)| at(*u, *v))
+            .count();
         let is_known = count as f64 >= KNOWN_SHARE * pixels.area() as f64;
         move |u, v| !is_known || at(u, v)
     }
@@ -186,15 +220,24 @@ impl<'a> Scene<'a> {
         // Half pixels: an object's depth is that of its nearest surface, which fills a few of them.
         let mut counts = vec![0u32; 2 * 256];
         for v in core.top..core.top + core.height {
-            for disparity_px in (core.left..core.left + core.width).filter_map(|u| self.disparity_px(u, v)) {
-                counts.get_mut((2.0 * disparity_px) as usize).into_iter().for_each(|count| *count += 1);
+            for disparity_px in
+                (core.left..core.left + core.width).filter_map(|u| self.disparity_px(u, v))
+            {
+                counts
+                    .get_mut((2.0 * disparity_px) as usize)
+                    .into_iter()
+                    .for_each(|count| *count += 1);
             }
         }
         let around = |bin: usize| {
             let reach = 1 + bin / 16;
-            counts.get(bin.saturating_sub(reach)..=(bin + reach).min(counts.len() - 1)).map_or(0, |near| near.iter().sum::<u32>())
+            counts
+                .get(bin.saturating_sub(reach)..=(bin + reach).min(counts.len() - 1))
+                .map_or(0, |near| near.iter().sum::<u32>())
         };
-        let best = (1..counts.len()).max_by_key(|&bin| (around(bin), bin)).filter(|&bin| around(bin) > 0)?;
+        let best = (1..counts.len())
+            .max_by_key(|&bin| (around(bin), bin))
+            .filter(|&bin| around(bin) > 0)?;
         Some((best as f64 + 0.5) / 2.0)
     }
 }
@@ -203,13 +246,19 @@ impl<'a> Scene<'a> {
 mod tests {
     use super::*;
 
-    const RIG: StereoRig = StereoRig { focal_px: 300.0, center_u_px: 100.0, center_v_px: 40.0, baseline_m: 0.5 };
+    const RIG: StereoRig =
+        StereoRig { focal_px: 300.0, center_u_px: 100.0, center_v_px: 40.0, baseline_m: 0.5 };
 
     /// A car 60 x 50 px large, with a pane that shows the wall behind it, before a wall.
     fn mask(class: Class, edges: [f64; 4]) -> Option<InstanceMask> {
-        let on_car =
-            |u: usize, v: usize| (70..130).contains(&u) && (30..80).contains(&v) && !((90..94).contains(&u) && (40..44).contains(&v));
-        let disparity: Vec<u16> = (0..200 * 100).map(|at| if on_car(at % 200, at / 200) { 24 * 256 } else { 6 * 256 }).collect();
+        let on_car = |u: usize, v: usize| {
+            (70..130).contains(&u)
+                && (30..80).contains(&v)
+                && !((90..94).contains(&u) && (40..44).contains(&v))
+        };
+        let disparity: Vec<u16> = (0..200 * 100)
+            .map(|at| if on_car(at % 200, at / 200) { 24 * 256 } else { 6 * 256 })
+            .collect();
         let view = View::new(&disparity, 200, 100).unwrap();
         Scene::new(&RIG, view, None).mask(&DetectedBox { class, score: 0.5, edges })
     }
@@ -227,7 +276,8 @@ mod tests {
 
     #[test]
     fn a_car_at_the_left_edge_has_its_columns_that_the_right_camera_does_not_see() {
-        // Disparity 24 px: the first 26 columns have none. Of a car inside the image, what is left of it has none either: it hides that.
+        // Disparity 24 px: the first 26 columns have none. Of a car inside the image, what is left
+        // of it has none either: it hides that.
         let car = |first: usize| {
             let disparity: Vec<u16> = (0..200 * 100)
                 .map(|at| (at % 200, at / 200))
@@ -258,7 +308,12 @@ mod tests {
         // A box beyond the image ends with it.
         let cut = mask(Class::Car, [180.0, 40.0, 260.0, 60.0]).unwrap();
         assert_eq!((cut.pixels.left, cut.pixels.width), (184, 16));
-        for nothing in [[300.0, 10.0, 400.0, 90.0], [50.0, 50.0, 50.0, 50.0], [90.0, 50.0, 60.0, 20.0], [f64::NAN; 4]] {
+        for nothing in [
+            [300.0, 10.0, 400.0, 90.0],
+            [50.0, 50.0, 50.0, 50.0],
+            [90.0, 50.0, 60.0, 20.0],
+            [f64::NAN; 4],
+        ] {
             assert_eq!(mask(Class::Car, nothing), None);
         }
     }

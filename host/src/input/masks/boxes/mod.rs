@@ -1,10 +1,13 @@
 //! Boxes of a detector, made masks by disparity.
 //!
-//! Most detectors give boxes, and a mapper needs pixels: a box is a third road and background. What a box shows most of, within the depth that
-//! its class can have, above the ground and in one component, is its object (`mask`). Small boxes, whose disparity tells too little, are only shrunk.
+//! Most detectors give boxes, and a mapper needs pixels: a box is a third road and background. What
+//! a box shows most of, within the depth that its class can have, above the ground and in one
+//! component, is its object (`mask`). Small boxes, whose disparity tells too little, are only
+//! shrunk.
 //!
-//! The disparity is the frame's own where depth is given, else that of the core's stereo matching, computed here on the thread that reads ahead
-//! (`disparity`). Masks of one frame share no pixel: the better score has it, so that they can be saved as a picture and taken again.
+//! The disparity is the frame's own where depth is given, else that of the core's stereo matching,
+//! computed here on the thread that reads ahead (`disparity`). Masks of one frame share no pixel:
+//! the better score has it, so that they can be saved as a picture and taken again.
 
 mod disparity;
 mod marks;
@@ -16,7 +19,9 @@ pub(super) use tables::{BoxFiles, BoxTable};
 
 use super::MaskSource;
 use crate::formats::Image;
-use crate::input::source::{FrameMasks, FrameSource, InputError, InstanceMask, StereoImages, bounding_boxes};
+use crate::input::source::{
+    FrameMasks, FrameSource, InputError, InstanceMask, StereoImages, bounding_boxes,
+};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::Class;
@@ -32,11 +37,13 @@ pub(super) struct DetectedBox {
 }
 
 impl DetectedBox {
-    /// The pixels whose centres lie within the box, `margins` of its width and height left out at every side, and in the image.
+    /// The pixels whose centres lie within the box, `margins` of its width and height left out at
+    /// every side, and in the image.
     pub fn pixels(&self, margin: f64, (width, height): (usize, usize)) -> PixelBox {
         let [left, top, right, bottom] = self.edges;
         let [x, y] = [margin * (right - left), margin * (bottom - top)];
-        let [left, top, right, bottom] = [left + x, top + y, right - x, bottom - y].map(|edge| edge.round().clamp(-1e6, 1e6) as i32);
+        let [left, top, right, bottom] = [left + x, top + y, right - x, bottom - y]
+            .map(|edge| edge.round().clamp(-1e6, 1e6) as i32);
         let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
         PixelBox { left, top, width: right - left, height: bottom - top }.intersection(&image)
     }
@@ -94,7 +101,10 @@ impl<S: DetectionSource> BoxMasks<S> {
             for one in std::mem::take(&mut found.masks.instances) {
                 found.masks.push(one.scaled(self.scale, self.size));
             }
-            found.boxes.iter_mut().for_each(|one| one.edges = one.edges.map(|edge| edge * self.scale));
+            found
+                .boxes
+                .iter_mut()
+                .for_each(|one| one.edges = one.edges.map(|edge| edge * self.scale));
         }
         found
     }
@@ -102,7 +112,8 @@ impl<S: DetectionSource> BoxMasks<S> {
 
 impl<S: DetectionSource> MaskSource for BoxMasks<S> {
     fn masks(&self, index: usize, images: &StereoImages) -> Result<FrameMasks, InputError> {
-        let Detections { mut masks, boxes, regions } = self.fitted(self.source.detections(index, images)?);
+        let Detections { mut masks, boxes, regions } =
+            self.fitted(self.source.detections(index, images)?);
         if !boxes.is_empty() || regions.is_some() {
             self.disparity.with(images, |disparity_q8| {
                 let scene = Scene::new(&self.rig, disparity_q8, regions.as_ref());
@@ -129,14 +140,20 @@ fn disjoint(masks: FrameMasks, (width, height): (usize, usize)) -> FrameMasks {
     let mut labels = vec![0u16; width * height];
     for (label, one) in order {
         for v in one.pixels.top..one.pixels.top + one.pixels.height {
-            for u in (one.pixels.left..one.pixels.left + one.pixels.width).filter(|u| one.contains(*u, v)) {
-                labels.get_mut(v as usize * width + u as usize).into_iter().for_each(|pixel| *pixel = label);
+            for u in (one.pixels.left..one.pixels.left + one.pixels.width)
+                .filter(|u| one.contains(*u, v))
+            {
+                labels
+                    .get_mut(v as usize * width + u as usize)
+                    .into_iter()
+                    .for_each(|pixel| *pixel = label);
             }
         }
     }
     let Some(labels) = Image::new(width, height, labels) else { return masks };
     let mut apart = FrameMasks::refusing(masks.refusals);
-    let named = (1..).zip(&masks.instances).map(|(label, one)| (label, one.class, one.score)).collect();
+    let named =
+        (1..).zip(&masks.instances).map(|(label, one)| (label, one.class, one.score)).collect();
     apart.extract(&labels, &bounding_boxes(&labels), named);
     apart
 }

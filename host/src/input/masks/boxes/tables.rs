@@ -1,4 +1,5 @@
-//! Boxes as text: KITTI's labels and MOTChallenge's tables of a sequence, KITTI's labels and dynvox's own lists of a frame.
+//! Boxes as text: KITTI's labels and MOTChallenge's tables of a sequence, KITTI's labels and
+//! dynvox's own lists of a frame.
 
 use super::{DetectedBox, DetectionSource, Detections};
 use crate::input::masks::{Frames, class_of, read_text};
@@ -24,7 +25,8 @@ const MOT: [Class; 13] = [
     Class::Other,      // crowd
 ];
 
-/// A row: its frame where the table names it, the class or `None` for an unknown one, score and edges. A region to ignore is `None`.
+/// A row: its frame where the table names it, the class or `None` for an unknown one, score and
+/// edges. A region to ignore is `None`.
 type Row = Option<(Option<usize>, Option<Class>, f32, [f64; 4])>;
 
 /// A table of a sequence: KITTI tracking labels or MOTChallenge text.
@@ -74,7 +76,9 @@ impl BoxFiles {
 impl DetectionSource for BoxFiles {
     fn detections(&self, index: usize, _: &StereoImages) -> Result<Detections, InputError> {
         let path = self.frames.stems.get(index).map(|stem| self.folder.join(format!("{stem}.txt")));
-        let Some((path, text)) = path.and_then(|path| read_text(&path).transpose().map(|text| (path, text))) else {
+        let Some((path, text)) =
+            path.and_then(|path| read_text(&path).transpose().map(|text| (path, text)))
+        else {
             return Ok(Detections { masks: FrameMasks::missing(), ..Detections::default() });
         };
         let mut found = Detections::default();
@@ -91,7 +95,9 @@ impl DetectionSource for BoxFiles {
 
 /// Lines that are neither empty nor comments, with their numbers.
 fn numbered(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    (1..).zip(text.lines().map(str::trim)).filter(|(_, row)| !row.is_empty() && !row.starts_with('#'))
+    (1..)
+        .zip(text.lines().map(str::trim))
+        .filter(|(_, row)| !row.is_empty() && !row.starts_with('#'))
 }
 
 /// Adds a row's box.
@@ -103,7 +109,10 @@ fn add(found: &mut Detections, row: Row) {
 
 /// Numbers, all finite.
 fn numbers(words: &[&str]) -> Option<Vec<f64>> {
-    words.iter().map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect()
+    words
+        .iter()
+        .map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite()))
+        .collect()
 }
 
 /// A score in 0..=1: detectors that give others (KITTI's labels without one, logits) are believed.
@@ -128,7 +137,9 @@ fn kitti(words: &[&str]) -> Option<Row> {
     let values = numbers(words.get(1..)?)?;
     let &[x1, y1, x2, y2] = values.get(3..7)? else { return None };
     // KITTI's edges are columns and rows that belong to the box.
-    Some((*name != "DontCare").then(|| (None, class_of(name), score(values.get(14).copied()), [x1, y1, x2 + 1.0, y2 + 1.0])))
+    Some((*name != "DontCare").then(|| {
+        (None, class_of(name), score(values.get(14).copied()), [x1, y1, x2 + 1.0, y2 + 1.0])
+    }))
 }
 
 /// `id class score x1 y1 x2 y2`; a class may have spaces.
@@ -141,7 +152,8 @@ fn own(row: &str) -> Option<Row> {
     Some(Some((None, class_of(&name.join(" ")), score(Some(given)), [x1, y1, x2, y2])))
 }
 
-/// `frame,id,left,top,width,height,score[,class,...]`, frames and pixels counted from 1. A score of 0 marks a region to ignore.
+/// `frame,id,left,top,width,height,score[,class,...]`, frames and pixels counted from 1. A score of
+/// 0 marks a region to ignore.
 fn mot(row: &str) -> Option<Row> {
     let values = numbers(&row.split(',').collect::<Vec<_>>())?;
     let &[frame, _, left, top, width, height] = values.get(..6)? else { return None };
@@ -149,7 +161,10 @@ fn mot(row: &str) -> Option<Row> {
     let given = values.get(6).copied();
     let class = values.get(7).and_then(|&class| MOT.get((class as usize).checked_sub(1)?)).copied();
     let [left, top] = [left - 1.0, top - 1.0];
-    Some((given != Some(0.0)).then(|| (Some(frame), class, score(given), [left, top, left + width, top + height])))
+    Some(
+        (given != Some(0.0))
+            .then(|| (Some(frame), class, score(given), [left, top, left + width, top + height])),
+    )
 }
 
 #[cfg(test)]
@@ -159,16 +174,37 @@ mod tests {
     #[test]
     fn rows_of_every_format_are_told_apart() {
         let label = "3 7 Van 0 1 -1.5 10.0 20.0 29.0 59.0 1.5 1.6 4.0 2.0 1.6 20.0 -1.57";
-        assert_eq!(kitti_tracking(label), Some(Some((Some(3), Some(Class::Van), 1.0, [10.0, 20.0, 30.0, 60.0]))));
-        assert_eq!(kitti_tracking("3 -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10"), Some(None));
+        assert_eq!(
+            kitti_tracking(label),
+            Some(Some((Some(3), Some(Class::Van), 1.0, [10.0, 20.0, 30.0, 60.0])))
+        );
+        assert_eq!(
+            kitti_tracking("3 -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10"),
+            Some(None)
+        );
         let object = "Pedestrian 0.00 0 -0.20 712.4 143.0 810.7 307.9 1.89 0.48 1.20 1.84 1.47 8.41 0.01 0.5";
-        assert_eq!(kitti_object(object).flatten().map(|row| (row.1, row.2)), Some((Some(Class::Person), 0.5)));
-        assert_eq!(mot("1,-1,11,21,5,6,0.9,3,1"), Some(Some((Some(0), Some(Class::Car), 0.9, [10.0, 20.0, 15.0, 26.0]))));
+        assert_eq!(
+            kitti_object(object).flatten().map(|row| (row.1, row.2)),
+            Some((Some(Class::Person), 0.5))
+        );
+        assert_eq!(
+            mot("1,-1,11,21,5,6,0.9,3,1"),
+            Some(Some((Some(0), Some(Class::Car), 0.9, [10.0, 20.0, 15.0, 26.0])))
+        );
         assert_eq!(mot("1,-1,11,21,5,6,0,3,1"), Some(None), "a region to ignore");
-        assert_eq!(mot("2,-1,11,21,5,6,57.3,-1,-1,-1").flatten().map(|row| (row.1, row.2)), Some((None, 1.0)));
-        assert_eq!(own("2 traffic light 0.7 1 2 3.5 4"), Some(Some((None, Some(Class::Other), 0.7, [1.0, 2.0, 3.5, 4.0]))));
+        assert_eq!(
+            mot("2,-1,11,21,5,6,57.3,-1,-1,-1").flatten().map(|row| (row.1, row.2)),
+            Some((None, 1.0))
+        );
+        assert_eq!(
+            own("2 traffic light 0.7 1 2 3.5 4"),
+            Some(Some((None, Some(Class::Other), 0.7, [1.0, 2.0, 3.5, 4.0])))
+        );
         for wrong in ["", "1 2 3", "frame,id,left,top,width,height", "0,1,2,3,4,5"] {
-            assert!(kitti_tracking(wrong).is_none() && mot(wrong).is_none() && own(wrong).is_none(), "{wrong}");
+            assert!(
+                kitti_tracking(wrong).is_none() && mot(wrong).is_none() && own(wrong).is_none(),
+                "{wrong}"
+            );
         }
         assert!(kitti_tracking("3 7 Van 0 1 -1.5 10.0 20.0").is_none(), "a label cut off");
     }

@@ -17,7 +17,11 @@ impl BoxRow<'_> {
     /// An attribute of the box.
     pub fn value(&self, attribute: usize) -> f32 {
         let attributes = self.values.len() / self.format.count;
-        let at = if self.format.transposed { attribute * self.format.count + self.index } else { self.index * attributes + attribute };
+        let at = if self.format.transposed {
+            attribute * self.format.count + self.index
+        } else {
+            self.index * attributes + attribute
+        };
         self.values.get(at).copied().unwrap_or(0.0)
     }
 
@@ -62,7 +66,8 @@ pub fn rows<'o>(
 ) -> impl Iterator<Item = (BoxRow<'o>, DetectedBox)> + 'o {
     let row = move |index| BoxRow { values: &output.values, format: *format, index };
     (0..format.count).map(row).filter_map(move |row| {
-        let (class, score) = row.best(part.classes).filter(|(_, score)| *score >= part.settings.score_min)?;
+        let (class, score) =
+            row.best(part.classes).filter(|(_, score)| *score >= part.settings.score_min)?;
         let edges = part.edges(row.edges(part.input));
         Some((row, DetectedBox { class, score: score.min(1.0), edges }))
     })

@@ -57,12 +57,25 @@ impl Layout {
     ///
     /// # Errors
     /// The shapes fit none; the sentence prints them.
-    pub fn of(outputs: &[Output], size: (usize, usize), settings: &Settings) -> Result<Self, String> {
-        let of = |rank: usize| outputs.iter().enumerate().filter(move |(_, output)| output.shape.len() == rank && output.shape[0] == 1);
+    pub fn of(
+        outputs: &[Output],
+        size: (usize, usize),
+        settings: &Settings,
+    ) -> Result<Self, String> {
+        let of = |rank: usize| {
+            outputs
+                .iter()
+                .enumerate()
+                .filter(move |(_, output)| output.shape.len() == rank && output.shape[0] == 1)
+        };
         let layout = match outputs.len() {
             1 if is_map(&outputs[0], size) => Some(Self::Semantic),
-            1 => of(3).next().and_then(|(at, output)| box_format(at, &output.shape, 0, size, settings)).map(Self::Boxes),
-            2 | 3 => prototypes(of(3).next(), of(4).next(), size, settings).or_else(|| end_to_end(outputs)),
+            1 => of(3)
+                .next()
+                .and_then(|(at, output)| box_format(at, &output.shape, 0, size, settings))
+                .map(Self::Boxes),
+            2 | 3 => prototypes(of(3).next(), of(4).next(), size, settings)
+                .or_else(|| end_to_end(outputs)),
             _ => None,
         };
         layout.ok_or_else(|| {
@@ -82,7 +95,8 @@ impl Layout {
         matches!(self, Self::Boxes(_))
     }
 
-    /// Whether boxes lie in the cells of grids: YOLOX's, whose input is in another form than those of others.
+    /// Whether boxes lie in the cells of grids: YOLOX's, whose input is in another form than those
+    /// of others.
     pub fn is_in_grid(&self) -> bool {
         matches!(self, Self::Boxes(format) if format.in_grid)
     }
@@ -92,7 +106,10 @@ impl Layout {
         match self {
             Self::Boxes(format) => Some(format.classes),
             Self::Prototypes(format) => Some(format.boxes.classes),
-            Self::Semantic => outputs.first().filter(|output| output.shape.len() == 4 && output.shape[1] > 1).map(|output| output.shape[1]),
+            Self::Semantic => outputs
+                .first()
+                .filter(|output| output.shape.len() == 4 && output.shape[1] > 1)
+                .map(|output| output.shape[1]),
             // Labels are numbers of any list: COCO's unless the settings name others.
             Self::EndToEnd(_) => Some(80),
         }
@@ -101,7 +118,9 @@ impl Layout {
 
 /// Whether an output is an image of the input's size, or of a whole part of it.
 fn is_map(output: &Output, (width, height): (usize, usize)) -> bool {
-    let is_part = |side: usize, whole: usize| [1, 2, 4, 8, 16].iter().any(|part| side == whole / part || side == whole.div_ceil(*part));
+    let is_part = |side: usize, whole: usize| {
+        [1, 2, 4, 8, 16].iter().any(|part| side == whole / part || side == whole.div_ceil(*part))
+    };
     match output.shape[..] {
         [1, h, w] => output.integers && is_part(h, height) && is_part(w, width),
         [1, _, h, w] => is_part(h, height) && is_part(w, width),
@@ -110,13 +129,23 @@ fn is_map(output: &Output, (width, height): (usize, usize)) -> bool {
 }
 
 /// The format of boxes with `more` attributes after their classes.
-fn box_format(output: usize, shape: &[usize], more: usize, (width, height): (usize, usize), settings: &Settings) -> Option<BoxFormat> {
+fn box_format(
+    output: usize,
+    shape: &[usize],
+    more: usize,
+    (width, height): (usize, usize),
+    settings: &Settings,
+) -> Option<BoxFormat> {
     let &[1, rows, columns] = shape else { return None };
     let cells: usize = STRIDES.iter().map(|stride| (width / stride) * (height / stride)).sum();
-    // One box a cell of the grids, with attributes in rows: YOLOX. Three a cell: YOLOv5. One a cell in columns: YOLOv8 and later.
-    let (count, attributes, transposed) = if rows > columns { (rows, columns, false) } else { (columns, rows, true) };
+    // One box a cell of the grids, with attributes in rows: YOLOX. Three a cell: YOLOv5. One a cell
+    // in columns: YOLOv8 and later.
+    let (count, attributes, transposed) =
+        if rows > columns { (rows, columns, false) } else { (columns, rows, true) };
     let objectness = !transposed && more == 0;
-    let classes = attributes.checked_sub(4 + usize::from(objectness) + more).filter(|classes| *classes > 0)?;
+    let classes = attributes
+        .checked_sub(4 + usize::from(objectness) + more)
+        .filter(|classes| *classes > 0)?;
     if count != cells && count != 3 * cells {
         return None;
     }
@@ -138,10 +167,15 @@ fn prototypes(
 }
 
 fn end_to_end(outputs: &[Output]) -> Option<Layout> {
-    let find = |fits: &dyn Fn(&[usize]) -> bool| outputs.iter().position(|output| fits(&output.shape));
+    let find =
+        |fits: &dyn Fn(&[usize]) -> bool| outputs.iter().position(|output| fits(&output.shape));
     let boxes = find(&|shape| matches!(shape, [1, _, 5]))?;
     let count = outputs[boxes].shape[1];
     let labels = find(&|shape| *shape == [1, count])?;
     let masks = find(&|shape| matches!(shape, [1, n, _, _] if *n == count));
-    (outputs.len() == 2 || masks.is_some()).then_some(Layout::EndToEnd(EndToEndFormat { boxes, labels, masks }))
+    (outputs.len() == 2 || masks.is_some()).then_some(Layout::EndToEnd(EndToEndFormat {
+        boxes,
+        labels,
+        masks,
+    }))
 }

@@ -1,12 +1,15 @@
-//! Networks of ONNX files, run in this process: their boxes, masks and semantic maps become the masks of a frame.
+//! Networks of ONNX files, run in this process: their boxes, masks and semantic maps become the
+//! masks of a frame.
 //!
-//! What a network's outputs mean is told from their shapes, never from their names (`layout`); what shapes cannot tell stands in a TOML file beside
-//! the model (`settings`). Several networks may be given: boxes of one and the semantic map of another name the same objects, and are combined
+//! What a network's outputs mean is told from their shapes, never from their names (`layout`); what
+//! shapes cannot tell stands in a TOML file beside the model (`settings`). Several networks may be
+//! given: boxes of one and the semantic map of another name the same objects, and are combined
 //! where boxes are made masks.
 //!
-//! A network runs on the thread that reads frames ahead, beside the mapper, on one thread of its own: with two it computes other bits.
-//! Memory: what the runtime takes; an input and its outputs at a time. Time: 50 to 100 ms a picture for the
-//! small networks this is meant for; boxes in wide images take three, with two tiles.
+//! A network runs on the thread that reads frames ahead, beside the mapper, on one thread of its
+//! own: with two it computes other bits. Memory: what the runtime takes; an input and its outputs
+//! at a time. Time: 50 to 100 ms a picture for the small networks this is meant for; boxes in wide
+//! images take three, with two tiles.
 
 mod boxes;
 mod end_to_end;
@@ -59,7 +62,8 @@ struct PicturePart<'a> {
 impl PicturePart<'_> {
     /// Left, top, right and bottom edge in the picture of those in the input.
     fn edges(&self, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
-        let ([left, top], [right, bottom]) = (self.fit.picture_point([left, top]), self.fit.picture_point([right, bottom]));
+        let ([left, top], [right, bottom]) =
+            (self.fit.picture_point([left, top]), self.fit.picture_point([right, bottom]));
         [left, top, right, bottom]
     }
 }
@@ -71,7 +75,8 @@ impl Networks {
     /// Loads the networks.
     ///
     /// # Errors
-    /// A file is missing, is not a network that the runtime takes, or has an input that is not one picture.
+    /// A file is missing, is not a network that the runtime takes, or has an input that is not one
+    /// picture.
     pub fn open(paths: &[PathBuf]) -> Result<Self, InputError> {
         paths.iter().map(|path| Network::open(path)).collect::<Result<_, _>>().map(Self)
     }
@@ -90,22 +95,27 @@ impl DetectionSource for Networks {
 }
 
 impl Network {
-    /// Loads a network and runs it on a grey picture: what its outputs are is known before the first frame.
+    /// Loads a network and runs it on a grey picture: what its outputs are is known before the
+    /// first frame.
     fn open(path: &Path) -> Result<Self, InputError> {
         let (path, settings) = Settings::beside(path)?;
         let refused = |reason: String| InputError::network(&path, reason);
         let model = Model::open(&path, &settings).map_err(refused)?;
         let Input { size, bytes, .. } = model.input();
-        let grey = Image::new(size.0, size.1, vec![0; size.0 * size.1]).ok_or_else(|| refused("its input is empty".to_owned()))?;
+        let grey = Image::new(size.0, size.1, vec![0; size.0 * size.1])
+            .ok_or_else(|| refused("its input is empty".to_owned()))?;
         let fit = Fit::new([0, 0, size.0, size.1], size, true);
-        let outputs = model.run(&Picture::Grey(&grey), &fit, &settings.values(bytes, false)).map_err(refused)?;
+        let outputs = model
+            .run(&Picture::Grey(&grey), &fit, &settings.values(bytes, false))
+            .map_err(refused)?;
         let layout = Layout::of(&outputs, size, &settings).map_err(refused)?;
         let classes = settings.classes(layout.class_count(&outputs)).map_err(refused)?;
         let values = settings.values(bytes, layout.is_in_grid());
         Ok(Self { layout, values, classes, model, settings, path: path.clone() })
     }
 
-    /// Runs it on the picture, and on tiles of one that is much wider than the input where small boxes would be lost.
+    /// Runs it on the picture, and on tiles of one that is much wider than the input where small
+    /// boxes would be lost.
     fn run(&self, picture: &Picture<'_>, found: &mut Detections) -> Result<(), InputError> {
         let (width, height) = picture.size();
         self.add(picture, [0, 0, width, height], found)?;
@@ -118,7 +128,8 @@ impl Network {
             // An object that a tile cuts is whole in the picture, or in the next tile.
             let (left, right) = (tile[0] as f64, (tile[0] + tile[2]) as f64);
             let is_whole = |one: &DetectedBox| {
-                (tile[0] == 0 || one.edges[0] > left + TILE_MARGIN_PX) && (right >= width as f64 || one.edges[2] < right - TILE_MARGIN_PX)
+                (tile[0] == 0 || one.edges[0] > left + TILE_MARGIN_PX)
+                    && (right >= width as f64 || one.edges[2] < right - TILE_MARGIN_PX)
             };
             found.boxes.extend(of_tile.boxes.into_iter().filter(is_whole));
         }
@@ -126,7 +137,12 @@ impl Network {
     }
 
     /// Runs it on a part of the picture (left, top, width, height) and adds what it finds.
-    fn add(&self, picture: &Picture<'_>, part: [usize; 4], found: &mut Detections) -> Result<(), InputError> {
+    fn add(
+        &self,
+        picture: &Picture<'_>,
+        part: [usize; 4],
+        found: &mut Detections,
+    ) -> Result<(), InputError> {
         let refused = |reason: String| InputError::network(&self.path, reason);
         let input = self.model.input().size;
         let fill = self.settings.fill.unwrap_or(self.layout == Layout::Semantic);
@@ -143,16 +159,21 @@ impl Network {
             settings: &self.settings,
         };
         match &self.layout {
-            Layout::Boxes(format) => found.boxes.extend(boxes::rows(&outputs[format.output], format, &part).map(|(_, one)| one)),
+            Layout::Boxes(format) => found
+                .boxes
+                .extend(boxes::rows(&outputs[format.output], format, &part).map(|(_, one)| one)),
             Layout::Semantic => found.regions = semantic::decode(&outputs[0], &part),
-            Layout::Prototypes(format) => prototypes::decode(&outputs, format, &part, &mut found.masks),
+            Layout::Prototypes(format) => {
+                prototypes::decode(&outputs, format, &part, &mut found.masks)
+            }
             Layout::EndToEnd(format) => end_to_end::decode(&outputs, format, &part, found),
         }
         Ok(())
     }
 }
 
-/// Boxes without those that overlap a better one of a class that can be the same: non-maximum suppression.
+/// Boxes without those that overlap a better one of a class that can be the same: non-maximum
+/// suppression.
 fn without_doubles(mut boxes: Vec<DetectedBox>) -> Vec<DetectedBox> {
     /// Overlap from which on two boxes are one object's.
     const OVERLAP_MAX: f64 = 0.45;
@@ -160,7 +181,9 @@ fn without_doubles(mut boxes: Vec<DetectedBox>) -> Vec<DetectedBox> {
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<DetectedBox> = Vec::new();
     for one in boxes {
-        if kept.iter().all(|better| !better.class.agrees_with(one.class) || overlap(better, &one) < OVERLAP_MAX) {
+        if kept.iter().all(|better| {
+            !better.class.agrees_with(one.class) || overlap(better, &one) < OVERLAP_MAX
+        }) {
             kept.push(one);
         }
     }
@@ -169,7 +192,8 @@ fn without_doubles(mut boxes: Vec<DetectedBox>) -> Vec<DetectedBox> {
 
 /// Intersection over union.
 fn overlap(a: &DetectedBox, b: &DetectedBox) -> f64 {
-    let area = |[left, top, right, bottom]: [f64; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
+    let area =
+        |[left, top, right, bottom]: [f64; 4]| (right - left).max(0.0) * (bottom - top).max(0.0);
     let ([left, top, right, bottom], [left_b, top_b, right_b, bottom_b]) = (a.edges, b.edges);
     let both = area([left.max(left_b), top.max(top_b), right.min(right_b), bottom.min(bottom_b)]);
     both / (area(a.edges) + area(b.edges) - both).max(f64::MIN_POSITIVE)

@@ -36,7 +36,8 @@ impl<'i> Picture<'i> {
         }
     }
 
-    /// The colour at a point, px from the outer corner of the upper left pixel: bilinear between pixels.
+    /// The colour at a point, px from the outer corner of the upper left pixel: bilinear between
+    /// pixels.
     pub fn sample(&self, x: f64, y: f64) -> [f32; 3] {
         let (width, height) = self.size();
         let axis = |at: f64, size: usize| {
@@ -44,8 +45,14 @@ impl<'i> Picture<'i> {
             let low = at as usize;
             (low, (low + 1).min(size - 1), (at - low as f64) as f32)
         };
-        let ((left, right, right_share), (top, bottom, bottom_share)) = (axis(x, width), axis(y, height));
-        let [a, b, c, d] = [self.rgb(left, top), self.rgb(right, top), self.rgb(left, bottom), self.rgb(right, bottom)];
+        let ((left, right, right_share), (top, bottom, bottom_share)) =
+            (axis(x, width), axis(y, height));
+        let [a, b, c, d] = [
+            self.rgb(left, top),
+            self.rgb(right, top),
+            self.rgb(left, bottom),
+            self.rgb(right, bottom),
+        ];
         std::array::from_fn(|channel| {
             let upper = a[channel] + (b[channel] - a[channel]) * right_share;
             let lower = c[channel] + (d[channel] - c[channel]) * right_share;
@@ -95,11 +102,25 @@ impl Fit {
     }
 }
 
-/// Tiles of a picture, side by side with an overlap: `count` of them, or two where the picture is wide for an input of `size`.
-pub fn tiles((width, height): (usize, usize), size: (usize, usize), count: Option<usize>) -> Vec<[usize; 4]> {
+/// Tiles of a picture, side by side with an overlap: `count` of them, or two where the picture is
+/// wide for an input of `size`.
+pub fn tiles(
+    (width, height): (usize, usize),
+    size: (usize, usize),
+    count: Option<usize>,
+) -> Vec<[usize; 4]> {
     let is_wide = width as f64 / height as f64 >= WIDE * size.0 as f64 / size.1 as f64;
     let count = count.unwrap_or(if is_wide { 2 } else { 0 });
     let tile = width as f64 / (count as f64 - (count as f64 - 1.0) * OVERLAP);
     let left = |index: usize| (index as f64 * tile * (1.0 - OVERLAP)) as usize;
-    (0..count).map(|index| [left(index), 0, if index + 1 == count { width - left(index) } else { tile as usize }, height]).collect()
+    (0..count)
+        .map(|index| {
+            [
+                left(index),
+                0,
+                if index + 1 == count { width - left(index) } else { tile as usize },
+                height,
+            ]
+        })
+        .collect()
 }

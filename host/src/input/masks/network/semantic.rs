@@ -4,15 +4,17 @@ use super::PicturePart;
 use super::model::Output;
 use crate::formats::Image;
 
-/// The class of each pixel as [`dynvox_core::tracking::Class::code`], 0 for those that are not kept. Logits are interpolated between their pixels,
-/// numbers of classes are not.
+/// The class of each pixel as [`dynvox_core::tracking::Class::code`], 0 for those that are not
+/// kept. Logits are interpolated between their pixels, numbers of classes are not.
 pub fn decode(output: &Output, part: &PicturePart<'_>) -> Option<Image<u8>> {
     let (map_width, map_height) = (*output.shape.last()?, output.shape[output.shape.len() - 2]);
     let channels = if output.shape.len() == 4 { output.shape[1] } else { 1 };
     let (width, height) = part.picture;
     let share = [map_width as f64 / part.input.0 as f64, map_height as f64 / part.input.1 as f64];
     let map = Map { values: &output.values, width: map_width, height: map_height };
-    let code = |class: usize| part.classes.get(class).copied().flatten().map_or(0, |class| class.code() as u8);
+    let code = |class: usize| {
+        part.classes.get(class).copied().flatten().map_or(0, |class| class.code() as u8)
+    };
     let mut codes = Vec::with_capacity(width * height);
     for v in 0..height {
         for u in 0..width {
@@ -53,7 +55,8 @@ impl Map<'_> {
             let low = at as usize;
             (low, (low + 1).min(size - 1), (at - low as f64) as f32)
         };
-        let ((left, right, right_share), (top, bottom, bottom_share)) = (axis(x, self.width), axis(y, self.height));
+        let ((left, right, right_share), (top, bottom, bottom_share)) =
+            (axis(x, self.width), axis(y, self.height));
         (0..channels).map(move |channel| {
             let row = |v: usize| {
                 let [a, b] = [left, right].map(|u| self.value(channel, u, v));
@@ -66,6 +69,7 @@ impl Map<'_> {
     /// The channel with the largest number at a point.
     fn best(&self, channels: usize, x: f64, y: f64) -> usize {
         let all = self.at(channels, x, y).enumerate();
-        all.reduce(|best, one| if one.1 > best.1 { one } else { best }).map_or(0, |(channel, _)| channel)
+        all.reduce(|best, one| if one.1 > best.1 { one } else { best })
+            .map_or(0, |(channel, _)| channel)
     }
 }

@@ -57,7 +57,8 @@ pub struct Settings {
     pub mean: Option<[f32; 3]>,
     /// Multiplies the difference; 1 for boxes that are not decoded, else 1/255.
     pub scale: Option<[f32; 3]>,
-    /// Whether the picture fills the input; otherwise its sides keep their ratio and the rest is grey.
+    /// Whether the picture fills the input; otherwise its sides keep their ratio and the rest is
+    /// grey.
     pub fill: Option<bool>,
     /// Whether boxes of the shape that YOLOX gives are decoded already; false.
     pub decoded: bool,
@@ -67,7 +68,8 @@ pub struct Settings {
     pub keep: Option<Vec<String>>,
     /// Least score; 0.3.
     pub score_min: f32,
-    /// Tiles side by side that a wide picture is divided into, besides the whole; 2 where it is 1.5 times as wide as the input's shape, 0 for none.
+    /// Tiles side by side that a wide picture is divided into, besides the whole; 2 where it is 1.5
+    /// times as wide as the input's shape, 0 for none.
     pub tiles: Option<usize>,
 }
 
@@ -109,25 +111,33 @@ impl Settings {
         } else {
             Self::default()
         };
-        let given =
-            if is_settings { settings.model.as_ref().map(|model| file.with_file_name("").join(model)) } else { Some(path.to_path_buf()) };
+        let given = if is_settings {
+            settings.model.as_ref().map(|model| file.with_file_name("").join(model))
+        } else {
+            Some(path.to_path_buf())
+        };
         match given {
             Some(path) if path.is_file() => Ok((path, settings)),
             Some(path) => Err(InputError::network(&path, "there is no such file".to_owned())),
-            None => Err(InputError::network(&file, "it does not name its network: add model = \"FILE.onnx\"".to_owned())),
+            None => Err(InputError::network(
+                &file,
+                "it does not name its network: add model = \"FILE.onnx\"".to_owned(),
+            )),
         }
     }
 
-    /// What each of so many classes is; `None` for those that are not kept. Without a number, as of a map of integers, as many as are named.
+    /// What each of so many classes is; `None` for those that are not kept. Without a number, as of
+    /// a map of integers, as many as are named.
     ///
     /// # Errors
     /// The number of classes has no list that is known.
     pub fn classes(&self, count: Option<usize>) -> Result<Vec<Option<Class>>, String> {
         let named = |name: &str| self.kept(name, class_of(name));
         match (&self.names, count) {
-            (Some(names), Some(count)) if names.len() != count => {
-                Err(format!("its settings name {} classes, but it has {count}: correct `names`", names.len()))
-            }
+            (Some(names), Some(count)) if names.len() != count => Err(format!(
+                "its settings name {} classes, but it has {count}: correct `names`",
+                names.len()
+            )),
             (Some(names), _) => Ok(names.iter().map(|name| named(name)).collect()),
             (None, None | Some(19)) => Ok(CITYSCAPES.iter().map(|name| named(name)).collect()),
             (None, Some(80)) => Ok((0..80).map(|index| self.kept("", coco_class(index))).collect()),
@@ -137,7 +147,8 @@ impl Settings {
         }
     }
 
-    /// The values of an input that takes bytes or not; `in_grid`: of a network that gives boxes in the cells of its grids.
+    /// The values of an input that takes bytes or not; `in_grid`: of a network that gives boxes in
+    /// the cells of its grids.
     pub fn values(&self, bytes: bool, in_grid: bool) -> InputValues {
         let channels = self.channels.unwrap_or(if in_grid { Channels::Bgr } else { Channels::Rgb });
         InputValues {

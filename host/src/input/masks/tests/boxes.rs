@@ -1,11 +1,16 @@
-//! Boxes and masks of other programs: COCO, YOLO, tables of boxes, numbers; and what boxes become over a disparity image.
+//! Boxes and masks of other programs: COCO, YOLO, tables of boxes, numbers; and what boxes become
+//! over a disparity image.
 
 use super::*;
 use crate::input::masks::boxes::{BoxMasks, DetectedBox, DetectionSource, Detections};
 use crate::input::source::StereoImages;
 
 /// Frame 0 of the folder with masks of a file that `write` fills.
-fn of_file(name: &str, text: &str, choice: fn(PathBuf) -> MaskChoice) -> Result<FrameMasks, InputError> {
+fn of_file(
+    name: &str,
+    text: &str,
+    choice: fn(PathBuf) -> MaskChoice,
+) -> Result<FrameMasks, InputError> {
     let root = rig();
     let path = root.path().join(name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -14,7 +19,11 @@ fn of_file(name: &str, text: &str, choice: fn(PathBuf) -> MaskChoice) -> Result<
 }
 
 /// The same of a folder with one file.
-fn of_folder(name: &str, text: &str, choice: fn(PathBuf) -> MaskChoice) -> Result<FrameMasks, InputError> {
+fn of_folder(
+    name: &str,
+    text: &str,
+    choice: fn(PathBuf) -> MaskChoice,
+) -> Result<FrameMasks, InputError> {
     let root = rig();
     let folder = root.path().join("given");
     fs::create_dir(&folder).unwrap();
@@ -48,16 +57,32 @@ fn coco_has_polygons_runs_and_boxes() {
     let runs_box = PixelBox { left: 20, top: 0, width: 5, height: 4 };
     assert_eq!(
         found(&masks),
-        [(Class::Car, 1.0, CAR), (Class::Other, 1.0, PixelBox { left: 0, top: 0, width: 1, height: 2 }), (Class::Car, 0.5, runs_box)]
+        [
+            (Class::Car, 1.0, CAR),
+            (Class::Other, 1.0, PixelBox { left: 0, top: 0, width: 1, height: 2 }),
+            (Class::Car, 0.5, runs_box)
+        ]
     );
     assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
     let results = r#"[{"image_id": 0, "category_id": 8, "score": 0.75, "bbox": [4, 10, 10, 20]}, {"image_id": 1, "category_id": 3, "bbox": [0, 0, 9, 9]}]"#;
-    assert_eq!(found(&of_file("results.json", results, MaskChoice::Coco).unwrap()), [(Class::Truck, 0.75, SHRUNK_CAR)]);
+    assert_eq!(
+        found(&of_file("results.json", results, MaskChoice::Coco).unwrap()),
+        [(Class::Truck, 0.75, SHRUNK_CAR)]
+    );
     for (text, reason) in [
         ("{}", "neither COCO's annotations nor a list"),
-        (r#"[{"image_id": 0, "category_id": 3, "segmentation": {"size": [9, 9], "counts": [81]}}]"#, "a mask is 9 x 9 px"),
-        (r#"[{"image_id": 0, "category_id": 3, "segmentation": {"size": [36, 40], "counts": [81]}}]"#, "its runs hold 81"),
-        (r#"[{"image_id": "other.png", "category_id": 3, "bbox": [0, 0, 9, 9]}]"#, "nothing for any frame"),
+        (
+            r#"[{"image_id": 0, "category_id": 3, "segmentation": {"size": [9, 9], "counts": [81]}}]"#,
+            "a mask is 9 x 9 px",
+        ),
+        (
+            r#"[{"image_id": 0, "category_id": 3, "segmentation": {"size": [36, 40], "counts": [81]}}]"#,
+            "its runs hold 81",
+        ),
+        (
+            r#"[{"image_id": "other.png", "category_id": 3, "bbox": [0, 0, 9, 9]}]"#,
+            "nothing for any frame",
+        ),
     ] {
         let message = refusal_of(of_file("coco.json", text, MaskChoice::Coco));
         assert!(message.contains(reason) && message.contains("--instances"), "{message}");
@@ -92,13 +117,30 @@ fn boxes_come_as_labels_of_kitti_as_mot_text_and_as_lists() {
     let expected = [(Class::Car, 1.0, SHRUNK_CAR)];
     let tracking = format!("{none}0 7 {label}\n1 7 {label}\n1 8 {label}\n");
     assert_eq!(found(&of_file("labels.txt", &tracking, MaskChoice::Boxes).unwrap()), expected);
-    assert_eq!(found(&of_file("mot.csv", "1,-1,5,11,10,20,1,3,1\n2,-1,1,1,9,9,1,3,1\n", MaskChoice::Boxes).unwrap()), expected);
+    assert_eq!(
+        found(
+            &of_file("mot.csv", "1,-1,5,11,10,20,1,3,1\n2,-1,1,1,9,9,1,3,1\n", MaskChoice::Boxes)
+                .unwrap()
+        ),
+        expected
+    );
     assert_eq!(found(&of_folder("000000.txt", label, MaskChoice::Boxes).unwrap()), expected);
-    assert_eq!(found(&of_folder("000000.txt", "# a list\n3 car 1.0 4 10 14 30\n", MaskChoice::Boxes).unwrap()), expected);
+    assert_eq!(
+        found(
+            &of_folder("000000.txt", "# a list\n3 car 1.0 4 10 14 30\n", MaskChoice::Boxes)
+                .unwrap()
+        ),
+        expected
+    );
     let missing = of_folder("000001.txt", label, MaskChoice::Boxes).unwrap();
     assert_eq!((missing.instances.len(), missing.refusals.missing), (0, 1));
-    assert!(refusal_of(of_file("mot.csv", "1,2,3\n", MaskChoice::Boxes)).contains("line 1 is neither"));
-    assert!(refusal_of(of_folder("000000.txt", "Car 0 1\n", MaskChoice::Boxes)).contains("line 1 is neither"));
+    assert!(
+        refusal_of(of_file("mot.csv", "1,2,3\n", MaskChoice::Boxes)).contains("line 1 is neither")
+    );
+    assert!(
+        refusal_of(of_folder("000000.txt", "Car 0 1\n", MaskChoice::Boxes))
+            .contains("line 1 is neither")
+    );
 }
 
 #[test]
@@ -112,7 +154,10 @@ fn numbers_without_a_list_are_cars_and_cityscapes_numbers_have_classes() {
     fs::remove_file(folder.join("000000.png")).unwrap();
     labels(&folder.join("000000_gtFine_instanceIds.png"), &[7, 24_000, 33_002, 60_001], true);
     let masks = first(root.path(), &MaskChoice::Ids(folder)).unwrap();
-    assert_eq!(masks.instances.iter().map(|one| one.class).collect::<Vec<_>>(), [Class::Person, Class::Bicycle, Class::Other]);
+    assert_eq!(
+        masks.instances.iter().map(|one| one.class).collect::<Vec<_>>(),
+        [Class::Person, Class::Bicycle, Class::Other]
+    );
     assert_eq!(masks.refusals.unknown_class, 1);
 }
 
@@ -128,12 +173,19 @@ impl DetectionSource for Given {
 /// What the street's exact boxes become, and the exact masks.
 fn of_street() -> (FrameMasks, FrameMasks, usize) {
     let config = StreetConfig { width: 640, height: 192, frames: 2, ..StreetConfig::default() };
-    let street = || -> Box<dyn FrameSource> { Box::new(StreetFrames::new(config.clone()).unwrap()) };
+    let street =
+        || -> Box<dyn FrameSource> { Box::new(StreetFrames::new(config.clone()).unwrap()) };
     let exact = attach(street(), &MaskChoice::Exact, EVERY).unwrap().frame(0).unwrap();
     let whole = |one: &InstanceMask| DetectedBox {
         class: one.class,
         score: one.score,
-        edges: [one.pixels.left, one.pixels.top, one.pixels.left + one.pixels.width, one.pixels.top + one.pixels.height].map(f64::from),
+        edges: [
+            one.pixels.left,
+            one.pixels.top,
+            one.pixels.left + one.pixels.width,
+            one.pixels.top + one.pixels.height,
+        ]
+        .map(f64::from),
     };
     let boxes = exact.masks.instances.iter().map(whole).collect();
     let masks = BoxMasks::new(Given(boxes), street().as_ref()).unwrap().masks(0, &exact).unwrap();
@@ -146,9 +198,12 @@ fn boxes_over_the_streets_disparity_become_masks_close_to_the_exact_ones() {
     let (masks, exact, pixels) = of_street();
     let area = |one: &InstanceMask| one.mask.iter().filter(|pixel| **pixel > 0).count();
     let shared = |a: &InstanceMask, b: &InstanceMask| {
-        (0..pixels as i32).filter(|at| a.contains(at % 640, at / 640) && b.contains(at % 640, at / 640)).count()
+        (0..pixels as i32)
+            .filter(|at| a.contains(at % 640, at / 640) && b.contains(at % 640, at / 640))
+            .count()
     };
-    let large: Vec<&InstanceMask> = exact.instances.iter().filter(|one| area(one) > 2_000).collect();
+    let large: Vec<&InstanceMask> =
+        exact.instances.iter().filter(|one| area(one) > 2_000).collect();
     assert!(large.len() > 1);
     for one in large {
         let both = |other: &&InstanceMask| shared(one, other);

@@ -1,4 +1,5 @@
-//! Linux without a C library: two system calls and a first instruction. Any machine the linker knows, under qemu-user.
+//! Linux without a C library: two system calls and a first instruction. Any machine the linker
+//! knows, under qemu-user.
 
 use core::arch::asm;
 #[cfg(not(target_arch = "powerpc64"))]
@@ -31,7 +32,8 @@ unsafe fn call(number: usize, a: usize, b: usize, c: usize) {
 }
 
 /// Numbers of `write` and `exit`.
-const WRITE_EXIT: [usize; 2] = if cfg!(any(target_arch = "powerpc64", target_arch = "s390x")) { [4, 1] } else { [64, 93] };
+const WRITE_EXIT: [usize; 2] =
+    if cfg!(any(target_arch = "powerpc64", target_arch = "s390x")) { [4, 1] } else { [64, 93] };
 
 /// Writes text to standard output.
 pub fn put(text: &crate::line::Line) {
@@ -48,7 +50,8 @@ pub fn exit(code: u8) -> ! {
     }
 }
 
-// The kernel hands a PowerPC program its own address where a function expects it (ELFv2), so that it can begin with one.
+// The kernel hands a PowerPC program its own address where a function expects it (ELFv2), so that
+// it can begin with one.
 #[cfg_attr(target_arch = "powerpc64", unsafe(export_name = "_start"))]
 #[cfg_attr(not(target_arch = "powerpc64"), unsafe(no_mangle))]
 extern "C" fn dynvox_start() -> ! {
@@ -59,6 +62,13 @@ extern "C" fn dynvox_start() -> ! {
 #[cfg(target_arch = "aarch64")]
 global_asm!(".globl _start", "_start:", "b dynvox_start");
 #[cfg(target_arch = "riscv64")]
-global_asm!(".globl _start", "_start:", ".option push", ".option norelax", "tail dynvox_start", ".option pop");
+global_asm!(
+    ".globl _start",
+    "_start:",
+    ".option push",
+    ".option norelax",
+    "tail dynvox_start",
+    ".option pop"
+);
 #[cfg(target_arch = "s390x")]
 global_asm!(".globl _start", "_start:", "aghi %r15, -160", "brasl %r14, dynvox_start");

@@ -27,7 +27,8 @@ impl Paint {
         unsafe { core::arch::asm!("mov {}, sp", out(reg) top, options(nomem, nostack)) };
         let mut word = (top - PAINTED) as *mut u32;
         while (word as usize) < top - MARGIN {
-            // SAFETY: between the statics at the foot of 4 MiB of memory and the stack pointer near its head there is nothing.
+            // SAFETY: between the statics at the foot of 4 MiB of memory and the stack pointer near
+            // its head there is nothing.
             unsafe {
                 word.write_volatile(PAINT);
                 word = word.add(1);
