@@ -24,8 +24,13 @@ const CLAUSES: [&str; 10] =
 /// Words that make a doc lean on its neighbour.
 const LEANING: [&str; 7] = ["The same", "Its", "As", "Of", "Their", "Likewise", "Ditto"];
 /// Phrases with a plainer word: instead of, compared with, only, because.
-const PHRASES: [&str; 5] =
-    ["in place of", "the same about any other", "is no matter of", "likewise the other", "of it alone"];
+const PHRASES: [&str; 5] = [
+    "in place of",
+    "the same about any other",
+    "is no matter of",
+    "likewise the other",
+    "of it alone",
+];
 
 /// Kinds of findings, with the most there may be of each.
 const BOUNDS: [(&str, usize); 7] = [
