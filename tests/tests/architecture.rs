@@ -18,27 +18,30 @@ const CORE: Layers = &[
     ("audit", &[]),
     ("digest", &[]),
     ("memory", &[]),
-    ("part", &[]),
+    ("slices", &[]),
     ("flags", &[]),
     ("lanes", &[]),
-    ("image", &["part"]),
+    ("image", &["slices"]),
     ("parallel", &[]),
     ("sad", &["lanes", "parallel"]),
     ("geometry", &["image"]),
     ("state", &["digest", "geometry"]),
     ("random", &["state"]),
-    ("rectify", &["digest", "geometry", "image", "memory", "parallel", "part", "problem", "state"]),
+    (
+        "rectify",
+        &["digest", "geometry", "image", "memory", "parallel", "slices", "problem", "state"],
+    ),
     (
         "stereo",
         &[
-            "digest", "flags", "geometry", "image", "lanes", "memory", "parallel", "part",
+            "digest", "flags", "geometry", "image", "lanes", "memory", "parallel", "slices",
             "problem", "sad",
         ],
     ),
     (
         "scene_flow",
         &[
-            "audit", "digest", "geometry", "image", "lanes", "memory", "parallel", "part",
+            "audit", "digest", "geometry", "image", "lanes", "memory", "parallel", "slices",
             "problem", "sad", "state",
         ],
     ),
@@ -46,7 +49,7 @@ const CORE: Layers = &[
         "egomotion",
         &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"],
     ),
-    ("masks", &["digest", "image", "memory", "part", "state"]),
+    ("masks", &["digest", "image", "memory", "slices", "state"]),
     (
         "tracking",
         &[
@@ -57,7 +60,7 @@ const CORE: Layers = &[
             "image",
             "masks",
             "memory",
-            "part",
+            "slices",
             "problem",
             "random",
             "scene_flow",
@@ -67,25 +70,28 @@ const CORE: Layers = &[
     (
         "volume",
         &[
-            "audit", "digest", "flags", "geometry", "image", "memory", "parallel", "part",
+            "audit", "digest", "flags", "geometry", "image", "memory", "parallel", "slices",
             "problem", "state",
         ],
     ),
     (
         "view",
-        &["flags", "geometry", "image", "lanes", "memory", "parallel", "part", "problem", "volume"],
+        &[
+            "flags", "geometry", "image", "lanes", "memory", "parallel", "slices", "problem",
+            "volume",
+        ],
     ),
     (
         "objects",
         &[
-            "audit", "digest", "geometry", "image", "masks", "memory", "parallel", "part",
+            "audit", "digest", "geometry", "image", "masks", "memory", "parallel", "slices",
             "problem", "state", "tracking", "volume",
         ],
     ),
     (
         "planning",
         &[
-            "digest", "geometry", "image", "memory", "part", "problem", "state", "tracking",
+            "digest", "geometry", "image", "memory", "slices", "problem", "state", "tracking",
             "view", "volume",
         ],
     ),

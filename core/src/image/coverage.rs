@@ -1,6 +1,6 @@
 //! Which pixels of an image show anything.
 
-use crate::part::part;
+use crate::slices::clipped;
 
 /// Pixels a word has bits for.
 const WORD: usize = 64;
@@ -36,7 +36,7 @@ impl<'a> InvalidPixels<'a> {
     /// The columns of row `v` that are not to be used, from left to right.
     pub(crate) fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
         let row = Self::words_a_row(self.width);
-        let words = part(self.words, v * row..(v + 1) * row);
+        let words = clipped(self.words, v * row..(v + 1) * row);
         words.iter().enumerate().flat_map(|(at, &word)| Bits(word).map(move |bit| at * WORD + bit))
     }
 }

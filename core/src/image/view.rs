@@ -1,6 +1,6 @@
 //! Row-major image views over borrowed slices.
 
-use crate::part::part;
+use crate::slices::clipped;
 
 /// A read-only image. Rows are `stride` items apart.
 ///
@@ -89,12 +89,12 @@ impl<'a, T> View<'a, T> {
         if v >= self.height {
             return &[];
         }
-        part(self.data, v * self.stride..v * self.stride + self.width)
+        clipped(self.data, v * self.stride..v * self.stride + self.width)
     }
 
     /// The pixels row by row, of an image without padding; empty for one with.
     pub fn pixels(&self) -> &'a [T] {
-        if self.stride == self.width { part(self.data, ..self.width * self.height) } else { &[] }
+        if self.stride == self.width { clipped(self.data, ..self.width * self.height) } else { &[] }
     }
 
     /// The pixels from the first on, and how many items apart rows are.
@@ -105,7 +105,7 @@ impl<'a, T> View<'a, T> {
     /// All rows, top to bottom.
     pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let this = (self.data, self.width, self.stride);
-        (0..self.height).map(move |v| part(this.0, v * this.2..v * this.2 + this.1))
+        (0..self.height).map(move |v| clipped(this.0, v * this.2..v * this.2 + this.1))
     }
 }
 

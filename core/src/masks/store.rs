@@ -3,7 +3,7 @@
 
 use super::{PixelBox, pixel_box::share};
 use crate::{
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
@@ -72,7 +72,7 @@ impl<'s> MaskStore<'s> {
             peak: _,
         } = self;
         visitor.count(used, words.len());
-        visitor.u64s(part_mut(words, ..*used));
+        visitor.u64s(clipped_mut(words, ..*used));
     }
 
     /// Forgets all masks.
@@ -113,8 +113,8 @@ impl<'s> MaskStore<'s> {
         let Some(to) = self.alloc(mask.pixels) else {
             return (MaskHandle::full(mask.pixels), false);
         };
-        let words = part(from.words, mask.start as usize..);
-        let copy = part_mut(self.words, to.start as usize..self.used);
+        let words = clipped(from.words, mask.start as usize..);
+        let copy = clipped_mut(self.words, to.start as usize..self.used);
         copy.iter_mut().zip(words).for_each(|(to, from)| *to = *from);
         (to, true)
     }
@@ -126,7 +126,7 @@ impl<'s> MaskStore<'s> {
             return &[];
         }
         let start = mask.start as usize + row as usize * mask.stride as usize;
-        part(self.words, start..start + mask.stride as usize)
+        clipped(self.words, start..start + mask.stride as usize)
     }
 
     fn row_mut(&mut self, mask: &MaskHandle, v: i32) -> &mut [u64] {
@@ -135,7 +135,7 @@ impl<'s> MaskStore<'s> {
             return &mut [];
         }
         let start = mask.start as usize + row as usize * mask.stride as usize;
-        part_mut(self.words, start..start + mask.stride as usize)
+        clipped_mut(self.words, start..start + mask.stride as usize)
     }
 
     /// Whether a pixel of the image belongs to the mask.
@@ -202,7 +202,7 @@ impl<'s> MaskStore<'s> {
             return mask.pixels.area();
         }
         let end = mask.start as usize + mask.stride as usize * mask.pixels.height.max(0) as usize;
-        let words = part(self.words, mask.start as usize..end);
+        let words = clipped(self.words, mask.start as usize..end);
         words.iter().map(|word| i64::from(word.count_ones())).sum()
     }
 

@@ -18,7 +18,7 @@ use crate::{
     masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Vectors, Work},
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
@@ -49,7 +49,7 @@ fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOC
             // What would lie left of the image is skipped.
             let outside = du.min(0).unsigned_abs().saturating_sub(u).min(BLOCK);
             let row = row.get(u.saturating_add_signed(du)..).unwrap_or(&[]);
-            let nearest = part_mut(&mut nearest, outside..);
+            let nearest = clipped_mut(&mut nearest, outside..);
             for (nearest, &other) in nearest.iter_mut().zip(row) {
                 *nearest = if other > *nearest { other } else { *nearest };
             }
@@ -310,7 +310,7 @@ impl<'s> Crops<'s> {
 
     /// The crops of a track, oldest first.
     pub fn of(&self, id: u32) -> impl Iterator<Item = (&Crop, &[u16], Picture<'_>)> {
-        let entries = part(self.entries, ..self.len);
+        let entries = clipped(self.entries, ..self.len);
         entries.iter().filter(move |crop| crop.id == id).filter_map(|crop| {
             let (disparity_q8, picture) = self.picture(crop)?;
             Some((crop, disparity_q8, picture))
@@ -353,10 +353,10 @@ impl<'s> Crops<'s> {
                 return;
             }
             visitor.content(crop.digest, |visitor| {
-                visitor.u16s(part_mut(disparity_q8, span.clone()));
-                visitor.bytes(part_mut(grey, span.clone()));
+                visitor.u16s(clipped_mut(disparity_q8, span.clone()));
+                visitor.bytes(clipped_mut(grey, span.clone()));
                 if crop.coloured > 0 {
-                    visitor.bytes(part_mut(colour, span).as_flattened_mut());
+                    visitor.bytes(clipped_mut(colour, span).as_flattened_mut());
                 }
             });
         }
@@ -380,7 +380,7 @@ impl<'s> Crops<'s> {
     /// Pixels of a ring that would hold the crops kept now: from the oldest to the newest, and once
     /// more the largest, since a crop that does not fit at the end of the ring begins at its front.
     pub fn enough_pixels(&self) -> usize {
-        let kept = part(self.entries, ..self.len);
+        let kept = clipped(self.entries, ..self.len);
         let oldest = kept.first().map_or(0, |crop| crop.start as usize);
         let pixels = self.disparity_q8.len();
         let span =

@@ -23,7 +23,7 @@
 use crate::{
     digest::Digest,
     memory::{Carver, region_bytes},
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -138,16 +138,16 @@ impl<'s> DistanceField<'s> {
     /// The first pass, along y: rows of `row` cells, one after the other, up and down again.
     fn across_rows(&mut self, is_obstacle: &[u8], row: usize, rows: usize) {
         let (squared, nearest) =
-            (part_mut(self.squared, ..row * rows), part_mut(self.nearest, ..row * rows));
-        part_mut(squared, ..row).fill(NO_OBSTACLE);
+            (clipped_mut(self.squared, ..row * rows), clipped_mut(self.nearest, ..row * rows));
+        clipped_mut(squared, ..row).fill(NO_OBSTACLE);
         // Steps to the nearest cell of the other kind in the rows before.
         for y in 1..rows {
             let Some((before, after)) = squared.split_at_mut_checked(y * row) else { return };
-            let kinds = part(is_obstacle, (y - 1) * row..y * row)
+            let kinds = clipped(is_obstacle, (y - 1) * row..y * row)
                 .iter()
-                .zip(part(is_obstacle, y * row..(y + 1) * row));
+                .zip(clipped(is_obstacle, y * row..(y + 1) * row));
             for ((steps, last), (other, own)) in
-                after.iter_mut().zip(part(before, (y - 1) * row..)).zip(kinds)
+                after.iter_mut().zip(clipped(before, (y - 1) * row..)).zip(kinds)
             {
                 *steps = if own == other { last.saturating_add(1) } else { 1 };
             }
@@ -163,12 +163,12 @@ impl<'s> DistanceField<'s> {
             let Some((near_before, near_after)) = nearest.split_at_mut_checked(y * row) else {
                 return;
             };
-            let kinds = part(is_obstacle, (y - 1) * row..y * row)
+            let kinds = clipped(is_obstacle, (y - 1) * row..y * row)
                 .iter()
-                .zip(part(is_obstacle, y * row..(y + 1) * row));
-            let below = part_mut(before, (y - 1) * row..)
+                .zip(clipped(is_obstacle, y * row..(y + 1) * row));
+            let below = clipped_mut(before, (y - 1) * row..)
                 .iter_mut()
-                .zip(part_mut(near_before, (y - 1) * row..));
+                .zip(clipped_mut(near_before, (y - 1) * row..));
             let first = (y * row) as u32;
             for (((steps, near), (last, near_last)), ((own, other), at)) in
                 below.zip(after.iter().zip(&*near_after)).zip(kinds.zip(first..))
@@ -232,7 +232,7 @@ impl<'s> DistanceField<'s> {
                 len += 1;
             }
         }
-        let mut sites = part_mut(self.sites, ..len).iter().peekable();
+        let mut sites = clipped_mut(self.sites, ..len).iter().peekable();
         let Some(mut current) = sites.next() else { return };
         for at in begin as u32..end as u32 {
             let mut squared = current.squared_from(at);

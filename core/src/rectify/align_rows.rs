@@ -7,7 +7,7 @@ use crate::{
     image::View,
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, Work, each, zip2},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// Columns that move by the same: over so few, what a calibration leaves changes by a few
@@ -40,7 +40,7 @@ impl<'s> AlignedImage<'s> {
     ) -> Option<View<'_, u8>> {
         let (width, height) = (right.width(), right.height());
         let bands = Bands::of(height);
-        let rows = part_mut(self.0, ..width * height);
+        let rows = clipped_mut(self.0, ..width * height);
         each(executor, zip2(bands.first(), bands.split_mut(rows, width)), |(first, rows)| {
             executor.vectors().run(AlignRows { right, shift, first, rows });
         });

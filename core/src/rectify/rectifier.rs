@@ -12,7 +12,7 @@ use crate::{
     image::{InvalidPair, InvalidPixels, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip2},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// Why a rectification does not fit a capacity.
@@ -200,7 +200,7 @@ impl<'s> Rectifier<'s> {
         for (camera, turned) in
             [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)]
         {
-            let entries = part_mut(camera.map, ..width * height);
+            let entries = clipped_mut(camera.map, ..width * height);
             map::fill(entries, width, turned, rig);
             camera.invalid_count = map::mark_invalid(entries, width, height, camera.invalid);
         }

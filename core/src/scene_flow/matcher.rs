@@ -19,7 +19,7 @@ use crate::{
     image::{InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, Vectors, each, zip3},
-    part::part,
+    slices::clipped,
     state::Visitor,
 };
 
@@ -126,19 +126,19 @@ impl<'s> FlowMatcher<'s> {
 
     /// The sparse pass' matches of the last frame: whole pixels, outliers included.
     pub(crate) fn sparse(&self) -> &[Match] {
-        part(self.sparse, ..self.sparse_len)
+        clipped(self.sparse, ..self.sparse_len)
     }
 
     /// The dense pass' matches of the last frame that are supported by their neighbours, refined
     /// below the pixel.
     pub(crate) fn refined(&self) -> &[Match] {
-        part(self.refined, ..self.refined_len)
+        clipped(self.refined, ..self.refined_len)
     }
 
     /// Positions in [`FlowMatcher::refined`] of the matches selected for egomotion: the best of
     /// each cell, cell by cell.
     pub(crate) fn selection(&self) -> &[u32] {
-        part(self.selection, ..self.selection_len)
+        clipped(self.selection, ..self.selection_len)
     }
 
     /// The matches selected for egomotion.
@@ -330,7 +330,7 @@ impl<'s> FlowMatcher<'s> {
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
         let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
-        let (refined, score) = (part(self.refined, ..self.refined_len), &*self.score);
+        let (refined, score) = (clipped(self.refined, ..self.refined_len), &*self.score);
         self.selection_len = select(
             refined,
             score,
@@ -362,7 +362,7 @@ impl<'s> FlowMatcher<'s> {
         corners.trace(|_| widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
-        let matches = part(self.sparse, ..self.sparse_len);
+        let matches = clipped(self.sparse, ..self.sparse_len);
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         support(matches, shape, config, &mut self.cells, self.motion, self.supported);
         let supported = matches
@@ -399,7 +399,7 @@ impl<'s> FlowMatcher<'s> {
         corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
-        let matches = part(self.refined, ..stored);
+        let matches = clipped(self.refined, ..stored);
         support(
             matches,
             Shape::new(width, height, CELL_MIN_PX),
@@ -457,7 +457,7 @@ fn images<'a>(
     [width, height]: [usize; 2],
 ) -> Images<'a> {
     let ((left_before, left), (right_before, right)) = (left.frames(), right.frames());
-    let pixels = |data: &'a [u8]| Pixels { data: part(data, ..width * height), width };
+    let pixels = |data: &'a [u8]| Pixels { data: clipped(data, ..width * height), width };
     Images {
         previous_left: pixels(left_before.pixels),
         previous_right: pixels(right_before.pixels),

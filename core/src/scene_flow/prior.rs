@@ -11,7 +11,7 @@
 use super::{SceneFlowConfig, circle::Reach, matches::Match};
 use crate::{
     memory::{Capacity, Carver, region_bytes},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// Side of a bin, px.
@@ -79,7 +79,7 @@ impl<'s> Prior<'s> {
             for row in row.saturating_sub(1)..=(row + 1).min(self.rows.saturating_sub(1)) {
                 let bins = row * self.columns + column.saturating_sub(1)
                     ..=row * self.columns + last_column;
-                for bin in part_mut(self.learned, bins) {
+                for bin in clipped_mut(self.learned, bins) {
                     bin.to_previous_right =
                         extended(bin.to_previous_right, m.previous_left, m.previous_right);
                     bin.to_current_right =

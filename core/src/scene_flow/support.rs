@@ -7,7 +7,7 @@
 //! flow. No mesh, bounded work, and where matches stand dense more neighbours than a triangulation
 //! has.
 
-use crate::part::part;
+use crate::slices::clipped;
 
 use super::{
     SceneFlowConfig,
@@ -39,7 +39,7 @@ pub(super) fn support(
         let [du, dv] = m.flow_px();
         *motion = [m.previous_disparity_px(), du, dv, 0.0];
     }
-    let motion = part(motion, ..matches.len());
+    let motion = clipped(motion, ..matches.len());
     for (&index, own) in order.iter().zip(motion) {
         if let (Some(m), Some(supported)) =
             (matches.get(index as usize), supported.get_mut(index as usize))
@@ -70,7 +70,7 @@ fn is_supported(
             let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else {
                 continue;
             };
-            let run = part(motion, from as usize..to as usize);
+            let run = clipped(motion, from as usize..to as usize);
             neighbours += run.len();
             agreeing +=
                 run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();

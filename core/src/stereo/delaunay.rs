@@ -17,7 +17,7 @@
 
 use crate::{
     memory::{Carver, region_bytes},
-    part::part,
+    slices::clipped,
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -161,7 +161,7 @@ impl<'s> Triangulation<'s> {
 
     /// The points.
     pub fn points(&self) -> &[SupportPoint] {
-        part(self.points, ..self.len)
+        clipped(self.points, ..self.len)
     }
 
     /// The corners of all triangles, in the order in which they were made.

@@ -22,8 +22,8 @@ use super::{
 };
 use crate::{
     lanes::{Eight, LANES},
-    part::{padded, part, part_mut},
     sad::{Comparison, Kernels},
+    slices::{clipped, clipped_mut, padded},
 };
 use core::cell::Cell;
 
@@ -112,12 +112,12 @@ impl DenseMatching<'_> {
         kernels: &impl Kernels,
     ) {
         let end = planes.len().saturating_sub(MARGIN);
-        part_mut(planes, ..MARGIN).fill(NO_PLANE);
-        part_mut(planes, end..).fill(NO_PLANE);
+        clipped_mut(planes, ..MARGIN).fill(NO_PLANE);
+        clipped_mut(planes, end..).fill(NO_PLANE);
         let [left_cells, right_cells] = &self.cells;
         let grid = if LEFT { left_cells } else { right_cells };
         let size = self.config.grid_size.max(1);
-        let sets = part(grid.cells, v / size * grid.columns..);
+        let sets = clipped(grid.cells, v / size * grid.columns..);
         let mut row = Row::<LEFT>::new(self.config, &self.cost, here, other);
         let mut list = [0; 256];
         let mut cell = 0..size;
@@ -148,7 +148,7 @@ fn list_candidates<'l>(set: &DisparitySet, cost: u32, list: &'l mut [u32; 256]) 
             rest &= rest - 1;
         }
     }
-    part(list, ..count)
+    clipped(list, ..count)
 }
 
 /// Eight pixels of a row from column `u` on; those beyond it have no plane.

@@ -7,8 +7,8 @@
 use super::gradient::FLAT;
 use crate::{
     lanes::{Eight, LANES},
-    part::part,
     sad::distance,
+    slices::clipped,
 };
 
 pub(super) use crate::sad::Descriptor;
@@ -55,7 +55,7 @@ impl<'a> Gradients<'a> {
     /// margin are left as they are; returns whether the row has descriptors at all.
     #[inline(always)]
     pub fn describe_row(&self, v: usize, out: &mut [Descriptor]) -> bool {
-        let row = |image: &'a [u8], v: usize| part(image, v * self.width..(v + 1) * self.width);
+        let row = |image: &'a [u8], v: usize| clipped(image, v * self.width..(v + 1) * self.width);
         if v < MARGIN
             || v + MARGIN >= self.height
             || self.width < 2 * MARGIN
@@ -102,7 +102,7 @@ impl<'a> SampledRows<'a> {
     #[inline(always)]
     fn describe_most(&self, out: &mut [Descriptor]) -> usize {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
-        let from = |row: &'a [u8], column: usize| part(row, column..);
+        let from = |row: &'a [u8], column: usize| clipped(row, column..);
         let words = du_here.array_windows::<8>();
         let threes = [du_above, du_below, dv_here].map(|row| from(row, 1).array_windows::<4>());
         let ones = [dv_above, dv_below].map(|row| from(row, 2).iter());

@@ -6,7 +6,7 @@
 
 use crate::{
     parallel::Work,
-    part::{padded, part, part_mut},
+    slices::{clipped, clipped_mut, padded},
 };
 
 use super::{StereoConfig, config::MAX_PLAUSIBLE_WINDOW, support::NO_MATCH};
@@ -32,7 +32,7 @@ impl Work for FilterSupport<'_> {
     #[inline(always)]
     fn run(self) -> [u32; 2] {
         let Self { config, grid, columns, scratch } = self;
-        let scratch = part_mut(scratch, ..grid.len());
+        let scratch = clipped_mut(scratch, ..grid.len());
         [
             remove_implausible(config, grid, columns, scratch),
             remove_redundant(config, grid, columns, scratch),
@@ -117,8 +117,8 @@ fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 
             let here: [i16; BLOCK] = padded(points, 0, 0, NO_MATCH);
             let mut between = [1; BLOCK];
             for rows in [
-                part(above, above.len().saturating_sub(reach * width)..),
-                part(below, ..below.len().min(reach * width)),
+                clipped(above, above.len().saturating_sub(reach * width)..),
+                clipped(below, ..below.len().min(reach * width)),
             ] {
                 let any = any_alike(rows.chunks_exact(width), first, &here, threshold);
                 between.iter_mut().zip(any).for_each(|(between, any)| *between &= any);
@@ -171,7 +171,7 @@ fn remove(points: &mut [i16], flags: &[u16; BLOCK]) -> u32 {
 fn transpose(from: &[i16], width: usize, to: &mut [i16]) {
     let height = from.len() / width.max(1);
     for (u, column) in to.chunks_exact_mut(height.max(1)).enumerate() {
-        let values = part(from, u..).iter().step_by(width.max(1));
+        let values = clipped(from, u..).iter().step_by(width.max(1));
         column.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
     }
 }

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     flags::for_each_set,
     parallel::Work,
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 use core::ops::Range;
 
@@ -58,11 +58,11 @@ impl Work for FillRows<'_> {
         let Self { rows, width, filling, edges } = self;
         let mut filled = 0;
         let width = width.max(1);
-        let edges = part_mut(edges, ..width - 1);
+        let edges = clipped_mut(edges, ..width - 1);
         for row in rows.chunks_exact_mut(width) {
             // Edges between pixels with and without disparity take turns: a gap lies between two of
             // them.
-            for (edge, (&a, &b)) in edges.iter_mut().zip(row.iter().zip(part(row, 1..))) {
+            for (edge, (&a, &b)) in edges.iter_mut().zip(row.iter().zip(clipped(row, 1..))) {
                 *edge = u8::from((a == NONE) != (b == NONE));
             }
             let mut start = None;

@@ -1,7 +1,7 @@
 //! A 3 x 3 median, for pixels whose eight neighbours all have a disparity; the others stay. What
 //! was filled in stays marked so.
 
-use crate::part::part;
+use crate::slices::clipped;
 
 use super::dense::{FILLED, NONE};
 
@@ -9,7 +9,7 @@ use super::dense::{FILLED, NONE};
 pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
     let width = width.max(1);
     for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
-        to.iter_mut().zip(part(from, v * width..)).for_each(|(to, from)| *to = *from);
+        to.iter_mut().zip(clipped(from, v * width..)).for_each(|(to, from)| *to = *from);
         median_row(from, width, v, to);
     }
 }

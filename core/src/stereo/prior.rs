@@ -7,7 +7,7 @@
 use crate::{
     lanes::{self, LANES},
     parallel::Work,
-    part::{padded, part_mut, store},
+    slices::{clipped_mut, padded, store},
 };
 
 use super::{
@@ -75,7 +75,7 @@ fn rasterise_planes(
             plane.rasterise(
                 left as i64,
                 at.into(),
-                part_mut(out, (v - first) * width + left..),
+                clipped_mut(out, (v - first) * width + left..),
                 count,
             );
         }

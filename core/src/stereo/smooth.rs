@@ -8,7 +8,7 @@
 use crate::{
     geometry::scalar::rounded_i32,
     parallel::Work,
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 
 use super::dense::NONE;
@@ -33,7 +33,7 @@ type Taps<'a> = [&'a [i16]; 2 * REACH];
 fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     for (block, (centre, to)) in centre.chunks(BLOCK).zip(to.chunks_mut(BLOCK)).enumerate() {
         let (mut numerators, mut denominators) = ([0; BLOCK], [0; BLOCK]);
-        let [a, b, c, d, e, f, g, h] = taps.map(|tap| part(tap, block * BLOCK..));
+        let [a, b, c, d, e, f, g, h] = taps.map(|tap| clipped(tap, block * BLOCK..));
         let taps = a.iter().zip(b).zip(c.iter().zip(d)).zip(e.iter().zip(f).zip(g.iter().zip(h)));
         let sums = numerators.iter_mut().zip(&mut denominators);
         for ((numerator, denominator), (&centre, (((a, b), (c, d)), ((e, f), (g, h))))) in
@@ -87,7 +87,7 @@ impl Work for Smooth<'_> {
         let inner_rows = REACH..(from.len() / width).saturating_sub(REACH);
         for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
             let row = v * width;
-            to.iter_mut().zip(part(from, row..row + width)).for_each(|(to, from)| *to = *from);
+            to.iter_mut().zip(clipped(from, row..row + width)).for_each(|(to, from)| *to = *from);
             let (inner, stride) = match along {
                 Along::Rows => (REACH..width.saturating_sub(REACH), 1),
                 Along::Columns => (if inner_rows.contains(&v) { 0..width } else { 0..0 }, width),
@@ -95,10 +95,10 @@ impl Work for Smooth<'_> {
             if inner.is_empty() {
                 continue;
             }
-            let pixels = |first: usize| part(from, first..first + inner.len());
+            let pixels = |first: usize| clipped(from, first..first + inner.len());
             let centre = row + inner.start;
             let taps = window().map(|k| pixels(centre + k * stride - REACH * stride));
-            mean(pixels(centre), taps, part_mut(to, inner.clone()));
+            mean(pixels(centre), taps, clipped_mut(to, inner.clone()));
         }
     }
 }

@@ -9,8 +9,8 @@
 
 use crate::{
     lanes::{Eight, LANES},
-    part::{part, part_mut},
     sad::{Comparison, Kernels},
+    slices::{clipped, clipped_mut},
 };
 use core::ops::RangeInclusive;
 
@@ -78,7 +78,7 @@ impl Rows<'_> {
     ) {
         let (west, east) = (first - CORNER, first + CORNER);
         let from = [(self.above, west), (self.above, east), (self.below, west), (self.below, east)];
-        let columns = from.map(|(row, at)| part(row, at..).as_chunks().0);
+        let columns = from.map(|(row, at)| clipped(row, at..).as_chunks().0);
         kernels.costs(point, columns, costs);
         // The east ends first.
         let whole = columns[1].len();
@@ -211,12 +211,12 @@ impl SupportMatching<'_> {
         // At most 64 x 255 = 16,320, so that costs fit i16, whose minimum is one instruction
         // everywhere.
         let mut costs = [[i16::MAX; LANES]; (DISPARITY_LIMIT as usize + 1) / LANES];
-        other.costs(&point, first, part_mut(&mut costs, ..count.div_ceil(LANES)), kernels);
+        other.costs(&point, first, clipped_mut(&mut costs, ..count.div_ceil(LANES)), kernels);
         let costs = costs.as_flattened_mut();
         // What is beyond the columns was compared with them.
-        part_mut(costs, count..count.next_multiple_of(LANES)).fill(i16::MAX);
+        clipped_mut(costs, count..count.next_multiple_of(LANES)).fill(i16::MAX);
         let (blocks, _) = costs.as_chunks_mut();
-        self.distinct(part_mut(blocks, ..count.div_ceil(BLOCK))).map(|i| first + i)
+        self.distinct(clipped_mut(blocks, ..count.div_ceil(BLOCK))).map(|i| first + i)
     }
 
     /// Position of the least cost, if it passes the ratio test. Costs near it are overwritten.

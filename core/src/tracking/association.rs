@@ -25,7 +25,7 @@ use crate::{
     audit::Audit,
     masks::{MaskStore, TwoFrames},
     memory::{Capacity, Carver, region_bytes},
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
     state::Visitor,
 };
 
@@ -104,11 +104,11 @@ impl<'s> TrackTable<'s> {
 
     pub fn all(&self) -> &[Track] {
         debug_assert!(self.len <= self.tracks.len());
-        part(self.tracks, ..self.len)
+        clipped(self.tracks, ..self.len)
     }
 
     pub fn all_mut(&mut self) -> &mut [Track] {
-        part_mut(self.tracks, ..self.len)
+        clipped_mut(self.tracks, ..self.len)
     }
 
     /// Associates the instances of frame `frame` with tracks, or begins new ones. A track keeps the
@@ -197,7 +197,7 @@ impl<'s> TrackTable<'s> {
         instances: &[Instance],
         affinity: impl Fn(&Instance, &Track) -> f32,
     ) {
-        let tracks = part(self.tracks, ..self.len);
+        let tracks = clipped(self.tracks, ..self.len);
         let rows =
             self.scores.chunks_exact_mut(self.tracks.len().max(1)).zip(instances).enumerate();
         for (at, (row, instance)) in rows {

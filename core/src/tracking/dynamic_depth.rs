@@ -4,7 +4,7 @@ use super::{Tracker, TrackingConfig, track::Track};
 use crate::{
     image::ViewMut,
     masks::{MaskStore, ScaledMask},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// Frames over which the depth under an undetected track's predicted mask is removed: detectors
@@ -64,7 +64,7 @@ fn remove_depth(depth_m: &mut ViewMut<'_, f32>, mask: &ScaledMask<'_, '_>) -> u3
     let mut removed = 0;
     for (v, row) in (0..).zip(rows).take(take as usize).skip(skip as usize) {
         mask.runs(v, width, |run| {
-            let depths = part_mut(row, run);
+            let depths = clipped_mut(row, run);
             removed += depths.iter().map(|&depth_m| u32::from(depth_m != 0.0)).sum::<u32>();
             depths.fill(0.0);
         });

@@ -22,7 +22,7 @@ use crate::{
     digest::Digest,
     masks::{MaskHandle, MaskStore, PixelBox, ScaledMask},
     memory::{Capacity, Carver, region_bytes},
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 use bytemuck::{Pod, Zeroable};
 use heapless::Vec;
@@ -103,11 +103,11 @@ impl<'s> Instances<'s> {
 
     pub fn all(&self) -> &[Instance] {
         debug_assert!(self.len <= self.table.len());
-        part(self.table, ..self.len)
+        clipped(self.table, ..self.len)
     }
 
     pub fn all_mut(&mut self) -> &mut [Instance] {
-        part_mut(self.table, ..self.len)
+        clipped_mut(self.table, ..self.len)
     }
 
     /// Validates a frame's detections and keeps the best, with their masks in `store`.

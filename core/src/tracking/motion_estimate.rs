@@ -11,9 +11,9 @@ use super::{
 use crate::{
     egomotion::Estimator,
     geometry::{StereoRig, Transform, histogram::Histogram},
-    part::part,
     random::Random,
     scene_flow::Match,
+    slices::clipped,
 };
 use nalgebra::Point3;
 
@@ -120,7 +120,7 @@ pub(super) fn estimate_motion<'m>(
         }
         let count = find(&expected, buffer);
         debug_assert!(count <= buffer.len());
-        found = part(buffer, ..count);
+        found = clipped(buffer, ..count);
     }
     let matches = matches.chain(found);
     let range = DisparityRange::of(config, frame.rig, matches.clone());

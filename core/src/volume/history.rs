@@ -14,7 +14,7 @@ use super::Slot;
 use crate::state::Visitor;
 use crate::{
     memory::{Capacity, Carver, region_bytes},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// Frames, as bit sets over slots, oldest first out.
@@ -146,10 +146,10 @@ impl<'s> VisibleHistory<'s> {
         for age in 0..*len as u32 {
             let at =
                 (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
-            visitor.u64s(part_mut(sets, at..at + used));
+            visitor.u64s(clipped_mut(sets, at..at + used));
         }
-        visitor.u64s(part_mut(due, ..used));
-        visitor.u32s(part_mut(allocated_at, ..slots));
+        visitor.u64s(clipped_mut(due, ..used));
+        visitor.u32s(clipped_mut(allocated_at, ..slots));
     }
 
     /// The oldest frame in the ring.

@@ -23,7 +23,7 @@ use crate::{
     },
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
-    part::padded,
+    slices::padded,
 };
 
 /// Columns worked on at once.

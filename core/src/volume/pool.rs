@@ -9,7 +9,7 @@
 
 use crate::{
     memory::{Carver, region_bytes},
-    part::part_mut,
+    slices::clipped_mut,
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
@@ -181,7 +181,7 @@ impl<'s> SlotPool<'s> {
         visitor.count(fresh, freed.len());
         visitor.count(freed_len, *fresh);
         visitor.count(peak, freed.len());
-        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(part_mut(freed, ..*freed_len)));
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(clipped_mut(freed, ..*freed_len)));
     }
 
     /// Finds which slots are taken: those given out and not in the free list. Whether that list can

@@ -7,7 +7,7 @@ use super::Slot;
 use crate::state::Visitor;
 use crate::{
     memory::{Carver, region_bytes},
-    part::part_mut,
+    slices::clipped_mut,
 };
 
 /// The list. Links are slot + 1; 0 is none.
@@ -71,7 +71,7 @@ impl<'s> Recency<'s> {
     pub(super) fn visit(&mut self, slots: usize, visitor: &mut impl Visitor) {
         let Self { links, ends } = self;
         visitor.u32s(ends);
-        visitor.u32s(part_mut(links, ..slots).as_flattened_mut());
+        visitor.u32s(clipped_mut(links, ..slots).as_flattened_mut());
     }
 
     fn link(&mut self, entry: u32, links: [u32; 2]) {

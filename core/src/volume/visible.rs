@@ -11,7 +11,7 @@ use super::{Full, Slot};
 use crate::state::Visitor;
 use crate::{
     memory::{Capacity, Carver, region_bytes},
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 
 /// This frame's visible slots, each once.
@@ -108,8 +108,8 @@ impl<'s> VisibleList<'s> {
         visitor.u32(frame);
         visitor.count(peak, slots.len());
         visitor.count(len, slots.len());
-        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(part_mut(slots, ..*len)));
-        visitor.u32s(part_mut(last_visible, ..end));
+        visitor.u32s(bytemuck::cast_slice_mut::<_, u32>(clipped_mut(slots, ..*len)));
+        visitor.u32s(clipped_mut(last_visible, ..end));
     }
 
     /// Orders the list by slot, which is the order of fusion and of memory; all slots are below
@@ -125,7 +125,7 @@ impl<'s> VisibleList<'s> {
 
     /// The slots visible in this frame, ascending.
     pub fn slots(&self) -> &[Slot] {
-        part(self.slots, ..self.len)
+        clipped(self.slots, ..self.len)
     }
 
     /// The most entries a frame ever had.

@@ -9,8 +9,8 @@
 use super::load;
 use crate::{
     lanes::{Eight, LANES},
-    part::{part, store},
     sad::{KEY_SCALE_BITS, Kernels},
+    slices::{clipped, store},
     stereo::{
         StereoConfig,
         config::DISPARITY_LIMIT,
@@ -149,7 +149,7 @@ fn consider<const LEFT: bool>(
     };
     let mut keys = [[BARRED; LANES]; 2];
     let mut border = whole;
-    for (i, &base) in part(bases, ..whole).iter().enumerate() {
+    for (i, &base) in clipped(bases, ..whole).iter().enumerate() {
         let others = other
             .get(matched::<LEFT>(*first, base)..)
             .and_then(|row| row.as_chunks().0.first_chunk::<2>());
@@ -164,7 +164,7 @@ fn consider<const LEFT: bool>(
     for (keys, group) in keys.iter_mut().zip(groups) {
         *keys = kernels.ordered(*keys);
         if border < bases.len() {
-            group.consider_at_border::<LEFT>(other, part(bases, border..), keys, spare, kernels);
+            group.consider_at_border::<LEFT>(other, clipped(bases, border..), keys, spare, kernels);
         }
     }
     keys
@@ -337,20 +337,22 @@ impl Group {
                 let first = (plane & 255) - cost.radius as i32;
                 let costs =
                     if plane >= i32::from(STEEP) { &cost.about_steep } else { &cost.about_plane };
-                let costs = part(costs, ..2 * cost.radius + 1);
+                let costs = clipped(costs, ..2 * cost.radius + 1);
                 let outside = usize::try_from(-first).unwrap_or_default();
                 // A key holds no greater disparity.
                 let within = first.max(0) as u32..=u32::from(DISPARITY_LIMIT);
                 let mut bases = [0; PLANE_WIDTH];
                 let mut count = 0;
-                for ((base, d), &cost) in bases.iter_mut().zip(within).zip(part(costs, outside..)) {
+                for ((base, d), &cost) in
+                    bases.iter_mut().zip(within).zip(clipped(costs, outside..))
+                {
                     *base = (cost << 8) + d;
                     count += 1;
                 }
                 let mut keys = [BARRED; LANES];
                 self.consider_at_border::<LEFT>(
                     other,
-                    part(&bases, ..count),
+                    clipped(&bases, ..count),
                     &mut keys,
                     spare,
                     kernels,

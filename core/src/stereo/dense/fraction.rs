@@ -4,8 +4,8 @@
 use super::{NONE, WORKING_ONE_PX, load};
 use crate::{
     lanes::{Eight, LANES},
-    part::store,
     sad::Kernels,
+    slices::store,
     stereo::{
         StereoConfig,
         descriptor::{Descriptor, MARGIN, UNTEXTURED, eight},

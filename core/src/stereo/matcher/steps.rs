@@ -4,8 +4,8 @@ use super::{ROWS, StereoMatcher};
 use crate::{
     image::{DISPARITY_FILLED, DISPARITY_ONE_PX, InvalidPair, View},
     parallel::{BANDS, Bands, Executor, each, zip2, zip3},
-    part::{part, part_mut},
     sad::compare,
+    slices::{clipped, clipped_mut},
     stereo::{
         GapEnds, StereoConfig, StereoReport,
         config::DISPARITY_LIMIT,
@@ -72,7 +72,7 @@ impl StereoMatcher<'_> {
         each(executor, jobs, |(first, grid, scratch)| {
             compare(executor.vectors(), MatchRows { matching, first, grid, scratch })
         });
-        let grid = part(self.support, ..columns * rows);
+        let grid = clipped(self.support, ..columns * rows);
         report.candidates = grid.len() as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
@@ -112,7 +112,7 @@ impl StereoMatcher<'_> {
         let cells = columns * prior::cells(self.height, config.grid_size);
         let prepare = |mesh: &mut Triangulation<'_>, sets: &mut [DisparitySet]| {
             mesh.triangulate();
-            prior::mark_cells(config, mesh.points(), columns, part_mut(sets, ..cells));
+            prior::mark_cells(config, mesh.points(), columns, clipped_mut(sets, ..cells));
         };
         executor.join(
             || prepare(&mut self.left_mesh, self.left_cells),
@@ -249,7 +249,7 @@ impl StereoMatcher<'_> {
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
         let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
         let image = image_of(self.disparity, pixels);
-        let other = part_mut(self.other, ..pixels);
+        let other = clipped_mut(self.other, ..pixels);
         let smooth = |from: &[i16], along, to: &mut [i16]| {
             let rows = zip2(bands.first(), bands.split_mut(to, width));
             each(executor, rows, |(first, to)| {
@@ -269,7 +269,7 @@ impl StereoMatcher<'_> {
 
     /// Turns working units into the result's.
     pub(super) fn finish(&mut self, invalid: Option<&InvalidPair<'_>>, report: &mut StereoReport) {
-        let disparities = part_mut(self.disparity, ..self.width * self.height);
+        let disparities = clipped_mut(self.disparity, ..self.width * self.height);
         for disparity in disparities.iter_mut() {
             let working = *disparity as i16;
             // Smoothed values stay between those they come from: 0..=255 px.

@@ -11,7 +11,7 @@ use crate::{
         Transform,
         scalar::{max_f64, min_f64},
     },
-    part::part,
+    slices::clipped,
     state::Visitor,
     tracking::association::remove_at,
 };
@@ -205,7 +205,7 @@ impl<'s> Hypotheses<'s> {
 
     pub fn all(&self) -> &[Hypothesis] {
         debug_assert!(self.len <= self.table.len());
-        part(self.table, ..self.len)
+        clipped(self.table, ..self.len)
     }
 
     /// Continues hypotheses with a frame's groups, the nearest first for each, begins new ones and

@@ -47,7 +47,7 @@ use crate::{
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
     parallel::{Executor, Vectors, each, zip2},
-    part::part_mut,
+    slices::clipped_mut,
     volume::{Slot, Viewpoint, Volume},
 };
 use core::fmt;
@@ -210,11 +210,11 @@ impl<'s> Raycaster<'s> {
         }
         let ray_camera = ray_camera(volume, view)?;
         (self.width, self.height) = (view.width, view.height);
-        part_mut(self.depth_m, ..pixels).fill(0.0);
-        part_mut(self.normal, ..pixels).fill([0; 3]);
-        part_mut(self.colour, ..pixels).fill([0; 3]);
-        part_mut(self.weight, ..pixels).fill(0);
-        part_mut(self.layer, ..pixels).fill(0);
+        clipped_mut(self.depth_m, ..pixels).fill(0.0);
+        clipped_mut(self.normal, ..pixels).fill([0; 3]);
+        clipped_mut(self.colour, ..pixels).fill([0; 3]);
+        clipped_mut(self.weight, ..pixels).fill(0);
+        clipped_mut(self.layer, ..pixels).fill(0);
         Ok(self.draw(volume, &ray_camera, 0, executor))
     }
 

@@ -17,7 +17,7 @@ use crate::{
     lanes::{self, Eight, LANES, at_lane, set},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Work, zip2},
-    part::part,
+    slices::clipped,
     volume::BLOCK_SIDE,
 };
 
@@ -99,7 +99,7 @@ impl Strip<'_> {
 
     /// The cells of the pixels of a row.
     pub fn row(&self, row: usize) -> &[CellId] {
-        part(self.cells, row * self.stride..(row + 1) * self.stride)
+        clipped(self.cells, row * self.stride..(row + 1) * self.stride)
     }
 
     /// Eight pixels of a row.

@@ -7,7 +7,7 @@
 use crate::{
     geometry::scalar::max_f32,
     image::View,
-    part::{part, part_mut},
+    slices::{clipped, clipped_mut},
 };
 
 /// Least side of a tile, px, as a shift.
@@ -93,14 +93,14 @@ fn greatest(image: View<'_, f32>, shift: u32, columns: usize, tiles: &mut [f32])
             // Of each column first: many at a time.
             let mut along = [0.0; BLOCK];
             for v in first..image.height().min(first + side) {
-                let pixels = part(image.row(v), start..);
+                let pixels = clipped(image.row(v), start..);
                 along
                     .iter_mut()
                     .zip(pixels)
                     .for_each(|(greatest, &depth_m)| *greatest = max_f32(depth_m, *greatest));
             }
             for (tile, along) in
-                part_mut(tiles, start >> shift..).iter_mut().zip(along.chunks(side))
+                clipped_mut(tiles, start >> shift..).iter_mut().zip(along.chunks(side))
             {
                 *tile = along.iter().fold(*tile, |greatest, &depth_m| max_f32(depth_m, greatest));
             }

@@ -11,7 +11,7 @@ const MISSING: &str = "internal fault: a part of a slice is missing";
 /// The entries of `slice` in `range`.
 #[inline]
 #[track_caller]
-pub(crate) fn part<T, R: SliceIndex<[T], Output = [T]>>(slice: &[T], range: R) -> &[T] {
+pub(crate) fn clipped<T, R: SliceIndex<[T], Output = [T]>>(slice: &[T], range: R) -> &[T] {
     let found = slice.get(range);
     debug_assert!(found.is_some(), "{MISSING}");
     found.unwrap_or(&[])
@@ -20,7 +20,10 @@ pub(crate) fn part<T, R: SliceIndex<[T], Output = [T]>>(slice: &[T], range: R) -
 /// The entries of `slice` in `range`, to be written.
 #[inline]
 #[track_caller]
-pub(crate) fn part_mut<T, R: SliceIndex<[T], Output = [T]>>(slice: &mut [T], range: R) -> &mut [T] {
+pub(crate) fn clipped_mut<T, R: SliceIndex<[T], Output = [T]>>(
+    slice: &mut [T],
+    range: R,
+) -> &mut [T] {
     let found = slice.get_mut(range);
     debug_assert!(found.is_some(), "{MISSING}");
     found.unwrap_or(&mut [])
@@ -72,8 +75,8 @@ mod tests {
     #[test]
     fn a_part_is_what_its_range_says() {
         let mut numbers = [1, 2, 3, 4];
-        assert_eq!((part(&numbers, 1..3), part(&numbers, 4..)), (&[2, 3][..], &[][..]));
-        part_mut(&mut numbers, ..2).fill(0);
+        assert_eq!((clipped(&numbers, 1..3), clipped(&numbers, 4..)), (&[2, 3][..], &[][..]));
+        clipped_mut(&mut numbers, ..2).fill(0);
         assert_eq!(numbers, [0, 0, 3, 4]);
     }
 
@@ -99,12 +102,12 @@ mod tests {
     #[test]
     #[should_panic(expected = "internal fault")]
     fn a_missing_part_stops_a_test() {
-        part(&[1, 2, 3], 2..5);
+        clipped(&[1, 2, 3], 2..5);
     }
 
     #[test]
     #[should_panic(expected = "internal fault")]
     fn so_does_one_to_be_written() {
-        part_mut(&mut [1, 2, 3], ..4);
+        clipped_mut(&mut [1, 2, 3], ..4);
     }
 }
