@@ -17,12 +17,12 @@
 #[cfg(test)]
 extern crate std;
 
-mod audit;
 pub mod digest;
 pub mod egomotion;
 mod flags;
 pub mod geometry;
 pub mod image;
+mod invariants;
 mod lanes;
 pub mod mapper;
 pub mod masks;

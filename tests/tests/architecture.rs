@@ -15,7 +15,7 @@ type Layers = &'static [(&'static str, &'static [&'static str])];
 /// The core: leaves first.
 const CORE: Layers = &[
     ("problem", &[]),
-    ("audit", &[]),
+    ("invariants", &[]),
     ("digest", &[]),
     ("memory", &[]),
     ("slices", &[]),
@@ -41,8 +41,17 @@ const CORE: Layers = &[
     (
         "scene_flow",
         &[
-            "audit", "digest", "geometry", "image", "lanes", "memory", "parallel", "slices",
-            "problem", "sad", "state",
+            "invariants",
+            "digest",
+            "geometry",
+            "image",
+            "lanes",
+            "memory",
+            "parallel",
+            "slices",
+            "problem",
+            "sad",
+            "state",
         ],
     ),
     (
@@ -53,7 +62,7 @@ const CORE: Layers = &[
     (
         "tracking",
         &[
-            "audit",
+            "invariants",
             "digest",
             "egomotion",
             "geometry",
@@ -70,8 +79,16 @@ const CORE: Layers = &[
     (
         "volume",
         &[
-            "audit", "digest", "flags", "geometry", "image", "memory", "parallel", "slices",
-            "problem", "state",
+            "invariants",
+            "digest",
+            "flags",
+            "geometry",
+            "image",
+            "memory",
+            "parallel",
+            "slices",
+            "problem",
+            "state",
         ],
     ),
     (
@@ -84,8 +101,18 @@ const CORE: Layers = &[
     (
         "objects",
         &[
-            "audit", "digest", "geometry", "image", "masks", "memory", "parallel", "slices",
-            "problem", "state", "tracking", "volume",
+            "invariants",
+            "digest",
+            "geometry",
+            "image",
+            "masks",
+            "memory",
+            "parallel",
+            "slices",
+            "problem",
+            "state",
+            "tracking",
+            "volume",
         ],
     ),
     (
@@ -98,7 +125,7 @@ const CORE: Layers = &[
     (
         "mapper",
         &[
-            "audit",
+            "invariants",
             "digest",
             "egomotion",
             "geometry",

@@ -9,10 +9,10 @@ use super::{
 };
 use crate::{
     Executor, Stage,
-    audit::Audit,
     digest::Digest,
     egomotion::MotionEstimate,
     image::InvalidPair,
+    invariants::Invariants,
     objects::{InstancesReport, NoSink, ObjectFrame, ObjectSink, Picture},
     rectify::{Pair, self_calibration::SelfCalibration},
     scene_flow::{FlowMatcher, FlowReport, Match},
@@ -226,7 +226,7 @@ impl Mapper<'_> {
             allocation,
             prune,
             blocks: self.block_count(),
-            internal_faults: self.audit(),
+            internal_faults: self.invariants(),
             digests,
             digest: digests.whole(self.frame),
         };
@@ -235,14 +235,14 @@ impl Mapper<'_> {
     }
 
     /// How much of what must hold after a frame does not.
-    fn audit(&self) -> u32 {
-        let mut audit = Audit::default();
-        audit.require(self.camera.t_world_camera().is_finite(), "the camera's pose is finite");
-        self.scene_flow.audit(&mut audit);
-        self.tracker.audit(&mut audit);
-        self.objects.audit(&mut audit);
-        self.background.audit(&mut audit);
-        audit.faults()
+    fn invariants(&self) -> u32 {
+        let mut invariants = Invariants::default();
+        invariants.require(self.camera.t_world_camera().is_finite(), "the camera's pose is finite");
+        self.scene_flow.invariants(&mut invariants);
+        self.tracker.invariants(&mut invariants);
+        self.objects.invariants(&mut invariants);
+        self.background.invariants(&mut invariants);
+        invariants.faults()
     }
 
     fn block_count(&self) -> BlockCount {

@@ -11,10 +11,10 @@
 //! 152 bytes.
 
 use crate::{
-    audit::Audit,
     digest::Digest,
     geometry::{StereoRig, Transform, histogram::Histogram},
     image::View,
+    invariants::Invariants,
     masks::{MaskHandle, MaskStore, PixelBox},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Vectors, Work},
@@ -329,11 +329,12 @@ impl<'s> Crops<'s> {
     }
 
     /// Says what must hold of the ring after a frame.
-    pub fn audit(&self, audit: &mut Audit) {
-        audit.require(self.len <= self.entries.len(), "no more crops wait than there are entries");
+    pub fn invariants(&self, invariants: &mut Invariants) {
+        invariants
+            .require(self.len <= self.entries.len(), "no more crops wait than there are entries");
         let pixels = self.disparity_q8.len();
         for crop in self.entries.iter().take(self.len) {
-            audit.require(
+            invariants.require(
                 crop.start as usize + crop.len as usize <= pixels,
                 "a crop's pixels lie in the ring",
             );

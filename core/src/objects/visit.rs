@@ -2,26 +2,26 @@
 
 use super::{Object, ObjectSummary, Objects};
 use crate::{
-    audit::Audit,
     geometry::Transform,
+    invariants::Invariants,
     state::Visitor,
     tracking::{Class, MotionState},
 };
 
 impl Objects<'_> {
     /// Says what must hold of crops and volumes after a frame.
-    pub(crate) fn audit(&self, audit: &mut Audit) {
-        self.crops.audit(audit);
+    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+        self.crops.invariants(invariants);
         for object in &self.volumes.objects {
-            audit.require(
+            invariants.require(
                 object.summary.is_none_or(|summary| summary.id != 0),
                 "an object belongs to a track",
             );
-            audit.require(
+            invariants.require(
                 object.summary.is_some() || object.volume.pool().is_empty(),
                 "a volume without an object is empty",
             );
-            object.volume.audit(audit);
+            object.volume.invariants(invariants);
         }
     }
 

@@ -13,10 +13,10 @@ use super::{
     support::{Motion, support},
 };
 use crate::{
-    audit::Audit,
     digest::Digest,
     geometry::PixelCorrection,
     image::{InvalidPair, View},
+    invariants::Invariants,
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, Vectors, each, zip3},
     slices::clipped,
@@ -215,17 +215,17 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Says what must hold of the matches after a frame.
-    pub(crate) fn audit(&self, audit: &mut Audit) {
-        audit.require(
+    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+        invariants.require(
             self.sparse_len <= self.sparse.len(),
             "no more sparse matches than there is memory for",
         );
-        audit.require(
+        invariants.require(
             self.refined_len <= self.refined.len(),
             "no more refined matches than there is memory for",
         );
         let selected = |&index: &u32| (index as usize) < self.refined_len;
-        audit.require(
+        invariants.require(
             self.selection().iter().all(selected),
             "every selected match is a refined one",
         );

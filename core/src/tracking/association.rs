@@ -22,7 +22,7 @@ use super::{
     track::Track,
 };
 use crate::{
-    audit::Audit,
+    invariants::Invariants,
     masks::{MaskStore, TwoFrames},
     memory::{Capacity, Carver, region_bytes},
     slices::{clipped, clipped_mut},
@@ -76,18 +76,18 @@ impl<'s> TrackTable<'s> {
 
     /// Says what must hold of the tracks after frame `frame`, in which there were so many
     /// instances.
-    pub fn audit(&self, frame: u32, instances: usize, audit: &mut Audit) {
-        audit.require(
+    pub fn invariants(&self, frame: u32, instances: usize, invariants: &mut Invariants) {
+        invariants.require(
             self.len <= self.tracks.len(),
             "the table has no more tracks than its capacity",
         );
         for track in self.all() {
-            audit.require(track.id != 0, "a track has a number");
-            audit.require(
+            invariants.require(track.id != 0, "a track has a number");
+            invariants.require(
                 track.first_frame <= track.last_frame && track.last_frame <= frame,
                 "a track was seen before it was seen last",
             );
-            audit.require(
+            invariants.require(
                 track.instance.get().is_none_or(|index| index < instances),
                 "a track's instance is one of this frame",
             );

@@ -1,12 +1,12 @@
 //! Tracks and masks as state.
 
 use super::Tracker;
-use crate::{audit::Audit, state::Visitor};
+use crate::{invariants::Invariants, state::Visitor};
 
 impl Tracker<'_> {
     /// Says what must hold of the tracks after a frame.
-    pub(crate) fn audit(&self, audit: &mut Audit) {
-        self.tracks.audit(self.frame, self.instances.all().len(), audit);
+    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+        self.tracks.invariants(self.frame, self.instances.all().len(), invariants);
     }
 
     /// Visits all that outlives a frame. Only this frame's mask store does: the next frame empties

@@ -2,7 +2,7 @@
 //! when.
 
 use super::Volume;
-use crate::{audit::Audit, state::Visitor};
+use crate::{invariants::Invariants, state::Visitor};
 
 impl Volume<'_> {
     /// Visits every field; [`Volume::rebuild`] must follow a reading.
@@ -33,21 +33,21 @@ impl Volume<'_> {
     }
 
     /// Says what must hold of the volume after a frame.
-    pub(crate) fn audit(&self, audit: &mut Audit) {
-        audit.require(
+    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+        invariants.require(
             self.pool.len() <= self.pool.capacity(),
             "no more blocks are in use than the pool has",
         );
-        audit.require(
+        invariants.require(
             self.pool.is_empty() == self.recency.oldest().is_none(),
             "every block in use is in the list of recency",
         );
-        audit.require(
+        invariants.require(
             self.history.len() <= self.history.capacity(),
             "the window has no more frames than it can hold",
         );
         let end = self.pool.high_water();
-        audit.require(
+        invariants.require(
             self.visible.slots().iter().all(|slot| slot.index() < end),
             "every visible slot was given out",
         );

@@ -1,17 +1,17 @@
 //! Contradictions in what the software itself controls.
 //!
 //! What the world sends is checked and refused; what the core keeps must be right. Each owner of
-//! state has an `audit` that says what must hold after a frame. Where it does not hold, a test
+//! state has an `invariants` that says what must hold after a frame. Where it does not hold, a test
 //! stops, and every other build counts it into [`crate::Report::internal_faults`]: nothing wrong
 //! goes on unseen.
 
 /// Counts what does not hold.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Audit {
+pub(crate) struct Invariants {
     faults: u32,
 }
 
-impl Audit {
+impl Invariants {
     /// Notes whether `what` holds.
     #[track_caller]
     pub fn require(&mut self, holds: bool, what: &'static str) {
@@ -31,14 +31,14 @@ mod tests {
 
     #[test]
     fn what_holds_is_no_fault() {
-        let mut audit = Audit::default();
-        audit.require(true, "one is one");
-        assert_eq!(audit.faults(), 0);
+        let mut invariants = Invariants::default();
+        invariants.require(true, "one is one");
+        assert_eq!(invariants.faults(), 0);
     }
 
     #[test]
     #[should_panic(expected = "internal fault: the pool is no larger than its capacity")]
     fn a_fault_stops_a_test() {
-        Audit::default().require(false, "the pool is no larger than its capacity");
+        Invariants::default().require(false, "the pool is no larger than its capacity");
     }
 }
