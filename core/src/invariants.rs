@@ -1,9 +1,8 @@
 //! Contradictions in what the software itself controls.
 //!
 //! What the world sends is checked and refused; what the core keeps must be right. Each owner of
-//! state has an `invariants` that says what must hold after a frame. Where it does not hold, a test
-//! stops, and every other build counts it into [`crate::Report::internal_faults`]: nothing wrong
-//! goes on unseen.
+//! state has a `check_invariants` that says what must hold after a frame. Where it does not hold, a
+//! test stops, and every other build counts it into [`crate::Report::internal_faults`].
 
 /// Counts what does not hold.
 #[derive(Clone, Copy, Debug, Default)]

@@ -17,6 +17,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod bits;
 pub mod digest;
 pub mod egomotion;
 mod flags;

@@ -69,8 +69,12 @@ fn a_block_takes_the_bytes_promised_and_finding_and_remembering_it_little_beside
             };
             let voxels = bytes(&["volume.voxels", "volume.colour"]);
             assert_eq!(voxels, voxel_bytes * capacity.blocks);
-            let beside =
-                bytes(&["volume.index", "volume.history", "volume.history_due", "volume.born"]);
+            let beside = bytes(&[
+                "volume.index",
+                "volume.history",
+                "volume.history_due",
+                "volume.allocated_at",
+            ]);
             assert!(beside > 0 && 20 * beside <= voxels, "{beside} bytes beside {voxels}");
         });
     }

@@ -1,6 +1,6 @@
 //! Which pixels of an image show anything.
 
-use crate::slices::clipped;
+use crate::{bits::set_bits, slices::clipped};
 
 /// Pixels a word has bits for.
 const WORD: usize = 64;
@@ -37,20 +37,8 @@ impl<'a> InvalidPixels<'a> {
     pub(crate) fn in_row(&self, v: usize) -> impl Iterator<Item = usize> + use<'a> {
         let row = Self::words_a_row(self.width);
         let words = clipped(self.words, v * row..(v + 1) * row);
-        words.iter().enumerate().flat_map(|(at, &word)| Bits(word).map(move |bit| at * WORD + bit))
-    }
-}
-
-/// The set bits of a word, from the lowest.
-struct Bits(u64);
-
-impl Iterator for Bits {
-    type Item = usize;
-
-    fn next(&mut self) -> Option<usize> {
-        let bit = (self.0 != 0).then(|| self.0.trailing_zeros() as usize)?;
-        self.0 &= self.0 - 1;
-        Some(bit)
+        let columns = |(at, &word)| set_bits(word).map(move |bit| at * WORD + bit as usize);
+        words.iter().enumerate().flat_map(columns)
     }
 }
 

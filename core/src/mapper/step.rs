@@ -226,7 +226,7 @@ impl Mapper<'_> {
             allocation,
             prune,
             blocks: self.block_count(),
-            internal_faults: self.invariants(),
+            internal_faults: self.check_invariants(),
             digests,
             digest: digests.whole(self.frame),
         };
@@ -235,13 +235,13 @@ impl Mapper<'_> {
     }
 
     /// How much of what must hold after a frame does not.
-    fn invariants(&self) -> u32 {
+    fn check_invariants(&self) -> u32 {
         let mut invariants = Invariants::default();
         invariants.require(self.camera.t_world_camera().is_finite(), "the camera's pose is finite");
-        self.scene_flow.invariants(&mut invariants);
-        self.tracker.invariants(&mut invariants);
-        self.objects.invariants(&mut invariants);
-        self.background.invariants(&mut invariants);
+        self.scene_flow.check_invariants(&mut invariants);
+        self.tracker.check_invariants(&mut invariants);
+        self.objects.check_invariants(&mut invariants);
+        self.background.check_invariants(&mut invariants);
         invariants.faults()
     }
 

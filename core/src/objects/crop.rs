@@ -329,7 +329,7 @@ impl<'s> Crops<'s> {
     }
 
     /// Says what must hold of the ring after a frame.
-    pub fn invariants(&self, invariants: &mut Invariants) {
+    pub fn check_invariants(&self, invariants: &mut Invariants) {
         invariants
             .require(self.len <= self.entries.len(), "no more crops wait than there are entries");
         let pixels = self.disparity_q8.len();

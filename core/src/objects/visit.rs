@@ -10,8 +10,8 @@ use crate::{
 
 impl Objects<'_> {
     /// Says what must hold of crops and volumes after a frame.
-    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
-        self.crops.invariants(invariants);
+    pub(crate) fn check_invariants(&self, invariants: &mut Invariants) {
+        self.crops.check_invariants(invariants);
         for object in &self.volumes.objects {
             invariants.require(
                 object.summary.is_none_or(|summary| summary.id != 0),
@@ -21,7 +21,7 @@ impl Objects<'_> {
                 object.summary.is_some() || object.volume.pool().is_empty(),
                 "a volume without an object is empty",
             );
-            object.volume.invariants(invariants);
+            object.volume.check_invariants(invariants);
         }
     }
 

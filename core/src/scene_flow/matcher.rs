@@ -215,7 +215,7 @@ impl<'s> FlowMatcher<'s> {
     }
 
     /// Says what must hold of the matches after a frame.
-    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+    pub(crate) fn check_invariants(&self, invariants: &mut Invariants) {
         invariants.require(
             self.sparse_len <= self.sparse.len(),
             "no more sparse matches than there is memory for",

@@ -223,7 +223,7 @@ impl<'s> StereoMatcher<'s> {
         self.match_support(config, executor, &mut report);
         done(StereoStep::Support);
         self.filter_support_points(config, executor, &mut report);
-        done(StereoStep::Sifting);
+        done(StereoStep::FilterSupport);
         self.triangulate(config, executor, &mut report);
         done(StereoStep::Triangulation);
         if report.triangles_left == 0 || report.triangles_right == 0 {

@@ -78,7 +78,7 @@ pub enum StereoStep {
     /// Support points matched over the full disparity range.
     Support,
     /// Implausible and redundant support points removed.
-    Sifting,
+    FilterSupport,
     /// Both triangulations and grid priors.
     Triangulation,
     /// Planes drawn, both images matched densely and compared.
@@ -98,7 +98,7 @@ impl StereoStep {
     pub const ALL: [Self; 9] = [
         Self::Gradients,
         Self::Support,
-        Self::Sifting,
+        Self::FilterSupport,
         Self::Triangulation,
         Self::DenseMatching,
         Self::Speckles,
@@ -112,7 +112,7 @@ impl StereoStep {
         match self {
             Self::Gradients => "gradients",
             Self::Support => "support",
-            Self::Sifting => "sifting",
+            Self::FilterSupport => "filter_support",
             Self::Triangulation => "triangulation",
             Self::DenseMatching => "dense_matching",
             Self::Speckles => "speckles",

@@ -76,7 +76,7 @@ impl<'s> TrackTable<'s> {
 
     /// Says what must hold of the tracks after frame `frame`, in which there were so many
     /// instances.
-    pub fn invariants(&self, frame: u32, instances: usize, invariants: &mut Invariants) {
+    pub fn check_invariants(&self, frame: u32, instances: usize, invariants: &mut Invariants) {
         invariants.require(
             self.len <= self.tracks.len(),
             "the table has no more tracks than its capacity",

@@ -5,8 +5,8 @@ use crate::{invariants::Invariants, state::Visitor};
 
 impl Tracker<'_> {
     /// Says what must hold of the tracks after a frame.
-    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
-        self.tracks.invariants(self.frame, self.instances.all().len(), invariants);
+    pub(crate) fn check_invariants(&self, invariants: &mut Invariants) {
+        self.tracks.check_invariants(self.frame, self.instances.all().len(), invariants);
     }
 
     /// Visits all that outlives a frame. Only this frame's mask store does: the next frame empties

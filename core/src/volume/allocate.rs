@@ -136,7 +136,7 @@ impl Volume<'_> {
         if self.visible.mark(slot).is_err() {
             report.unlisted += 1;
         }
-        self.recency.touch(slot);
+        self.lru.touch(slot);
     }
 
     /// Takes a slot for a new, empty block.

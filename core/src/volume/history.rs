@@ -52,7 +52,7 @@ impl<'s> VisibleHistory<'s> {
             sets: carver.alloc("volume.history", capacity.history_frames * words),
             words,
             due: carver.alloc("volume.history_due", words),
-            allocated_at: carver.alloc("volume.born", capacity.blocks),
+            allocated_at: carver.alloc("volume.allocated_at", capacity.blocks),
             oldest: 0,
             len: 0,
             peak: 0,

@@ -15,10 +15,10 @@ mod erase;
 mod fuse;
 mod history;
 mod index;
+mod lru_list;
 mod observed;
 mod pool;
 mod prune;
-mod recency;
 mod request;
 mod sampler;
 mod store;
@@ -34,10 +34,10 @@ pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, VolumeConfig, Wh
 pub use fuse::Observation;
 pub use history::VisibleHistory;
 pub use index::BlockIndex;
+pub(crate) use lru_list::LruList;
 pub(crate) use observed::ObservedDepth;
 pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
-pub(crate) use recency::Recency;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
 pub use viewpoint::Viewpoint;
@@ -55,7 +55,7 @@ pub struct Volume<'s> {
     visible: VisibleList<'s>,
     requested: request::RequestedCache<'s>,
     history: VisibleHistory<'s>,
-    recency: Recency<'s>,
+    lru: LruList<'s>,
     digest: u64,
 }
 
@@ -68,7 +68,7 @@ impl<'s> Volume<'s> {
             + VisibleList::bytes(capacity)
             + request::RequestedCache::bytes()
             + VisibleHistory::bytes(capacity)
-            + Recency::bytes(capacity.blocks)
+            + LruList::bytes(capacity.blocks)
     }
 
     /// Cuts an empty map.
@@ -81,7 +81,7 @@ impl<'s> Volume<'s> {
             visible: VisibleList::new_in(capacity, carver),
             requested: request::RequestedCache::new_in(carver),
             history: VisibleHistory::new_in(capacity, carver),
-            recency: Recency::new_in(capacity.blocks, carver),
+            lru: LruList::new_in(capacity.blocks, carver),
             digest: 0,
         }
     }

@@ -8,6 +8,7 @@
 //! gives out 0, 1, 2, …; a freed slot is the next one given out.
 
 use crate::{
+    bits::set_bits,
     memory::{Carver, region_bytes},
     slices::clipped_mut,
     state::Visitor,
@@ -150,7 +151,7 @@ impl<'s> SlotPool<'s> {
     /// The slots taken, ascending.
     pub fn live(&self) -> impl Iterator<Item = Slot> + Clone + '_ {
         let words = self.live.iter().take(self.fresh.div_ceil(64));
-        (0u32..).zip(words).flat_map(|(i, &word)| bits(word).map(move |bit| Slot(64 * i + bit)))
+        (0u32..).zip(words).flat_map(|(i, &word)| set_bits(word).map(move |bit| Slot(64 * i + bit)))
     }
 
     /// The first slot at or after position `from` that is taken: a walk that may free slots on its
@@ -161,7 +162,7 @@ impl<'s> SlotPool<'s> {
         words
             .map(|(i, &word)| (i, if i == first { word & u64::MAX << (from % 64) } else { word }))
             .find_map(|(i, word)| {
-                let bit = bits(word).next()?;
+                let bit = set_bits(word).next()?;
                 Some(Slot(64 * i + bit))
             })
     }
@@ -197,15 +198,6 @@ impl<'s> SlotPool<'s> {
         }
         true
     }
-}
-
-/// The bits set in a word, lowest first.
-fn bits(mut word: u64) -> impl Iterator<Item = u32> + Clone {
-    core::iter::from_fn(move || {
-        let bit = word.trailing_zeros();
-        word &= word.wrapping_sub(1);
-        (bit < 64).then_some(bit)
-    })
 }
 
 #[cfg(test)]

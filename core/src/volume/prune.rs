@@ -155,7 +155,7 @@ impl Volume<'_> {
             .digest
             .wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));
         self.history.on_free(slot);
-        self.recency.remove(slot);
+        self.lru.remove(slot);
         self.pool.free(slot);
     }
 }

@@ -81,7 +81,7 @@ impl Volume<'_> {
         store: &mut S,
         report: &mut EvictionReport,
     ) -> bool {
-        let Some(slot) = self.recency.oldest() else { return false };
+        let Some(slot) = self.lru.oldest() else { return false };
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
             return false;
         }

@@ -12,7 +12,7 @@ impl Volume<'_> {
             blocks,
             visible,
             history,
-            recency,
+            lru,
             // Rebuilt, given by the caller, or of one frame alone.
             index: _,
             digest: _,
@@ -29,18 +29,18 @@ impl Volume<'_> {
         }
         visible.visit(slots, visitor);
         history.visit(slots, visitor);
-        recency.visit(slots, visitor);
+        lru.visit(slots, visitor);
     }
 
     /// Says what must hold of the volume after a frame.
-    pub(crate) fn invariants(&self, invariants: &mut Invariants) {
+    pub(crate) fn check_invariants(&self, invariants: &mut Invariants) {
         invariants.require(
             self.pool.len() <= self.pool.capacity(),
             "no more blocks are in use than the pool has",
         );
         invariants.require(
-            self.pool.is_empty() == self.recency.oldest().is_none(),
-            "every block in use is in the list of recency",
+            self.pool.is_empty() == self.lru.oldest().is_none(),
+            "every block in use is in the LRU list",
         );
         invariants.require(
             self.history.len() <= self.history.capacity(),

@@ -3,7 +3,7 @@
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 8 | `DVXDRIVE` |
+//! | 8 | `DVXSNAP\0` |
 //! | 4 | [`VERSION`], little-endian as all numbers here |
 //! | 8 | length of the host's part |
 //! | | the host's part, CBOR: manifest, end of the file of blocks, state |
@@ -39,7 +39,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Take, Write};
 use std::path::{Path, PathBuf};
 
-const MAGIC: [u8; 8] = *b"DVXDRIVE";
+const MAGIC: [u8; 8] = *b"DVXSNAP\0";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
 const VERSION: u32 = 7;
 /// Magic, version, length.

@@ -12,7 +12,7 @@ use crate::{
 
 /// The list. Links are slot + 1; 0 is none.
 #[derive(Debug)]
-pub(crate) struct Recency<'s> {
+pub(crate) struct LruList<'s> {
     /// Towards blocks unseen for longer, and towards those seen later.
     links: &'s mut [[u32; 2]],
     /// Slot + 1 of the block unseen for longest and of the one seen last.
@@ -27,7 +27,7 @@ fn link(slot: Slot) -> u32 {
 const OLDER: usize = 0;
 const NEWER: usize = 1;
 
-impl<'s> Recency<'s> {
+impl<'s> LruList<'s> {
     /// Bytes of the slab.
     pub(crate) const fn bytes(blocks: usize) -> usize {
         region_bytes::<[u32; 2]>(blocks)
@@ -35,7 +35,7 @@ impl<'s> Recency<'s> {
 
     /// Cuts an empty list for `blocks` slots.
     pub(crate) fn new_in(blocks: usize, carver: &mut Carver<'s>) -> Self {
-        Self { links: carver.alloc("volume.recency", blocks), ends: [0; 2] }
+        Self { links: carver.alloc("volume.lru_list", blocks), ends: [0; 2] }
     }
 
     /// The slot unseen for longest.
@@ -105,26 +105,25 @@ mod tests {
     #[test]
     fn keeps_the_order_of_last_touch_through_a_hundred_thousand_operations() {
         const SLOTS: u32 = 40;
-        let mut slab = Box::new(Slab([0u8; Recency::bytes(SLOTS as usize)]));
+        let mut slab = Box::new(Slab([0u8; LruList::bytes(SLOTS as usize)]));
         let len = slab.0.len();
-        let mut recency =
-            Recency::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
+        let mut lru = LruList::new_in(SLOTS as usize, &mut Carver::new(&mut slab.0, len).unwrap());
         let (mut model, mut random) = (Vec::<Slot>::new(), Random::new(1));
         for _ in 0..100_000 {
             let slot = Slot::new(random.below(SLOTS));
             model.retain(|&other| other != slot);
             if random.below(3) == 0 {
-                recency.remove(slot);
+                lru.remove(slot);
             } else {
-                recency.touch(slot);
+                lru.touch(slot);
                 model.push(slot);
             }
-            assert_eq!(recency.oldest(), model.first().copied());
+            assert_eq!(lru.oldest(), model.first().copied());
             let mut walked = Vec::new();
-            let mut at = recency.ends[OLDER];
+            let mut at = lru.ends[OLDER];
             while let Some(slot) = at.checked_sub(1) {
                 walked.push(Slot::new(slot));
-                at = recency.links[slot as usize][NEWER];
+                at = lru.links[slot as usize][NEWER];
             }
             assert_eq!(walked, model);
         }
