@@ -1,5 +1,5 @@
 #!/bin/sh
-# The table of map size, accuracy and completeness against the prune weight: `docs/prune_weights.sh [dynvox run arguments]`.
+# The table of map size, accuracy and completeness against the prune weight: `host/tools/prune_weights.sh [dynvox run arguments]`.
 # Needs jq. DYNVOX names the binary.
 set -eu
 dynvox=${DYNVOX:-target/release/dynvox}

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reads a run's recording back with the `mcap` package of PyPI and compares it with the rest of the run folder.
 
-docs/read_mcap.py RUN_FOLDER      (needs mcap, jsonschema, numpy, pillow)
+host/tools/read_mcap.py RUN_FOLDER      (needs mcap, jsonschema, numpy, pillow)
 
 Every message must satisfy the schema in the file; times, poses, figures and the sizes of images must be those of frames.csv, trajectory_tum.txt and
 summary.json; topics must have as many messages as the run has frames. Prints a line for each topic.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Speeds and motion states at other frame rates, with irregular time stamps and with dropped frames, against those at 10 Hz.
 
-docs/time_stamps.py DYNVOX FOLDER [SETTING=VALUE ...] renders twelve seconds of the street at 30 Hz into FOLDER once, links its frames as 10 Hz, 30 Hz,
+host/tools/time_stamps.py DYNVOX FOLDER [SETTING=VALUE ...] renders twelve seconds of the street at 30 Hz into FOLDER once, links its frames as 10 Hz, 30 Hz,
 irregular and 10 Hz without every seventh frame, maps each with exact masks, and prints the median speed of each moving object.
 """
 import collections, csv, os, pathlib, shutil, statistics, subprocess, sys

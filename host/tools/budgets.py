@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Budgets asked of `dynvox budget`: the share of each that is used, or the least that works. docs/budgets.py DYNVOX
+"""Budgets asked of `dynvox budget`: the share of each that is used, or the least that works. host/tools/budgets.py DYNVOX
 
-docs/budgets.py DYNVOX FOLDER maps 200 frames of the street in six of them and prints what each bound refused.
+host/tools/budgets.py DYNVOX FOLDER maps 200 frames of the street in six of them and prints what each bound refused.
 """
 import json, pathlib, re, subprocess, sys
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the street's frames as recordings of ROS 2 by other tools: `mcap` and `rosbags` of PyPI.
 
-docs/write_bags.py STREET OUT      (needs mcap, rosbags, numpy, pillow)
+host/tools/write_bags.py STREET OUT      (needs mcap, rosbags, numpy, pillow)
 
 STREET is a folder of `dynvox synth`. OUT gets mcap.mcap (the mcap package: CDR written by rosbags' type system) and rosbags/ (a bag of
 rosbags with MCAP storage), raw mono8 images and CameraInfo; `dynvox run` on each must give the digest of `dynvox run STREET --images grey`.

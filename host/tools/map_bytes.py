@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where the bytes of a run's `map.ply` go, and what would make it smaller.
 
-docs/map_bytes.py RUN_FOLDER      (needs numpy, scipy)
+host/tools/map_bytes.py RUN_FOLDER      (needs numpy, scipy)
 
 Prints the bytes of vertices and faces; the share of vertices that are there twice; the share of triangles in components of fewer than so many; and
 the size left if vertices close to a lattice point moved there and the triangles that collapse were dropped.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Memory, snapshots and lost blocks of a run of many frames.
 
-docs/long_run.py DYNVOX FOLDER [FRAMES [RUN OPTION ...]] renders 200 frames of the street with cars at 96 x 64 px into FOLDER once, links them to and fro as
+host/tools/long_run.py DYNVOX FOLDER [FRAMES [RUN OPTION ...]] renders 200 frames of the street with cars at 96 x 64 px into FOLDER once, links them to and fro as
 a recording of FRAMES frames (100,000), maps it with the profile `tiny` (2,500 blocks, the others on disk) and a snapshot every 1,000 frames, and prints
 resident memory along the run, the time that snapshots take, and blocks lost. FOLDER may be deleted afterwards.
 """

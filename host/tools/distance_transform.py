@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The core's distance transform against SciPy's, on maps of runs and on random ones: squared distances must be equal, and how long each takes.
 
-docs/distance_transform.py EXAMPLE MAP.pgm [...] takes the built example `distance_transform` of dynvox-core and binary PGM files, as `dynvox run --planning`
+host/tools/distance_transform.py EXAMPLE MAP.pgm [...] takes the built example `distance_transform` of dynvox-core and binary PGM files, as `dynvox run --planning`
 writes to planning/map.pgm. Needs numpy and scipy. Both sides of the obstacles are compared: SciPy transforms the map and its inverse. Ends with 1 where a
 distance differs.
 """
