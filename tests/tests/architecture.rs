@@ -80,6 +80,7 @@ const CORE: Layers = &[
     (
         "volume",
         &[
+            "bits",
             "invariants",
             "digest",
             "flags",
