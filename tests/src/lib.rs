@@ -1,8 +1,16 @@
 //! What the integration tests share: a slab for a mapper, clips of the synthetic street, and the
 //! repository's own source.
 //!
-//! The README's example is compiled and run with the doc tests of this package.
+//! The Rust blocks of the README and of the book are compiled and run with the doc tests of this
+//! package.
 #![cfg_attr(doctest, doc = include_str!("../../README.md"))]
+
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/rust.md")]
+pub mod rust_page {}
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/pin_your_rig.md")]
+pub mod pin_your_rig_page {}
 
 pub mod fuzz;
 pub mod source;

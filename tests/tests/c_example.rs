@@ -31,11 +31,17 @@ fn library() -> PathBuf {
 /// Builds an example with the system's compiler.
 fn build(name: &str, folder: &Path) -> PathBuf {
     let capi = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/capi");
-    let program = folder.join(name);
+    build_source(&capi.join("examples").join(name).with_extension("c"), folder)
+}
+
+/// Builds a C file with the system's compiler, into `folder`.
+fn build_source(source: &Path, folder: &Path) -> PathBuf {
+    let capi = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/capi");
+    let program = folder.join(source.file_stem().expect("a file"));
     let built = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
         .arg(capi.join("include"))
-        .arg(capi.join("examples").join(name).with_extension("c"))
+        .arg(source)
         .arg(library())
         .args(["-lm", "-lpthread", "-ldl", "-o"])
         .arg(&program)
@@ -43,6 +49,20 @@ fn build(name: &str, folder: &Path) -> PathBuf {
         .expect("there is a C compiler: install cc, or name one in CC");
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     program
+}
+
+#[test]
+fn the_program_of_the_page_about_c_maps_a_pair() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/c.md");
+    let page = fs::read_to_string(page).expect("the page is there");
+    let (_, block) = page.split_once("```c\n").expect("a block of C");
+    let (program, _) = block.split_once("```").expect("that ends");
+    let folder = tempfile::TempDir::new().expect("a folder");
+    let source = folder.path().join("page.c");
+    fs::write(&source, program).expect("a source");
+    let ran = Command::new(build_source(&source, folder.path())).output().expect("it runs");
+    let output = String::from_utf8_lossy(&ran.stdout);
+    assert!(ran.status.success() && output.starts_with("frame 2:"), "{output}");
 }
 
 #[test]

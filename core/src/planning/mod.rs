@@ -17,8 +17,8 @@
 //! Memory: nothing where [`Capacity::planning_width`] or another side is 0. Else 2 bytes for every
 //! third pixel, 6 bytes a cell, 42 bytes a column and 16 for the longest side, and with
 //! [`Capacity::planning_distance_3d`] 9 bytes a cell and 16 for the longest side more; 56 bytes a
-//! track. Time: linear in cells, columns and blocks; see docs/measurements.md. What can go wrong:
-//! nothing; a window without ground, free space or obstacles says so.
+//! track. Time: linear in cells, columns and blocks; see docs/measurements/speed.md. What can
+//! go wrong: nothing; a window without ground, free space or obstacles says so.
 
 mod boxes;
 mod cells;

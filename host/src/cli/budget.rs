@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 /// Speed of the camera in the table, m/s.
 const SPEED_M_S: f64 = 10.0;
-/// Blocks a metre of the synthetic street leaves in the map (docs/measurements.md).
+/// Blocks a metre of the synthetic street leaves in the map (docs/measurements/memory.md).
 const BLOCKS_PER_M: u32 = 1_000;
 
 #[derive(Debug, clap::Args)]

@@ -4,6 +4,7 @@
 
 mod bags;
 mod binary;
+mod book;
 mod browser;
 mod capacity;
 mod cli;
