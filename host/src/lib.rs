@@ -8,6 +8,7 @@ pub mod formats;
 pub mod input;
 pub mod observe;
 pub mod report;
+pub mod request;
 pub mod run;
 pub mod scene;
 pub mod slab;

@@ -155,6 +155,7 @@ const HOST: Layers = &[
     ("formats", &[]),
     ("synth", &["formats"]),
     ("input", &["formats", "slab", "synth"]),
+    ("request", &["formats", "synth"]),
     ("scene", &["formats"]),
     ("evaluate", &["formats", "input"]),
     ("observe", &["evaluate", "formats", "input", "scene", "slab"]),
@@ -166,8 +167,8 @@ const HOST: Layers = &[
     (
         "cli",
         &[
-            "evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "run",
-            "scene", "slab", "sweep", "synth",
+            "evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "request",
+            "run", "scene", "slab", "sweep", "synth",
         ],
     ),
 ];

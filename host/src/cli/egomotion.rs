@@ -1,7 +1,7 @@
 //! `--egomotion`.
 
-use super::settings::Settings;
 use crate::input::{self, FrameSource, InputError};
+use crate::request::Settings;
 use dynvox_core::MotionSource;
 use dynvox_core::geometry::Transform;
 use std::path::PathBuf;

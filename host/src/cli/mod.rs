@@ -25,7 +25,6 @@ mod manual;
 mod output;
 mod rectified;
 mod run;
-mod settings;
 mod signals;
 mod sweep;
 mod synth;

@@ -12,7 +12,6 @@ use super::capacity::CapacityArgs;
 use super::egomotion::EgomotionChoice;
 use super::export::ExportArgs;
 use super::rectified::RectifiedArgs;
-use super::settings::{Settings, on_or_off};
 use crate::formats::MAP_FILE;
 use crate::input::bags::Topics;
 use crate::input::depth::{self, DepthChoice};
@@ -24,6 +23,7 @@ use crate::input::{
 use crate::observe::Reference;
 use crate::report;
 use crate::report::text::counted;
+use crate::request::Settings;
 use crate::run::{
     self, BLOCKS_FILE, Checkpoint, Incomplete, PREVIOUS_SNAPSHOT_FILE, Plan, RunError, RunFolder,
     RunRecord, SNAPSHOT_FILE, has_snapshot,
@@ -267,6 +267,15 @@ impl RunArgs {
     fn dress(&self, dataset: Box<dyn FrameSource>) -> anyhow::Result<Box<dyn FrameSource>> {
         faults::attach(self.masks.attach(dataset)?, self.faults.as_ref())
             .map_err(anyhow::Error::msg)
+    }
+}
+
+/// The value of a switch on the command line.
+fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("must be on or off".to_owned()),
     }
 }
 

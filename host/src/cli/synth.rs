@@ -1,7 +1,7 @@
 //! `dynvox synth`, and the synthetic street as a data set.
 
-use super::settings::Settings;
 use crate::input::{FrameSource, InputError, StreetFrames};
+use crate::request::Settings;
 use crate::synth::{Street, write_kitti};
 use std::path::PathBuf;
 

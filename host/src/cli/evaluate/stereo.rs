@@ -1,11 +1,11 @@
 //! `dynvox evaluate stereo`.
 
-use crate::cli::settings::Settings;
 use crate::evaluate::stereo::{
     BAD_PX, Estimate, PartFigures, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set,
 };
 use crate::formats::{Image, read_picture, read_png_deep, read_png_u16, write_png_deep};
 use crate::observe::pictures;
+use crate::request::Settings;
 use crate::run::Threads;
 use crate::slab::HostSlab;
 use anyhow::{Context, bail};

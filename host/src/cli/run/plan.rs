@@ -3,9 +3,9 @@
 use super::RunArgs;
 use super::examine::{self, Examined};
 use crate::cli::egomotion::EgomotionChoice;
-use crate::cli::settings::Settings;
 use crate::formats::calibration::FittedGeometry;
 use crate::input::StopRequest;
+use crate::request::Settings;
 use crate::run::{self, FrameNumbers, Plan, Streaming};
 use anyhow::bail;
 use dynvox_core::{Capacity, Config, MotionSource};

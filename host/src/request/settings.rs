@@ -23,23 +23,37 @@ use toml::{Table, Value};
 
 /// Everything that can be configured, in the sections of the file. The rig's calibration is not
 /// among it: it comes with the data set.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    rig: RigConfig,
-    rectify: RectifiedSize,
-    stereo: StereoConfig,
-    scene_flow: SceneFlowConfig,
-    egomotion: EgomotionConfig,
-    icp: IcpConfig,
-    mapper: MapperConfig,
-    tracking: TrackingConfig,
-    objects: ObjectsConfig,
-    volume: VolumeConfig,
-    raycast: RaycastConfig,
-    mesh: MeshConfig,
-    planning: PlanningConfig,
-    /// The synthetic street; absent from the file of a run on other data.
+    /// Corrections of the rig.
+    pub rig: RigConfig,
+    /// Size that raw pairs are rectified to.
+    pub rectify: RectifiedSize,
+    /// Stereo matching.
+    pub stereo: StereoConfig,
+    /// Matches from frame to frame.
+    pub scene_flow: SceneFlowConfig,
+    /// Motion of the camera from matches.
+    pub egomotion: EgomotionConfig,
+    /// Motion of the camera from depth against the map.
+    pub icp: IcpConfig,
+    /// Stages of the mapper.
+    pub mapper: MapperConfig,
+    /// Tracking of objects.
+    pub tracking: TrackingConfig,
+    /// Reconstruction of objects.
+    pub objects: ObjectsConfig,
+    /// Static map.
+    pub volume: VolumeConfig,
+    /// Raycasts of the map.
+    pub raycast: RaycastConfig,
+    /// Mesh of the map.
+    pub mesh: MeshConfig,
+    /// Window of the planner.
+    pub planning: PlanningConfig,
+    /// The synthetic street; absent where it has its defaults, and from the file of a run on other
+    /// data.
     #[serde(skip_serializing_if = "Option::is_none")]
     street: Option<StreetConfig>,
 }
@@ -47,8 +61,7 @@ pub struct Settings {
 impl Settings {
     /// Resolves defaults, file and settings of the command line, in that order.
     pub fn resolve(file: Option<&Path>, sets: &[String]) -> anyhow::Result<Self> {
-        let defaults = Self { street: Some(StreetConfig::default()), ..Self::default() };
-        let mut layers = Layers { table: Table::try_from(&defaults)?, settings: defaults };
+        let mut layers = Layers::defaults()?;
         if let Some(path) = file {
             let shown = path.display();
             let text = std::fs::read_to_string(path)
@@ -73,7 +86,19 @@ impl Settings {
                 .set(key.trim(), value_of(text.trim()))
                 .with_context(|| format!("--set {set} cannot be used"))?;
         }
-        Ok(layers.settings)
+        Ok(layers.finish())
+    }
+
+    /// Resolves defaults and a table of settings in their sections.
+    ///
+    /// # Errors
+    /// A key is unknown, or its value is of another kind.
+    pub fn from_table(table: &Table) -> anyhow::Result<Self> {
+        let mut layers = Layers::defaults()?;
+        for (key, value) in leaves("", table) {
+            layers.set(&key, value)?;
+        }
+        Ok(layers.finish())
     }
 
     /// The matcher's configuration.
@@ -172,19 +197,15 @@ impl Settings {
         self.street.clone().unwrap_or_default()
     }
 
+    /// The street's configuration, to be changed.
+    pub fn street_mut(&mut self) -> &mut StreetConfig {
+        self.street.get_or_insert_default()
+    }
+
     /// All settings as a file that `--config` takes.
     pub fn to_toml(&self, with_street: bool) -> anyhow::Result<String> {
-        let street = if with_street { self.street.clone() } else { None };
+        let street = with_street.then(|| self.street());
         Ok(toml::to_string(&Self { street, ..self.clone() })?)
-    }
-}
-
-/// The value of a switch on the command line.
-pub fn on_or_off(text: &str) -> Result<bool, String> {
-    match text {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("must be on or off".to_owned()),
     }
 }
 
@@ -195,6 +216,18 @@ struct Layers {
 }
 
 impl Layers {
+    /// The defaults, those of the street among them.
+    fn defaults() -> anyhow::Result<Self> {
+        let settings = Settings { street: Some(StreetConfig::default()), ..Settings::default() };
+        Ok(Self { table: Table::try_from(&settings)?, settings })
+    }
+
+    /// The settings; equal ones are equal values.
+    fn finish(mut self) -> Settings {
+        self.settings.street.take_if(|street| *street == StreetConfig::default());
+        self.settings
+    }
+
     /// Sets one key and checks at once that it is known and its value of the right kind, so that
     /// the error can name it.
     fn set(&mut self, key: &str, value: Value) -> anyhow::Result<()> {

@@ -1,0 +1,5 @@
+//! What is asked of a run, as values.
+
+mod settings;
+
+pub use settings::Settings;
