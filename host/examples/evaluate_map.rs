@@ -1,17 +1,17 @@
 //! How true is a merged map? It is viewed from each pose of a trajectory and compared with LiDAR or
 //! the street's exact depth, as `dynvox run --evaluate` does; pixels of instance masks are left
-//! out.
+//! out. The data set is that of a request, as `--example run_request` prints one.
 //!
-//! `cargo run --release -p dynvox --example evaluate_map -- MAP TRAJECTORY lidar|exact [arguments of dynvox run ...]`
+//! `cargo run --release -p dynvox --example evaluate_map -- MAP TRAJECTORY lidar|exact REQUEST.json`
 
 use anyhow::Context;
-use dynvox::cli::plan_of;
+use dynvox::Request;
 use dynvox::evaluate::reference::{
     Field, PendingFrame, ReferenceFigures, Region, project_scan, sample_exact_depth,
 };
 use dynvox::fleet::Averages;
 use dynvox::formats::read_poses;
-use dynvox::run::Plan;
+use dynvox::request::Plan;
 use dynvox::slab::HostSlab;
 use dynvox_core::geometry::Transform;
 use dynvox_core::memory::Carver;
@@ -22,12 +22,11 @@ use dynvox_core::{Capacity, Serial};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [map, trajectory, reference, run @ ..] = arguments.as_slice() else {
-        anyhow::bail!("evaluate_map MAP TRAJECTORY lidar|exact [arguments of dynvox run ...]")
+    let [map, trajectory, reference, request] = arguments.as_slice() else {
+        anyhow::bail!("evaluate_map MAP TRAJECTORY lidar|exact REQUEST.json")
     };
-    let line: Vec<String> =
-        ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(run.iter().cloned()).collect();
-    let plan = plan_of(&line)?;
+    let request: Request = serde_json::from_str(&std::fs::read_to_string(request)?)?;
+    let plan = request.absolute()?.resolve()?;
     let poses = read_poses(trajectory.as_ref())?.poses;
     let mut map = Averages::of(map.as_ref(), &std::env::temp_dir().join("evaluate_map"))?;
     let blocks = map.blocks as usize;

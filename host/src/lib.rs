@@ -11,6 +11,10 @@ pub mod report;
 pub mod request;
 pub mod run;
 pub mod scene;
+mod sentence;
 pub mod slab;
 pub mod sweep;
 pub mod synth;
+
+pub use request::Request;
+pub use sentence::sentence;

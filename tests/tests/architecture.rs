@@ -151,24 +151,25 @@ const CORE: Layers = &[
 
 /// The host: what knows nothing of runs first.
 const HOST: Layers = &[
+    ("sentence", &[]),
     ("slab", &[]),
     ("formats", &[]),
     ("synth", &["formats"]),
     ("input", &["formats", "slab", "synth"]),
-    ("request", &["formats", "synth"]),
     ("scene", &["formats"]),
     ("evaluate", &["formats", "input"]),
-    ("observe", &["evaluate", "formats", "input", "scene", "slab"]),
-    ("run", &["evaluate", "formats", "input", "observe", "scene", "slab"]),
-    ("report", &["evaluate", "formats", "observe", "run", "scene"]),
-    ("sweep", &["evaluate", "formats", "observe", "report", "run"]),
-    ("fixtures", &["formats", "input", "run", "slab"]),
-    ("fleet", &["formats", "run"]),
+    ("request", &["evaluate", "formats", "input", "synth"]),
+    ("observe", &["evaluate", "formats", "input", "request", "scene", "slab"]),
+    ("run", &["evaluate", "formats", "input", "observe", "request", "scene", "slab"]),
+    ("report", &["evaluate", "formats", "observe", "request", "run", "scene"]),
+    ("sweep", &["evaluate", "formats", "input", "observe", "report", "request", "run"]),
+    ("fixtures", &["formats", "input", "request", "run", "slab"]),
+    ("fleet", &["formats", "request", "run"]),
     (
         "cli",
         &[
             "evaluate", "fixtures", "fleet", "formats", "input", "observe", "report", "request",
-            "run", "scene", "slab", "sweep", "synth",
+            "run", "scene", "sentence", "slab", "sweep", "synth",
         ],
     ),
 ];

@@ -18,12 +18,7 @@ pub struct BenchArgs {
 }
 
 pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
-    let line: Vec<String> = ["dynvox", "--quiet"]
-        .into_iter()
-        .map(str::to_owned)
-        .chain(args.run.iter().cloned())
-        .collect();
-    let plan = super::run::plan_of(&line)?;
+    let plan = super::run::request_of(&args.run)?.resolve()?;
     let bench =
         run::bench(&plan, if args.baseline { Vectors::BASELINE } else { Vectors::detect() })?;
     if args.json {

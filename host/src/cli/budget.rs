@@ -2,8 +2,9 @@
 
 mod targets;
 
-use super::capacity::{Bytes, ImageSize, to_json, to_toml};
+use crate::formats::CapacityFile;
 use crate::report::text::grouped;
+use crate::request::{self, Bytes, ImageSize};
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
 use dynvox_core::{BudgetOptions, Capacity};
 use std::fmt::Write;
@@ -56,7 +57,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
             voxel_size_m: Some(args.voxel),
             raw_image: args.raw.map_or([0; 2], |ImageSize(width, height)| [width, height]),
         };
-        let capacity = super::capacity::solve(memory, (width, height), &options)?;
+        let capacity = request::solve(memory, (width, height), &options)?;
         return if args.stack {
             targets::show(&[(memory.to_string(), capacity)], args.json)
         } else {
@@ -64,7 +65,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
         };
     }
     match &args.profile {
-        Some(name) if args.stack => targets::show(&[super::profile(name)?], args.json)?,
+        Some(name) if args.stack => targets::show(&[request::profile(name)?], args.json)?,
         None if args.stack => {
             let profiles = Capacity::PROFILES.map(|(name, capacity)| (name.to_owned(), capacity));
             targets::show(&profiles, args.json)?;
@@ -72,7 +73,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
         None if args.json => outln!("{}", serde_json::to_string_pretty(&profiles_json()?)?),
         None => overview(),
         Some(name) => {
-            let (name, capacity) = super::profile(name)?;
+            let (name, capacity) = request::profile(name)?;
             regions(&name, &capacity, args.json)?;
         }
     }
@@ -81,7 +82,7 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
 
 fn profiles_json() -> anyhow::Result<serde_json::Value> {
     let profiles = Capacity::PROFILES.iter().map(|(name, capacity)| {
-        let mut value = to_json(capacity)?;
+        let mut value = serde_json::to_value(CapacityFile::of(capacity))?;
         value["bytes"] = capacity.bytes().into();
         Ok(((*name).to_owned(), value))
     });
@@ -93,7 +94,7 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
     let volume = VolumeConfig { voxel_size_m: args.voxel, ..VolumeConfig::default() };
     let path_m = path_m(capacity.blocks, &volume);
     if args.json {
-        let mut value = to_json(capacity)?;
+        let mut value = serde_json::to_value(CapacityFile::of(capacity))?;
         value["bytes"] = capacity.bytes().into();
         value["path_m"] = path_m.into();
         outln!("{}", serde_json::to_string_pretty(&value)?);
@@ -109,7 +110,10 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
         capacity.objects,
         grouped(capacity.object_blocks as u64)
     );
-    outln!("\nas a file for `dynvox run --capacity FILE`:\n\n{}", to_toml(capacity)?);
+    outln!(
+        "\nas a file for `dynvox run --capacity FILE`:\n\n{}",
+        CapacityFile::of(capacity).to_toml()?
+    );
     outln!("as Rust:\n\nconst CAPACITY: Capacity = {capacity:#?};");
     outln!("\nas C:\n\n{}", to_c(capacity)?);
     Ok(())
@@ -117,7 +121,7 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
 
 /// The capacity as an initialiser in C.
 fn to_c(capacity: &Capacity) -> anyhow::Result<String> {
-    let table = to_json(capacity)?;
+    let table = serde_json::to_value(CapacityFile::of(capacity))?;
     let bounds = table["capacity"].as_object().into_iter().flatten();
     let fields = bounds.map(|(name, value)| match value.as_bool() {
         Some(flag) => format!("  .{name} = {},\n", u8::from(flag)),

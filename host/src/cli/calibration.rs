@@ -1,8 +1,8 @@
 //! `dynvox calibration`.
 
-use super::capacity::ImageSize;
 use super::rectified::RectifiedArgs;
 use crate::formats::calibration::{RectifiedSize, StereoCalibration, to_toml};
+use crate::request::ImageSize;
 use anyhow::Context;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{LensModel, RawCamera, Rectification, TurnedCamera};

@@ -1,6 +1,8 @@
 //! `dynvox fixtures`.
 
 use crate::fixtures::{self, Blessing, Verdict};
+use crate::input::masks::MaskChoice;
+use crate::request::{Bytes, Options, Request, RequestError};
 use crate::run::write_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
@@ -67,19 +69,19 @@ struct NewArgs {
     folder: PathBuf,
     /// Data set to take the frames from
     #[arg(long, value_name = "DATASET")]
-    from: String,
+    from: PathBuf,
     /// Frames to take
     #[arg(long, default_value_t = 24, value_name = "N")]
     frames: usize,
     /// First frame
     #[arg(long, value_name = "N")]
-    start: Option<String>,
+    start: Option<usize>,
     /// Shrink the images, above 0 and up to 1
     #[arg(long, value_name = "S")]
-    scale: Option<String>,
+    scale: Option<f64>,
     /// Bytes of memory to replay in, divided for the images [default: 32MiB]
     #[arg(long, value_name = "BYTES", conflicts_with = "profile")]
-    memory: Option<String>,
+    memory: Option<Bytes>,
     /// Bounds by name
     #[arg(long, value_name = "NAME")]
     profile: Option<String>,
@@ -88,13 +90,13 @@ struct NewArgs {
     sequence: Option<String>,
     /// Calibration in place of the recording's own
     #[arg(long, value_name = "FILE")]
-    calibration: Vec<String>,
+    calibration: Vec<PathBuf>,
     /// Source of instance masks
     #[arg(long, value_name = "SOURCE")]
-    instances: Option<String>,
+    instances: Option<MaskChoice>,
     /// Settings from a file
     #[arg(long, value_name = "FILE")]
-    config: Option<String>,
+    config: Option<PathBuf>,
     /// One setting; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -104,44 +106,32 @@ struct NewArgs {
 }
 
 impl NewArgs {
-    /// The same as a command line of `dynvox run`.
-    fn as_run(&self) -> Vec<String> {
-        let mut line = ["dynvox", &self.from, "--quiet", "--frames"].map(str::to_owned).to_vec();
-        line.push(self.frames.to_string());
-        let memory = if self.profile.is_none() {
-            Some(self.memory.clone().unwrap_or_else(|| DEFAULT_MEMORY.to_owned()))
-        } else {
-            None
+    /// What they ask of a run.
+    fn request(&self) -> Result<Request, RequestError> {
+        let memory = self.memory.or(self.profile.is_none().then_some(DEFAULT_MEMORY));
+        let options = Options {
+            path: Some(self.from.clone()),
+            frames: Some(self.frames),
+            start: self.start,
+            scale: self.scale,
+            memory,
+            profile: self.profile.clone(),
+            sequence: self.sequence.clone(),
+            calibration: self.calibration.clone(),
+            instances: self.instances.clone(),
+            config: self.config.clone(),
+            set: self.set.clone(),
+            ..Options::default()
         };
-        let single = [
-            ("--start", &self.start),
-            ("--scale", &self.scale),
-            ("--memory", &memory),
-            ("--profile", &self.profile),
-            ("--sequence", &self.sequence),
-            ("--instances", &self.instances),
-            ("--config", &self.config),
-        ];
-        line.extend(
-            single
-                .into_iter()
-                .filter_map(|(name, value)| Some([name.to_owned(), value.clone()?]))
-                .flatten(),
-        );
-        let repeated = [("--calibration", &self.calibration), ("--set", &self.set)];
-        let each = repeated.into_iter().flat_map(|(name, values)| {
-            values.iter().map(move |value| [name.to_owned(), value.clone()])
-        });
-        line.extend(each.flatten());
-        line
+        options.request()
     }
 }
 
 /// The default budget of a new fixture: a microcontroller with external memory.
-const DEFAULT_MEMORY: &str = "32MiB";
+const DEFAULT_MEMORY: Bytes = Bytes(32 << 20);
 
 fn new(args: &NewArgs) -> anyhow::Result<()> {
-    let plan = super::run::plan_of(&args.as_run())?;
+    let plan = args.request()?.resolve()?;
     let frames = fixtures::create(&args.folder, &plan, &Serial)?;
     if args.json {
         outln!(

@@ -34,6 +34,14 @@ enum Action {
         #[arg(long, value_name = "I/N")]
         shard: Option<Shard>,
     },
+    /// Do the run of one job in this process: a part of `fleet run`
+    #[command(hide = true)]
+    Job {
+        /// Folder of the jobs
+        folder: PathBuf,
+        /// The job
+        id: String,
+    },
     /// Register the maps of jobs that are all done with one another, and correct where they lie in
     /// the world
     Align {
@@ -146,6 +154,7 @@ pub fn run(args: &FleetArgs) -> anyhow::Result<()> {
     match &args.action {
         Action::Plan { recordings, out } => jobs::plan(recordings, out),
         Action::Run { folder, shard } => jobs::run(folder, share(*shard)),
+        Action::Job { folder, id } => jobs::run_one(folder, id),
         Action::Align { folder, uncertainty_m, uncertainty_deg } => world::align(
             folder,
             &Uncertainty { position_m: *uncertainty_m, rotation_rad: uncertainty_deg.to_radians() },

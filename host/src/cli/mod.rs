@@ -13,11 +13,8 @@ macro_rules! outln {
 mod bench;
 mod budget;
 mod calibration;
-mod capacity;
 mod diff;
-mod egomotion;
 mod evaluate;
-mod export;
 mod fixtures;
 mod fleet;
 mod inspect;
@@ -30,8 +27,7 @@ mod sweep;
 mod synth;
 mod view;
 
-pub use run::{MapperPlan, check_options, mapper_of, plan_of};
-
+use crate::request::RequestError;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -120,7 +116,7 @@ const INCOMPLETE: u8 = 4;
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
-        None => run::run(&run::RunArgs::without_arguments()),
+        None => run::run(&run::RunArgs::default()),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
         Some(Command::Calibration(args)) => calibration::run(&args),
@@ -144,7 +140,7 @@ pub fn main() -> ExitCode {
         Err(error) => {
             eprintln!("error: {}", sentence(&error));
             match () {
-                () if error.is::<crate::input::diagnosis::RefusedInput>() => {
+                () if matches!(error.downcast_ref(), Some(RequestError::Refused(_))) => {
                     ExitCode::from(REFUSED_INPUT)
                 }
                 () if error.is::<run::IncompleteRun>() => ExitCode::from(INCOMPLETE),
@@ -154,45 +150,18 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An error with its causes. A cause that is a part of the text already is not repeated, nor is how
-/// a command is used.
-pub fn sentence(error: &anyhow::Error) -> String {
+/// An error with its causes, without how a command is used.
+fn sentence(error: &anyhow::Error) -> String {
     if let Some(refused) = error.downcast_ref::<clap::Error>() {
         let text = refused.to_string();
         return text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
     }
-    error.chain().skip(1).map(ToString::to_string).fold(error.to_string(), |text, cause| {
-        if text.contains(&cause) { text } else { format!("{text}: {cause}") }
-    })
-}
-
-/// The profile of that name, in any case, and its name.
-fn profile(name: &str) -> anyhow::Result<(String, dynvox_core::Capacity)> {
-    let known = dynvox_core::Capacity::PROFILES;
-    let found = known.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
-    found.map(|(name, capacity)| ((*name).to_owned(), *capacity)).ok_or_else(|| {
-        let names = known.map(|(name, _)| name).join(", ");
-        anyhow::anyhow!(
-            "there is no profile {name}. Choose one of {names}; `dynvox budget` shows them"
-        )
-    })
+    crate::sentence(error)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_cause_is_printed_once() {
-        let cause = || std::io::Error::other("no space");
-        let error = anyhow::Error::new(crate::run::FolderError::Write {
-            path: "x".into(),
-            source: cause(),
-        });
-        assert_eq!(sentence(&error).matches("no space").count(), 1);
-        let error = anyhow::Error::new(cause()).context("the map cannot be written");
-        assert_eq!(sentence(&error), "the map cannot be written: no space");
-    }
 
     #[test]
     fn the_command_line_is_well_formed_and_every_example_parses() {

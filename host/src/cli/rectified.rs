@@ -1,7 +1,7 @@
 //! The size raw pairs are rectified to, on the command line.
 
-use super::capacity::ImageSize;
 use crate::formats::calibration::RectifiedSize;
+use crate::request::ImageSize;
 
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct RectifiedArgs {

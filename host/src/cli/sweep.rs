@@ -1,9 +1,11 @@
 //! `dynvox sweep`.
 
 use super::fleet::jobs;
-use super::run::{self, RunArgs};
+use super::run;
 use crate::fleet::{Job, Manifest};
+use crate::input::depth::DepthChoice;
 use crate::input::{self, OpenOptions};
+use crate::request::{Memory, Reference, Request, Settings, Source};
 use crate::sweep::{Data, Kind, Plan, Results, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
 use serde_json::json;
@@ -18,7 +20,7 @@ pub struct SweepArgs {
     sweeps: Vec<Kind>,
     /// Prune weights
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2, 3, 5, 8, 10], value_name = "W,...")]
-    weights: Vec<u32>,
+    weights: Vec<u8>,
     /// Frames from one that is fused to the next
     #[arg(long, value_delimiter = ',', default_values_t = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], value_name = "K,...")]
     rates: Vec<u32>,
@@ -30,7 +32,7 @@ pub struct SweepArgs {
     depths: Vec<String>,
     /// Pruning lag of the first two sweeps, frames
     #[arg(long, default_value_t = 40, value_name = "N")]
-    prune_lag: usize,
+    prune_lag: u32,
     /// Frames after which the first two sweeps evaluate the map, after pruning
     #[arg(long, default_value_t = 80, value_name = "N")]
     evaluation_delay: usize,
@@ -83,6 +85,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     {
         bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
+    let common = args.common()?;
     let plan = Plan::new(&SweepRequest {
         data: data
             .iter()
@@ -92,29 +95,38 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         weights: args.weights.clone(),
         rates: args.rates.clone(),
         scales: args.scales.clone(),
-        depths: args.depths.clone(),
-        lag_and_delay: [args.prune_lag, args.evaluation_delay],
-        common: args.common(),
-    });
+        depths: args
+            .depths
+            .iter()
+            .map(|name| Ok((name.clone(), depth(name)?)))
+            .collect::<anyhow::Result<_>>()?,
+        prune_lag: args.prune_lag,
+        evaluation_delay: args.evaluation_delay,
+        common,
+    })?;
     let folder = SweepFolder::open(&args.out, &plan)?;
     let keys = plan.keys();
-    let line =
-        |key: &str| Some(args.line(data.get(data_of(&plan, key, &labels)?)?, plan.runs.get(key)?));
+    let request = |key: &str| -> anyhow::Result<Request> {
+        let found = data_of(&plan, key, &labels).and_then(|at| data.get(at));
+        let asked = found.zip(plan.runs.get(key)).context("a run is of no point of the sweep")?;
+        args.request(asked.0, asked.1)
+    };
     if args.plan {
-        let job = |key: &&str| {
-            jobs::of_figures(key, line(key).unwrap_or_default(), SweepFolder::result_below(key))
-        };
+        let job = |key: &&str| jobs::of_figures(key, request(key)?, SweepFolder::result_below(key));
         return jobs::write(
             &Manifest::of(keys.iter().map(job).collect::<anyhow::Result<_>>()?),
             &args.out,
         );
     }
     for (at, key) in keys.iter().enumerate() {
-        let Some(line) = line(key).filter(|_| !folder.result(key).is_file()) else { continue };
-        if !args.quiet && !args.json {
-            eprintln!("run {} of {}: {}", at + 1, keys.len(), line.join(" "));
+        if folder.result(key).is_file() {
+            continue;
         }
-        figures(&folder, &plan, key, &line)?.write(&folder.result(key))?;
+        let request = request(key)?;
+        if !args.quiet && !args.json {
+            eprintln!("run {} of {}: {}", at + 1, keys.len(), request.words());
+        }
+        figures(&folder, &plan, key, &request)?.write(&folder.result(key))?;
         // The page is written after every run, so that an interrupted sweep has one, too.
         folder.draw(&plan, &folder.results(&plan)?)?;
     }
@@ -124,35 +136,41 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
 }
 
 impl SweepArgs {
-    /// Arguments of every run.
-    fn common(&self) -> Vec<String> {
-        let mut common = vec!["--profile".to_owned(), self.profile.clone()];
-        if let Some(frames) = self.frames {
-            common.extend(["--frames".to_owned(), frames.to_string()]);
-        }
-        common.extend(self.set.iter().flat_map(|set| ["--set".to_owned(), set.clone()]));
-        common
+    /// What every run asks for.
+    fn common(&self) -> anyhow::Result<Request> {
+        let mut common = Request::default();
+        common.bounds.memory = Memory::Profile(self.profile.clone());
+        common.frames.most = self.frames;
+        common.settings = Settings::resolve(None, &self.set)?;
+        Ok(common)
     }
 
-    /// Arguments of `dynvox run` for one run.
-    fn line(&self, data: &Data, arguments: &[String]) -> Vec<String> {
-        let path = data.path.iter().map(|path| path.display().to_string());
-        let sequence =
-            data.sequence.iter().flat_map(|sequence| ["--sequence".to_owned(), sequence.clone()]);
-        let threads =
-            self.threads.iter().flat_map(|threads| ["--threads".to_owned(), threads.to_string()]);
-        path.chain(sequence).chain(threads).chain(arguments.iter().cloned()).collect()
+    /// What one run asks for, on this machine.
+    fn request(&self, data: &Data, asked: &Request) -> anyhow::Result<Request> {
+        let mut request = asked.clone();
+        if let Some(path) = &data.path {
+            request.input.source = Source::Recording(path.clone());
+        }
+        request.input.sequence = data.sequence.clone();
+        request.limits.threads = self.threads;
+        Ok(request.absolute()?)
     }
 }
 
+/// A source of depth by its name.
+fn depth(name: &str) -> anyhow::Result<DepthChoice> {
+    name.parse().map_err(|why: String| anyhow::anyhow!("--depths {name} cannot be used: {why}"))
+}
+
 /// The reference that a data set has.
-fn reference(data: &Data) -> anyhow::Result<Option<&'static str>> {
-    let Some(path) = &data.path else { return Ok(Some("exact")) };
+fn reference(data: &Data) -> anyhow::Result<Option<Reference>> {
+    let Some(path) = &data.path else { return Ok(Some(Reference::Exact)) };
     let dataset = input::open(
         path,
         &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() },
     )?;
-    Ok((0..dataset.len()).any(|index| dataset.has_lidar(index)).then_some("lidar"))
+    let has_lidar = (0..dataset.len()).any(|index| dataset.has_lidar(index));
+    Ok(has_lidar.then_some(Reference::Lidar))
 }
 
 /// Which data set a run is of.
@@ -161,16 +179,15 @@ fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
     labels.iter().position(|label| *label == point.data)
 }
 
-/// Runs once, with these arguments. Only the result remains.
+/// Runs once. Only the result remains.
 fn figures(
     folder: &SweepFolder,
     plan: &Plan,
     key: &str,
-    line: &[String],
+    request: &Request,
 ) -> anyhow::Result<RunResult> {
     let result = || -> anyhow::Result<RunResult> {
-        let record =
-            run::record(&RunArgs::parse(&jobs::quiet_line(line))?, &folder.scratch_dir(key))?;
+        let record = run::record(request.resolve()?, &folder.scratch_dir(key))?;
         Ok(RunResult::of(plan.runs.get(key).context("it is of no point of the sweep")?, &record)?)
     };
     result().with_context(|| format!("run {key} ended"))
@@ -179,7 +196,7 @@ fn figures(
 /// Does the run of a job in the folder of a sweep.
 pub fn figures_of(folder: &Path, job: &Job) -> anyhow::Result<RunResult> {
     let folder = SweepFolder::of(folder);
-    figures(&folder, &folder.plan()?, &job.name, &job.arguments)
+    figures(&folder, &folder.plan()?, &job.name, &job.request)
 }
 
 fn print_result(
@@ -192,7 +209,7 @@ fn print_result(
         let points = plan.points.iter().map(|point| {
             let result = results.get(&point.run);
             let mut value = serde_json::to_value(point)?;
-            value["arguments"] = plan.runs.get(&point.run).cloned().unwrap_or_default().into();
+            value["request"] = serde_json::to_value(plan.runs.get(&point.run))?;
             value["summary"] =
                 result.map_or(serde_json::Value::Null, |result| result.summary.clone());
             Ok(value)

@@ -1,6 +1,6 @@
-//! `dynvox synth`, and the synthetic street as a data set.
+//! `dynvox synth`.
 
-use crate::input::{FrameSource, InputError, StreetFrames};
+use crate::input::InputError;
 use crate::request::Settings;
 use crate::synth::{Street, write_kitti};
 use std::path::PathBuf;
@@ -19,11 +19,6 @@ pub struct SynthArgs {
     /// One setting of the street, as street.seed=7; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-}
-
-/// The street as a data set.
-pub fn street(settings: &Settings) -> anyhow::Result<Box<dyn FrameSource>> {
-    Ok(Box::new(StreetFrames::new(settings.street())?))
 }
 
 pub fn run(args: &SynthArgs) -> anyhow::Result<()> {

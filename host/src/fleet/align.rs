@@ -288,6 +288,7 @@ mod tests {
     use super::*;
     use crate::fleet::tile_file::Lattice;
     use crate::fleet::{Camera, Given, keep};
+    use crate::request::Request;
     use crate::run::store::BlockFile;
     use dynvox_core::geometry::StereoRig;
     use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock};
@@ -342,7 +343,7 @@ mod tests {
         Job {
             name: format!("part {nth}"),
             id: format!("{nth:016x}"),
-            arguments: Vec::new(),
+            request: Request::default(),
             given: Given::TWorldCamera(rows_of(given)),
             epoch: 0,
             bytes: 0,

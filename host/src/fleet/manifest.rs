@@ -3,6 +3,7 @@
 //! folder.
 
 use super::{FleetError, Recording, Recordings, submap, tile_file};
+use crate::request::Request;
 use crate::run::{self, write_whole};
 use dynvox_core::digest::Digest;
 use dynvox_core::geometry::Transform;
@@ -17,10 +18,10 @@ pub const MANIFEST_FILE: &str = "jobs.json";
 pub struct Job {
     /// The recording's name.
     pub name: String,
-    /// Hash of the program's version, the arguments, the settings and the images.
+    /// Hash of the program's version, the request, the settings and the images.
     pub id: String,
-    /// Arguments of `dynvox run`.
-    pub arguments: Vec<String>,
+    /// What is asked of its run.
+    pub request: Request,
     /// Where it lies in the world.
     #[serde(flatten)]
     pub given: Given,
@@ -61,7 +62,7 @@ pub enum JobState {
     Open,
 }
 
-/// What identifies the run of some arguments, and what it needs.
+/// What identifies the run of a request, and what it needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
     /// Hash of settings and images.
@@ -88,14 +89,15 @@ fn program() -> String {
 }
 
 impl Manifest {
-    /// The jobs of recordings. `identify` says what a run of some arguments is.
+    /// The jobs of recordings. `identify` gives the request of a recording's arguments, and what
+    /// its run is.
     ///
     /// # Errors
     /// It is not said where a recording lies, or that of `identify`.
     pub fn plan<E: From<FleetError>>(
         path: &Path,
         recordings: &Recordings,
-        identify: impl Fn(&[String]) -> Result<Identity, E>,
+        identify: impl Fn(&[String]) -> Result<(Request, Identity), E>,
     ) -> Result<Self, E> {
         let mut jobs: Vec<Job> = Vec::new();
         let origin = recordings.origin()?;
@@ -103,11 +105,11 @@ impl Manifest {
             let Recording { name, arguments, epoch, .. } = recording;
             let arguments: Vec<String> =
                 arguments.iter().chain(&recordings.arguments).cloned().collect();
-            let identity = identify(&arguments)?;
+            let (request, identity) = identify(&arguments)?;
             let given = recording
                 .given(origin, identity.first_pose.as_ref())
                 .map_err(|reason| FleetError::content(path, reason))?;
-            let job = Job { epoch: *epoch, ..Job::new(name, arguments, &identity, given) };
+            let job = Job { epoch: *epoch, ..Job::new(name, request, &identity, given) };
             if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
                 return Err(FleetError::content(
                     path,
@@ -169,12 +171,12 @@ impl Manifest {
 }
 
 impl Job {
-    /// Of a run of some arguments, and what is wanted of it.
-    pub fn new(name: &str, arguments: Vec<String>, identity: &Identity, given: Given) -> Self {
+    /// The job of a run, and what is wanted of it.
+    pub fn new(name: &str, request: Request, identity: &Identity, given: Given) -> Self {
         Self {
             name: name.to_owned(),
-            id: id(&arguments, identity.digest),
-            arguments,
+            id: id(&request, identity.digest),
+            request,
             given,
             epoch: 0,
             bytes: identity.bytes,
@@ -183,7 +185,7 @@ impl Job {
 
     /// Whether settings and images are those it was planned with.
     pub fn is_of(&self, digest: u64) -> bool {
-        self.id == id(&self.arguments, digest)
+        self.id == id(&self.request, digest)
     }
 
     /// Where its map is in the world's lattice, when it lies at a pose: the name is a hash of both.
@@ -221,13 +223,11 @@ impl Job {
     }
 }
 
-fn id(arguments: &[String], of_input: u64) -> String {
+fn id(request: &Request, of_input: u64) -> String {
     let mut digest = Digest::default();
     digest.bytes(program().as_bytes());
-    arguments.iter().for_each(|argument| {
-        digest.u64(argument.len() as u64);
-        digest.bytes(argument.as_bytes());
-    });
+    // What cannot be stored has no job: the manifest is not written.
+    digest.bytes(&serde_json::to_vec(request).unwrap_or_default());
     digest.u64(of_input);
     format!("{:016x}", digest.finish())
 }
@@ -257,12 +257,11 @@ mod tests {
     use super::*;
     use crate::fleet::RECORDINGS_EXAMPLE;
 
-    fn identify(arguments: &[String]) -> Result<Identity, FleetError> {
-        let first_pose = arguments
-            .iter()
-            .any(|argument| argument.contains("file:"))
-            .then(|| Transform::from_translation([0.0, 1.0, 700.0]));
-        Ok(Identity { digest: arguments.len() as u64, bytes: 7, first_pose })
+    fn identify(arguments: &[String]) -> Result<(Request, Identity), FleetError> {
+        let mut request = Request::default();
+        request.input.sequence = Some(arguments.join(" "));
+        let identity = Identity { digest: arguments.len() as u64, bytes: 7, first_pose: None };
+        Ok((request, identity))
     }
 
     #[test]
@@ -275,8 +274,9 @@ mod tests {
         assert_eq!(Manifest::read(root.path()).unwrap(), manifest);
         let [monday, tuesday] = &manifest.jobs[..] else { panic!("{manifest:?}") };
         assert_eq!(
-            monday.arguments,
-            ["recordings/monday", "--instances", "none", "--memory", "256MiB"]
+            monday.request.input.sequence.as_deref(),
+            Some("recordings/monday --instances none --memory 256MiB"),
+            "its own arguments, then those of all"
         );
         assert_eq!(
             tuesday.given,
@@ -300,6 +300,20 @@ mod tests {
         let refused = Manifest::read(root.path()).unwrap_err().to_string();
         assert!(
             refused.contains("sums 0; this is dynvox ")
+                && refused.contains("Make it with `dynvox fleet plan`"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn jobs_of_a_format_with_arguments_are_refused_with_the_next_action() {
+        let root = tempfile::TempDir::new().unwrap();
+        let job = r#"{"name": "monday", "id": "07", "arguments": ["rig"], "figures": "a.json", "epoch": 0, "bytes": 7}"#;
+        let text = format!(r#"{{"program": "{}", "jobs": [{job}]}}"#, program());
+        std::fs::write(root.path().join(MANIFEST_FILE), text).unwrap();
+        let refused = Manifest::read(root.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("no list of jobs of this version: missing field `request`")
                 && refused.contains("Make it with `dynvox fleet plan`"),
             "{refused}"
         );

@@ -5,7 +5,7 @@
 //! those that are left at the end.
 
 use super::tables::{BlockFate, block_rows};
-use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
+use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
 use crate::formats::BLOCKS_TABLE_FILE;
 use dynvox_core::volume::{BlockCoord, Volume};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl Observer for BlockHistoryObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let volume = frame.view.mapper().background();
@@ -54,17 +54,21 @@ impl Observer for BlockHistoryObserver {
                 BlockFate::Pruned
             }
         };
-        self.write(setup, left.into_iter().map(|(coord, last)| (coord, last, fate(&coord))))
+        self.write(run, left.into_iter().map(|(coord, last)| (coord, last, fate(&coord))))
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let pruned = self.take_absent(end.view.mapper().background());
         let kept = std::mem::take(&mut self.sightings).into_iter().flatten();
         let rows = pruned.into_iter().map(|(coord, last)| (coord, last, BlockFate::Pruned));
-        self.write(setup, rows.chain(kept.map(|(coord, last)| (coord, last, BlockFate::Map))))
+        self.write(run, rows.chain(kept.map(|(coord, last)| (coord, last, BlockFate::Map))))
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<(), ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<(), ObserveError> {
         Ok(())
     }
 }
@@ -99,11 +103,11 @@ impl BlockHistoryObserver {
 
     fn write(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>,
     ) -> Result<(), ObserveError> {
         let failed = |source: io::Error| ObserveError::Write {
-            path: setup.folder.join(BLOCKS_TABLE_FILE),
+            path: run.folder.join(BLOCKS_TABLE_FILE),
             source,
         };
         self.file.append(&block_rows(rows, self.file.is_empty()).map_err(failed)?);

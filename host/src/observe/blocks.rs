@@ -1,6 +1,6 @@
 //! Blocks of the map over a run: made, pruned, evicted, stored.
 
-use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::formats::Mesh;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::EvictionReport;
@@ -96,7 +96,7 @@ impl Observer for BlocksObserver {
 
     fn frame(
         &mut self,
-        _: &Setup<'_>,
+        _: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let (totals, row) = (&mut self.totals, frame.row);
@@ -118,7 +118,11 @@ impl Observer for BlocksObserver {
         Ok(())
     }
 
-    fn finish(mut self, _: &Setup<'_>, finished: &Finished) -> Result<BlocksSection, ObserveError> {
+    fn finish(
+        mut self,
+        _: &ObservedRun<'_>,
+        finished: &Finished,
+    ) -> Result<BlocksSection, ObserveError> {
         self.totals.prune_visited += u64::from(finished.pruned.visited);
         self.totals.voxels_reset += u64::from(finished.pruned.voxels_reset);
         self.totals.blocks_freed += u64::from(finished.pruned.blocks_freed);

@@ -1,7 +1,7 @@
 //! How much of each bound of [`Capacity`] a run needed, and the least capacity that would have been
 //! enough for it.
 
-use super::{Finished, FrameContext, FrameRow, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, FrameRow, ObserveError, ObservedRun, Observer};
 use dynvox_core::scene_flow::FlowReport;
 use dynvox_core::{Capacity, Mapper};
 use serde::{Deserialize, Serialize};
@@ -170,7 +170,7 @@ impl Observer for BoundsObserver {
 
     fn frame(
         &mut self,
-        _: &Setup<'_>,
+        _: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         self.lost_blocks += u64::from(frame.row.report.allocation.eviction.lost);
@@ -178,8 +178,12 @@ impl Observer for BoundsObserver {
         Ok(())
     }
 
-    fn finish(mut self, setup: &Setup<'_>, _: &Finished) -> Result<BoundsSection, ObserveError> {
-        let volume = &setup.config.volume;
+    fn finish(
+        mut self,
+        run: &ObservedRun<'_>,
+        _: &Finished,
+    ) -> Result<BoundsSection, ObserveError> {
+        let volume = &run.plan.config.volume;
         if volume.prunes() {
             // A shorter window would be another setting, even where the run ended before the window
             // was full.
@@ -187,12 +191,12 @@ impl Observer for BoundsObserver {
             self.uses.history_frames.needed = if self.uses.history_frames.refused > 0 {
                 asked
             } else {
-                asked.min(setup.capacity.history_frames)
+                asked.min(run.plan.capacity.history_frames)
             };
         }
         Ok(BoundsSection {
             uses: self.uses,
-            least: self.uses.least(setup.capacity, setup.dataset.size()),
+            least: self.uses.least(&run.plan.capacity, run.plan.dataset.size()),
         })
     }
 }

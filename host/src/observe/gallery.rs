@@ -2,7 +2,7 @@
 //! however long the run.
 
 use super::{
-    EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown,
+    EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, frame_pictures::Shown,
     pictures, spread,
 };
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
@@ -33,8 +33,8 @@ impl Observer for GalleryObserver {
     type Section = Option<String>;
 
     /// Removes pictures of frames after the checkpoint: they will be taken again.
-    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
-        let folder = folder(setup);
+    fn resume(&mut self, run: &ObservedRun<'_>) -> Result<(), ObserveError> {
+        let folder = folder(run);
         let failed = |source| ObserveError::Write { path: folder.clone(), source };
         if !folder.is_dir() {
             return Ok(());
@@ -55,47 +55,48 @@ impl Observer for GalleryObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let position = frame.position;
-        let chosen = setup.frames.map_or_else(
+        let chosen = run.plan.frames.count().map_or_else(
             || position.is_multiple_of(self.every),
             |frames| spread(frames, FRAMES)(position),
         );
         if chosen && self.failure.is_none() {
             self.taken.push((position, frame.row.frame));
-            self.failure = write_frame(&folder(setup), frame).err().map(|error| error.to_string());
-            self.thin_out(&folder(setup));
+            self.failure = write_frame(&folder(run), frame).err().map(|error| error.to_string());
+            self.thin_out(&folder(run));
         }
         Ok(())
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         if end.last.is_none() || self.failure.is_some() {
             return Ok(());
         }
-        let (width, height) = setup.dataset.size();
+        let (width, height) = run.plan.dataset.size();
         let index = PictureIndex {
             width,
             height,
             frames: self.taken.iter().map(|(_, frame)| *frame).collect(),
         };
         let overview = &end.overview_jpeg;
-        let written = if overview.is_empty() {
-            Ok(())
-        } else {
-            write(&folder(setup).join(OVERVIEW), overview)
-        };
+        let written =
+            if overview.is_empty() { Ok(()) } else { write(&folder(run).join(OVERVIEW), overview) };
         let index = serde_json::to_vec(&index).unwrap_or_default();
         self.failure = written
-            .and_then(|()| write(&folder(setup).join(PICTURES_INDEX), &index))
+            .and_then(|()| write(&folder(run).join(PICTURES_INDEX), &index))
             .err()
             .map(|error| error.to_string());
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
         Ok(self.failure)
     }
 }
@@ -126,8 +127,8 @@ impl GalleryObserver {
     }
 }
 
-fn folder(setup: &Setup<'_>) -> PathBuf {
-    setup.folder.join(PICTURES_FOLDER)
+fn folder(run: &ObservedRun<'_>) -> PathBuf {
+    run.folder.join(PICTURES_FOLDER)
 }
 
 /// Writes the pictures of a frame. One that cannot be made leaves no file.

@@ -1,6 +1,6 @@
 //! What was refused or lost, over a run.
 
-use super::{Finished, FrameContext, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::input::MaskRefusals;
 use dynvox_core::Severity;
 use dynvox_core::tracking::DetectionCount;
@@ -36,7 +36,7 @@ impl Observer for HealthObserver {
 
     fn frame(
         &mut self,
-        _: &Setup<'_>,
+        _: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let (sums, row) = (&mut self.sums, frame.row);
@@ -51,7 +51,11 @@ impl Observer for HealthObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<HealthSection, ObserveError> {
+    fn finish(
+        self,
+        _: &ObservedRun<'_>,
+        finished: &Finished,
+    ) -> Result<HealthSection, ObserveError> {
         let store = &finished.store;
         let end = if u64::from(store.end.lost) + store.unreadable > 0 {
             Severity::MapAffected

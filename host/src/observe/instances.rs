@@ -1,6 +1,6 @@
 //! Saves the instances of every frame: those given, and apart those found by motion.
 
-use super::{FrameContext, ObserveError, Observer, Setup};
+use super::{FrameContext, ObserveError, ObservedRun, Observer};
 use crate::input::masks::save_masks;
 use crate::input::{FrameSource, InstanceMask};
 use dynvox_core::Mapper;
@@ -13,7 +13,7 @@ use std::path::Path;
 /// Where those found by motion lie, in the folder of those given.
 pub const MOTION_FOLDER: &str = "motion";
 
-/// Saves instances where [`Setup::save_instances`] says so.
+/// Saves instances where [`ObservedRun::instances_folder`] says so.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct InstancesObserver {}
 
@@ -22,14 +22,15 @@ impl Observer for InstancesObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        let Some(folder) = setup.save_instances else { return Ok(()) };
+        let Some(folder) = run.instances_folder.as_deref() else { return Ok(()) };
         let motion_folder = folder.join(MOTION_FOLDER);
         std::fs::create_dir_all(&motion_folder)
             .map_err(|source| ObserveError::Write { path: motion_folder.clone(), source })?;
-        let (stem, size) = (stem(setup.dataset, frame.row.frame), setup.dataset.size());
+        let (stem, size) =
+            (stem(run.plan.dataset.as_ref(), frame.row.frame), run.plan.dataset.size());
         let save = |folder: &Path, masks: &[InstanceMask]| {
             Ok::<(), ObserveError>(save_masks(folder, &stem, size, masks)?)
         };
@@ -37,7 +38,7 @@ impl Observer for InstancesObserver {
         save(&motion_folder, &found_by_motion(frame.view.mapper(), size))
     }
 
-    fn finish(self, _: &Setup<'_>, _: &super::Finished) -> Result<(), ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &super::Finished) -> Result<(), ObserveError> {
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! Pictures of some frames, and of the finished map.
 
 use super::{
-    EndContext, Finished, FrameContext, ObserveError, Observer, Setup, frame_pictures::Shown,
+    EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, frame_pictures::Shown,
     spread,
 };
 use serde::{Deserialize, Serialize};
@@ -47,12 +47,12 @@ impl Observer for KeyframesObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let position = frame.position;
         // Of a stream the first frame, and others ever further apart.
-        let chosen = setup.frames.map_or_else(
+        let chosen = run.plan.frames.count().map_or_else(
             || position == 0 || position.is_power_of_two(),
             |frames| spread(frames, KEYFRAMES)(position),
         );
@@ -65,12 +65,16 @@ impl Observer for KeyframesObserver {
         Ok(())
     }
 
-    fn end(&mut self, _: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        _: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         self.overview_jpeg = end.overview_jpeg.clone();
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<KeyframesSection, ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<KeyframesSection, ObserveError> {
         Ok(KeyframesSection { keyframes: self.keyframes, overview_jpeg: self.overview_jpeg })
     }
 }

@@ -1,7 +1,9 @@
 //! Saves what the finished map shows at every frame's pose, as disparities, to be compared with a
 //! matcher that was never fused.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup, instances::stem};
+use super::{
+    EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, instances::stem,
+};
 use crate::formats::{Image, write_png_deep};
 use crate::input::InputError;
 use dynvox_core::geometry::{DisparityCorrection, StereoRig, Transform};
@@ -11,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Units of a disparity in a file, per px.
 const UNITS_PER_PX: f32 = 256.0;
 
-/// Saves disparities where [`Setup::save_map_disparity`] says so.
+/// Saves disparities where [`ObservedRun::map_disparity_folder`] says so.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct MapDisparityObserver {
     /// Names of the frames, and their poses. No checkpoint has them: such a run has none.
@@ -24,18 +26,24 @@ impl Observer for MapDisparityObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        if setup.save_map_disparity.is_some() {
-            self.frames
-                .push((stem(setup.dataset, frame.row.frame), frame.row.report.t_world_camera));
+        if run.map_disparity_folder.as_deref().is_some() {
+            self.frames.push((
+                stem(run.plan.dataset.as_ref(), frame.row.frame),
+                frame.row.report.t_world_camera,
+            ));
         }
         Ok(())
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        let Some(folder) = setup.save_map_disparity else { return Ok(()) };
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
+        let Some(folder) = run.map_disparity_folder.as_deref() else { return Ok(()) };
         let calibration =
             end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
         let correction = calibration.and_then(|report| report.found()).unwrap_or_default();
@@ -43,7 +51,7 @@ impl Observer for MapDisparityObserver {
             let seen = end
                 .view
                 .raycast((&t_world_camera).into())
-                .and_then(|seen| disparities(&setup.config.rig, &correction, seen.depth_m()?));
+                .and_then(|seen| disparities(&run.plan.config.rig, &correction, seen.depth_m()?));
             if let Some(disparity) = seen {
                 write_png_deep(&folder.join(format!("{name}.png")), &disparity)
                     .map_err(InputError::from)?;
@@ -52,7 +60,7 @@ impl Observer for MapDisparityObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<(), ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<(), ObserveError> {
         Ok(())
     }
 }

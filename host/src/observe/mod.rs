@@ -46,7 +46,7 @@ pub use overview::overview;
 pub use planning::{BoxDescription, PlanningObserver, write_folder as write_planning};
 pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
-pub use reference::{ErrorPictures, Reference, ReferenceObserver, ReferencePlan, ReferenceSection};
+pub use reference::{ErrorPictures, ReferenceObserver, ReferencePlan, ReferenceSection};
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{
     ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first,
@@ -54,17 +54,18 @@ pub use trajectory::{
 pub use volume_copy::VolumeCopy;
 pub use written_file::WrittenFile;
 
-use crate::formats::{Axes, Mesh};
-use crate::input::{FrameSource, InputError, StereoImages};
+use crate::formats::Mesh;
+use crate::input::{InputError, StereoImages};
+use crate::request::Plan;
+use dynvox_core::Mapper;
 use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::planning::PlanningReport;
 use dynvox_core::view::{RaycastView, Raycaster};
 use dynvox_core::volume::{BlockCoord, PruneReport};
-use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Why an observer cannot continue.
 #[derive(Debug, thiserror::Error)]
@@ -90,28 +91,16 @@ pub enum ObserveError {
     Dataset(#[from] InputError),
 }
 
-/// What does not change during a run.
-pub struct Setup<'p> {
-    /// The frames.
-    pub dataset: &'p dyn FrameSource,
-    /// Frames that the run takes; `None` where a stream's end is unknown.
-    pub frames: Option<usize>,
-    /// The bounds.
-    pub capacity: &'p Capacity,
-    /// The settings.
-    pub config: &'p Config,
+/// A run as its observers see it: the plan, and where files go.
+pub struct ObservedRun<'p> {
+    /// What is run.
+    pub plan: &'p Plan,
     /// The run folder under construction.
     pub folder: PathBuf,
-    /// Where the camera's motion comes from: `stereo`, `icp` or `file`.
-    pub motion_source: &'static str,
-    /// Whether the run is recorded as an MCAP file.
-    pub record: bool,
-    /// Axes of meshes in world coordinates.
-    pub axes: Axes,
     /// Folder that every frame's instances are saved to, if they are.
-    pub save_instances: Option<&'p Path>,
+    pub instances_folder: Option<PathBuf>,
     /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
-    pub save_map_disparity: Option<&'p Path>,
+    pub map_disparity_folder: Option<PathBuf>,
     /// What the map is evaluated against, and when.
     pub reference: Option<ReferencePlan>,
 }
@@ -201,7 +190,7 @@ pub trait Observer {
     ///
     /// # Errors
     /// The disk refuses.
-    fn checkpoint(&mut self, _setup: &Setup<'_>) -> Result<(), ObserveError> {
+    fn checkpoint(&mut self, _run: &ObservedRun<'_>) -> Result<(), ObserveError> {
         Ok(())
     }
 
@@ -210,7 +199,7 @@ pub trait Observer {
     ///
     /// # Errors
     /// A file is missing or differs, or cannot be removed.
-    fn resume(&mut self, _setup: &Setup<'_>) -> Result<(), ObserveError> {
+    fn resume(&mut self, _run: &ObservedRun<'_>) -> Result<(), ObserveError> {
         Ok(())
     }
 
@@ -220,7 +209,7 @@ pub trait Observer {
     /// The data set or the disk refuses.
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError>;
 
@@ -230,7 +219,7 @@ pub trait Observer {
     /// The disk refuses.
     fn end(
         &mut self,
-        _setup: &Setup<'_>,
+        _run: &ObservedRun<'_>,
         _end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         Ok(())
@@ -240,7 +229,11 @@ pub trait Observer {
     ///
     /// # Errors
     /// The disk refuses.
-    fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Self::Section, ObserveError>;
+    fn finish(
+        self,
+        run: &ObservedRun<'_>,
+        finished: &Finished,
+    ) -> Result<Self::Section, ObserveError>;
 }
 
 /// All observers, in the order in which they see a frame.
@@ -306,60 +299,64 @@ impl Observer for Observers {
             .collect()
     }
 
-    fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
-        self.objects.checkpoint(setup)
+    fn checkpoint(&mut self, run: &ObservedRun<'_>) -> Result<(), ObserveError> {
+        self.objects.checkpoint(run)
     }
 
-    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
-        self.gallery.resume(setup)?;
-        self.objects.resume(setup)
+    fn resume(&mut self, run: &ObservedRun<'_>) -> Result<(), ObserveError> {
+        self.gallery.resume(run)?;
+        self.objects.resume(run)
     }
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        self.trajectory.frame(setup, frame)?;
-        self.keyframes.frame(setup, frame)?;
-        self.gallery.frame(setup, frame)?;
-        self.recording.frame(setup, frame)?;
-        self.reference.frame(setup, frame)?;
-        self.tracks.frame(setup, frame)?;
-        self.objects.frame(setup, frame)?;
-        self.blocks.frame(setup, frame)?;
-        self.block_history.frame(setup, frame)?;
-        self.bounds.frame(setup, frame)?;
-        self.health.frame(setup, frame)?;
-        self.instances.frame(setup, frame)?;
-        self.map_disparity.frame(setup, frame)?;
-        self.planning.frame(setup, frame)
+        self.trajectory.frame(run, frame)?;
+        self.keyframes.frame(run, frame)?;
+        self.gallery.frame(run, frame)?;
+        self.recording.frame(run, frame)?;
+        self.reference.frame(run, frame)?;
+        self.tracks.frame(run, frame)?;
+        self.objects.frame(run, frame)?;
+        self.blocks.frame(run, frame)?;
+        self.block_history.frame(run, frame)?;
+        self.bounds.frame(run, frame)?;
+        self.health.frame(run, frame)?;
+        self.instances.frame(run, frame)?;
+        self.map_disparity.frame(run, frame)?;
+        self.planning.frame(run, frame)
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        self.keyframes.end(setup, end)?;
-        self.gallery.end(setup, end)?;
-        self.recording.end(setup, end)?;
-        self.objects.end(setup, end)?;
-        self.block_history.end(setup, end)?;
-        self.map_disparity.end(setup, end)?;
-        self.planning.end(setup, end)
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
+        self.keyframes.end(run, end)?;
+        self.gallery.end(run, end)?;
+        self.recording.end(run, end)?;
+        self.objects.end(run, end)?;
+        self.block_history.end(run, end)?;
+        self.map_disparity.end(run, end)?;
+        self.planning.end(run, end)
     }
 
-    fn finish(self, setup: &Setup<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
-        self.planning.finish(setup, finished)?;
-        self.block_history.finish(setup, finished)?;
+    fn finish(self, run: &ObservedRun<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
+        self.planning.finish(run, finished)?;
+        self.block_history.finish(run, finished)?;
         Ok(Sections {
-            trajectory: self.trajectory.finish(setup, finished)?,
-            keyframes: self.keyframes.finish(setup, finished)?,
-            gallery_failure: self.gallery.finish(setup, finished)?,
-            recording_failure: self.recording.finish(setup, finished)?,
-            reference: self.reference.finish(setup, finished)?,
-            tracks: self.tracks.finish(setup, finished)?,
-            objects: self.objects.finish(setup, finished)?,
-            blocks: self.blocks.finish(setup, finished)?,
-            bounds: self.bounds.finish(setup, finished)?,
-            health: self.health.finish(setup, finished)?,
+            trajectory: self.trajectory.finish(run, finished)?,
+            keyframes: self.keyframes.finish(run, finished)?,
+            gallery_failure: self.gallery.finish(run, finished)?,
+            recording_failure: self.recording.finish(run, finished)?,
+            reference: self.reference.finish(run, finished)?,
+            tracks: self.tracks.finish(run, finished)?,
+            objects: self.objects.finish(run, finished)?,
+            blocks: self.blocks.finish(run, finished)?,
+            bounds: self.bounds.finish(run, finished)?,
+            health: self.health.finish(run, finished)?,
         })
     }
 }

@@ -4,7 +4,8 @@
 
 use super::thumbnail::thumbnail;
 use super::{
-    EndContext, Finished, FrameContext, ObserveError, Observer, RetiredVolume, Setup, WrittenFile,
+    EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, RetiredVolume,
+    WrittenFile,
 };
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
@@ -91,18 +92,18 @@ pub struct ObjectsObserver {
 impl Observer for ObjectsObserver {
     type Section = ObjectsSection;
 
-    fn checkpoint(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
+    fn checkpoint(&mut self, run: &ObservedRun<'_>) -> Result<(), ObserveError> {
         while let Some(name) = self.unsynced.last() {
-            self.files.push(WrittenFile::synced(&setup.folder, name.clone())?);
+            self.files.push(WrittenFile::synced(&run.folder, name.clone())?);
             self.unsynced.pop();
         }
         Ok(())
     }
 
     /// Removes files of objects that left after the checkpoint: they will leave again.
-    fn resume(&mut self, setup: &Setup<'_>) -> Result<(), ObserveError> {
-        self.files.iter().try_for_each(|file| file.check(&setup.folder))?;
-        let folder = setup.folder.join(OBJECTS_FOLDER);
+    fn resume(&mut self, run: &ObservedRun<'_>) -> Result<(), ObserveError> {
+        self.files.iter().try_for_each(|file| file.check(&run.folder))?;
+        let folder = run.folder.join(OBJECTS_FOLDER);
         let failed = |source| ObserveError::Write { path: folder.clone(), source };
         if !folder.is_dir() {
             return Ok(());
@@ -122,10 +123,10 @@ impl Observer for ObjectsObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        self.write_all(setup, frame.retired);
+        self.write_all(run, frame.retired);
         for object in fused(frame) {
             self.paths.entry((object.id, object.segment_id)).or_default().push(PosedAt {
                 frame: frame.row.frame,
@@ -133,16 +134,24 @@ impl Observer for ObjectsObserver {
                 t_world_object: object.t_world_object,
             });
         }
-        self.note_truth(setup, frame);
+        self.note_truth(run, frame);
         Ok(())
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
-        self.write_all(setup, end.retired);
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
+        self.write_all(run, end.retired);
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, finished: &Finished) -> Result<ObjectsSection, ObserveError> {
+    fn finish(
+        self,
+        _: &ObservedRun<'_>,
+        finished: &Finished,
+    ) -> Result<ObjectsSection, ObserveError> {
         let mesh = finished.mesh_path.is_file();
         let swept = self
             .swept
@@ -168,7 +177,7 @@ fn fused(frame: &FrameContext<'_, '_>) -> Vec<ObjectSummary> {
 impl ObjectsObserver {
     /// Notes what is really there, where the truth is exact: the volume moving objects sweep, and
     /// the surfaces that are seen.
-    fn note_truth(&mut self, setup: &Setup<'_>, frame: &FrameContext<'_, '_>) {
+    fn note_truth(&mut self, run: &ObservedRun<'_>, frame: &FrameContext<'_, '_>) {
         let (Some(truth), Some(exact)) = (&frame.images.objects, &frame.images.exact) else {
             return;
         };
@@ -177,10 +186,10 @@ impl ObjectsObserver {
         truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
         let Some(depth_m) = exact.depth_m.view() else { return };
         let view = TrueView {
-            rig: &setup.config.rig,
+            rig: &run.plan.config.rig,
             depth_m,
             t_world_camera: truth.t_world_camera,
-            far_m: f64::from(setup.config.objects.far_m),
+            far_m: f64::from(run.plan.config.objects.far_m),
         };
         let tracks: Vec<TrackReport> =
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
@@ -204,12 +213,12 @@ impl ObjectsObserver {
     }
 
     /// Writes objects. One that cannot be written is noted, and the run goes on without it.
-    fn write_all(&mut self, setup: &Setup<'_>, retired: &[RetiredVolume]) {
+    fn write_all(&mut self, run: &ObservedRun<'_>, retired: &[RetiredVolume]) {
         for one in retired {
             let name = self.name_of(one);
-            if let Err(error) = self.write(setup, one, &name) {
+            if let Err(error) = self.write(run, one, &name) {
                 files(&name).iter().for_each(|file| {
-                    drop(std::fs::remove_file(setup.folder.join(OBJECTS_FOLDER).join(file)))
+                    drop(std::fs::remove_file(run.folder.join(OBJECTS_FOLDER).join(file)))
                 });
                 self.unwritten.push(name);
                 self.failure.get_or_insert_with(|| error.to_string());
@@ -226,21 +235,26 @@ impl ObjectsObserver {
     /// Writes an object's mesh and poses. One without triangles leaves no file.
     fn write(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         RetiredVolume { summary, volume }: &RetiredVolume,
         name: &str,
     ) -> Result<(), ObserveError> {
         let poses = self.paths.remove(&(summary.id, summary.segment_id)).unwrap_or_default();
         let side = self.sides.remove(&(summary.id, summary.segment_id));
-        let folder = setup.folder.join(OBJECTS_FOLDER);
+        let folder = run.folder.join(OBJECTS_FOLDER);
         let mut triangles = Vec::new();
         let meshed = volume
-            .triangles(&setup.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
+            .triangles(&run.plan.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
         if triangles.is_empty() {
             return Ok(());
         }
-        write_files(&folder, (summary.id, name), (&triangles, setup.axes), &poses)?;
+        write_files(
+            &folder,
+            (summary.id, name),
+            (&triangles, run.plan.request.exports.axes),
+            &poses,
+        )?;
         self.unsynced.extend(files(name).map(|file| format!("{OBJECTS_FOLDER}/{file}")));
         self.retired.push(ReconstructedObject {
             id: summary.id,

@@ -1,7 +1,7 @@
 //! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a
 //! picture of them.
 
-use super::{EndContext, Finished, FrameContext, ObserveError, Observer, Setup};
+use super::{EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::scene::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, WindowScales};
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
@@ -68,23 +68,27 @@ impl Observer for PlanningObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        if setup.frames == Some(frame.position + 1) {
-            self.write(setup, frame.row.frame, frame.view)?;
+        if run.plan.frames.count() == Some(frame.position + 1) {
+            self.write(run, frame.row.frame, frame.view)?;
         }
         Ok(())
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         match end.last {
-            Some(last) if !self.written => self.write(setup, last.frame, end.view),
+            Some(last) if !self.written => self.write(run, last.frame, end.view),
             _ => Ok(()),
         }
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<(), ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<(), ObserveError> {
         Ok(())
     }
 }
@@ -92,7 +96,7 @@ impl Observer for PlanningObserver {
 impl PlanningObserver {
     fn write(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: usize,
         view: &mut dyn super::MapView<'_>,
     ) -> Result<(), ObserveError> {
@@ -102,7 +106,7 @@ impl PlanningObserver {
         let report = view.plan(0.0);
         let camera = view.mapper().t_world_camera().translation_m;
         write_folder(
-            &setup.folder.join(PLANNING_FOLDER),
+            &run.folder.join(PLANNING_FOLDER),
             frame,
             camera,
             report,

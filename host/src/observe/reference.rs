@@ -1,7 +1,7 @@
 //! Input and map against a reference depth, LiDAR or exact: regions are fixed while a frame is
 //! there, the map is viewed when the frame is due.
 
-use super::{Finished, FrameContext, ObserveError, Observer, Setup, pictures, spread};
+use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer, pictures, spread};
 use crate::evaluate::reference::{
     DepthErrors, EvaluatedFrame, Field, PendingFrame, PendingFrames, PointOutcomes, ProjectedScan,
     ReferenceFigures, Region, Sample, SurfaceErrors, project_scan, sample_exact_depth,
@@ -9,6 +9,7 @@ use crate::evaluate::reference::{
 use crate::formats::Image;
 use crate::input::InstanceMask;
 use crate::input::{FrameSource, StereoImages};
+use crate::request::{Plan, Reference};
 use dynvox_core::Mapper;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
@@ -21,34 +22,6 @@ use serde::{Deserialize, Serialize};
 const PICTURES: usize = 4;
 /// Frames evaluated against exact depth, where it is there and no evaluation was asked for.
 const SAMPLED_FRAMES: usize = 24;
-
-/// What the map is evaluated against.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Reference {
-    /// LiDAR scans, of the frames that have one: `velodyne/` next to the images, or the synthetic
-    /// street's.
-    Lidar,
-    /// The synthetic street's exact depth.
-    Exact,
-}
-
-impl Reference {
-    /// Name in tables and files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Lidar => "lidar",
-            Self::Exact => "exact",
-        }
-    }
-
-    /// Whether a frame has it.
-    fn is_there(self, dataset: &dyn FrameSource, index: usize) -> bool {
-        match self {
-            Self::Lidar => dataset.has_lidar(index),
-            Self::Exact => dataset.has_exact_depth(),
-        }
-    }
-}
 
 /// What the map is evaluated against, and in which frames.
 #[derive(Clone, Debug)]
@@ -63,24 +36,29 @@ pub struct ReferencePlan {
 }
 
 impl ReferencePlan {
+    /// The reference that a run asks for; without one, some frames of exact depth.
+    pub fn of_run(run: &Plan) -> Option<Self> {
+        let (dataset, listed) = (run.dataset.as_ref(), run.frames.listed());
+        let asked = &run.request.evaluation;
+        match asked.reference {
+            Some(reference) => Self::all(dataset, listed, reference, asked.delay),
+            None => Self::sampled(dataset, listed),
+        }
+    }
+
     /// All frames that have the reference, each evaluated `delay` frames later; `None` when no
     /// frame has it in time.
-    pub fn all(
+    fn all(
         dataset: &dyn FrameSource,
         indices: &[usize],
         reference: Reference,
         delay: usize,
     ) -> Option<Self> {
-        let in_time = indices.iter().enumerate().take(indices.len().saturating_sub(delay));
-        let positions = in_time
-            .filter(|&(_, &index)| reference.is_there(dataset, index))
-            .map(|(at, _)| at)
-            .collect();
-        Self::of(reference, delay, positions)
+        Self::of(reference, delay, reference.positions(dataset, indices, delay))
     }
 
     /// Some frames against exact depth, at once; `None` where there is no exact depth.
-    pub fn sampled(dataset: &dyn FrameSource, indices: &[usize]) -> Option<Self> {
+    fn sampled(dataset: &dyn FrameSource, indices: &[usize]) -> Option<Self> {
         let chosen = spread(indices.len(), SAMPLED_FRAMES);
         let positions = if dataset.has_exact_depth() {
             (0..indices.len()).filter(|&at| chosen(at)).collect()
@@ -144,12 +122,12 @@ impl Observer for ReferenceObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        let Some(plan) = &setup.reference else { return Ok(()) };
+        let Some(plan) = &run.reference else { return Ok(()) };
         let pending = if plan.positions.binary_search(&frame.position).is_ok() {
-            pending(setup, plan, frame)?
+            pending(run, plan, frame)?
         } else {
             None
         };
@@ -162,13 +140,13 @@ impl Observer for ReferenceObserver {
         if let Some((depth_m, normal)) =
             seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?)))
         {
-            self.compare(setup, &due, &depth_m, &normal);
+            self.compare(run, &due, &depth_m, &normal);
         }
         Ok(())
     }
 
-    fn finish(self, setup: &Setup<'_>, _: &Finished) -> Result<Self::Section, ObserveError> {
-        Ok(setup.reference.as_ref().map(|plan| ReferenceSection {
+    fn finish(self, run: &ObservedRun<'_>, _: &Finished) -> Result<Self::Section, ObserveError> {
+        Ok(run.reference.as_ref().map(|plan| ReferenceSection {
             figures: ReferenceFigures::of(
                 plan.reference.name(),
                 plan.delay,
@@ -187,14 +165,14 @@ impl ReferenceObserver {
     /// Compares a frame that is due with a view of the map from its pose.
     fn compare(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         due: &PendingFrame,
         map_depth_m: &View<'_, f32>,
         normal: &View<'_, [i8; 3]>,
     ) {
-        let rig = &setup.config.rig;
+        let rig = &run.plan.config.rig;
         let focal_baseline_px_m = rig.focal_baseline_px_m();
-        let (size, full_size) = (setup.dataset.size(), setup.dataset.full_size());
+        let (size, full_size) = (run.plan.dataset.size(), run.plan.dataset.full_size());
         let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
         let (evaluated, shown_px) = due.compare(map_depth_m, focal_baseline_px_m, enlarged);
         self.frames.push(evaluated);
@@ -246,17 +224,18 @@ fn ray(rig: &StereoRig, sample: &Sample) -> [f64; 3] {
 /// The points of a frame, with their regions and what the input measured there; `None` without a
 /// reference.
 fn pending(
-    setup: &Setup<'_>,
+    run: &ObservedRun<'_>,
     plan: &ReferencePlan,
     frame: &FrameContext<'_, '_>,
 ) -> Result<Option<PendingFrame>, ObserveError> {
-    let (rig, images, mapper) = (&setup.config.rig, frame.images, frame.view.mapper());
-    let (width, height) = setup.dataset.size();
-    let (near_m, far_m) = (setup.config.volume.near_m.into(), setup.config.volume.far_m.into());
+    let (rig, images, mapper) = (&run.plan.config.rig, frame.images, frame.view.mapper());
+    let (width, height) = run.plan.dataset.size();
+    let (near_m, far_m) =
+        (run.plan.config.volume.near_m.into(), run.plan.config.volume.far_m.into());
     let field = Field { width, height, near_m, far_m };
     let scan: Option<ProjectedScan> = match plan.reference {
         Reference::Lidar => {
-            setup.dataset.lidar(frame.row.frame)?.map(|scan| project_scan(&scan, &field))
+            run.plan.dataset.lidar(frame.row.frame)?.map(|scan| project_scan(&scan, &field))
         }
         Reference::Exact => {
             images.exact.as_ref().map(|exact| sample_exact_depth(&exact.depth_m, rig, &field))
@@ -265,7 +244,7 @@ fn pending(
     let disparity = mapper.disparity_q8();
     // The map's metres are those of the scaled baseline: a disparity is compared as the calibrated
     // rig would have it at that depth.
-    let baseline_scale = setup.config.rig_settings.baseline_scale as f32;
+    let baseline_scale = run.plan.config.rig_settings.baseline_scale as f32;
     let input_px = |u: usize, v: usize| {
         let px = f32::from(disparity.get(u, v).unwrap_or_default())
             / f32::from(DISPARITY_ONE_PX)
@@ -274,7 +253,7 @@ fn pending(
         // Only what is fused is the map's input. Infinite where there is no disparity.
         if depth_m >= near_m && depth_m <= far_m { px } else { 0.0 }
     };
-    let region = |u: i32, v: i32| region(setup, mapper, images, u, v);
+    let region = |u: i32, v: i32| region(run, mapper, images, u, v);
     Ok(scan.map(|scan| {
         let mut pending = PendingFrame::new(
             frame.row.frame,
@@ -294,12 +273,18 @@ fn pending(
 
 /// The region of a pixel. Without object tracking every masked object counts as one of unknown
 /// motion, so that maps with and without it are evaluated at the same points of the background.
-fn region(setup: &Setup<'_>, mapper: &Mapper<'_>, images: &StereoImages, u: i32, v: i32) -> Region {
-    let instances = &setup.config.tracking;
+fn region(
+    run: &ObservedRun<'_>,
+    mapper: &Mapper<'_>,
+    images: &StereoImages,
+    u: i32,
+    v: i32,
+) -> Region {
+    let instances = &run.plan.config.tracking;
     if instances.dynamic {
         return Region::of(mapper.instance_at(u, v).as_ref());
     }
-    let (width, height) = setup.dataset.size();
+    let (width, height) = run.plan.dataset.size();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
     let taken = |one: &&InstanceMask| {
         one.contains(u, v)

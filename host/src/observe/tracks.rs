@@ -3,7 +3,7 @@
 mod sums;
 
 use super::tables::track_rows;
-use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
 use crate::evaluate::masks::{MovingErrors, MovingFigures, Overlaps};
 use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
 use crate::formats::{Image, TRACKS_FILE};
@@ -155,21 +155,22 @@ impl Observer for TracksObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let tracks: Vec<TrackReport> =
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
-            let size = setup.dataset.size();
-            let large_enough =
-                |pixels: &PixelBox| setup.config.tracking.is_reconstructable(pixels.area(), size.0);
+            let size = run.plan.dataset.size();
+            let large_enough = |pixels: &PixelBox| {
+                run.plan.config.tracking.is_reconstructable(pixels.area(), size.0)
+            };
             self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
             self.compared_frames.push(frame.row.frame);
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
                 let large_enough =
-                    |pixels: u64| setup.config.tracking.is_trackable(pixels as i64, size.0);
+                    |pixels: u64| run.plan.config.tracking.is_trackable(pixels as i64, size.0);
                 self.masks.add(
                     &overlaps,
                     &truth.objects,
@@ -181,10 +182,12 @@ impl Observer for TracksObserver {
         }
         let rows: Vec<TrackRow> = tracks.iter().map(TrackRow::from).collect();
         let text = track_rows(frame.row.frame, &rows, self.file.is_empty());
-        self.file.append(&text.map_err(|source| ObserveError::Write {
-            path: self.file.path(&setup.folder),
-            source,
-        })?);
+        self.file.append(
+            &text.map_err(|source| ObserveError::Write {
+                path: self.file.path(&run.folder),
+                source,
+            })?,
+        );
         for row in &rows {
             let sums =
                 self.tracks.entry(row.id).or_insert_with(|| TrackSums::begin(frame.row.frame));
@@ -194,7 +197,7 @@ impl Observer for TracksObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<TracksSection, ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<TracksSection, ObserveError> {
         let errors = self.errors.tracks();
         Ok(TracksSection {
             tracks: self

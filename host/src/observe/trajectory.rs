@@ -1,7 +1,7 @@
 //! The camera's path: written to `trajectory_kitti.txt` and `trajectory_tum.txt` as it comes, and
 //! kept in memory only where it is compared with true poses, which are there as well.
 
-use super::{Finished, FrameContext, GrowingFile, ObserveError, Observer, Setup};
+use super::{Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
 use crate::formats::{TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, kitti_line, tum_line};
 use dynvox_core::egomotion::icp::IcpStatus;
@@ -119,7 +119,7 @@ impl Observer for TrajectoryObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let (row, pose) = (frame.row, frame.row.report.t_world_camera);
@@ -127,7 +127,7 @@ impl Observer for TrajectoryObserver {
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
         self.path.add(pose.translation_m);
-        if setup.dataset.truth().is_some() && row.report.segment == 0 {
+        if run.plan.dataset.truth().is_some() && row.report.segment == 0 {
             self.compared.push((row.frame, pose));
         }
         self.held_frames += usize::from(row.held());
@@ -141,11 +141,15 @@ impl Observer for TrajectoryObserver {
         Ok(())
     }
 
-    fn finish(self, setup: &Setup<'_>, _: &Finished) -> Result<TrajectorySection, ObserveError> {
+    fn finish(
+        self,
+        run: &ObservedRun<'_>,
+        _: &Finished,
+    ) -> Result<TrajectorySection, ObserveError> {
         let (frames, poses): (Vec<usize>, Vec<Transform>) = self.compared.into_iter().unzip();
-        let truth = setup.dataset.truth().map(|truth| from_first(truth, &frames));
+        let truth = run.plan.dataset.truth().map(|truth| from_first(truth, &frames));
         Ok(TrajectorySection {
-            source: setup.motion_source,
+            source: run.plan.motion_source(),
             path: self.path,
             errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,

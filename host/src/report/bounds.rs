@@ -32,7 +32,7 @@ struct BoundSummary {
 /// The figures.
 pub fn summary(run: &RunRecord) -> CapacitySummary {
     let section = &run.sections.bounds;
-    let rows = section.uses.rows(&run.header.capacity);
+    let rows = section.uses.rows(&run.plan.capacity);
     let bounds = rows.iter().map(|&(name, bound, of)| {
         (name, BoundSummary { bound, needed: of.needed, refused: of.refused })
     });
@@ -46,7 +46,7 @@ pub fn summary(run: &RunRecord) -> CapacitySummary {
 
 /// Bounds that something was refused for, and how much.
 fn refusals(run: &RunRecord) -> Vec<(&'static str, u64)> {
-    let rows = run.sections.bounds.uses.rows(&run.header.capacity);
+    let rows = run.sections.bounds.uses.rows(&run.plan.capacity);
     rows.iter().filter(|(.., of)| of.refused > 0).map(|(name, _, of)| (*name, of.refused)).collect()
 }
 
@@ -79,7 +79,7 @@ pub fn capacity_toml(run: &RunRecord) -> Result<String, toml::ser::Error> {
     Ok(format!(
         "# The least that a run over {} frames of {} needed: {} bytes.\n{refused}# dynvox run PATH --capacity capacity.toml\n{}",
         run.frames.len(),
-        run.header.name,
+        run.plan.dataset.name(),
         least.bytes(),
         CapacityFile::of(least).to_toml()?
     ))

@@ -136,7 +136,7 @@ fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             "{} triangles, peak {} of {} blocks",
             blocks.mesh.static_triangles(),
             totals.peak,
-            run.header.capacity.blocks
+            run.plan.capacity.blocks
         ),
     )];
     if totals.refused > 0 {

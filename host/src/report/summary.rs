@@ -210,15 +210,15 @@ impl Summary {
             cpu_median_ms: of.cpu_median_ms,
         };
         Self {
-            dataset: run.header.name.clone(),
-            profile: run.header.profile.clone(),
-            threads: run.header.threads,
+            dataset: run.plan.dataset.name().to_owned(),
+            profile: run.plan.profile.clone(),
+            threads: run.plan.threads,
             frames: run.frames.len(),
             seconds: run.seconds,
             fps: run.fps(),
             digest: format!("{:016x}", run.digest()),
             incomplete: run.incomplete.clone(),
-            slab_bytes: run.header.slab_bytes,
+            slab_bytes: run.plan.capacity.bytes(),
             rss_peak_bytes: run.rss_peak_bytes,
             stages: run
                 .frames
@@ -250,7 +250,7 @@ impl Summary {
             evict: EvictSummary::of(&sections.blocks),
             health: HealthSummary::of(run),
             input: InputSummary {
-                warnings: run.header.warnings.clone(),
+                warnings: run.plan.warnings.clone(),
                 skipped: run.skipped.clone(),
                 dropped: run.dropped,
             },
@@ -314,7 +314,7 @@ impl HealthSummary {
             matches_dropped: health.matches_dropped,
             probes_most: blocks.totals.probes_most,
             history_frames_most: blocks.totals.history_frames_most,
-            rss_limit_bytes: run.header.rss_limit_bytes,
+            rss_limit_bytes: run.plan.rss_limit_bytes,
             disk_failure: blocks.store.failure.clone(),
             depth_values_refused: health.depth_values_refused,
             detections_refused: u64::from(health.detections.refused()),

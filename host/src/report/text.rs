@@ -61,7 +61,7 @@ pub fn lost_because(run: &RunRecord) -> String {
         Some(failure) => {
             format!("map.blocks could not grow ({failure}). Free disk space, or raise --stream-mib")
         }
-        None if run.header.streaming.is_some() => {
+        None if run.plan.request.storage.streaming().is_some() => {
             "records of map.blocks could not be read back. Check the disk".to_owned()
         }
         None => "the pool was full. Run without --no-stream, or give more bytes with --memory"

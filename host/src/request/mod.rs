@@ -1,5 +1,108 @@
-//! What is asked of a run, as values.
+//! What is asked of a run, as a value: [`Request`].
+//!
+//! A request is plain data: it can be compared, cloned, stored and sent to another machine. The
+//! command line, Python's keywords and a person's list of recordings become one by way of
+//! [`Options`]; snapshots, jobs and sweeps store it. [`Request::resolve`] opens the data set and
+//! gives a [`Plan`], which the run and its observers borrow.
+//!
+//! To add an option of a run: a field of [`Options`] and its line in `Options::request`, a field
+//! of the part of the request it belongs to, and the code that reads it.
 
+mod asked;
+mod bounds;
+mod checks;
+mod describe;
+mod error;
+mod evaluation;
+mod examine;
+mod exports;
+mod frames;
+mod input;
+mod limits;
+mod mapper;
+mod masks;
+mod options;
+mod overrides;
+mod paths;
+mod plan;
+mod poses;
+mod resolve;
 mod settings;
+mod sizes;
+mod storage;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod words;
 
+pub use bounds::{Bounds, Memory, PlanningWindow, profile, solve};
+pub use checks::{check_bounds, resident_limit_bytes};
+pub use error::RequestError;
+pub use evaluation::{Evaluation, Reference};
+pub use exports::{Exports, MapObjects};
+pub use frames::{FrameNumbers, Frames, frame_interval_s};
+pub use input::{Input, Source};
+pub use limits::Limits;
+pub use mapper::MapperPlan;
+pub use masks::Masks;
+pub use options::Options;
+pub use plan::Plan;
+pub use poses::Poses;
 pub use settings::Settings;
+pub use sizes::{Bytes, ImageSize, WindowSize};
+pub use storage::{Storage, Streaming};
+
+use crate::input::depth::DepthChoice;
+use serde::{Deserialize, Serialize};
+
+/// Everything that is asked of a run. The default maps the synthetic street.
+///
+/// ```
+/// use dynvox::Request;
+/// use dynvox::request::Memory;
+/// use dynvox::run::{RunFolder, run};
+///
+/// let mut request = Request::default();
+/// request.bounds.memory = Memory::Profile("tiny".to_owned());
+/// request.settings.volume.voxel_size_m = 0.1;
+/// request.settings.street_mut().frames = 2;
+/// request.settings.street_mut().width = 160;
+/// request.settings.street_mut().height = 64;
+///
+/// let scratch = tempfile::TempDir::new()?;
+/// let folder = RunFolder::begin(&scratch.path().join("street"), false)?;
+/// let record = run(request.resolve()?, &folder, None)?;
+/// assert_eq!(record.frames.len(), 2);
+///
+/// // A request outlives its process: jobs and snapshots store it.
+/// let stored = serde_json::to_string(&request)?;
+/// assert_eq!(serde_json::from_str::<Request>(&stored)?, request);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Request {
+    /// Where the images come from.
+    pub input: Input,
+    /// Which of them are mapped, and at which size.
+    pub frames: Frames,
+    /// Where depth comes from.
+    pub depth: DepthChoice,
+    /// Where instance masks come from.
+    pub masks: Masks,
+    /// Where the camera's poses come from.
+    pub poses: Poses,
+    /// Memory of the mapper.
+    pub bounds: Bounds,
+    /// Settings of the mapper; stored are those that differ from the defaults.
+    #[serde(with = "overrides")]
+    pub settings: Settings,
+    /// What is kept on disk during the run.
+    pub storage: Storage,
+    /// What the map is evaluated against.
+    pub evaluation: Evaluation,
+    /// What the run leaves behind for other programs.
+    pub exports: Exports,
+    /// Limits of the process.
+    pub limits: Limits,
+}

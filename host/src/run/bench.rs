@@ -3,9 +3,10 @@
 
 use super::error::{RunError, refused, step_reason};
 use super::spans::{Cost, Spans};
-use super::{Plan, read_ahead, stereo_frame};
+use super::{read_ahead, stereo_frame};
 use crate::evaluate::quantile::median;
 use crate::input::InstanceMask;
+use crate::request::Plan;
 use crate::slab::HostSlab;
 use dynvox_core::parallel::Vectors;
 use dynvox_core::{Mapper, Stage};

@@ -1,10 +1,11 @@
 //! The store of evicted blocks during a run, and the mesh made of pool and store.
 
-use super::map_objects::{MapObjects, add_objects};
+use super::map_objects::add_objects;
 use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
 use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter};
 use crate::observe::StoreStats;
+use crate::request::{MapObjects, Streaming};
 use crate::slab::HostSlab;
 use dynvox_core::memory::SlabError;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
@@ -14,15 +15,6 @@ use std::fs::File;
 
 /// Name of the file in the run folder.
 pub const BLOCKS_FILE: &str = "map.blocks";
-
-/// How evicted blocks are stored.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Streaming {
-    /// Bytes the file may grow to; limited by the disk when absent.
-    pub most_bytes: Option<u64>,
-    /// Whether the file is a part of the result.
-    pub keep_file: bool,
-}
 
 /// A file of blocks, or none.
 #[derive(Debug)]

@@ -2,10 +2,12 @@
 
 use super::{FolderError, ResumeError};
 use crate::input::InputError;
-use crate::observe::{ObserveError, Reference};
+use crate::observe::ObserveError;
+use crate::request::RequestError;
 use crate::run::store::StoreError;
 use dynvox_core::memory::SlabError;
 use dynvox_core::{NewError, StepError};
+use std::path::PathBuf;
 
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
@@ -16,62 +18,16 @@ pub enum RunError {
     /// The run folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// No frame is left of the data set.
-    #[error("--start {start} leaves none of the {len} frames. Give a smaller --start")]
-    NoFrames {
-        /// First frame asked for.
-        start: usize,
-        /// Frames there are.
-        len: usize,
-    },
-    /// No reference for the evaluation.
-    #[error("--evaluate {} finds nothing in the {frames} frames: {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
-    NoReference {
-        /// What was asked for.
-        reference: Reference,
-        /// Frames of the run.
-        frames: usize,
-        /// Frames after which the map is evaluated.
-        delay: usize,
-    },
-    /// The images are larger than the profile's.
-    #[error(
-        "images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}"
-    )]
-    ImageSize {
-        /// Image width, px.
-        width: usize,
-        /// Image height, px.
-        height: usize,
-        /// Name of the profile.
-        profile: String,
-        /// Widest image, px.
-        fits_width: usize,
-        /// Highest image, px.
-        fits_height: usize,
-        /// What to do.
-        action: String,
-    },
-    /// The pruning window is longer than the profile's history.
-    #[error(
-        "volume.prune_lag is {prune_lag} frames; profile {profile} has a history of {history_frames}. Give more bytes with --memory or a larger --profile, or \
-         --set volume.prune_lag={history_frames}"
-    )]
-    Window {
-        /// Frames asked for.
-        prune_lag: u32,
-        /// Frames the profile's history holds.
-        history_frames: usize,
-        /// Name of the profile.
-        profile: String,
-    },
-    /// The configuration.
-    #[error(
-        "the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file"
-    )]
-    Config {
-        /// All problems.
-        problems: String,
+    /// The request.
+    #[error(transparent)]
+    Request(#[from] RequestError),
+    /// A folder to save to is there already.
+    #[error("{path} exists. Give another {option}, or remove it")]
+    SavedExists {
+        /// The folder.
+        path: PathBuf,
+        /// The option that names it.
+        option: &'static str,
     },
     /// No memory for the slab.
     #[error(
@@ -176,23 +132,13 @@ fn signal_name(signal: usize) -> String {
     }
 }
 
-/// Why there is no reference, and what to do.
-fn missing(reference: Reference, frames: usize, delay: usize) -> String {
-    match reference {
-        _ if delay >= frames => format!("--evaluation-delay {delay} reaches beyond the last of them. Give a smaller delay, or more --frames"),
-        Reference::Lidar => {
-            "there are no scans. KITTI keeps them in velodyne/ (`dynvox inspect` shows where); download them, or choose frames that have one"
-                .to_owned()
-        }
-        Reference::Exact => "only the synthetic street has exact depth. Give --evaluate lidar".to_owned(),
-    }
-}
-
 /// The core's refusal of a slab, as an error.
 pub(super) fn refused(profile: &str, error: NewError) -> RunError {
     let reason = match error {
         NewError::Slab(SlabError::TooSmall { missing }) => format!("it lacks {missing} bytes"),
-        NewError::Config(problem) => return RunError::Config { problems: problem.to_string() },
+        NewError::Config(problem) => {
+            return RequestError::Config { problems: problem.to_string() }.into();
+        }
         other => other.to_string(),
     };
     RunError::Slab { profile: profile.to_owned(), reason }

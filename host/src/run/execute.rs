@@ -4,12 +4,14 @@ use super::checkpoint::Checkpoint;
 use super::disk_store::MeshOutput;
 use super::ending::Incomplete;
 use super::error::RunError;
-use super::record::{RunHeader, RunRecord};
+use super::record::RunRecord;
+use super::saved::Saved;
 use super::session::Session;
 use super::state::RunState;
-use super::{Plan, RunFolder, resident_bytes};
+use super::{RunFolder, resident_bytes};
 use crate::formats::{MAP_FILE, Mesh};
-use crate::observe::{Finished, Observer, RECORDING_FILE, Setup};
+use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan};
+use crate::request::Plan;
 use crate::scene::PICTURES_FOLDER;
 use crate::slab::HostSlab;
 use dynvox_core::memory::Region;
@@ -23,7 +25,7 @@ use std::time::Instant;
 /// # Errors
 /// The plan cannot be run, or not even its first frame can be mapped.
 pub fn run(
-    plan: &Plan,
+    plan: Plan,
     folder: &RunFolder,
     checkpoint: Option<Checkpoint>,
 ) -> Result<RunRecord, RunError> {
@@ -31,8 +33,18 @@ pub fn run(
     let slab_bytes = plan.capacity.bytes();
     let mut slab = HostSlab::map(slab_bytes)
         .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let Mapped { setup, mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
-        map(plan, slab.bytes_mut(), folder, checkpoint)?;
+    let exports = &plan.request.exports;
+    let instances = Saved::begin(exports.instances.as_deref(), "--save-instances")?;
+    let map_disparity = Saved::begin(exports.map_disparity.as_deref(), "--save-map-disparity")?;
+    let observed = ObservedRun {
+        plan: &plan,
+        folder: folder.path().to_path_buf(),
+        instances_folder: instances.path(),
+        map_disparity_folder: map_disparity.path(),
+        reference: ReferencePlan::of_run(&plan),
+    };
+    let Mapped { mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
+        map(&observed, slab.bytes_mut(), folder, checkpoint)?;
     if !state.sync(folder.path()).is_empty() {
         // What was kept for this moment is enough for the last rows.
         folder.release_reserve();
@@ -44,7 +56,7 @@ pub fn run(
     let (written, store) = output.finish(
         slab.bytes_mut(),
         (&plan.capacity, &plan.config),
-        (folder, plan.export.objects),
+        (folder, plan.request.exports.objects),
     );
     let mesh = written.unwrap_or_else(|error| {
         Incomplete::add_missing(&mut incomplete, MAP_FILE, &error.to_string());
@@ -52,7 +64,7 @@ pub fn run(
     });
     let mesh_path = folder.file(MAP_FILE);
     let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store };
-    let sections = std::mem::take(&mut state.observers).finish(&setup, &finished)?;
+    let sections = std::mem::take(&mut state.observers).finish(&observed, &finished)?;
     for name in &sections.objects.unwritten {
         Incomplete::add_missing(
             &mut incomplete,
@@ -68,10 +80,12 @@ pub fn run(
             Incomplete::add_missing(&mut incomplete, name, failure);
         }
     }
+    if incomplete.is_none() {
+        [instances, map_disparity].into_iter().try_for_each(Saved::commit)?;
+    }
     let mapping_seconds = state.timers.mapping().as_secs_f64();
     state.timers.add_since(&mut since);
     Ok(RunRecord {
-        header: header(plan),
         frames: state.frames,
         skipped: state.skipped,
         dropped: plan.dataset.stream().map_or(0, |stream| stream.dropped),
@@ -80,12 +94,12 @@ pub fn run(
         seconds: state.timers.total.as_secs_f64(),
         mapping_seconds,
         rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
+        plan,
     })
 }
 
 /// A run whose frames are mapped, without its mapper.
-struct Mapped<'p> {
-    setup: Setup<'p>,
+struct Mapped {
     state: RunState,
     since: Instant,
     regions: Vec<Region>,
@@ -96,49 +110,32 @@ struct Mapped<'p> {
 }
 
 /// Maps the planned frames in `slab`.
-fn map<'p>(
-    plan: &'p Plan,
+fn map(
+    run: &ObservedRun<'_>,
     slab: &mut [u8],
-    folder: &'p RunFolder,
+    folder: &RunFolder,
     checkpoint: Option<Checkpoint>,
-) -> Result<Mapped<'p>, RunError> {
+) -> Result<Mapped, RunError> {
+    let plan = run.plan;
     let mut session = match checkpoint {
-        None => Session::begin(plan, folder, slab)?,
-        Some(checkpoint) => Session::resume(plan, folder, slab, checkpoint)?,
+        None => Session::begin(run, folder, slab)?,
+        Some(checkpoint) => Session::resume(run, folder, slab, checkpoint)?,
     };
     let incomplete = session.frames()?.or_else(|| session.of_disk());
     let pruned = session.end()?;
-    let Session { mut mapper, store, state, setup, since, .. } = session;
+    let Session { mut mapper, store, state, since, .. } = session;
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.background().pool().len(),
         pruned,
         output: MeshOutput::begin(
             &mut mapper,
-            (store, plan.streaming),
+            (store, plan.request.storage.streaming()),
             folder,
-            (plan.export.axes, plan.capacity.colour),
+            (plan.request.exports.axes, plan.capacity.colour),
         ),
         incomplete,
-        setup,
         state,
         since,
     })
-}
-
-fn header(plan: &Plan) -> RunHeader {
-    RunHeader {
-        name: plan.dataset.name().to_owned(),
-        notes: plan.dataset.notes().to_vec(),
-        warnings: plan.warnings.clone(),
-        profile: plan.profile.clone(),
-        capacity: plan.capacity,
-        threads: plan.threads,
-        size: plan.dataset.size(),
-        rig: plan.dataset.rig(),
-        config_toml: plan.config_toml.clone(),
-        streaming: plan.streaming,
-        slab_bytes: plan.capacity.bytes(),
-        rss_limit_bytes: plan.rss_limit_bytes,
-    }
 }

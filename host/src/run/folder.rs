@@ -234,6 +234,11 @@ impl RunFolder {
         self.file(SNAPSHOT_FILE)
     }
 
+    /// Whether the folder replaces earlier results.
+    pub fn overwrites(&self) -> bool {
+        self.overwrite
+    }
+
     /// Whether there is one, or the one before.
     pub fn has_snapshot(&self) -> bool {
         has_snapshot(&self.partial)

@@ -1,34 +1,12 @@
 //! Objects in `map.ply`, next to the static map.
 
-use crate::formats::{Axes, PlyMesh, PlyVertex, PlyWriter, read_numbered};
+use crate::formats::{PlyMesh, PlyVertex, PlyWriter, read_numbered};
+use crate::request::MapObjects;
 use crate::scene::{OBJECTS_FOLDER, object_files};
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::Vertex;
 use std::io;
 use std::path::Path;
-
-/// Which poses of objects are in `map.ply`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum MapObjects {
-    /// None: the static map alone.
-    None,
-    /// Each object where it was last seen.
-    #[default]
-    Last,
-    /// Each object at every pose it was seen in: a file many times larger.
-    All,
-}
-
-/// What a run leaves behind for other programs.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ExportOptions {
-    /// Objects in `map.ply`.
-    pub objects: MapObjects,
-    /// Axes of meshes in world coordinates.
-    pub axes: Axes,
-    /// Whether the run is recorded as an MCAP file.
-    pub record: bool,
-}
 
 /// Adds the objects of a run folder.
 ///
@@ -66,6 +44,7 @@ fn moved(pose: &Transform, position_m: [f32; 3]) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::Axes;
 
     #[test]
     fn objects_stand_where_they_were_last_seen_and_say_which_they_are() {

@@ -9,11 +9,11 @@ mod error;
 mod execute;
 mod folder;
 mod map_objects;
-mod plan;
 mod progress;
 mod reader;
 mod record;
 mod resident;
+mod saved;
 mod session;
 pub mod settings;
 mod spans;
@@ -24,19 +24,17 @@ mod version;
 mod view;
 
 pub use bench::{Bench, StageBench, bench};
-pub use checkpoint::{Checkpoint, CheckpointPlan, ResumeError, RunManifest};
-pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput, Streaming};
+pub use checkpoint::{Checkpoint, ResumeError, RunManifest, fingerprint};
+pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::{RunError, step_reason};
 pub use execute::run;
 pub use folder::{
     FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole,
 };
-pub use map_objects::{ExportOptions, MapObjects};
-pub use plan::{FrameNumbers, Plan, check_bounds, frame_interval_s, resident_limit_bytes};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};
-pub use record::{RunHeader, RunRecord, StageStatistics};
+pub use record::{RunRecord, StageStatistics};
 pub use resident::resident_bytes;
 pub use spans::{Cost, Spans};
 pub use threads::Threads;

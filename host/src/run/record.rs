@@ -1,45 +1,15 @@
 //! A finished run: what was run, frame by frame, and the sections of its observers.
 
-use super::{Incomplete, SkippedFrames, Streaming};
+use super::{Incomplete, SkippedFrames};
 pub use crate::observe::StageStatistics;
 use crate::observe::{FrameLog, Sections};
-use dynvox_core::Capacity;
-use dynvox_core::geometry::StereoRig;
-
-/// What was run.
-#[derive(Clone, Debug)]
-pub struct RunHeader {
-    /// Name of the data set.
-    pub name: String,
-    /// Assumptions of the data set's loader.
-    pub notes: Vec<String>,
-    /// What is doubtful about the images.
-    pub warnings: Vec<String>,
-    /// Name of the profile.
-    pub profile: String,
-    /// Its bounds.
-    pub capacity: Capacity,
-    /// Threads at work.
-    pub threads: usize,
-    /// Image size, px.
-    pub size: (usize, usize),
-    /// The rig.
-    pub rig: StereoRig,
-    /// The resolved configuration as a file.
-    pub config_toml: String,
-    /// How evicted blocks were stored, if they were.
-    pub streaming: Option<Streaming>,
-    /// Bytes of the slab.
-    pub slab_bytes: usize,
-    /// Resident memory the process was allowed.
-    pub rss_limit_bytes: u64,
-}
+use crate::request::Plan;
 
 /// A finished run.
 #[derive(Debug)]
 pub struct RunRecord {
     /// What was run.
-    pub header: RunHeader,
+    pub plan: Plan,
     /// The frames.
     pub frames: FrameLog,
     /// Frames left out because they could not be read or mapped.
@@ -77,6 +47,6 @@ impl RunRecord {
     /// Whether the file of stored blocks is a part of the result.
     pub fn keeps_blocks(&self) -> bool {
         self.sections.blocks.store.records > 0
-            && self.header.streaming.is_some_and(|streaming| streaming.keep_file)
+            && self.plan.request.storage.streaming().is_some_and(|streaming| streaming.keep_file)
     }
 }

@@ -1,19 +1,20 @@
 //! A run under way: read, step, observe.
 
-use super::checkpoint::{self, Checkpoint, ResumeError};
+use super::checkpoint::{self, Checkpoint, ResumeError, RunManifest};
 use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
 use super::state::RunState;
 use super::view::LiveMap;
 use super::{
-    FolderError, Incomplete, Plan, Progress, ReadFrame, RunFolder, Threads, read_ahead,
-    resident_bytes, stereo_frame,
+    FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes,
+    stereo_frame,
 };
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, Observer, RetiredVolume,
-    Setup, StepTimes, VolumeCopy, from_first, overview,
+    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, ObservedRun, Observer,
+    RetiredVolume, StepTimes, VolumeCopy, from_first, overview,
 };
+use crate::request::Plan;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use dynvox_core::objects::{ObjectSink, RetiredObject};
@@ -27,7 +28,9 @@ use std::time::Instant;
 pub(super) struct Session<'p, 's> {
     plan: &'p Plan,
     folder: &'p RunFolder,
-    pub setup: Setup<'p>,
+    observed: &'p ObservedRun<'p>,
+    /// How the run was started, where it writes checkpoints.
+    manifest: Option<RunManifest>,
     pub mapper: Mapper<'s>,
     threads: Threads,
     pub store: DiskStore,
@@ -52,49 +55,59 @@ impl ObjectSink for RetiredVolumes {
 impl<'p, 's> Session<'p, 's> {
     /// At the first frame.
     pub fn begin(
-        plan: &'p Plan,
+        observed: &'p ObservedRun<'p>,
         folder: &'p RunFolder,
         slab: &'s mut [u8],
     ) -> Result<Self, RunError> {
-        let since = Instant::now();
+        let (since, plan) = (Instant::now(), observed.plan);
         let mapper = Mapper::new(&plan.capacity, &plan.config, slab)
             .map_err(|error| refused(&plan.profile, error))?;
-        let store =
-            DiskStore::begin(plan.streaming, folder, &plan.config).map_err(RunError::Store)?;
-        Self::with(plan, folder, mapper, store, RunState::default(), since)
+        let store = DiskStore::begin(plan.request.storage.streaming(), folder, &plan.config)
+            .map_err(RunError::Store)?;
+        Self::with(observed, folder, mapper, store, RunState::default(), since)
     }
 
     /// After the last frame of a checkpoint.
     pub fn resume(
-        plan: &'p Plan,
+        observed: &'p ObservedRun<'p>,
         folder: &'p RunFolder,
         slab: &'s mut [u8],
         mut checkpoint: Checkpoint,
     ) -> Result<Self, RunError> {
-        let since = Instant::now();
-        let store =
-            DiskStore::resume(plan.streaming, folder, &plan.config, checkpoint.blocks.as_ref())
-                .map_err(RunError::Reopen)?;
+        let (since, plan) = (Instant::now(), observed.plan);
+        let store = DiskStore::resume(
+            plan.request.storage.streaming(),
+            folder,
+            &plan.config,
+            checkpoint.blocks.as_ref(),
+        )
+        .map_err(RunError::Reopen)?;
         let mapper = checkpoint.mapper(plan, slab)?;
-        let mut session = Self::with(plan, folder, mapper, store, checkpoint.state, since)?;
+        let mut session = Self::with(observed, folder, mapper, store, checkpoint.state, since)?;
         session.check_last_frame()?;
-        session.state.observers.resume(&session.setup)?;
-        session.state.resume(&session.setup.folder)?;
+        session.state.observers.resume(session.observed)?;
+        session.state.resume(&session.observed.folder)?;
         Ok(session)
     }
 
     fn with(
-        plan: &'p Plan,
+        observed: &'p ObservedRun<'p>,
         folder: &'p RunFolder,
         mapper: Mapper<'s>,
         store: DiskStore,
         state: RunState,
         since: Instant,
     ) -> Result<Self, RunError> {
+        let plan = observed.plan;
+        let manifest = match plan.request.storage.snapshot_every {
+            Some(_) => Some(RunManifest::new(plan, folder.overwrites())?),
+            None => None,
+        };
         Ok(Self {
             plan,
             folder,
-            setup: plan.setup(folder),
+            observed,
+            manifest,
             mapper,
             threads: Threads::new(plan.threads)
                 .map_err(|source| RunError::Threads { count: plan.threads, source })?,
@@ -142,11 +155,12 @@ impl<'p, 's> Session<'p, 's> {
     /// before, it is an error.
     pub fn frames(&mut self) -> Result<Option<Incomplete>, RunError> {
         let (plan, taken) = (self.plan, self.state.taken);
-        let progress = Progress::new(plan.frames.count(), plan.quiet);
+        let progress = Progress::new(plan.frames.count(), !plan.progress);
         let remaining = plan.frames.from_position(taken);
-        let mapped = read_ahead(plan.dataset.as_ref(), remaining, plan.skip_bad_frames, |read| {
-            self.take(read, &progress)
-        });
+        let mapped =
+            read_ahead(plan.dataset.as_ref(), remaining, plan.request.frames.skip_bad, |read| {
+                self.take(read, &progress)
+            });
         progress.finish();
         let Err(error) = mapped else {
             return if self.state.frames.is_empty() { Err(self.no_frame()) } else { Ok(None) };
@@ -155,7 +169,7 @@ impl<'p, 's> Session<'p, 's> {
             return Err(error);
         }
         // After a failed observation the state is not that of one frame.
-        if !matches!(error, RunError::Observe(_)) && plan.checkpoints.is_some() {
+        if !matches!(error, RunError::Observe(_)) && self.manifest.is_some() {
             self.write_checkpoint_or_warn(&progress);
         }
         Ok(Some(Incomplete::of(
@@ -198,7 +212,7 @@ impl<'p, 's> Session<'p, 's> {
             match self.frame(frame, progress) {
                 Ok(()) => {}
                 Err(RunError::Dataset(InputError::PastEnd { .. })) if open => return Ok(()),
-                Err(error) if plan.skip_bad_frames && error.is_of_one_frame() => {
+                Err(error) if plan.request.frames.skip_bad && error.is_of_one_frame() => {
                     progress.warn(&format!("frame {index} is left out: {error}"));
                     self.state.skipped.add(index, error.to_string());
                     self.state.taken = position + 1;
@@ -238,21 +252,22 @@ impl<'p, 's> Session<'p, 's> {
             view: &mut view,
             pictures: FramePictures::default(),
         };
-        let observed = observers.frame(&self.setup, &mut context);
+        let observed = observers.frame(self.observed, &mut context);
         row.times.stages[Stage::Raycast as usize] = view.first_raycast.unwrap_or_default();
         frames.add(row).map_err(|source| ObserveError::Write {
-            path: frames.file().path(&self.setup.folder),
+            path: frames.file().path(&self.observed.folder),
             source,
         })?;
         observed?;
-        self.state.write_due(&self.setup.folder)?;
+        self.state.write_due(&self.observed.folder)?;
         self.warn_of_disk(index, failed_before, progress);
         self.check_limits()?;
         if self
             .plan
-            .checkpoints
-            .as_ref()
-            .is_some_and(|plan| (position + 1).is_multiple_of(plan.every))
+            .request
+            .storage
+            .snapshot_every
+            .is_some_and(|every| (position + 1).is_multiple_of(every))
         {
             self.write_checkpoint_or_warn(progress);
         }
@@ -333,7 +348,7 @@ impl<'p, 's> Session<'p, 's> {
     /// Ends a run whose last frame went beyond its limits.
     fn check_limits(&self) -> Result<(), RunError> {
         let Some(row) = self.state.frames.last() else { return Ok(()) };
-        if self.plan.strict && row.severity() >= Severity::MapAffected {
+        if self.plan.request.limits.strict && row.severity() >= Severity::MapAffected {
             return Err(RunError::Strict { frame: row.frame, cause: row.cause() });
         }
         let limit_bytes = self.plan.rss_limit_bytes;
@@ -356,17 +371,17 @@ impl<'p, 's> Session<'p, 's> {
     }
 
     fn write_checkpoint(&mut self) -> Result<(), FolderError> {
-        let Some(plan) = &self.plan.checkpoints else { return Ok(()) };
+        let Some(manifest) = &self.manifest else { return Ok(()) };
         let refused =
-            self.state.sync(&self.setup.folder).into_iter().next().map(|(_, error)| error);
-        let refused = refused.or(self.state.observers.checkpoint(&self.setup).err());
+            self.state.sync(&self.observed.folder).into_iter().next().map(|(_, error)| error);
+        let refused = refused.or(self.state.observers.checkpoint(self.observed).err());
         if let Some(ObserveError::Write { path, source }) = refused {
             return Err(FolderError::Write { path, source });
         }
         let position = self.store.position();
         let blocks = position
             .map_err(|source| FolderError::Write { path: self.folder.file(BLOCKS_FILE), source })?;
-        checkpoint::write(self.folder, &plan.manifest, blocks, &self.state, &mut self.mapper)
+        checkpoint::write(self.folder, manifest, blocks, &self.state, &mut self.mapper)
     }
 
     /// Ends the run: what is still in the pruning window is pruned, and objects leave.
@@ -380,7 +395,7 @@ impl<'p, 's> Session<'p, 's> {
         let overview_jpeg =
             last.map(|row| overview(&mut view, &row.report.t_world_camera)).unwrap_or_default();
         let mut context = EndContext { last, retired: &retired.0, overview_jpeg, view: &mut view };
-        observers.end(&self.setup, &mut context)?;
+        observers.end(self.observed, &mut context)?;
         Ok(pruned)
     }
 }

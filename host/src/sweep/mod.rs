@@ -1,7 +1,7 @@
 //! Many runs with one setting varied, and one page that compares them with the original's numbers:
 //! the paper's tables and figures.
 //!
-//! A [`Plan`] lists the points of each sweep and the runs they need; points with equal arguments
+//! A [`Plan`] lists the points of each sweep and the runs they need; points with equal requests
 //! share a run. Each finished run leaves one file, `runs/KEY.json`, written atomically: an
 //! interrupted sweep continues with the missing runs. `plan.json` is the folder's plan; parts made
 //! on several machines are merged when their plans are equal, and refused when their results

@@ -185,9 +185,9 @@ fn commands(plan: &Plan) -> Markup {
     html! {
         section { details {
             summary { "Commands" }
-            p.soft.small { "Each run is " code { "dynvox run [PATH] [--sequence NAME]" } " with these arguments." }
+            p.soft.small { "Each run asks for its data set, and for these values unlike the defaults." }
             div.scroll { table {
-                @for (key, arguments) in &plan.runs { tr { td { code { (key) } } td { code { (arguments.join(" ")) } } } }
+                @for (key, request) in &plan.runs { tr { td { code { (key) } } td { code { (request.words()) } } } }
             } }
         } }
     }

@@ -1,9 +1,14 @@
 //! Which runs a sweep is made of. Points of different sweeps that mean the same run share it.
 
+use crate::input::depth::DepthChoice;
+use crate::input::masks::MaskChoice;
+use crate::request::{Reference, Request};
 use crate::run::program;
+use dynvox_core::MotionSource;
 use dynvox_core::digest::Digest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -29,6 +34,11 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether the map is evaluated at a frame's pose later, after pruning.
+    const fn is_evaluated_late(self) -> bool {
+        matches!(self, Self::PruneWeight | Self::FrameRate)
+    }
+
     /// Name on the command line, and of its table.
     pub const fn name(self) -> &'static str {
         match self {
@@ -92,22 +102,24 @@ impl Data {
 /// What to vary, and its values.
 #[derive(Clone, Debug)]
 pub struct SweepRequest {
-    /// Data sets, and what each is evaluated against: `lidar`, `exact` or nothing.
-    pub data: Vec<(Data, Option<&'static str>)>,
+    /// Data sets, and what each is evaluated against, if it can be.
+    pub data: Vec<(Data, Option<Reference>)>,
     /// Sweeps.
     pub kinds: Vec<Kind>,
     /// Prune weights.
-    pub weights: Vec<u32>,
+    pub weights: Vec<u8>,
     /// Frames from one that is fused to the next.
     pub rates: Vec<u32>,
     /// Scales, percent.
     pub scales: Vec<u32>,
-    /// Sources of depth; `exact` is for the street alone.
-    pub depths: Vec<String>,
-    /// Pruning lag and evaluation delay of the first two sweeps, frames.
-    pub lag_and_delay: [usize; 2],
-    /// Arguments of every run.
-    pub common: Vec<String>,
+    /// Sources of depth by name; [`DepthChoice::Exact`] is for the street alone.
+    pub depths: Vec<(String, DepthChoice)>,
+    /// Pruning lag of the first two sweeps, frames.
+    pub prune_lag: u32,
+    /// Frames after which the first two sweeps evaluate the map.
+    pub evaluation_delay: usize,
+    /// What every run asks for.
+    pub common: Request,
 }
 
 /// One point of a sweep.
@@ -128,42 +140,37 @@ pub struct Point {
 pub struct Plan {
     /// In the order shown.
     pub points: Vec<Point>,
-    /// What makes a run, by its key: its arguments without path and threads.
-    pub runs: BTreeMap<String, Vec<String>>,
+    /// What is asked of a run, by its key, without data set and threads.
+    pub runs: BTreeMap<String, Request>,
 }
 
 impl Plan {
     /// Lists points and runs of a request.
-    pub fn new(request: &SweepRequest) -> Self {
+    ///
+    /// # Errors
+    /// A run cannot be stored: a path among its parts is not Unicode.
+    pub fn new(request: &SweepRequest) -> Result<Self, serde_json::Error> {
         let mut plan = Self { points: Vec::new(), runs: BTreeMap::new() };
         for &kind in &request.kinds {
             for (data, reference) in &request.data {
-                for (value, more, delayed) in values(kind, request, data) {
-                    let mut arguments = request.common.clone();
-                    if data.path.is_none() && !more.contains(&MOTION[0].to_owned()) {
-                        arguments.extend(["--instances", "exact"].map(str::to_owned));
-                    }
-                    arguments.extend(more);
-                    if let Some(reference) = reference {
-                        arguments.extend(["--evaluate", reference].map(str::to_owned));
-                    }
-                    if delayed {
-                        let [lag, delay] = request.lag_and_delay;
-                        arguments.extend(["--set".to_owned(), format!("volume.prune_lag={lag}")]);
-                        arguments.extend(["--evaluation-delay".to_owned(), delay.to_string()]);
+                for (value, mut run) in values(kind, request, data) {
+                    run.evaluation.reference = *reference;
+                    if kind.is_evaluated_late() {
+                        run.settings.volume.prune_lag = request.prune_lag;
+                        run.evaluation.delay = request.evaluation_delay;
                     }
                     let label = data.label();
                     let mut digest = Digest::default();
                     // Figures of another version are not taken over.
                     digest.bytes(program().as_bytes());
-                    arguments.iter().for_each(|argument| digest.bytes(argument.as_bytes()));
-                    let run = format!("{label}-{:016x}", digest.finish());
-                    plan.points.push(Point { kind, data: label, value, run: run.clone() });
-                    plan.runs.insert(run, arguments);
+                    digest.bytes(&serde_json::to_vec(&run)?);
+                    let key = format!("{label}-{:016x}", digest.finish());
+                    plan.points.push(Point { kind, data: label, value, run: key.clone() });
+                    plan.runs.insert(key, run);
                 }
             }
         }
-        plan
+        Ok(plan)
     }
 
     /// Keys of the runs, in the order in which points need them.
@@ -202,63 +209,51 @@ impl Plan {
     }
 }
 
-/// No masks: objects are found by their motion. Otherwise the street is swept with its exact masks.
-const MOTION: [&str; 2] = ["--instances", "motion"];
-
-/// Values of one sweep on one data set: as shown, as arguments, and whether the map is evaluated
-/// later.
-fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Vec<String>, bool)> {
-    let one = |value: &dyn std::fmt::Display, arguments: &[&str], delayed: bool| {
-        (
-            value.to_string(),
-            arguments.iter().map(|argument| (*argument).to_owned()).collect::<Vec<_>>(),
-            delayed,
-        )
+/// Values of one sweep on one data set: as shown, and what their runs ask for.
+fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Request)> {
+    let is_street = data.path.is_none();
+    let mut base = request.common.clone();
+    if is_street {
+        base.masks.source = MaskChoice::Exact;
+    }
+    let one = |value: &dyn Display, change: &dyn Fn(&mut Request)| {
+        let mut run = base.clone();
+        change(&mut run);
+        (value.to_string(), run)
     };
-    // Defaults are not listed as arguments, so that sweeps share the runs they have in common.
+    let of = |values: &[u32], change: fn(&mut Request, u32)| {
+        values.iter().map(|&value| one(&value, &|run| change(run, value))).collect()
+    };
     match kind {
         Kind::PruneWeight => request
             .weights
             .iter()
-            .map(|weight| match weight {
-                1 => one(weight, &[], true),
-                _ => one(weight, &["--set", &format!("volume.prune_weight={weight}")], true),
-            })
+            .map(|&weight| one(&weight, &|run| run.settings.volume.prune_weight = weight))
             .collect(),
-        Kind::FrameRate => request
-            .rates
-            .iter()
-            .map(|rate| match rate {
-                1 => one(rate, &[], true),
-                _ => one(rate, &["--fuse-every", &rate.to_string()], true),
-            })
-            .collect(),
-        Kind::Scale => request
-            .scales
-            .iter()
-            .map(|percent| match percent {
-                100 => one(percent, &[], false),
-                _ => one(percent, &["--scale", &(f64::from(*percent) / 100.0).to_string()], false),
-            })
-            .collect(),
-        Kind::Depth => {
-            let fits = |source: &&String| source.as_str() != "exact" || data.path.is_none();
-            request
-                .depths
-                .iter()
-                .filter(fits)
-                .map(|source| match source.as_str() {
-                    "elas" => one(source, &[], false),
-                    _ => one(source, &["--depth", source], false),
-                })
-                .collect()
+        Kind::FrameRate => of(&request.rates, |run, rate| run.settings.mapper.fuse_every = rate),
+        Kind::Scale => {
+            of(&request.scales, |run, percent| run.frames.scale = f64::from(percent) / 100.0)
         }
-        Kind::Dynamic => vec![one(&"off", &["--dynamic", "off"], false), one(&"on", &[], false)],
+        Kind::Depth => request
+            .depths
+            .iter()
+            .filter(|(_, depth)| is_street || *depth != DepthChoice::Exact)
+            .map(|(name, depth)| one(name, &|run| run.depth = depth.clone()))
+            .collect(),
+        Kind::Dynamic => {
+            vec![one(&"off", &|run| run.settings.tracking.dynamic = false), one(&"on", &|_| {})]
+        }
         Kind::Methods => vec![
-            one(&"depth tracker (ICP)", &["--dynamic", "off", "--egomotion", "icp"], false),
-            one(&"stereo egomotion", &["--dynamic", "off"], false),
-            one(&"stereo egomotion, separate objects", &[], false),
-            one(&"stereo egomotion, objects by motion alone", &MOTION, false),
+            one(&"depth tracker (ICP)", &|run| {
+                run.settings.tracking.dynamic = false;
+                run.settings.mapper.egomotion = MotionSource::Icp;
+            }),
+            one(&"stereo egomotion", &|run| run.settings.tracking.dynamic = false),
+            one(&"stereo egomotion, separate objects", &|_| {}),
+            // No masks: otherwise the street is swept with its exact ones.
+            one(&"stereo egomotion, objects by motion alone", &|run| {
+                run.masks.source = MaskChoice::Motion;
+            }),
         ],
     }
 }

@@ -5,6 +5,7 @@ use super::SweepError;
 use crate::evaluate::reference::{EvaluatedFrame, PointOutcomes, Region};
 use crate::observe::Charted;
 use crate::report::Summary;
+use crate::request::Request;
 use crate::run::{RunRecord, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -14,8 +15,8 @@ use std::path::Path;
 /// A finished run of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunResult {
-    /// Its arguments, without path and threads.
-    pub arguments: Vec<String>,
+    /// What was asked of it, without data set and threads.
+    pub request: Request,
     /// `summary.json` of the run.
     pub summary: Value,
     /// Evaluated frames.
@@ -62,10 +63,10 @@ impl RunResult {
     ///
     /// # Errors
     /// The summary cannot be turned into JSON.
-    pub fn of(arguments: &[String], run: &RunRecord) -> Result<Self, serde_json::Error> {
+    pub fn of(request: &Request, run: &RunRecord) -> Result<Self, serde_json::Error> {
         let charts = run.frames.charts();
         Ok(Self {
-            arguments: arguments.to_vec(),
+            request: request.clone(),
             summary: serde_json::to_value(Summary::of(run))?,
             samples: run
                 .sections

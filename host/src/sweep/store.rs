@@ -75,16 +75,16 @@ impl SweepFolder {
     /// All results so far.
     ///
     /// # Errors
-    /// A result cannot be read, or is of other arguments.
+    /// A result cannot be read, or is of another request.
     pub fn results(&self, plan: &Plan) -> Result<Results, SweepError> {
         let mut results = Results::new();
-        for (key, arguments) in &plan.runs {
+        for (key, request) in &plan.runs {
             let path = self.result(key);
             if let Some(result) = RunResult::read(&path)? {
-                if result.arguments != *arguments {
+                if result.request != *request {
                     return Err(SweepError::Foreign {
                         path,
-                        reason: "it is of other arguments".to_owned(),
+                        reason: "it is of another request".to_owned(),
                     });
                 }
                 results.insert(key.clone(), result);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::request::{Bounds, Memory, Reference, Request};
 use serde_json::json;
 use std::collections::BTreeSet;
 use tempfile::TempDir;
@@ -7,24 +8,32 @@ fn request(kinds: &[Kind]) -> SweepRequest {
     let street: Data = "street".parse().unwrap();
     let kitti: Data = "some/where:06".parse().unwrap();
     SweepRequest {
-        data: vec![(street, Some("exact")), (kitti, Some("lidar"))],
+        data: vec![(street, Some(Reference::Exact)), (kitti, Some(Reference::Lidar))],
         kinds: kinds.to_vec(),
         weights: vec![0, 1, 2],
         rates: vec![1, 4],
         scales: vec![100, 50],
-        depths: vec!["elas".to_owned(), "exact".to_owned()],
-        lag_and_delay: [20, 40],
-        common: vec!["--profile".to_owned(), "small".to_owned()],
+        depths: ["elas", "exact"].map(|name| (name.to_owned(), name.parse().unwrap())).to_vec(),
+        prune_lag: 20,
+        evaluation_delay: 40,
+        common: Request {
+            bounds: Bounds { memory: Memory::Profile("small".to_owned()), planning: None },
+            ..Request::default()
+        },
     }
 }
 
 const ALL: [Kind; 6] =
     [Kind::PruneWeight, Kind::FrameRate, Kind::Scale, Kind::Depth, Kind::Dynamic, Kind::Methods];
 
-fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
+fn planned(kinds: &[Kind]) -> Plan {
+    Plan::new(&request(kinds)).unwrap()
+}
+
+fn result(request: &Request, digest: &str, accuracy: f64) -> RunResult {
     let share = json!({"accuracy": accuracy, "completeness": 0.9, "f1": 0.85});
     RunResult {
-        arguments: arguments.to_vec(),
+        request: request.clone(),
         summary: json!({
             "digest": digest, "frames": 3, "map": {"bytes": 1000, "blocks": 3},
             "lidar": {"source": "exact", "frames": 2, "delay_frames": 0, "static": {"input": share, "fused": share}},
@@ -44,7 +53,7 @@ fn result(arguments: &[String], digest: &str, accuracy: f64) -> RunResult {
 }
 
 fn results(plan: &Plan) -> Results {
-    plan.runs.iter().map(|(key, arguments)| (key.clone(), result(arguments, key, 0.92))).collect()
+    plan.runs.iter().map(|(key, request)| (key.clone(), result(request, key, 0.92))).collect()
 }
 
 #[test]
@@ -65,7 +74,7 @@ fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
 
 #[test]
 fn points_that_mean_the_same_run_share_it() {
-    let plan = Plan::new(&request(&ALL));
+    let plan = planned(&ALL);
     let run = |kind: Kind, value: &str| {
         plan.of(kind, "street").find(|point| point.value == value).map(|point| point.run.clone())
     };
@@ -84,32 +93,32 @@ fn points_that_mean_the_same_run_share_it() {
     // By hand: 3 weights and 1 rate late; default, 50 %, off, tracker, motion; on the street exact
     // depth as well.
     assert_eq!(plan.runs.len(), 2 * 9 + 1);
-    let paths = plan.runs.values().flatten().any(|argument| argument.contains("where"));
+    let paths = plan.runs.values().any(|run| run.words().contains("where"));
     assert!(!paths, "a plan is the same wherever the data lie");
 }
 
 #[test]
 fn every_run_is_listed_once() {
-    let plan = Plan::new(&request(&ALL));
+    let plan = planned(&ALL);
     let keys = plan.keys();
     let distinct: BTreeSet<&str> = keys.iter().copied().collect();
     assert_eq!((keys.len(), distinct.len()), (plan.runs.len(), plan.runs.len()));
 }
 
 #[test]
-fn a_folder_keeps_to_its_plan_and_to_its_results_arguments() {
+fn a_folder_keeps_to_its_plan_and_to_its_results_requests() {
     let root = TempDir::new().unwrap();
-    let plan = Plan::new(&request(&[Kind::Scale]));
+    let plan = planned(&[Kind::Scale]);
     let folder = SweepFolder::open(root.path(), &plan).unwrap();
-    let (key, arguments) = plan.runs.iter().next().unwrap();
-    let made = result(arguments, "aa", 0.9);
+    let (key, request) = plan.runs.iter().next().unwrap();
+    let made = result(request, "aa", 0.9);
     made.write(&folder.result(key)).unwrap();
     let again = SweepFolder::open(root.path(), &plan).unwrap();
     assert_eq!(again.results(&plan).unwrap(), Results::from([(key.clone(), made.clone())]));
-    let other = SweepFolder::open(root.path(), &Plan::new(&request(&[Kind::Dynamic])));
+    let other = SweepFolder::open(root.path(), &planned(&[Kind::Dynamic]));
     assert!(other.unwrap_err().to_string().contains("belongs to another sweep"));
-    result(&["--frames".to_owned()], "aa", 0.9).write(&folder.result(key)).unwrap();
-    assert!(again.results(&plan).unwrap_err().to_string().contains("it is of other arguments"));
+    result(&Request::default(), "aa", 0.9).write(&folder.result(key)).unwrap();
+    assert!(again.results(&plan).unwrap_err().to_string().contains("it is of another request"));
     std::fs::write(folder.result(key), "{\"arg").unwrap();
     assert!(again.results(&plan).unwrap_err().to_string().contains("is not a file of a sweep"));
 }
@@ -117,7 +126,7 @@ fn a_folder_keeps_to_its_plan_and_to_its_results_arguments() {
 #[test]
 fn parts_are_put_together_unless_they_disagree() {
     let [a, b, c] = [(); 3].map(|()| TempDir::new().unwrap());
-    let plan = Plan::new(&request(&[Kind::Scale]));
+    let plan = planned(&[Kind::Scale]);
     let all = results(&plan);
     for (part, root) in [&a, &b].into_iter().enumerate() {
         let folder = SweepFolder::open(root.path(), &plan).unwrap();
@@ -132,9 +141,9 @@ fn parts_are_put_together_unless_they_disagree() {
     assert_eq!((&merged, &found), (&plan, &all));
     folder.draw(&merged, &found).unwrap();
     assert!(c.path().join("report.html").is_file() && c.path().join("scale.csv").is_file());
-    let (key, arguments) = plan.runs.iter().next().unwrap();
+    let (key, request) = plan.runs.iter().next().unwrap();
     for (root, digest) in [(&a, "one"), (&b, "two")] {
-        result(arguments, digest, 0.9)
+        result(request, digest, 0.9)
             .write(&SweepFolder::open(root.path(), &plan).unwrap().result(key))
             .unwrap();
     }
@@ -147,7 +156,7 @@ fn parts_are_put_together_unless_they_disagree() {
 
 #[test]
 fn tables_and_page_have_every_point_made_or_not() {
-    let plan = Plan::new(&request(&ALL));
+    let plan = planned(&ALL);
     let mut found = results(&plan);
     let missing = found.pop_first().unwrap().0;
     for kind in ALL {

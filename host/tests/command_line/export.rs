@@ -3,7 +3,10 @@
 
 use super::binary::{dynvox, names, output_text, rig};
 use base64::{Engine, engine::general_purpose::STANDARD};
+use dynvox::Request;
 use dynvox::formats::{PlyMesh, read_numbered, read_poses};
+use dynvox::input::masks::MaskChoice;
+use dynvox::request::Memory;
 use dynvox::run::stereo_frame;
 use dynvox_core::geometry::Transform;
 use dynvox_core::{Mapper, Serial, StereoFrame};
@@ -27,6 +30,16 @@ const STREET: [&str; 12] = [
     "--set",
     "street.frames=16",
 ];
+
+/// The run of [`STREET`].
+fn street() -> Request {
+    let mut request = Request::default();
+    request.bounds.memory = Memory::Profile("tiny".to_owned());
+    request.masks.source = MaskChoice::Exact;
+    let street = request.settings.street_mut();
+    (street.width, street.height, street.frames) = (320, 96, 16);
+    request
+}
 
 fn run(root: &Path, args: &[&str]) {
     let done = dynvox(root, args);
@@ -184,14 +197,7 @@ fn cars_stand_in_both_maps_where_the_raycast_of_the_last_frame_shows_them() {
     let root = TempDir::new().unwrap();
     run(root.path(), &[&STREET[..], &["--out", "result"]].concat());
     // The same run once more, up to a look through the last camera.
-    let plan = dynvox::cli::plan_of(
-        &[&["dynvox"], &STREET[1..]]
-            .concat()
-            .iter()
-            .map(|word| (*word).to_owned())
-            .collect::<Vec<_>>(),
-    )
-    .unwrap();
+    let plan = street().resolve().unwrap();
     let mut slab = vec![0; plan.capacity.bytes() + dynvox_core::memory::SLAB_ALIGN];
     let mut mapper = Mapper::new(&plan.capacity, &plan.config, &mut slab).unwrap();
     for &frame in plan.frames.listed() {

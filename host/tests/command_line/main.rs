@@ -19,6 +19,7 @@ mod fixtures;
 mod fleet;
 mod layouts;
 mod masks;
+mod requests;
 mod resume;
 mod run_folder;
 mod same_run;

@@ -9,8 +9,8 @@ fn of_the_machine(column: &str) -> bool {
     column.ends_with("_ms") || column == "rss_bytes" || column == "probes_most"
 }
 
-/// The rows of frames.csv without times.
-fn rows(folder: &Path) -> Vec<String> {
+/// Rows of frames.csv without times.
+pub fn rows(folder: &Path) -> Vec<String> {
     let text = fs::read_to_string(folder.join("frames.csv")).unwrap();
     let columns: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     let kept = |line: &str| {

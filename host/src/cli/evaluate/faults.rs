@@ -3,7 +3,8 @@
 use crate::cli::run;
 use crate::evaluate::faults::{EvaluatedFrame, FaultOutcome};
 use crate::input::InstanceMask;
-use crate::run::{Plan, Threads, stereo_frame};
+use crate::request::{Plan, Request};
+use crate::run::{Threads, stereo_frame};
 use anyhow::{Context, bail};
 use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::{Mapper, StereoFrame};
@@ -82,6 +83,8 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
             args.frames.saturating_sub(1)
         );
     }
+    let mut request = run::request_of(&args.run)?;
+    request.frames.most = request.frames.most.or(Some(args.frames));
     let faults = if args.fault.is_empty() { listed(args.at) } else { args.fault.clone() };
     let mut rows = Vec::new();
     if !args.json {
@@ -91,7 +94,7 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
         outln!("|---|---|---|---|---|---|---|---|");
     }
     for fault in faults {
-        let row = FaultRow { outcome: outcome(args, &fault)?, fault };
+        let row = FaultRow { outcome: outcome(&request, &fault, args.at)?, fault };
         if !args.json {
             outln!("{}", line(&row));
         }
@@ -120,13 +123,14 @@ fn line(FaultRow { fault, outcome }: &FaultRow) -> String {
 }
 
 /// Maps with one fault and compares with the truth.
-fn outcome(args: &FaultsArgs, fault: &str) -> anyhow::Result<FaultOutcome> {
-    let (faults, frames) = (format!("--faults={fault}"), format!("--frames={}", args.frames));
-    let words =
-        ["dynvox", &faults, &frames].into_iter().map(str::to_owned).chain(args.run.iter().cloned());
-    let plan = run::plan_of(&words.collect::<Vec<_>>())
-        .with_context(|| format!("{fault} cannot be tried"))?;
-    Ok(FaultOutcome::of(&evaluated(&plan)?, args.at))
+fn outcome(request: &Request, fault: &str, at: usize) -> anyhow::Result<FaultOutcome> {
+    let trial = || -> anyhow::Result<Plan> {
+        let mut request = request.clone();
+        request.input.faults = Some(fault.parse().map_err(anyhow::Error::msg)?);
+        Ok(request.resolve()?)
+    };
+    let plan = trial().with_context(|| format!("{fault} cannot be tried"))?;
+    Ok(FaultOutcome::of(&evaluated(&plan)?, at))
 }
 
 /// Maps the frames of a plan and puts the truth beside each.

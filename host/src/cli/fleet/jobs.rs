@@ -1,35 +1,27 @@
 //! Jobs: made, done, listed.
 
 use super::{Shard, each};
-use crate::cli::{run::plan_of, sweep};
+use crate::cli::run::{request_of, write as run_to};
+use crate::cli::{signals, sweep};
 use crate::fleet::{
     self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap,
 };
 use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::read_frame_digests;
 use crate::report::text::counted;
+use crate::request::{Plan, Request};
 use crate::run::store::BlockFile;
-use crate::run::{BLOCKS_FILE, Plan, RunManifest, stereo_frame};
+use crate::run::{self, BLOCKS_FILE, RunFolder, stereo_frame};
 use anyhow::{Context, bail};
 use dynvox_core::digest::Digest;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The plan of a run's arguments.
-fn planned(arguments: &[String]) -> anyhow::Result<Plan> {
-    plan_of(&quiet_line(arguments))
-}
-
-/// The command line of some arguments.
-pub fn quiet_line(arguments: &[String]) -> Vec<String> {
-    ["dynvox", "--quiet"].into_iter().map(str::to_owned).chain(arguments.iter().cloned()).collect()
-}
-
 /// What identifies a run: its settings, what is known of its data set, its first and its last
 /// image.
 fn identify(plan: &Plan) -> anyhow::Result<Identity> {
     let mut digest = Digest::default();
-    for (key, value) in RunManifest::of(plan, std::iter::empty(), Path::new(""))?.fingerprint() {
+    for (key, value) in run::fingerprint(plan) {
         digest.bytes(key.as_bytes());
         digest.bytes(value.as_bytes());
     }
@@ -43,13 +35,29 @@ fn identify(plan: &Plan) -> anyhow::Result<Identity> {
 }
 
 /// A job whose figures are wanted, as a file below the folder of the jobs.
-pub fn of_figures(name: &str, arguments: Vec<String>, file: PathBuf) -> anyhow::Result<Job> {
-    let identity = identify(&planned(&arguments)?)?;
-    Ok(Job::new(name, arguments, &identity, Given::Figures(file)))
+pub fn of_figures(name: &str, request: Request, file: PathBuf) -> anyhow::Result<Job> {
+    let identity = identify(&request.resolve()?)?;
+    Ok(Job::new(name, request, &identity, Given::Figures(file)))
+}
+
+/// Blocks as far about surfaces as distances are kept: registration searches so far, and what is
+/// free of one epoch's surfaces tells what has changed.
+const ALLOCATION: [&str; 2] = ["--set", "volume.allocation_m=64"];
+
+/// The request of a recording's arguments, whose map is kept.
+fn request_of_map(arguments: &[String]) -> anyhow::Result<Request> {
+    let words = ALLOCATION.into_iter().map(str::to_owned).chain(arguments.iter().cloned());
+    let mut request = request_of(&words.collect::<Vec<_>>())?;
+    request.storage.keep_blocks = true;
+    Ok(request)
 }
 
 pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
-    let of = |arguments: &[String]| identify(&planned(arguments)?);
+    let of = |arguments: &[String]| {
+        let request = request_of_map(arguments)?;
+        let identity = identify(&request.resolve()?)?;
+        anyhow::Ok((request, identity))
+    };
     write(&Manifest::plan(recordings, &Recordings::read(recordings)?, of)?, out)
 }
 
@@ -89,7 +97,7 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
 /// Does one job, of the settings and images it was planned for.
 fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     let is_same = |plan: &Plan| anyhow::Ok(job.is_of(identify(plan)?.digest));
-    let plan = planned(&job.arguments)?;
+    let plan = job.request.resolve()?;
     if !is_same(&plan)? {
         bail!("its settings or images are not those of the plan. Plan again");
     }
@@ -100,7 +108,7 @@ fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
             None
         }
     };
-    if !is_same(&planned(&job.arguments)?)? {
+    if !is_same(&job.request.resolve()?)? {
         bail!("its images have changed while it ran. Plan again");
     }
     match figures {
@@ -109,24 +117,28 @@ fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     }
 }
 
-/// Blocks as far about surfaces as distances are kept: registration searches so far, and what is
-/// free of one epoch's surfaces tells what has changed.
-const ALLOCATION: [&str; 2] = ["--set", "volume.allocation_m=64"];
-
-/// Runs one job in a process of its own.
+/// Runs one job in a process of its own, so that memory and a crash are its own.
 fn run_apart(folder: &Path, job: &Job) -> anyhow::Result<()> {
     let run = Command::new(std::env::current_exe()?)
-        .arg("run")
-        .args(ALLOCATION)
-        .args(&job.arguments)
-        .args(["--quiet", "--keep-blocks", "--overwrite", "--out"])
-        .arg(job.run_folder(folder))
+        .args(["fleet", "job"])
+        .arg(folder)
+        .arg(&job.id)
         .output()
         .context("the run cannot be started")?;
     if !run.status.success() {
         bail!("{}", String::from_utf8_lossy(&run.stderr).trim().trim_start_matches("error: "));
     }
     Ok(())
+}
+
+/// Does the run of one job in this process.
+pub fn run_one(folder: &Path, id: &str) -> anyhow::Result<()> {
+    let manifest = Manifest::read(folder)?;
+    let Some(job) = manifest.jobs.iter().find(|job| job.id == id) else {
+        bail!("{} has no job {id}. `dynvox fleet status` lists them", folder.display())
+    };
+    let plan = job.request.resolve_with(&signals::stop_request()?)?;
+    run_to(plan, RunFolder::begin(&job.run_folder(folder), true)?)
 }
 
 /// Keeps the map of a job's run, and removes the run's block file.

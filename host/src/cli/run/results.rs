@@ -34,8 +34,8 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
         Incomplete::add_missing(&mut incomplete, GLB_FILE, &error.to_string());
     }
     run.incomplete = incomplete;
-    let viewer =
-        scene.and_then(|scene| report::viewer::fragment(folder.path(), &run.header.name, &scene));
+    let viewer = scene
+        .and_then(|scene| report::viewer::fragment(folder.path(), run.plan.dataset.name(), &scene));
     let viewer =
         viewer.unwrap_or_else(|error| html! { p { b { "The report has no viewer: " (error) } } });
     if let Err(error) = folder.write("report.html", |out| report::html::write(out, run, &viewer)) {
@@ -50,7 +50,7 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
 fn files(run: &RunRecord) -> Vec<(&'static str, Writer<'_>)> {
     let sections = &run.sections;
     let mut files: Vec<(&'static str, Writer<'_>)> =
-        vec![(SETTINGS_FILE, Box::new(|out| out.write_all(run.header.config_toml.as_bytes())))];
+        vec![(SETTINGS_FILE, Box::new(|out| out.write_all(run.plan.config_toml.as_bytes())))];
     if let Ok(text) = report::bounds::capacity_toml(run) {
         files.push(("capacity.toml", Box::new(move |out| out.write_all(text.as_bytes()))));
     }

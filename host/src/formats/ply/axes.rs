@@ -1,7 +1,10 @@
 //! Which way the axes of a mesh point.
 
+use serde::{Deserialize, Serialize};
+
 /// The axes of a mesh file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum Axes {
     /// The first camera's: x right, y down, z forward.
     #[default]

@@ -2,6 +2,7 @@
 
 use super::file::{BagFile, Topic};
 use crate::input::source::InputError;
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
 /// Names of a camera's side in topics, left and right.
@@ -16,7 +17,7 @@ const SIDES: [[&str; 2]; 7] = [
 ];
 
 /// The two topics by name: `LEFT,RIGHT`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Topics(pub [String; 2]);
 
 impl FromStr for Topics {

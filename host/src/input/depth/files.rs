@@ -6,6 +6,7 @@ use crate::input::source::{
     StereoImages, to_disparity,
 };
 use dynvox_core::geometry::StereoRig;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -15,7 +16,8 @@ const ENDINGS: [&str; 3] = ["png", "pfm", "xml"];
 const INNER: &str = "Frames";
 
 /// Where depth comes from, as the command line says it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum DepthChoice {
     /// The core's stereo matching.
     #[default]

@@ -1,9 +1,11 @@
 //! Faults as the command line names them: `freeze:right@20..,noise=12@5..9,drop%10,seed=3`.
 
+use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
 /// One of a camera's images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Side {
     /// The left one, in grey and in colour.
     Left,
@@ -24,7 +26,8 @@ impl Side {
 }
 
 /// What happens to a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// It is lost; the time stamps show it.
     Drop,
@@ -53,7 +56,7 @@ pub enum FaultKind {
 }
 
 /// A fault and the frames it happens in.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
     /// What happens.
     pub kind: FaultKind,
@@ -82,7 +85,7 @@ impl Fault {
 /// assert_eq!((faults.list[1].end, faults.list[2].percent, faults.seed), (6, 10, 3));
 /// # Ok::<(), String>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Faults {
     /// One after the other.
     pub list: Vec<Fault>,

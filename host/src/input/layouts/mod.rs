@@ -1,6 +1,8 @@
 //! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360,
 //! Cityscapes, EuRoC and TUM VI, any folders of images; and the synthetic street.
 
+use serde::{Deserialize, Serialize};
+
 mod camera_folders;
 mod cityscapes;
 mod euroc;
@@ -27,7 +29,8 @@ pub use stacked::Stacking;
 pub use street::StreetFrames;
 
 /// Which camera pair of KITTI odometry to use.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum CameraPair {
     /// The grey pair where it is there, else the colour pair.
     #[default]

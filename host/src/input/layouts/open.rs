@@ -6,6 +6,7 @@ use crate::formats::calibration::{CameraGeometry, RectifiedSize};
 use crate::input::bags::{self, Topics};
 use crate::input::source::{FrameSource, InputError};
 use dynvox_core::geometry::StereoRig;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Data sets named at most where a folder is none itself but holds some.
@@ -15,7 +16,8 @@ const HINTS: usize = 8;
 const AROUND: usize = 3;
 
 /// The known layouts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum Layout {
     /// KITTI odometry: `sequences/NN/{image_0,image_1,calib.txt}`.
     KittiOdometry,
@@ -25,6 +27,7 @@ pub enum Layout {
     KittiRaw,
     /// KITTI-360: `data_2d_raw/DRIVE/{image_00,image_01}/data_rect`, `calibration/perspective.txt`.
     #[value(name = "kitti-360")]
+    #[serde(rename = "kitti-360")]
     Kitti360,
     /// Cityscapes: `leftImg8bit_sequence`, `rightImg8bit_sequence`, `camera`.
     Cityscapes,

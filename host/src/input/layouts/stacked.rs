@@ -1,9 +1,11 @@
 //! Two images of a pair in one file: side by side, or one above the other.
 
 use crate::formats::{Decoded, Image};
+use serde::{Deserialize, Serialize};
 
 /// How two images lie in one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Stacking {
     /// The left image, then the right one.
     SideBySide,

@@ -1,10 +1,12 @@
 //! Choosing a source of masks.
 
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Where masks come from, as the command line says it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum MaskChoice {
     /// The data set's folder of instances, if it has one, and moving objects by their motion.
     #[default]

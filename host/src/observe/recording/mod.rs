@@ -6,7 +6,7 @@ mod messages;
 mod schemas;
 
 use super::{
-    EndContext, Finished, FrameContext, ObserveError, Observer, PlanningLayers, Setup,
+    EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, PlanningLayers,
     frame_pictures, frame_pictures::Shown, pictures,
 };
 use dynvox_core::geometry::Transform;
@@ -53,8 +53,8 @@ struct Recording {
 }
 
 impl Recording {
-    fn begin(setup: &Setup<'_>) -> Result<Self, mcap::McapError> {
-        let file = BufWriter::new(File::create(setup.folder.join(RECORDING_FILE))?);
+    fn begin(run: &ObservedRun<'_>) -> Result<Self, mcap::McapError> {
+        let file = BufWriter::new(File::create(run.folder.join(RECORDING_FILE))?);
         let mut writer = mcap::WriteOptions::new().library("dynvox").create(file)?;
         let mut channels = [0; TOPICS.len()];
         for (channel, topic) in channels.iter_mut().zip(TOPICS) {
@@ -99,7 +99,7 @@ impl Recording {
     fn frame(
         &mut self,
         frame: &mut FrameContext<'_, '_>,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
     ) -> Result<(), mcap::McapError> {
         let (time_ns, t_world_camera) = (frame.row.time_ns(), frame.row.report.t_world_camera);
         let stamp = Stamp(time_ns);
@@ -112,8 +112,8 @@ impl Recording {
                 time_ns,
                 &messages::calibration(
                     stamp,
-                    &setup.config.rig,
-                    setup.dataset.size(),
+                    &run.plan.config.rig,
+                    run.plan.dataset.size(),
                     left.dimensions(),
                 ),
             )?;
@@ -126,7 +126,7 @@ impl Recording {
         if frame.position.is_multiple_of(MAP_EVERY)
             && let Some(seen) =
                 frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
-            && let Some(cloud) = messages::cloud(stamp, seen, &setup.config.rig)
+            && let Some(cloud) = messages::cloud(stamp, seen, &run.plan.config.rig)
         {
             self.write(Topic::Map, time_ns, &cloud)?;
         }
@@ -149,22 +149,23 @@ impl RecordingObserver {
     /// Does something with the recording, begun here if need be, unless it has failed.
     fn with(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         write: impl FnOnce(&mut Recording) -> Result<(), mcap::McapError>,
     ) {
-        if !setup.record || self.failure.is_some() {
+        if !run.plan.request.exports.record || self.failure.is_some() {
             return;
         }
         let done = match &mut self.recording {
             Some(recording) => write(recording),
-            None => Recording::begin(setup)
-                .and_then(|recording| write(self.recording.insert(recording))),
+            None => {
+                Recording::begin(run).and_then(|recording| write(self.recording.insert(recording)))
+            }
         };
         if let Err(error) = done {
             self.recording = None;
             self.failure = Some(error.to_string());
             // It may not exist.
-            let _ = std::fs::remove_file(setup.folder.join(RECORDING_FILE));
+            let _ = std::fs::remove_file(run.folder.join(RECORDING_FILE));
         }
     }
 }
@@ -175,16 +176,20 @@ impl Observer for RecordingObserver {
 
     fn frame(
         &mut self,
-        setup: &Setup<'_>,
+        run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        self.with(setup, |recording| recording.frame(frame, setup));
+        self.with(run, |recording| recording.frame(frame, run));
         Ok(())
     }
 
-    fn end(&mut self, setup: &Setup<'_>, end: &mut EndContext<'_, '_>) -> Result<(), ObserveError> {
+    fn end(
+        &mut self,
+        run: &ObservedRun<'_>,
+        end: &mut EndContext<'_, '_>,
+    ) -> Result<(), ObserveError> {
         let Some(last) = end.last else { return Ok(()) };
-        self.with(setup, |recording| {
+        self.with(run, |recording| {
             let trajectory = messages::trajectory(Stamp(last.time_ns()), recording.poses.iter());
             recording.write(Topic::Trajectory, last.time_ns(), &trajectory)?;
             recording.writer.finish().map(drop)
@@ -192,7 +197,7 @@ impl Observer for RecordingObserver {
         Ok(())
     }
 
-    fn finish(self, _: &Setup<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
+    fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<Option<String>, ObserveError> {
         Ok(self.failure)
     }
 }

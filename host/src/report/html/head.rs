@@ -5,18 +5,18 @@ use crate::run::RunRecord;
 use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
-    let (header, (width, height)) = (&run.header, run.header.size);
+    let (plan, (width, height)) = (&run.plan, run.plan.dataset.size());
     html! {
-        h1 { (header.name) }
+        h1 { (plan.dataset.name()) }
         p.soft {
-            (run.frames.len()) " frames of " (width) " × " (height) " px, profile " code { (header.profile) } ", "
-            (counted(header.threads, "thread")) ", dynvox " (env!("CARGO_PKG_VERSION")) ". Digest of the last frame: "
+            (run.frames.len()) " frames of " (width) " × " (height) " px, profile " code { (plan.profile) } ", "
+            (counted(plan.threads, "thread")) ", dynvox " (env!("CARGO_PKG_VERSION")) ". Digest of the last frame: "
             code { (format!("{:016x}", run.digest())) }
         }
         @if let Some(incomplete) = &run.incomplete { p { b { "Incomplete: " (incomplete.reason) } } }
-        @for warning in &header.warnings { p { b { "Warning: " (warning) } } }
-        @if !header.notes.is_empty() {
-            ul.soft.small { @for note in &header.notes { li { (note) } } }
+        @for warning in &plan.warnings { p { b { "Warning: " (warning) } } }
+        @if !plan.dataset.notes().is_empty() {
+            ul.soft.small { @for note in plan.dataset.notes() { li { (note) } } }
         }
         div.cards { @for (value, name) in cards(run) { div.card { b { (value) } span { (name) } } } }
     }
@@ -48,9 +48,9 @@ fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
         });
         cards.push((format!("{:.3} m", errors.ate_m), "absolute trajectory error"));
     }
-    let (peak, blocks) = (sections.blocks.totals.peak, run.header.capacity.blocks);
+    let (peak, blocks) = (sections.blocks.totals.peak, run.plan.capacity.blocks);
     cards.push((
-        format!("{:.1} MiB", run.header.slab_bytes as f64 / MIB),
+        format!("{:.1} MiB", run.plan.capacity.bytes() as f64 / MIB),
         "slab: all memory of the core",
     ));
     cards.push((

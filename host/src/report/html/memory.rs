@@ -9,13 +9,13 @@ use crate::run::RunRecord;
 use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
-    let (frames, header) = (frames(run), &run.header);
+    let (frames, plan) = (frames(run), &run.plan);
     let pool = lines(
         &frames,
         &[
             series(run, "blocks in use", COLOURS[0], Charted::BlocksUsed),
             series(run, "visible", COLOURS[3], Charted::BlocksVisible),
-            constant(run, "pool", COLOURS[5], header.capacity.blocks as f64),
+            constant(run, "pool", COLOURS[5], plan.capacity.blocks as f64),
         ],
         "blocks",
         0.0,
@@ -24,8 +24,8 @@ pub fn section(run: &RunRecord) -> Markup {
         &frames,
         &[
             series(run, "resident memory of the process", COLOURS[4], Charted::Resident),
-            constant(run, "slab", COLOURS[5], header.slab_bytes as f64 / MIB),
-            constant(run, "limit", COLOURS[2], header.rss_limit_bytes as f64 / MIB),
+            constant(run, "slab", COLOURS[5], plan.capacity.bytes() as f64 / MIB),
+            constant(run, "limit", COLOURS[2], plan.rss_limit_bytes as f64 / MIB),
         ],
         "MiB",
         0.0,
@@ -34,7 +34,7 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Memory" }
             p.soft.small {
-                "The core uses one slab of " (grouped(header.slab_bytes as u64)) " bytes, allocated before the first frame, and no other memory."
+                "The core uses one slab of " (grouped(plan.capacity.bytes() as u64)) " bytes, allocated before the first frame, and no other memory."
             }
             div.two { div { (pool) } div { (resident) } }
             p.small { "Bounds: " (bounds::sentence(run)) "." }
@@ -45,7 +45,7 @@ pub fn section(run: &RunRecord) -> Markup {
 }
 
 fn bounds_table(run: &RunRecord) -> Vec<Vec<String>> {
-    let rows = run.sections.bounds.uses.rows(&run.header.capacity);
+    let rows = run.sections.bounds.uses.rows(&run.plan.capacity);
     let cells = |(name, bound, of): (&str, usize, BoundUse)| {
         std::iter::once(name.to_owned())
             .chain([bound as u64, of.needed as u64, of.refused].map(grouped))

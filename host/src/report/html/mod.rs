@@ -54,11 +54,13 @@ pub fn write(out: &mut impl Write, run: &RunRecord, viewer: &Markup) -> io::Resu
         (rig::section(run))
         (configuration(run))
     };
-    out.write_all(page(&format!("dynvox: {}", run.header.name), &content).into_string().as_bytes())
+    out.write_all(
+        page(&format!("dynvox: {}", run.plan.dataset.name()), &content).into_string().as_bytes(),
+    )
 }
 
 fn configuration(run: &RunRecord) -> Markup {
-    let rig = run.header.rig;
+    let rig = run.plan.dataset.rig();
     html! {
         section { details {
             summary { "Configuration" }
@@ -68,7 +70,7 @@ fn configuration(run: &RunRecord) -> Markup {
                     rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m
                 ))
             }
-            pre { (run.header.config_toml) }
+            pre { (run.plan.config_toml) }
         } }
     }
 }

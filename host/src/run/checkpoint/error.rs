@@ -56,12 +56,12 @@ pub enum ResumeError {
         /// Each with what it was and is.
         differences: String,
     },
-    /// The command line cannot be stored.
+    /// The request cannot be stored.
     #[error(
-        "{what} is not Unicode, and a snapshot stores the command line. Rename it, or run without --snapshot-every"
+        "a snapshot cannot store what was asked for: {reason}. Rename it, or run without --snapshot-every"
     )]
-    NotUnicode {
-        /// The word, as well as it can be shown.
-        what: String,
+    NotStorable {
+        /// The part, a path that is not Unicode.
+        reason: String,
     },
 }

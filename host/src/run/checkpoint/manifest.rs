@@ -1,63 +1,46 @@
 //! How a run was started: enough to start it again, and to check that it is the same.
 
 use super::ResumeError;
-use crate::run::Plan;
+use crate::request::{Plan, Request};
 use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::digest::Digest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
 
 /// Differences listed at most.
 const MOST_DIFFERENCES: usize = 5;
 
 /// How a run was started.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// The command line after `dynvox run`.
-    arguments: Vec<String>,
-    /// The working directory: relative paths start there.
-    working_dir: String,
+    /// What was asked for.
+    request: Request,
+    /// Whether its folder replaces earlier results.
+    overwrites: bool,
     /// The resolved settings, and what identifies the data set.
     fingerprint: BTreeMap<String, String>,
 }
 
 impl RunManifest {
-    /// Of the run of `plan`, started with these arguments in this folder.
+    /// The manifest of a plan's run into a folder.
     ///
     /// # Errors
-    /// They are not Unicode.
-    pub fn of(
-        plan: &Plan,
-        arguments: impl Iterator<Item = OsString>,
-        working_dir: &Path,
-    ) -> Result<Self, ResumeError> {
-        let text = |word: OsString| {
-            word.into_string().map_err(|word| ResumeError::NotUnicode {
-                what: word.to_string_lossy().into_owned(),
-            })
-        };
-        Ok(Self {
-            arguments: arguments.map(text).collect::<Result<_, _>>()?,
-            working_dir: text(working_dir.to_path_buf().into_os_string())?,
-            fingerprint: fingerprint(plan),
-        })
+    /// A path of the request is not Unicode.
+    pub fn new(plan: &Plan, overwrites: bool) -> Result<Self, ResumeError> {
+        let request = plan.request.clone();
+        serde_json::to_value(&request)
+            .map_err(|error| ResumeError::NotStorable { reason: error.to_string() })?;
+        Ok(Self { request, overwrites, fingerprint: fingerprint(plan) })
     }
 
-    /// The command line after `dynvox run`.
-    pub fn arguments(&self) -> &[String] {
-        &self.arguments
+    /// What was asked for.
+    pub fn request(&self) -> &Request {
+        &self.request
     }
 
-    /// The resolved settings, and what identifies the data set, by name.
-    pub fn fingerprint(&self) -> &BTreeMap<String, String> {
-        &self.fingerprint
-    }
-
-    /// The working directory of the command line.
-    pub fn working_dir(&self) -> PathBuf {
-        PathBuf::from(&self.working_dir)
+    /// Whether the run's folder replaces earlier results.
+    pub fn overwrites(&self) -> bool {
+        self.overwrites
     }
 
     /// Checks that a plan is the one the run was started with.
@@ -82,8 +65,8 @@ impl RunManifest {
     }
 }
 
-/// Settings and data set of a plan, by name.
-fn fingerprint(plan: &Plan) -> BTreeMap<String, String> {
+/// The resolved settings of a plan, and what identifies its data set, by name.
+pub fn fingerprint(plan: &Plan) -> BTreeMap<String, String> {
     let mut fingerprint = settings(&plan.config_toml).unwrap_or_default();
     fingerprint.insert("profile".to_owned(), plan.profile.clone());
     let dataset = plan.dataset.as_ref();

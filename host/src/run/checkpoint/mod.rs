@@ -25,12 +25,12 @@ mod manifest;
 mod tests;
 
 pub use error::ResumeError;
-pub use manifest::RunManifest;
+pub use manifest::{RunManifest, fingerprint};
 
-use super::Plan;
 use super::state::RunState;
 use super::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, write_whole};
 use crate::formats::checksum_of;
+use crate::request::Plan;
 use crate::run::store::Position;
 use dynvox_core::Mapper;
 use dynvox_core::RestoreError;
@@ -41,20 +41,11 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"DVXSNAP\0";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// Magic, version, length.
 const HEAD: usize = 20;
 /// Checksum.
 const TAIL: usize = 4;
-
-/// When a run writes checkpoints.
-#[derive(Clone, Debug)]
-pub struct CheckpointPlan {
-    /// Frames from one to the next.
-    pub every: usize,
-    /// How the run was started.
-    pub manifest: RunManifest,
-}
 
 /// The host's part; borrowed to be written, owned when read.
 #[derive(Serialize, Deserialize)]

@@ -1,6 +1,7 @@
 //! The host's part of a checkpoint, with one byte changed.
 
 use super::*;
+use crate::request::Request;
 use crate::slab::HostSlab;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{Capacity, Config};
@@ -10,10 +11,10 @@ const RIG: StereoRig =
     StereoRig { focal_px: 90.0, center_u_px: 79.5, center_v_px: 31.5, baseline_m: 0.5 };
 
 fn manifest() -> RunManifest {
-    ciborium::Value::serialized(&BTreeMap::from([("arguments", vec!["--frames", "3"])]))
+    ciborium::Value::serialized(&BTreeMap::from([("request", Request::default())]))
         .and_then(|mut value| {
             let more = [
-                ("working_dir", ciborium::Value::from("/")),
+                ("overwrites", ciborium::Value::from(false)),
                 ("fingerprint", ciborium::Value::Map(Vec::new())),
             ];
             value.as_map_mut().unwrap().extend(more.map(|(key, value)| (key.into(), value)));

@@ -1,9 +1,8 @@
 //! What is doubtful about a recording's images, before the first is mapped.
 
-use super::RunArgs;
+use super::{FrameNumbers, Request, RequestError, Source, frame_interval_s};
 use crate::input::FrameSource;
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
-use crate::run::{FrameNumbers, frame_interval_s};
 
 /// What a recording says of itself.
 pub struct Examined {
@@ -16,20 +15,20 @@ pub struct Examined {
 /// Examines a recording without masks and injected faults.
 ///
 /// # Errors
-/// Its images would make a map meaningless, and `--force` is not given.
-pub fn examine(args: &RunArgs, dataset: &dyn FrameSource) -> anyhow::Result<Examined> {
-    let frames = FrameNumbers::of(dataset, args.start, args.stride, args.frames)?;
+/// Its images would make a map meaningless, and the request does not force it.
+pub fn examine(request: &Request, dataset: &dyn FrameSource) -> Result<Examined, RequestError> {
+    let frames = FrameNumbers::new(dataset, &request.frames)?;
     // Of a stream while no frame has come: then it is its nominal interval.
     let interval_s = frame_interval_s(dataset, &frames);
-    Ok(Examined { warnings: warnings(args, dataset, &frames)?, interval_s })
+    Ok(Examined { warnings: warnings(request, dataset, &frames)?, interval_s })
 }
 
 fn warnings(
-    args: &RunArgs,
+    request: &Request,
     dataset: &dyn FrameSource,
     frames: &FrameNumbers,
-) -> anyhow::Result<Vec<String>> {
-    if args.path.is_none() {
+) -> Result<Vec<String>, RequestError> {
+    if request.input.source == Source::Street {
         // The synthetic street knows what it renders.
         return Ok(Vec::new());
     }
@@ -37,7 +36,7 @@ fn warnings(
     // Of a stream the first frame can be looked at, and a camera may begin in the dark.
     let findings = diagnosis::examine(dataset, if stream { &[0] } else { frames.listed() })?;
     let refused = |finding: &Finding| finding.refused && !(stream && finding.fault == Fault::Black);
-    if findings.iter().any(refused) && !args.force {
+    if findings.iter().any(refused) && !request.frames.force {
         return Err(RefusedInput { findings }.into());
     }
     Ok(findings.into_iter().map(|finding| finding.message).collect())

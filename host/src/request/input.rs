@@ -1,0 +1,100 @@
+//! Where images come from.
+
+use super::{Request, RequestError, stream};
+use crate::input::bags::Topics;
+use crate::input::faults::{self, Faults};
+use crate::input::stream::WhenLate;
+use crate::input::{
+    self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest,
+    StreetFrames, depth, masks,
+};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Where images come from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Input {
+    /// The source.
+    pub source: Source,
+    /// Layout of the recording; guessed from its path when absent.
+    pub layout: Option<Layout>,
+    /// Sequence within the recording.
+    pub sequence: Option<String>,
+    /// Camera pair of KITTI odometry.
+    pub cameras: CameraPair,
+    /// Significant bits of 16-bit images, 8 to 16; told from some of them when absent.
+    pub bits: Option<u32>,
+    /// Topics of both cameras in a recording of ROS; told by their names when absent.
+    pub topics: Option<Topics>,
+    /// How both images of a pair lie in one; told from the calibration when absent.
+    pub stacking: Option<Stacking>,
+    /// Frames a second of a stream.
+    pub rate_hz: Option<f64>,
+    /// What becomes of a stream's frames that come while the mapper is busy.
+    pub when_late: Option<WhenLate>,
+    /// Calibration files instead of the recording's own: one, or one for each camera.
+    pub calibration: Vec<PathBuf>,
+    /// Faults to inject.
+    pub faults: Option<Faults>,
+}
+
+/// A source of images.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// The synthetic street, as the settings below `street` say.
+    #[default]
+    Street,
+    /// PGM or PPM images on standard input, left and right in turn.
+    Stream,
+    /// A recording: a folder, or a file of ROS.
+    Recording(PathBuf),
+}
+
+/// Opens the source with its depth, scaled, without masks and faults.
+pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource>, RequestError> {
+    let Input { source, layout, sequence, rate_hz, when_late, .. } = &request.input;
+    let only_streams = *source != Source::Stream && (rate_hz.is_some() || when_late.is_some());
+    if only_streams {
+        return Err(RequestError::invalid(
+            "--rate and --when-late are for a stream: `dynvox run -`",
+        ));
+    }
+    let dataset: Box<dyn FrameSource> = match source {
+        Source::Stream => stream::open(request, stop)?,
+        Source::Recording(path) => input::open(path, &options(request))?,
+        Source::Street if layout.is_some() || sequence.is_some() => {
+            return Err(RequestError::invalid(
+                "--dataset and --sequence need a data set. Give its path: `dynvox run PATH`",
+            ));
+        }
+        Source::Street => Box::new(StreetFrames::new(request.settings.street())?),
+    };
+    let dataset = depth::attach(dataset, &request.depth)?;
+    let scale = request.frames.scale;
+    Ok(if scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, scale)?) })
+}
+
+fn options(request: &Request) -> OpenOptions {
+    let input = &request.input;
+    OpenOptions {
+        layout: input.layout,
+        sequence: input.sequence.clone(),
+        cameras: input.cameras,
+        bits: input.bits,
+        stacking: input.stacking,
+        topics: input.topics.clone(),
+        calibration: input.calibration.clone(),
+        rectified: request.settings.rectify,
+    }
+}
+
+/// Lays the masks and faults that are asked for over an open source.
+pub fn dress(
+    request: &Request,
+    dataset: Box<dyn FrameSource>,
+) -> Result<Box<dyn FrameSource>, RequestError> {
+    let masked = masks::attach(dataset, &request.masks.source, request.masks.every)?;
+    faults::attach(masked, request.input.faults.as_ref()).map_err(RequestError::Invalid)
+}

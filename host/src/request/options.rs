@@ -1,0 +1,245 @@
+//! A request in the words of a person: options of `dynvox run`, keywords in Python.
+
+use super::{Bytes, ImageSize, MapObjects, Reference, WindowSize, words};
+use crate::formats::Axes;
+use crate::input::bags::Topics;
+use crate::input::depth::DepthChoice;
+use crate::input::faults::Faults;
+use crate::input::masks::MaskChoice;
+use crate::input::stream::WhenLate;
+use crate::input::{CameraPair, Layout};
+use dynvox_core::MotionSource;
+use serde::Deserialize;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Options of a run, as the command line and Python name them. What is absent is as the request's
+/// default has it.
+///
+/// ```
+/// use dynvox::request::{Options, Request};
+///
+/// let options: Options = serde_json::from_value(serde_json::json!({
+///     "memory": "48MiB",
+///     "frames": 10,
+///     "set": { "volume.voxel_size_m": 0.1 },
+/// }))?;
+/// let request = options.request()?;
+/// assert_eq!((request.frames.most, request.settings.volume.voxel_size_m), (Some(10), 0.1));
+/// assert_eq!(Options::default().request()?, Request::default());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, Default, Deserialize, clap::Args)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Data set to map; - for a stream of PGM or PPM images from standard input, left and right in
+    /// turn; the synthetic street without one
+    pub path: Option<PathBuf>,
+    /// Sequence within the data set: 06, 0003
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
+    pub sequence: Option<String>,
+    /// Layout of the data set; guessed from the path unless given
+    #[arg(long, value_enum, help_heading = "Input")]
+    pub dataset: Option<Layout>,
+    /// Camera pair of KITTI odometry [default: auto]
+    #[arg(long, value_enum, help_heading = "Input")]
+    pub images: Option<CameraPair>,
+    /// Significant bits of 16-bit images, 8 to 16; told from the largest value of some of them
+    /// otherwise
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16), help_heading = "Input")]
+    pub bits: Option<u32>,
+    /// Topics of both cameras in a recording of ROS [default: told by their names]
+    #[arg(long, value_name = "LEFT,RIGHT", help_heading = "Input")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub topics: Option<Topics>,
+    /// Both images of a pair lie in one, the left one left [default: told from the calibration]
+    #[arg(long, help_heading = "Input")]
+    pub side_by_side: bool,
+    /// Both images of a pair lie in one, the left one above
+    #[arg(long, conflicts_with = "side_by_side", help_heading = "Input")]
+    pub top_bottom: bool,
+    /// Frames a second of a stream
+    #[arg(long, value_name = "HZ", value_parser = rate_hz, help_heading = "Input")]
+    pub rate: Option<f64>,
+    /// Frames of a stream that come while the mapper is busy: wait lets the stream wait, drop drops
+    /// the oldest and counts it [default: wait]
+    #[arg(long, value_enum, value_name = "HOW", help_heading = "Input")]
+    pub when_late: Option<WhenLate>,
+    /// Calibration in place of the recording's own: of raw images in any format
+    /// `dynvox calibration` reads (give it twice where each camera has a file), of rectified ones
+    /// KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    #[serde(deserialize_with = "words::paths")]
+    pub calibration: Vec<PathBuf>,
+    /// Size raw pairs are rectified to
+    /// [default: the calibration's own, else all that both cameras see, at most 1920x1088]
+    #[arg(long, value_name = "WxH", help_heading = "Input")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub rectified: Option<ImageSize>,
+    /// Focal length raw pairs are rectified to, px
+    /// [default: the least that leaves no pixel without image]
+    #[arg(long, value_name = "PX", requires = "rectified", help_heading = "Input")]
+    pub rectified_focal: Option<f64>,
+    /// Bounds by name: tiny, small, onboard or desktop
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["memory", "capacity"], help_heading = "Limits")]
+    pub profile: Option<String>,
+    /// Bytes of memory the map and all stages may take, divided for the images that come: 48MiB,
+    /// 1GiB [default: 256MiB]
+    #[arg(long, value_name = "BYTES", conflicts_with = "capacity", help_heading = "Limits")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub memory: Option<Bytes>,
+    /// Bounds from a file, as `dynvox budget --memory 48MiB --image 752x480` prints them
+    #[arg(long, value_name = "FILE", help_heading = "Limits")]
+    pub capacity: Option<PathBuf>,
+    /// Make a map for planners around the camera and write it to planning/: cells to the sides,
+    /// ahead and behind, and upwards, of planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x
+    /// 4 m
+    #[arg(long, value_name = "CELLS", help_heading = "Results")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub planning: Option<WindowSize>,
+    /// Keep distances to obstacles for every cell of that window, and not for a slice of it alone
+    #[arg(long, requires = "planning", help_heading = "Results")]
+    pub planning_3d: bool,
+    /// First frame [default: 0]
+    #[arg(long, value_name = "N", help_heading = "Frames")]
+    pub start: Option<usize>,
+    /// Frames to map at most
+    #[arg(long, value_name = "N", help_heading = "Frames")]
+    pub frames: Option<usize>,
+    /// Take every N-th frame [default: 1]
+    #[arg(long, value_name = "N", help_heading = "Frames")]
+    pub stride: Option<usize>,
+    /// Shrink the images, above 0 and up to 1 [default: 1]
+    #[arg(long, value_name = "S", help_heading = "Frames")]
+    pub scale: Option<f64>,
+    /// Source of depth: elas (stereo matching), files:DIR (PNG, PFM or OpenCV XML named as the
+    /// images; depth where DIR's name says depth and not disparity), disparity:DIR, depth:DIR, or
+    /// exact (the synthetic street) [default: elas]
+    #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub depth: Option<DepthChoice>,
+    /// Source of instance masks: auto (files where the data set has them, and motion), motion
+    /// (moving objects are found by their motion alone), none, files:DIR (PNG and list), mots:DIR
+    /// or FILE (KITTI-MOTS), mnc:DIR, coco:FILE, yolo:DIR, boxes:FILE (KITTI labels, MOT), ids:DIR
+    /// (PNG of numbers), onnx:FILE[,FILE] (networks), exact or noisy[:SEED] (the synthetic street)
+    /// [default: auto]
+    #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub instances: Option<MaskChoice>,
+    /// Take masks in every K-th frame of the data set alone, as of a slow network; tracks carry on
+    /// in between [default: 1]
+    #[arg(long, value_name = "K", help_heading = "Mapping")]
+    pub instances_every: Option<NonZeroUsize>,
+    /// Save every frame's instance masks to a new folder, for --instances files:DIR; those found by
+    /// motion go to DIR/motion
+    #[arg(long, value_name = "DIR", conflicts_with = "scale", help_heading = "Mapping")]
+    pub save_instances: Option<PathBuf>,
+    /// Whether objects are masked out of the static map and reconstructed separately; off fuses
+    /// everything into one map [default: on]
+    #[arg(long, value_name = "on|off", value_parser = on_or_off, help_heading = "Mapping")]
+    pub dynamic: Option<bool>,
+    /// Source of the camera's motion: stereo (matches over two pairs), icp (depth against the map,
+    /// the baseline of hand-held mappers: expected to fail at driving speed), or file:POSES (KITTI
+    /// or TUM) [default: stereo]
+    #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub egomotion: Option<Egomotion>,
+    /// Fuse every K-th frame; the camera is tracked in all [default: 1]
+    #[arg(long, value_name = "K", help_heading = "Mapping")]
+    pub fuse_every: Option<u32>,
+    /// Settings from a file; config.toml of an earlier run is one
+    #[arg(long, value_name = "FILE", help_heading = "Mapping")]
+    pub config: Option<PathBuf>,
+    /// One setting, over those of the file; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Mapping")]
+    #[serde(deserialize_with = "words::settings")]
+    pub set: Vec<String>,
+    /// Lose blocks evicted from the full pool; otherwise they are stored in map.blocks, loaded back
+    /// when seen again, and included in map.ply
+    #[arg(long, help_heading = "Limits")]
+    pub no_stream: bool,
+    /// Limit map.blocks to so many MiB [default: the disk's space]
+    #[arg(long, value_name = "MIB", conflicts_with = "no_stream", help_heading = "Limits")]
+    pub stream_mib: Option<u64>,
+    /// Keep map.blocks in the run folder after the mesh is written
+    #[arg(long, conflicts_with = "no_stream", help_heading = "Results")]
+    pub keep_blocks: bool,
+    /// Evaluate input and map, static and of objects, against LiDAR scans or the synthetic street's
+    /// exact depth
+    #[arg(long, value_enum, value_name = "REFERENCE", help_heading = "Evaluation")]
+    pub evaluate: Option<Reference>,
+    /// Evaluate the map at a frame's pose N frames later, after pruning [default: 0]
+    #[arg(long, value_name = "N", requires = "evaluate", help_heading = "Evaluation")]
+    pub evaluation_delay: Option<usize>,
+    /// Save what the finished map shows at every frame's pose to a new folder: 16-bit PNG named as
+    /// the images, disparity in 1/256 px, 0 none
+    #[arg(long, value_name = "DIR", help_heading = "Evaluation")]
+    pub save_map_disparity: Option<PathBuf>,
+    /// End at the first frame that affects the map: an extrapolated pose, anything refused or lost
+    #[arg(long, help_heading = "Limits")]
+    pub strict: bool,
+    /// Leave out frames that cannot be read or mapped, and count them; otherwise the run ends
+    /// before the first of them
+    #[arg(long, help_heading = "Frames")]
+    pub skip_bad_frames: bool,
+    /// Inject faults, to see what becomes of them:
+    /// NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas; drop,
+    /// duplicate, swap, jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS,
+    /// occlude=SHARE, brightness=FACTOR, masks; seed=N
+    #[arg(long, value_name = "SPEC")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub faults: Option<Faults>,
+    /// Map images that are refused as exchanged, unrectified, out of order, black or the same in
+    /// both cameras
+    #[arg(long, help_heading = "Frames")]
+    pub force: bool,
+    /// Objects in map.ply next to the static map: none, last (each where it was last seen), all (at
+    /// every pose it was seen in) [default: last]
+    #[arg(long, value_enum, value_name = "WHICH", help_heading = "Results")]
+    pub map_objects: Option<MapObjects>,
+    /// Axes of map.ply: camera (x right, y down, z forward) or enu (x right, y forward, z up)
+    /// [default: camera]
+    #[arg(long, value_enum, value_name = "AXES", help_heading = "Results")]
+    pub axes: Option<Axes>,
+    /// Record the run as run.mcap for Foxglove and rerun: images, disparity, poses, objects, points
+    /// of the map, figures
+    #[arg(long, help_heading = "Results")]
+    pub mcap: bool,
+}
+
+/// A source of the camera's motion by name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Egomotion {
+    /// Estimated by the mapper.
+    Source(MotionSource),
+    /// A file of poses.
+    File(PathBuf),
+}
+
+impl FromStr for Egomotion {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.split_once(':') {
+            None if text == "stereo" => Ok(Self::Source(MotionSource::Stereo)),
+            None if text == "icp" => Ok(Self::Source(MotionSource::Icp)),
+            Some(("file", path)) if !path.is_empty() => Ok(Self::File(path.into())),
+            _ => Err("one of stereo, icp, file:POSES".to_owned()),
+        }
+    }
+}
+
+/// The value of a switch on the command line.
+fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("must be on or off".to_owned()),
+    }
+}
+
+fn rate_hz(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| "must be a number above 0".to_owned())
+}

@@ -1,0 +1,15 @@
+//! Poses of the camera.
+
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Where the camera's poses come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Poses {
+    /// The mapper estimates them, as the setting `mapper.egomotion` says.
+    #[default]
+    Estimated,
+    /// A file of KITTI or TUM.
+    File(PathBuf),
+}

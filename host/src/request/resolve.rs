@@ -1,0 +1,128 @@
+//! From a request to a plan.
+
+use super::examine::{Examined, examine};
+use super::resident_limit_bytes;
+use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Source, input};
+use crate::input::{StopRequest, read_given_poses};
+use dynvox_core::Capacity;
+
+const MIB: u64 = 1 << 20;
+/// Threads at most.
+const MAX_THREADS: usize = 256;
+
+impl Request {
+    /// Opens the data set and works out frames, bounds and settings.
+    ///
+    /// # Errors
+    /// A sentence of the part that cannot be used, with the next action.
+    pub fn resolve(&self) -> Result<Plan, RequestError> {
+        self.resolve_with(&StopRequest::default())
+    }
+
+    /// As [`Request::resolve`], for a run that `stop` can end.
+    ///
+    /// # Errors
+    /// As those of [`Request::resolve`].
+    pub fn resolve_with(&self, stop: &StopRequest) -> Result<Plan, RequestError> {
+        self.check_parts()?;
+        let threads = self.threads()?;
+        let recorded = input::open(self, stop)?;
+        // Before networks, which would run on every image that is examined.
+        let Examined { warnings, interval_s } = examine(self, recorded.as_ref())?;
+        let dataset = input::dress(self, recorded)?;
+        let (profile, capacity) = self.bounds.resolve(
+            dataset.size(),
+            dataset.rectification(),
+            self.settings.volume.voxel_size_m,
+        )?;
+        let settings = self.fitted_settings(&capacity, interval_s);
+        let frames = FrameNumbers::new(dataset.as_ref(), &self.frames)?;
+        let poses = match &self.poses {
+            Poses::Estimated => None,
+            Poses::File(path) => Some(read_given_poses(path, dataset.as_ref(), frames.listed())?),
+        };
+        Ok(Plan {
+            request: self.clone(),
+            config: settings.config(dataset.rig(), dataset.rectification()),
+            config_toml: file_of(&settings, self.input.source == Source::Street)?,
+            rss_limit_bytes: match self.limits.rss_mib {
+                Some(mib) => mib.saturating_mul(MIB),
+                None => resident_limit_bytes(&capacity, dataset.size()),
+            },
+            frames,
+            poses,
+            profile,
+            capacity,
+            threads,
+            warnings,
+            stop: stop.clone(),
+            progress: false,
+            dataset,
+        })
+    }
+
+    /// The settings with what depends on bounds and data set.
+    pub(super) fn fitted_settings(&self, bounds: &Capacity, interval_s: Option<f64>) -> Settings {
+        let mut settings = self.settings.clone();
+        settings.fit(bounds);
+        if let Some(finds_motion) = self.masks.source.finds_motion() {
+            settings.tracking.segmentation.enabled = finds_motion;
+        }
+        if let Some(interval_s) = interval_s {
+            settings.tracking.frame_interval_s = interval_s as f32;
+        }
+        settings
+    }
+
+    /// Threads to work with.
+    pub(super) fn threads(&self) -> Result<usize, RequestError> {
+        let threads = self
+            .limits
+            .threads
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
+        if threads > MAX_THREADS {
+            return Err(RequestError::Invalid(format!(
+                "--threads {threads} is more than {MAX_THREADS}. Give at most the number of processors"
+            )));
+        }
+        if threads == 0 || self.frames.stride == 0 || self.frames.most == Some(0) {
+            return Err(RequestError::invalid(
+                "--threads, --stride and --frames must be at least 1. Give a larger number",
+            ));
+        }
+        Ok(threads)
+    }
+
+    /// Checks that no part contradicts another.
+    fn check_parts(&self) -> Result<(), RequestError> {
+        let Self { frames, storage, evaluation, exports, .. } = self;
+        let snapshots = storage.snapshot_every.is_some();
+        let whole = [
+            ("an evaluation", evaluation.reference.is_some()),
+            ("a recording as MCAP", exports.record),
+            ("saved instances", exports.instances.is_some()),
+            ("saved disparities of the map", exports.map_disparity.is_some()),
+        ];
+        if let Some((what, _)) = whole.iter().find(|(_, asked)| snapshots && *asked) {
+            return Err(RequestError::Invalid(format!(
+                "a run with snapshots cannot have {what}. Leave out one of them"
+            )));
+        }
+        if storage.snapshot_every == Some(0) {
+            return Err(RequestError::invalid(
+                "--snapshot-every must be at least 1. Give a larger number",
+            ));
+        }
+        if exports.instances.is_some() && frames.scale != 1.0 {
+            return Err(RequestError::invalid(
+                "instances are saved at full size. Leave out --save-instances or --scale",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// The settings as a file.
+pub(super) fn file_of(settings: &Settings, with_street: bool) -> Result<String, RequestError> {
+    settings.to_toml(with_street).map_err(|error| RequestError::Invalid(format!("{error:#}")))
+}
