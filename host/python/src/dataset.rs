@@ -6,11 +6,10 @@ use super::error::{raise, refuse};
 use super::mapper::Mapper;
 use super::rig::Rig;
 use super::{arrays, options, pose};
-use dynvox::cli::{MapperPlan, plan_of};
 use dynvox::formats::Image;
 use dynvox::input::StereoImages;
 use dynvox::observe::from_first;
-use dynvox::run::Plan;
+use dynvox::request::{MapperPlan, Plan};
 use dynvox_core::geometry::Transform;
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
@@ -40,11 +39,12 @@ impl Dataset {
 #[pymethods]
 impl Dataset {
     #[new]
-    #[pyo3(signature = (path=None, *, stream=None, **options))]
+    #[pyo3(signature = (path=None, *, stream=None, threads=None, **options))]
     fn new(
         py: Python<'_>,
         path: Option<Bound<'_, PyAny>>,
         stream: Option<Bound<'_, PyAny>>,
+        threads: Option<usize>,
         options: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let path = path.map(|path| path.str().map(|path| path.to_string())).transpose()?;
@@ -53,8 +53,8 @@ impl Dataset {
                 "a stream is read by its own program. Give its pairs to Mapper.step",
             ));
         }
-        let line = options::dataset_line(path, options.as_ref())?;
-        let plan = py.detach(|| plan_of(&line)).map_err(raise)?;
+        let request = options::of_dataset(path, threads, options.as_ref())?;
+        let plan = py.detach(|| request.resolve()).map_err(raise)?;
         let poses = plan
             .poses
             .as_ref()
@@ -145,7 +145,7 @@ impl Dataset {
             config_toml: config_toml.clone(),
             threads: *threads,
         };
-        dynvox::run::check_bounds(self.plan.dataset.size(), (profile, capacity), config)
+        dynvox::request::check_bounds(self.plan.dataset.size(), (profile, capacity), config)
             .map_err(raise)?;
         Mapper::of_plan(self.rig(), self.plan.dataset.size(), plan, self.blocks.clone())
     }

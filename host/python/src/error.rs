@@ -18,5 +18,5 @@ pub fn refuse(sentence: impl Into<String>) -> PyErr {
 
 /// Any error of the host as an exception.
 pub fn raise(error: impl Into<anyhow::Error>) -> PyErr {
-    refuse(dynvox::cli::sentence(&error.into()))
+    refuse(dynvox::sentence(&error.into()))
 }

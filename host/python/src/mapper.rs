@@ -9,7 +9,8 @@ use super::planning::Plan;
 use super::rig::Rig;
 use super::running::{Recipe, Running, State};
 use super::{options, pose};
-use dynvox::cli::{MapperPlan, check_options};
+use dynvox::Request;
+use dynvox::request::MapperPlan;
 use dynvox::run::store;
 use dynvox::slab::HostSlab;
 use dynvox_core::tracking::TrackReport;
@@ -39,7 +40,8 @@ impl Mapper {
         plan: MapperPlan,
         blocks: BlocksChoice,
     ) -> PyResult<Self> {
-        let recipe = Recipe { rig, line: Vec::new(), interval_s: None, plan: Some(plan), blocks };
+        let request = Request::default();
+        let recipe = Recipe { rig, request, interval_s: None, plan: Some(plan), blocks };
         let mut state = State { recipe, running: None };
         state.running_for(size)?;
         Ok(Self { state: Mutex::new(state) })
@@ -62,16 +64,17 @@ impl Mapper {
 #[pymethods]
 impl Mapper {
     #[new]
-    #[pyo3(signature = (rig, *, image=None, frame_interval_s=None, stream=None, **options))]
+    #[pyo3(signature = (rig, *, image=None, frame_interval_s=None, stream=None, threads=None, **options))]
     fn new(
         rig: Rig,
         image: Option<(usize, usize)>,
         frame_interval_s: Option<f64>,
         stream: Option<Bound<'_, PyAny>>,
+        threads: Option<usize>,
         options: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let recipe = Recipe {
-            line: options::mapper_line(options.as_ref())?,
+            request: options::of_mapper(threads, options.as_ref())?,
             blocks: options::blocks(stream.as_ref())?,
             interval_s: frame_interval_s,
             plan: None,
@@ -82,7 +85,7 @@ impl Mapper {
         match size {
             Some(size) => drop(state.running_for(size)?),
             // What is wrong with the options is said at once, and not at the first picture.
-            None => check_options(&state.recipe.line).map_err(raise)?,
+            None => drop(state.recipe.request.check_mapper().map_err(raise)?),
         }
         Ok(Self { state: Mutex::new(state) })
     }

@@ -1,102 +1,88 @@
-//! Keyword arguments as options of `dynvox run`.
+//! Keyword arguments as a request.
 
 use super::blocks::BlocksChoice;
-use super::error::refuse;
+use super::error::{raise, refuse};
+use dynvox::Request;
+use dynvox::request::Options;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyList, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyTuple};
+use serde_json::{Map, Value};
 
-/// Switches of the command line that take a word.
-const ON_OR_OFF: [&str; 1] = ["dynamic"];
+/// The request of a data set's frames, of which nothing is written.
+pub fn of_dataset(
+    path: Option<String>,
+    threads: Option<usize>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Request> {
+    let request = request(path, threads, options)?;
+    request.check_frames_only().map_err(raise)?;
+    Ok(request)
+}
 
-fn add(line: &mut Vec<String>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-    let mut option = |text: String| line.push(format!("--{}={text}", key.replace('_', "-")));
-    if value.is_none() {
-        return Ok(());
+/// The request of a mapper alone.
+pub fn of_mapper(
+    threads: Option<usize>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Request> {
+    request(None, threads, options)
+}
+
+/// The request of options by name: `memory="48MiB"`, `planning_3d=True`, a list for an option that
+/// may be repeated, `set={"volume.voxel_size_m": 0.1}`.
+fn request(
+    path: Option<String>,
+    threads: Option<usize>,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Request> {
+    let mut named = match options {
+        Some(options) => object(options)?,
+        None => Map::new(),
+    };
+    if let Some(path) = path {
+        named.insert("path".to_owned(), path.into());
     }
+    let options: Options = serde_json::from_value(named.into()).map_err(|error| {
+        let text = error.to_string().replace(", expected one of ", ". Give one of ");
+        refuse(text.replace("unknown field ", "there is no option ").replace('`', ""))
+    })?;
+    let mut request = options.request().map_err(raise)?;
+    request.limits.threads = threads;
+    Ok(request)
+}
+
+/// A dictionary without what is None.
+fn object(dictionary: &Bound<'_, PyDict>) -> PyResult<Map<String, Value>> {
+    let mut object = Map::new();
+    for (key, value) in dictionary.iter().filter(|(_, value)| !value.is_none()) {
+        object.insert(key.str()?.to_string(), plain(&value)?);
+    }
+    Ok(object)
+}
+
+/// A value as plain data; what is neither number, list nor dictionary is its text, as a path is.
+fn plain(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(on) = value.cast::<PyBool>() {
-        match (ON_OR_OFF.contains(&key), on.is_true()) {
-            (true, true) => option("on".to_owned()),
-            (true, false) => option("off".to_owned()),
-            (false, true) => line.push(format!("--{}", key.replace('_', "-"))),
-            (false, false) => {}
-        }
-        return Ok(());
+        return Ok(on.is_true().into());
     }
-    if let Ok(settings) = value.cast::<PyDict>() {
-        for (key, value) in settings.iter() {
-            option(format!("{}={}", key.str()?, toml(&value)?));
-        }
-        return Ok(());
+    if let Ok(dictionary) = value.cast::<PyDict>() {
+        return Ok(object(dictionary)?.into());
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
-        return value.try_iter()?.try_for_each(|value| add(line, key, &value?));
+        return value.try_iter()?.map(|value| plain(&value?)).collect();
     }
-    option(value.str()?.to_string());
-    Ok(())
-}
-
-/// A value as TOML has it.
-fn toml(value: &Bound<'_, PyAny>) -> PyResult<String> {
+    if value.is_instance_of::<PyInt>() {
+        return Ok(value.extract::<i64>()?.into());
+    }
+    if value.is_instance_of::<PyFloat>() {
+        return Ok(value.extract::<f64>()?.into());
+    }
     let text = value.str()?.to_string();
-    if value.is_instance_of::<PyBool>() {
-        return Ok(text.to_lowercase());
-    }
     if text.contains('\n') {
         return Err(refuse(format!(
-            "the setting {text:?} has more than one line. Give a number, a word or a list"
+            "the option {text:?} has more than one line. Give a number, a word or a list"
         )));
     }
-    Ok(text)
-}
-
-/// Options of `dynvox run` that a mapper alone has.
-const OF_MAPPER: [&str; 12] = [
-    "profile",
-    "memory",
-    "capacity",
-    "planning",
-    "planning_3d",
-    "threads",
-    "config",
-    "set",
-    "dynamic",
-    "fuse_every",
-    "instances",
-    "egomotion",
-];
-/// Those that a data set has besides.
-const OF_DATASET: [&str; 18] = [
-    "sequence",
-    "dataset",
-    "images",
-    "bits",
-    "topics",
-    "side_by_side",
-    "top_bottom",
-    "calibration",
-    "rectified",
-    "rectified_focal",
-    "start",
-    "frames",
-    "stride",
-    "scale",
-    "depth",
-    "instances_every",
-    "faults",
-    "force",
-];
-
-/// The command line of a mapper alone.
-pub fn mapper_line(options: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
-    line(None, options, &[&OF_MAPPER], "Mapper")
-}
-
-/// The command line of a data set's run.
-pub fn dataset_line(
-    path: Option<String>,
-    options: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Vec<String>> {
-    line(path, options, &[&OF_DATASET, &OF_MAPPER], "Dataset")
+    Ok(text.into())
 }
 
 /// Where evicted blocks go.
@@ -107,27 +93,4 @@ pub fn blocks(stream: Option<&Bound<'_, PyAny>>) -> PyResult<BlocksChoice> {
         Ok(_) => Ok(BlocksChoice::Lost),
         Err(_) => Ok(BlocksChoice::File(stream.str()?.to_string().into())),
     }
-}
-
-/// The command line of a run with these options. `memory="48MiB"` is `--memory 48MiB`,
-/// `planning_3d=True` is `--planning-3d`, a list repeats its option, and
-/// `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
-fn line(
-    path: Option<String>,
-    options: Option<&Bound<'_, PyDict>>,
-    known: &[&[&str]],
-    of: &str,
-) -> PyResult<Vec<String>> {
-    let mut line = vec!["dynvox".to_owned()];
-    for (key, value) in options.into_iter().flat_map(|options| options.iter()) {
-        let key: String = key.extract()?;
-        if !known.iter().any(|known| known.contains(&key.as_str())) {
-            let names = known.iter().copied().flatten().copied().collect::<Vec<_>>().join(", ");
-            return Err(refuse(format!("{of} has no option {key}. Give one of {names}")));
-        }
-        add(&mut line, &key, &value)?;
-    }
-    // A path may begin with a hyphen.
-    line.extend(path.into_iter().flat_map(|path| ["--".to_owned(), path]));
-    Ok(line)
 }

@@ -3,7 +3,8 @@
 use super::blocks::{Blocks, BlocksChoice};
 use super::error::{raise, refuse};
 use super::rig::Rig;
-use dynvox::cli::{MapperPlan, mapper_of};
+use dynvox::Request;
+use dynvox::request::MapperPlan;
 use dynvox::run::{RunError, Threads, step_reason};
 use dynvox::slab::HostSlab;
 use dynvox_core::objects::NoSink;
@@ -46,8 +47,8 @@ pub struct Running {
 /// What a mapper is made of when its pictures' size is known.
 pub struct Recipe {
     pub rig: Rig,
-    /// Options of a run.
-    pub line: Vec<String>,
+    /// What is asked of it.
+    pub request: Request,
     pub interval_s: Option<f64>,
     /// Of a data set's run, whose plan is made already.
     pub plan: Option<MapperPlan>,
@@ -221,7 +222,9 @@ impl Recipe {
     fn plan_for(&self, size: (usize, usize)) -> PyResult<MapperPlan> {
         match &self.plan {
             Some(plan) => Ok(plan.clone()),
-            None => mapper_of(&self.line, &self.rig.fitted(size), self.interval_s).map_err(raise),
+            None => {
+                self.request.mapper(&self.rig.fitted(size), self.interval_s).map_err(raise)
+            }
         }
     }
 }
