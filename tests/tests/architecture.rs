@@ -185,6 +185,45 @@ fn the_host_imports_downwards_only() {
 }
 
 #[test]
+fn only_the_binary_uses_the_command_line_as_a_library() {
+    let is_program = |path: &&std::path::PathBuf| {
+        let tests = path.components().any(|part| part.as_os_str() == "tests");
+        !tests && !path.starts_with("host/src/cli") && !path.ends_with("host/src/main.rs")
+    };
+    let sources = files(&["rs"]);
+    let found: Vec<_> = sources
+        .iter()
+        .filter(is_program)
+        .filter(|path| uses_the_command_line(&text(path)))
+        .collect();
+    assert!(sources.iter().filter(is_program).any(|path| path.starts_with("host/python/src")));
+    assert_eq!(found, Vec::<&std::path::PathBuf>::new(), "ask for a run by dynvox::Request");
+}
+
+#[test]
+fn a_use_of_the_command_line_is_found_however_it_is_written() {
+    for line in [
+        "use dynvox::cli::main;",
+        "use dynvox::{Request, cli};",
+        "use dynvox::{\n    cli::plan_of,\n    run::Plan,\n};",
+        "fn f() { crate::cli::main(); }",
+    ] {
+        assert!(uses_the_command_line(line), "{line}");
+    }
+    for line in ["use dynvox::Request;", "// use dynvox::cli::main;", "use clippy::cli;"] {
+        assert!(!uses_the_command_line(line), "{line}");
+    }
+}
+
+/// Whether code leads a path through the module of the command line.
+fn uses_the_command_line(code: &str) -> bool {
+    let code = parts(code).code;
+    let starts = ["dynvox::", "crate::"].into_iter().flat_map(|root| code.match_indices(root));
+    let found: Vec<_> = starts.flat_map(|(at, _)| paths(&code, at).0).collect();
+    found.iter().any(|path| path.get(1).is_some_and(|module| module == "cli"))
+}
+
+#[test]
 fn a_forbidden_import_is_found_however_it_is_written() {
     let written = [
         "use crate::mapper::Mapper;",
