@@ -85,25 +85,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     {
         bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
-    let common = args.common()?;
-    let plan = Plan::new(&SweepRequest {
-        data: data
-            .iter()
-            .map(|one| Ok((one.clone(), reference(one)?)))
-            .collect::<anyhow::Result<_>>()?,
-        kinds: args.sweeps.clone(),
-        weights: args.weights.clone(),
-        rates: args.rates.clone(),
-        scales: args.scales.clone(),
-        depths: args
-            .depths
-            .iter()
-            .map(|name| Ok((name.clone(), depth(name)?)))
-            .collect::<anyhow::Result<_>>()?,
-        prune_lag: args.prune_lag,
-        evaluation_delay: args.evaluation_delay,
-        common,
-    })?;
+    let plan = args.plan_of(&data)?;
     let folder = SweepFolder::open(&args.out, &plan)?;
     let keys = plan.keys();
     let request = |key: &str| -> anyhow::Result<Request> {
@@ -136,6 +118,23 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
 }
 
 impl SweepArgs {
+    /// Points and runs of the sweeps.
+    fn plan_of(&self, data: &[Data]) -> anyhow::Result<Plan> {
+        let data = data.iter().map(|one| Ok((one.clone(), reference(one)?)));
+        let depths = self.depths.iter().map(|name| Ok((name.clone(), depth(name)?)));
+        Ok(Plan::new(&SweepRequest {
+            data: data.collect::<anyhow::Result<_>>()?,
+            kinds: self.sweeps.clone(),
+            weights: self.weights.clone(),
+            rates: self.rates.clone(),
+            scales: self.scales.clone(),
+            depths: depths.collect::<anyhow::Result<_>>()?,
+            prune_lag: self.prune_lag,
+            evaluation_delay: self.evaluation_delay,
+            common: self.common()?,
+        })?)
+    }
+
     /// What every run asks for.
     fn common(&self) -> anyhow::Result<Request> {
         let mut common = Request::default();

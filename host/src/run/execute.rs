@@ -10,7 +10,7 @@ use super::session::Session;
 use super::state::RunState;
 use super::{RunFolder, resident_bytes};
 use crate::formats::{MAP_FILE, Mesh};
-use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan};
+use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections};
 use crate::request::Plan;
 use crate::scene::PICTURES_FOLDER;
 use crate::slab::HostSlab;
@@ -45,13 +45,7 @@ pub fn run(
     };
     let Mapped { mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
         map(&observed, slab.bytes_mut(), folder, checkpoint)?;
-    if !state.sync(folder.path()).is_empty() {
-        // What was kept for this moment is enough for the last rows.
-        folder.release_reserve();
-        for (name, error) in state.sync(folder.path()) {
-            Incomplete::add_missing(&mut incomplete, &name, &error.to_string());
-        }
-    }
+    sync(&mut state, folder, &mut incomplete);
     // The mapper is gone: its slab serves to read the map piece by piece.
     let (written, store) = output.finish(
         slab.bytes_mut(),
@@ -65,21 +59,7 @@ pub fn run(
     let mesh_path = folder.file(MAP_FILE);
     let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store };
     let sections = std::mem::take(&mut state.observers).finish(&observed, &finished)?;
-    for name in &sections.objects.unwritten {
-        Incomplete::add_missing(
-            &mut incomplete,
-            &format!("objects/{name}.ply"),
-            "an object could not be written",
-        );
-    }
-    for (name, failure) in [
-        (PICTURES_FOLDER, &sections.gallery_failure),
-        (RECORDING_FILE, &sections.recording_failure),
-    ] {
-        if let Some(failure) = failure {
-            Incomplete::add_missing(&mut incomplete, name, failure);
-        }
-    }
+    add_unwritten(&mut incomplete, &sections);
     if incomplete.is_none() {
         [instances, map_disparity].into_iter().try_for_each(Saved::commit)?;
     }
@@ -96,6 +76,37 @@ pub fn run(
         rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
         plan,
     })
+}
+
+/// Writes the last rows; files that the disk refuses are missing.
+fn sync(state: &mut RunState, folder: &RunFolder, incomplete: &mut Option<Incomplete>) {
+    if state.sync(folder.path()).is_empty() {
+        return;
+    }
+    // What was kept for this moment is enough for the last rows.
+    folder.release_reserve();
+    for (name, error) in state.sync(folder.path()) {
+        Incomplete::add_missing(incomplete, &name, &error.to_string());
+    }
+}
+
+/// Adds the files that observers could not write.
+fn add_unwritten(incomplete: &mut Option<Incomplete>, sections: &Sections) {
+    for name in &sections.objects.unwritten {
+        Incomplete::add_missing(
+            incomplete,
+            &format!("objects/{name}.ply"),
+            "an object could not be written",
+        );
+    }
+    for (name, failure) in [
+        (PICTURES_FOLDER, &sections.gallery_failure),
+        (RECORDING_FILE, &sections.recording_failure),
+    ] {
+        if let Some(failure) = failure {
+            Incomplete::add_missing(incomplete, name, failure);
+        }
+    }
 }
 
 /// A run whose frames are mapped, without its mapper.

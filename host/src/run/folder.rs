@@ -1,92 +1,16 @@
 //! The run folder: written under another name next to its target, and renamed when its run has
 //! ended. A snapshot in it, of a run that was killed or ended early, is what resumes the run.
 
+mod error;
 #[cfg(test)]
 mod tests;
+
+pub use error::FolderError;
 
 use crate::formats::SUMMARY_FILE;
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
-
-/// Why a run folder cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum FolderError {
-    /// Something is there already.
-    #[error("{path} exists. Give another --out, remove it, or replace it with --overwrite")]
-    Exists {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// What is there is not a run folder.
-    #[error(
-        "{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give another --out"
-    )]
-    Foreign {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// An interrupted run has a snapshot there.
-    #[error(
-        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, or start again with --overwrite"
-    )]
-    Interrupted {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// There is no run to resume.
-    #[error("no run to {path} can be resumed: {reason}")]
-    NothingToResume {
-        /// The folder asked for.
-        path: PathBuf,
-        /// Why, and what to do.
-        reason: &'static str,
-    },
-    /// Another run writes there.
-    #[error("another run is writing to {path}. Wait for it, or give another --out")]
-    InUse {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// It is the current directory.
-    #[error("{path} is the current directory, which cannot be replaced. Give another --out")]
-    Current {
-        /// The folder asked for.
-        path: PathBuf,
-    },
-    /// The finished folder could not be renamed to it.
-    #[error(
-        "{path} cannot be replaced: {source}. Is it a mount point? Give a folder inside it as --out"
-    )]
-    Fixed {
-        /// The folder asked for.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
-    /// The results are complete and not where they should be.
-    #[error(
-        "the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the folder yourself"
-    )]
-    NotMoved {
-        /// Where the results are.
-        partial: PathBuf,
-        /// The folder asked for.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// The system refuses.
-    #[error(
-        "{path} cannot be written: {source}. Check the disk and the permissions, or give another --out"
-    )]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's error.
-        source: std::io::Error,
-    },
-}
 
 /// Name of the snapshot in the folder of a run that can be resumed.
 pub const SNAPSHOT_FILE: &str = "run.snapshot";

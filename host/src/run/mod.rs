@@ -13,6 +13,7 @@ mod progress;
 mod reader;
 mod record;
 mod resident;
+mod retired;
 mod saved;
 mod session;
 pub mod settings;

@@ -3,6 +3,7 @@
 use super::checkpoint::{self, Checkpoint, ResumeError, RunManifest};
 use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
+use super::retired::RetiredVolumes;
 use super::state::RunState;
 use super::view::LiveMap;
 use super::{
@@ -12,12 +13,11 @@ use super::{
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
     EndContext, FrameContext, FramePictures, FrameRow, ObserveError, ObservedRun, Observer,
-    RetiredVolume, StepTimes, VolumeCopy, from_first, overview,
+    RetiredVolume, StepTimes, from_first, overview,
 };
 use crate::request::Plan;
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
-use dynvox_core::objects::{ObjectSink, RetiredObject};
 use dynvox_core::tracking::{Detection, MotionState};
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Report, Severity, Stage, StereoFrame};
@@ -39,17 +39,6 @@ pub(super) struct Session<'p, 's> {
     pub state: RunState,
     /// Time before this is in the timers.
     pub since: Instant,
-}
-
-/// Copies the objects that leave during a step.
-#[derive(Default)]
-struct RetiredVolumes(Vec<RetiredVolume>);
-
-impl ObjectSink for RetiredVolumes {
-    fn retire(&mut self, object: RetiredObject<'_, '_>) {
-        self.0
-            .push(RetiredVolume { summary: object.summary, volume: VolumeCopy::of(object.volume) });
-    }
 }
 
 impl<'p, 's> Session<'p, 's> {
