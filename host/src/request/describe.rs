@@ -1,7 +1,7 @@
 //! A request in words: its values that differ from another's.
 
 use super::Request;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
 impl Request {
@@ -15,10 +15,11 @@ impl Request {
         found
     }
 
-    /// The values that differ from the defaults, as `key=value` words.
+    /// The values asked for that differ from the defaults, as `key=value` words.
     pub fn words(&self) -> String {
         let all = self.differences(&Self::default());
-        all.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
+        let asked = all.iter().filter(|(_, value)| !value.is_null());
+        asked.map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -30,12 +31,13 @@ fn compare(key: &str, (a, b): (&Value, &Value), found: &mut BTreeMap<String, Val
             let keys = inner.keys().chain(other.keys().filter(|key| !inner.contains_key(*key)));
             for name in keys {
                 let at = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                let of = |object: &serde_json::Map<String, Value>| {
-                    object.get(name).cloned().unwrap_or_default()
-                };
+                let of =
+                    |object: &Map<String, Value>| object.get(name).cloned().unwrap_or_default();
                 compare(&at, (&of(inner), &of(other)), found);
             }
         }
+        // A section that only one of them has is told value by value.
+        (Value::Object(_), Value::Null) => compare(key, (a, &Value::Object(Map::new())), found),
         (a, _) => drop(found.insert(key.to_owned(), a.clone())),
     }
 }
