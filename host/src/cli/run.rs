@@ -80,7 +80,7 @@ pub fn request_of(arguments: &[String]) -> anyhow::Result<Request> {
 }
 
 impl RunArgs {
-    /// What these arguments ask for.
+    /// Request of these arguments.
     fn request(&self) -> Result<Request, crate::request::RequestError> {
         Ok(self.changeable.over(self.options.request()?))
     }

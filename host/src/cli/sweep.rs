@@ -135,7 +135,7 @@ impl SweepArgs {
         })?)
     }
 
-    /// What every run asks for.
+    /// Request of every run.
     fn common(&self) -> anyhow::Result<Request> {
         let mut common = Request::default();
         common.bounds.memory = Memory::Profile(self.profile.clone());
@@ -144,7 +144,7 @@ impl SweepArgs {
         Ok(common)
     }
 
-    /// What one run asks for, on this machine.
+    /// Request of one run on this machine.
     fn request(&self, data: &Data, asked: &Request) -> anyhow::Result<Request> {
         let mut request = asked.clone();
         if let Some(path) = &data.path {

@@ -20,7 +20,7 @@ pub struct Job {
     pub name: String,
     /// Hash of the program's version, the request, the settings and the images.
     pub id: String,
-    /// What is asked of its run.
+    /// Request of its run.
     pub request: Request,
     /// Where it lies in the world.
     #[serde(flatten)]

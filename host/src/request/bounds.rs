@@ -15,7 +15,7 @@ const DEFAULT_MEMORY: Bytes = Bytes(256 << 20);
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bounds {
-    /// How many bytes, or which bounds.
+    /// Number of bytes, or the bounds.
     pub memory: Memory,
     /// The planner's window around the camera; none is made when absent.
     pub planning: Option<PlanningWindow>,
@@ -51,7 +51,7 @@ impl Default for Memory {
 pub struct PlanningWindow {
     /// Cells to the sides, ahead and behind, and upwards, of `planning.cell_voxels` voxels each.
     pub cells: [usize; 3],
-    /// Whether distances to obstacles are kept for every cell; otherwise for one slice.
+    /// Keep distances to obstacles for every cell; otherwise for one slice.
     #[serde(default)]
     pub distance_3d: bool,
 }

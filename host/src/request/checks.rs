@@ -6,7 +6,7 @@ use dynvox_core::{Capacity, Config};
 /// Bytes the host may use in addition to the slab, by default: the synthetic street, objects'
 /// meshes, the index of the block file.
 const HOST_BYTES: u64 = 256 << 20;
-/// The same for each pixel of an image: frames read ahead, their depth and masks, pictures of the
+/// Bytes the host may use for each pixel of an image: frames read ahead, their depth and masks, pictures of the
 /// report.
 const HOST_BYTES_PER_PIXEL: u64 = 64;
 
@@ -18,7 +18,7 @@ pub fn resident_limit_bytes(capacity: &Capacity, (width, height): (usize, usize)
 /// Refuses bounds and settings that images of a size cannot be mapped with.
 ///
 /// # Errors
-/// What does not fit, and what to change.
+/// Something does not fit; the message says what to change.
 pub fn check_bounds(
     (width, height): (usize, usize),
     (profile, bounds): (&str, &Capacity),

@@ -1,10 +1,10 @@
-//! Why a request cannot be run, in sentences.
+//! Errors of requests, as sentences.
 
 use super::Reference;
 use crate::input::InputError;
 use crate::input::diagnosis::RefusedInput;
 
-/// Why a request cannot be run. Each message ends in the next action.
+/// Reason that a request cannot be run. Each message ends in the next action.
 #[derive(Debug, thiserror::Error)]
 pub enum RequestError {
     /// The data set.
@@ -27,7 +27,7 @@ pub enum RequestError {
     /// No reference for the evaluation.
     #[error("--evaluate {} finds nothing in the {frames} frames: {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
     NoReference {
-        /// What was asked for.
+        /// Reference asked for.
         reference: Reference,
         /// Frames of the run.
         frames: usize,
@@ -49,7 +49,7 @@ pub enum RequestError {
         fits_width: usize,
         /// Highest image, px.
         fits_height: usize,
-        /// What to do.
+        /// Next action.
         action: String,
     },
     /// The pruning window is longer than the profile's history.
@@ -82,7 +82,7 @@ impl RequestError {
     }
 }
 
-/// Why there is no reference, and what to do.
+/// Says why there is no reference, and what to do.
 fn missing(reference: Reference, frames: usize, delay: usize) -> String {
     match reference {
         _ if delay >= frames => format!("--evaluation-delay {delay} reaches beyond the last of them. Give a smaller delay, or more --frames"),

@@ -3,7 +3,7 @@
 use crate::input::FrameSource;
 use serde::{Deserialize, Serialize};
 
-/// What the map is evaluated against.
+/// Evaluation of the map.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Evaluation {
@@ -44,7 +44,7 @@ impl Reference {
         in_time.filter(|&(_, &index)| self.is_there(dataset, index)).map(|(at, _)| at).collect()
     }
 
-    /// Whether a frame has it.
+    /// Returns true if a frame has it.
     fn is_there(self, dataset: &dyn FrameSource, index: usize) -> bool {
         match self {
             Self::Lidar => dataset.has_lidar(index),

@@ -1,12 +1,12 @@
-//! What is doubtful about a recording's images, before the first is mapped.
+//! Doubts about a recording's images, before the first is mapped.
 
 use super::{FrameNumbers, Request, RequestError, Source, frame_interval_s};
 use crate::input::FrameSource;
 use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
 
-/// What a recording says of itself.
+/// Findings about a recording.
 pub struct Examined {
-    /// What is doubtful about its images.
+    /// Doubts about the images.
     pub warnings: Vec<String>,
     /// Time from frame to frame, s, where it is known.
     pub interval_s: Option<f64>,
@@ -15,7 +15,7 @@ pub struct Examined {
 /// Examines a recording without masks and injected faults.
 ///
 /// # Errors
-/// Its images would make a map meaningless, and the request does not force it.
+/// The images would make a map meaningless, and the request does not force it.
 pub fn examine(request: &Request, dataset: &dyn FrameSource) -> Result<Examined, RequestError> {
     let frames = FrameNumbers::new(dataset, &request.frames)?;
     // Of a stream while no frame has come: then it is its nominal interval.

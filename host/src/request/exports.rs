@@ -4,7 +4,7 @@ use crate::formats::Axes;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// What a run leaves behind for other programs.
+/// Results of a run for other programs.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exports {
@@ -12,7 +12,7 @@ pub struct Exports {
     pub objects: MapObjects,
     /// Axes of meshes in world coordinates.
     pub axes: Axes,
-    /// Whether the run is recorded as an MCAP file.
+    /// Record the run as an MCAP file.
     pub record: bool,
     /// New folder that every frame's instance masks are saved to.
     pub instances: Option<PathBuf>,
@@ -21,11 +21,11 @@ pub struct Exports {
     pub map_disparity: Option<PathBuf>,
 }
 
-/// Which poses of objects are in `map.ply`.
+/// Choice of the poses of objects in `map.ply`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum MapObjects {
-    /// None: the static map alone.
+    /// The static map only.
     None,
     /// Each object where it was last seen.
     #[default]

@@ -5,7 +5,7 @@ use crate::evaluate::quantile::median;
 use crate::input::FrameSource;
 use serde::{Deserialize, Serialize};
 
-/// Which frames of the source are mapped, and at which size.
+/// Choice of the frames that are mapped, and their size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Frames {
@@ -17,10 +17,10 @@ pub struct Frames {
     pub stride: usize,
     /// Factor of the images' sides, above 0 and up to 1.
     pub scale: f64,
-    /// Whether frames that cannot be read or mapped are left out and counted; otherwise the run
+    /// Leave out and count frames that cannot be read or mapped; otherwise the run
     /// ends before the first of them.
     pub skip_bad: bool,
-    /// Whether images are mapped that an examination refuses as exchanged, unrectified, out of
+    /// Map images that an examination refuses as exchanged, unrectified, out of
     /// order, black or the same in both cameras.
     pub force: bool,
 }
@@ -35,13 +35,13 @@ impl Default for Frames {
 pub enum FrameNumbers {
     /// These.
     Listed(Vec<usize>),
-    /// Of a source without a known end: from `start`, every `stride`-th, at most `most`.
+    /// Frames of a source without a known end: from `start`, every `stride`-th, at most `most`.
     Open {
         /// The first.
         start: usize,
-        /// From one to the next.
+        /// Distance from one to the next.
         stride: usize,
-        /// How many at most.
+        /// Number of frames at most.
         most: usize,
     },
 }
@@ -74,7 +74,7 @@ impl FrameNumbers {
         }
     }
 
-    /// How many; `None` where the end is unknown.
+    /// Number of frames; `None` where the end is unknown.
     pub fn count(&self) -> Option<usize> {
         match self {
             Self::Listed(listed) => Some(listed.len()),

@@ -1,4 +1,4 @@
-//! Where images come from.
+//! Source of the images.
 
 use super::{Request, RequestError, stream};
 use crate::input::bags::Topics;
@@ -11,7 +11,7 @@ use crate::input::{
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Where images come from.
+/// Source of the images, and how they are read.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Input {
@@ -27,11 +27,11 @@ pub struct Input {
     pub bits: Option<u32>,
     /// Topics of both cameras in a recording of ROS; told by their names when absent.
     pub topics: Option<Topics>,
-    /// How both images of a pair lie in one; told from the calibration when absent.
+    /// Arrangement of a pair in one image; told from the calibration when absent.
     pub stacking: Option<Stacking>,
     /// Frames a second of a stream.
     pub rate_hz: Option<f64>,
-    /// What becomes of a stream's frames that come while the mapper is busy.
+    /// Fate of a stream's frames that come while the mapper is busy.
     pub when_late: Option<WhenLate>,
     /// Calibration files instead of the recording's own: one, or one for each camera.
     pub calibration: Vec<PathBuf>,

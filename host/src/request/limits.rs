@@ -12,6 +12,6 @@ pub struct Limits {
     /// Resident memory above which the run ends, MiB; when absent that of
     /// [`super::resident_limit_bytes`].
     pub rss_mib: Option<u64>,
-    /// Whether the run ends at the first frame that affects the map.
+    /// End the run at the first frame that affects the map.
     pub strict: bool,
 }

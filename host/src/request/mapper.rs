@@ -1,4 +1,4 @@
-//! A mapper alone, for cameras that other programs read.
+//! A mapper without a data set, for cameras that other programs read.
 
 use super::resolve::file_of;
 use super::{Evaluation, Exports, Storage};
@@ -7,7 +7,7 @@ use crate::formats::calibration::FittedGeometry;
 use crate::input::depth::DepthChoice;
 use dynvox_core::{Capacity, Config};
 
-/// What a mapper alone is made of.
+/// Bounds and settings of a mapper without a data set.
 #[derive(Clone, Debug)]
 pub struct MapperPlan {
     /// Name of the bounds.

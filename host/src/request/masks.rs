@@ -4,7 +4,7 @@ use crate::input::masks::MaskChoice;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// Where instance masks come from.
+/// Source of instance masks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Masks {
@@ -21,12 +21,12 @@ impl Default for Masks {
 }
 
 impl Masks {
-    /// Whether the mapper finds the masks, if there are any.
+    /// Returns true if the mapper finds the masks, should there be any.
     pub(super) fn need_no_recording(&self) -> bool {
         matches!(self.source, MaskChoice::Auto | MaskChoice::None | MaskChoice::Motion)
     }
 
-    /// Whether the masks can be made of a stream's pairs.
+    /// Returns true if the masks can be made of a stream's pairs.
     pub(super) fn fits_stream(&self) -> bool {
         self.need_no_recording() || matches!(self.source, MaskChoice::Networks(_))
     }

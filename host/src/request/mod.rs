@@ -1,4 +1,4 @@
-//! What is asked of a run, as a value: [`Request`].
+//! A run is asked for by a value: [`Request`].
 //!
 //! A request is plain data: it can be compared, cloned, stored and sent to another machine. The
 //! command line, Python's keywords and a person's list of recordings become one by way of
@@ -82,26 +82,26 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Request {
-    /// Where the images come from.
+    /// Source of the images.
     pub input: Input,
-    /// Which of them are mapped, and at which size.
+    /// Choice of the images that are mapped, and their size.
     pub frames: Frames,
-    /// Where depth comes from.
+    /// Source of depth.
     pub depth: DepthChoice,
-    /// Where instance masks come from.
+    /// Source of instance masks.
     pub masks: Masks,
-    /// Where the camera's poses come from.
+    /// Source of the camera's poses.
     pub poses: Poses,
     /// Memory of the mapper.
     pub bounds: Bounds,
     /// Settings of the mapper; stored are those that differ from the defaults.
     #[serde(with = "overrides")]
     pub settings: Settings,
-    /// What is kept on disk during the run.
+    /// Files kept on disk during the run.
     pub storage: Storage,
-    /// What the map is evaluated against.
+    /// Evaluation of the map.
     pub evaluation: Evaluation,
-    /// What the run leaves behind for other programs.
+    /// Results for other programs.
     pub exports: Exports,
     /// Limits of the process.
     pub limits: Limits,

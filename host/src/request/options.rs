@@ -66,7 +66,7 @@ pub struct Options {
     /// the oldest and counts it [default: wait]
     #[arg(long, value_enum, value_name = "HOW", help_heading = "Input")]
     pub when_late: Option<WhenLate>,
-    /// Calibration in place of the recording's own: of raw images in any format
+    /// Calibration instead of the recording's own: of raw images in any format
     /// `dynvox calibration` reads (give it twice where each camera has a file), of rectified ones
     /// KITTI's P0 and P1 lines, or focal_px, center_u_px, center_v_px, baseline_m
     #[arg(long, value_name = "FILE", help_heading = "Input")]

@@ -22,7 +22,7 @@ fn changed(settings: &Settings) -> anyhow::Result<Table> {
     Ok(difference(&table(settings)?, &table(&Settings::default())?))
 }
 
-/// What `table` has that `base` has not, or has otherwise.
+/// Entries of `table` that `base` lacks or has otherwise.
 fn difference(table: &Table, base: &Table) -> Table {
     let mut found = Table::new();
     for (key, value) in table {

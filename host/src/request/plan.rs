@@ -8,11 +8,11 @@ use dynvox_core::{Capacity, Config, MotionSource};
 
 /// A request whose data set is open and whose bounds and settings are known.
 pub struct Plan {
-    /// What was asked for.
+    /// Request that was resolved.
     pub request: Request,
     /// The frames, with masks, depth and faults.
     pub dataset: Box<dyn FrameSource>,
-    /// Which of them to take.
+    /// Numbers of the frames to take.
     pub frames: FrameNumbers,
     /// Given poses of these frames; `None` where the mapper estimates them.
     pub poses: Option<Vec<Transform>>,
@@ -28,16 +28,16 @@ pub struct Plan {
     pub threads: usize,
     /// Resident memory above which the run ends, bytes.
     pub rss_limit_bytes: u64,
-    /// What is doubtful about the images.
+    /// Doubts about the images.
     pub warnings: Vec<String>,
     /// Asks the run to end.
     pub stop: StopRequest,
-    /// Whether to show progress on standard error.
+    /// Show progress on standard error.
     pub progress: bool,
 }
 
 impl Plan {
-    /// Where the camera's motion comes from: `stereo`, `icp` or `file`.
+    /// Source of the camera's motion: `stereo`, `icp` or `file`.
     pub fn motion_source(&self) -> &'static str {
         match (&self.poses, self.config.mapper.egomotion) {
             (Some(_), _) => "file",
@@ -50,7 +50,7 @@ impl Plan {
     /// memory is taken.
     ///
     /// # Errors
-    /// What does not fit, and what to change.
+    /// Something does not fit; the message says what to change.
     pub fn check(&self) -> Result<(), RequestError> {
         let (listed, delay) = (self.frames.listed(), self.request.evaluation.delay);
         if let Some(reference) = self.request.evaluation.reference

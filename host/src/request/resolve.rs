@@ -19,10 +19,10 @@ impl Request {
         self.resolve_with(&StopRequest::default())
     }
 
-    /// As [`Request::resolve`], for a run that `stop` can end.
+    /// Opens the data set and works out frames, bounds and settings of a run that `stop` can end.
     ///
     /// # Errors
-    /// As those of [`Request::resolve`].
+    /// The errors of [`Request::resolve`].
     pub fn resolve_with(&self, stop: &StopRequest) -> Result<Plan, RequestError> {
         self.check_parts()?;
         let threads = self.threads()?;

@@ -8,7 +8,7 @@ use crate::request::Plan;
 /// A finished run.
 #[derive(Debug)]
 pub struct RunRecord {
-    /// What was run.
+    /// Plan that was run.
     pub plan: Plan,
     /// The frames.
     pub frames: FrameLog,
@@ -16,9 +16,9 @@ pub struct RunRecord {
     pub skipped: SkippedFrames,
     /// Frames of a stream that came while the mapper was busy, and were dropped.
     pub dropped: u64,
-    /// Why the results are incomplete, if they are.
+    /// Reason that the results are incomplete, if they are.
     pub incomplete: Option<Incomplete>,
-    /// What the observers found.
+    /// Findings of the observers.
     pub sections: Sections,
     /// Wall time of the run, s.
     pub seconds: f64,

@@ -34,7 +34,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whether the map is evaluated at a frame's pose later, after pruning.
+    /// Returns true if the map is evaluated at a frame's pose later, after pruning.
     const fn is_evaluated_late(self) -> bool {
         matches!(self, Self::PruneWeight | Self::FrameRate)
     }
@@ -118,7 +118,7 @@ pub struct SweepRequest {
     pub prune_lag: u32,
     /// Frames after which the first two sweeps evaluate the map.
     pub evaluation_delay: usize,
-    /// What every run asks for.
+    /// Request of every run.
     pub common: Request,
 }
 
@@ -140,7 +140,7 @@ pub struct Point {
 pub struct Plan {
     /// In the order shown.
     pub points: Vec<Point>,
-    /// What is asked of a run, by its key, without data set and threads.
+    /// Requests of the runs by key, without data set and threads.
     pub runs: BTreeMap<String, Request>,
 }
 

@@ -15,7 +15,7 @@ use std::path::Path;
 /// A finished run of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunResult {
-    /// What was asked of it, without data set and threads.
+    /// Request of the run, without data set and threads.
     pub request: Request,
     /// `summary.json` of the run.
     pub summary: Value,

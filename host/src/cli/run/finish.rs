@@ -104,7 +104,7 @@ pub fn finish(
 /// Maps and writes the results without a word.
 ///
 /// # Errors
-/// As those of a run, or the run is incomplete.
+/// The run fails, or is incomplete.
 pub fn write(plan: Plan, folder: RunFolder) -> anyhow::Result<()> {
     let (record, _, target) = written(plan, folder, None)?;
     complete(&record, target)

@@ -1,4 +1,4 @@
-//! How a run was started: enough to start it again, and to check that it is the same.
+//! Start of a run: enough to start it again, and to check that it is the same.
 
 use super::ResumeError;
 use crate::request::{Plan, Request};
@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 /// Differences listed at most.
 const MOST_DIFFERENCES: usize = 5;
 
-/// How a run was started.
+/// Start of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunManifest {
-    /// What was asked for.
+    /// Request of the run.
     request: Request,
-    /// Whether its folder replaces earlier results.
+    /// The run's folder replaces earlier results.
     overwrites: bool,
     /// The resolved settings, and what identifies the data set.
     fingerprint: BTreeMap<String, String>,
@@ -33,12 +33,12 @@ impl RunManifest {
         Ok(Self { request, overwrites, fingerprint: fingerprint(plan) })
     }
 
-    /// What was asked for.
+    /// Request of the run.
     pub fn request(&self) -> &Request {
         &self.request
     }
 
-    /// Whether the run's folder replaces earlier results.
+    /// Returns true if the run's folder replaces earlier results.
     pub fn overwrites(&self) -> bool {
         self.overwrites
     }
