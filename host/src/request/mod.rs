@@ -8,7 +8,6 @@
 //! To add an option of a run: a field of [`Options`] and its line in `Options::request`, a field
 //! of the part of the request it belongs to, and the code that reads it.
 
-mod asked;
 mod bounds;
 mod checks;
 mod describe;

@@ -1,18 +1,22 @@
 //! A request in the words of a person: options of `dynvox run`, keywords in Python.
 
-use super::{Bytes, ImageSize, MapObjects, Reference, WindowSize, words};
+use super::poses::Egomotion;
+use super::{
+    Bounds, Bytes, Evaluation, Exports, Frames, ImageSize, Input, Limits, MapObjects, Masks,
+    Memory, PlanningWindow, Poses, Reference, Request, RequestError, Settings, Source, Storage,
+    WindowSize, words,
+};
 use crate::formats::Axes;
+use crate::formats::calibration::RectifiedSize;
 use crate::input::bags::Topics;
 use crate::input::depth::DepthChoice;
 use crate::input::faults::Faults;
 use crate::input::masks::MaskChoice;
 use crate::input::stream::WhenLate;
-use crate::input::{CameraPair, Layout};
-use dynvox_core::MotionSource;
+use crate::input::{CameraPair, Layout, Stacking};
 use serde::Deserialize;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
-use std::str::FromStr;
+use std::path::{Path, PathBuf};
 
 /// Options of a run, as the command line and Python name them. What is absent is as the request's
 /// default has it.
@@ -60,7 +64,7 @@ pub struct Options {
     #[arg(long, conflicts_with = "side_by_side", help_heading = "Input")]
     pub top_bottom: bool,
     /// Frames a second of a stream
-    #[arg(long, value_name = "HZ", value_parser = rate_hz, help_heading = "Input")]
+    #[arg(long, value_name = "HZ", value_parser = words::rate_hz, help_heading = "Input")]
     pub rate: Option<f64>,
     /// Frames of a stream that come while the mapper is busy: wait lets the stream wait, drop drops
     /// the oldest and counts it [default: wait]
@@ -137,7 +141,7 @@ pub struct Options {
     pub save_instances: Option<PathBuf>,
     /// Whether objects are masked out of the static map and reconstructed separately; off fuses
     /// everything into one map [default: on]
-    #[arg(long, value_name = "on|off", value_parser = on_or_off, help_heading = "Mapping")]
+    #[arg(long, value_name = "on|off", value_parser = words::on_or_off, help_heading = "Mapping")]
     pub dynamic: Option<bool>,
     /// Source of the camera's motion: stereo (matches over two pairs), icp (depth against the map,
     /// the baseline of hand-held mappers: expected to fail at driving speed), or file:POSES (KITTI
@@ -208,38 +212,138 @@ pub struct Options {
     pub mcap: bool,
 }
 
-/// A source of the camera's motion by name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Egomotion {
-    /// Estimated by the mapper.
-    Source(MotionSource),
-    /// A file of poses.
-    File(PathBuf),
-}
+impl Options {
+    /// The request of these options. Files of settings and bounds are read, and paths become
+    /// absolute, so that it means the same elsewhere.
+    ///
+    /// # Errors
+    /// A file cannot be read, or a setting or a bound is none.
+    pub fn request(&self) -> Result<Request, RequestError> {
+        let request = Request {
+            input: self.input()?,
+            frames: self.frames(),
+            depth: self.depth.clone().unwrap_or_default(),
+            masks: self.masks(),
+            poses: self.poses(),
+            bounds: self.bounds()?,
+            settings: self.settings()?,
+            storage: Storage {
+                lose_evicted: self.no_stream,
+                most_mib: self.stream_mib,
+                keep_blocks: self.keep_blocks,
+                snapshot_every: None,
+            },
+            evaluation: Evaluation {
+                reference: self.evaluate,
+                delay: self.evaluation_delay.unwrap_or_default(),
+            },
+            exports: Exports {
+                objects: self.map_objects.unwrap_or_default(),
+                axes: self.axes.unwrap_or_default(),
+                record: self.mcap,
+                instances: self.save_instances.clone(),
+                map_disparity: self.save_map_disparity.clone(),
+            },
+            limits: Limits { strict: self.strict, ..Limits::default() },
+        };
+        request.absolute().map_err(|error| {
+            RequestError::Invalid(format!("the current folder is unknown: {error}. Enter another"))
+        })
+    }
 
-impl FromStr for Egomotion {
-    type Err = String;
+    fn input(&self) -> Result<Input, RequestError> {
+        if self.bits.is_some_and(|bits| !(8..=16).contains(&bits)) {
+            return Err(RequestError::invalid("--bits must be 8 to 16. Give another number"));
+        }
+        Ok(Input {
+            source: match &self.path {
+                None => Source::Street,
+                Some(path) if path == Path::new("-") => Source::Stream,
+                Some(path) => Source::Recording(path.clone()),
+            },
+            layout: self.dataset,
+            sequence: self.sequence.clone(),
+            cameras: self.images.unwrap_or_default(),
+            bits: self.bits,
+            topics: self.topics.clone(),
+            stacking: match (self.side_by_side, self.top_bottom) {
+                (true, _) => Some(Stacking::SideBySide),
+                (_, true) => Some(Stacking::TopBottom),
+                _ => None,
+            },
+            rate_hz: self.rate,
+            when_late: self.when_late,
+            calibration: self.calibration.clone(),
+            faults: self.faults.clone(),
+        })
+    }
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "stereo" => Ok(Self::Source(MotionSource::Stereo)),
-            None if text == "icp" => Ok(Self::Source(MotionSource::Icp)),
-            Some(("file", path)) if !path.is_empty() => Ok(Self::File(path.into())),
-            _ => Err("one of stereo, icp, file:POSES".to_owned()),
+    fn frames(&self) -> Frames {
+        let default = Frames::default();
+        Frames {
+            start: self.start.unwrap_or(default.start),
+            most: self.frames,
+            stride: self.stride.unwrap_or(default.stride),
+            scale: self.scale.unwrap_or(default.scale),
+            skip_bad: self.skip_bad_frames,
+            force: self.force,
         }
     }
-}
 
-/// The value of a switch on the command line.
-fn on_or_off(text: &str) -> Result<bool, String> {
-    match text {
-        "on" => Ok(true),
-        "off" => Ok(false),
-        _ => Err("must be on or off".to_owned()),
+    fn masks(&self) -> Masks {
+        let default = Masks::default();
+        Masks {
+            source: self.instances.clone().unwrap_or(default.source),
+            every: self.instances_every.unwrap_or(default.every),
+        }
     }
-}
 
-fn rate_hz(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
-    rate.ok_or_else(|| "must be a number above 0".to_owned())
+    fn poses(&self) -> Poses {
+        match &self.egomotion {
+            Some(Egomotion::File(path)) => Poses::File(path.clone()),
+            Some(Egomotion::Source(_)) | None => Poses::Estimated,
+        }
+    }
+
+    fn bounds(&self) -> Result<Bounds, RequestError> {
+        let memory = match (&self.profile, self.memory, &self.capacity) {
+            (None, None, None) => Memory::default(),
+            (Some(name), None, None) => Memory::Profile(name.clone()),
+            (None, Some(bytes), None) => Memory::Budget(bytes),
+            (None, None, Some(path)) => Memory::read(path)?,
+            _ => {
+                return Err(RequestError::invalid(
+                    "--profile, --memory and --capacity exclude each other. Give one of them",
+                ));
+            }
+        };
+        let planning = self
+            .planning
+            .map(|window| PlanningWindow { cells: window.0, distance_3d: self.planning_3d });
+        Ok(Bounds { memory, planning })
+    }
+
+    /// The file's settings, those given one by one, and those that have an option of their own.
+    fn settings(&self) -> Result<Settings, RequestError> {
+        let mut settings = Settings::resolve(self.config.as_deref(), &self.set)
+            .map_err(|error| RequestError::Invalid(format!("{error:#}")))?;
+        if let Some(size) = self.rectified {
+            let side = |side: usize| Some(u32::try_from(side).unwrap_or(u32::MAX));
+            settings.rectify = RectifiedSize {
+                width_px: side(size.0),
+                height_px: side(size.1),
+                focal_px: self.rectified_focal.or(settings.rectify.focal_px),
+            };
+        }
+        if let Some(dynamic) = self.dynamic {
+            settings.tracking.dynamic = dynamic;
+        }
+        if let Some(frames) = self.fuse_every {
+            settings.mapper.fuse_every = frames;
+        }
+        if let Some(Egomotion::Source(source)) = self.egomotion {
+            settings.mapper.egomotion = source;
+        }
+        Ok(settings)
+    }
 }

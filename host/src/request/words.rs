@@ -40,6 +40,21 @@ pub fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Er
     })
 }
 
+/// Reads a switch on the command line.
+pub fn on_or_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("must be on or off".to_owned()),
+    }
+}
+
+/// Reads a rate on the command line, Hz.
+pub fn rate_hz(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
+    rate.ok_or_else(|| "must be a number above 0".to_owned())
+}
+
 /// A value as the command line has it.
 fn word(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
