@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyTuple};
 use serde_json::{Map, Value};
 
-/// The request of a data set's frames, of which nothing is written.
+/// The request of a data set read frame by frame; nothing is written.
 pub fn of_dataset(
     path: Option<String>,
     threads: Option<usize>,
