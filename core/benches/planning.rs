@@ -17,7 +17,7 @@ use dynvox_core::{
     memory::{Carver, SLAB_ALIGN},
     planning::{DistanceField, Planning, PlanningConfig, Sight},
     random::Random,
-    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
+    volume::{DepthImage, NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::Vector3;
 use std::{hint::black_box, time::Duration};
@@ -131,11 +131,10 @@ fn windows(criterion: &mut Criterion) {
             let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
             volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             let seen = Observation {
-                depth_m,
+                depth: DepthImage::Plain(depth_m),
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
-                noted: false,
             };
             volume.fuse(&view, seen, &Serial);
             planning.observe(&sight(pose));

@@ -16,7 +16,7 @@ use dynvox_core::{
     geometry::{StereoRig, Transform},
     image::View,
     memory::Carver,
-    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
+    volume::{DepthImage, NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::Vector3;
 use std::time::Duration;
@@ -61,11 +61,10 @@ fn bench(criterion: &mut Criterion) {
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
         volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         let seen = Observation {
-            depth_m,
+            depth: DepthImage::Plain(depth_m),
             grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
             colour: None,
             class: None,
-            noted: false,
         };
         volume.fuse(&view, seen, &Serial);
     };

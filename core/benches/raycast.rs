@@ -17,7 +17,7 @@ use dynvox_core::{
     image::View,
     memory::Carver,
     view::{MeshConfig, RaycastConfig, Raycaster},
-    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
+    volume::{DepthImage, NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::Vector3;
 
@@ -94,11 +94,10 @@ fn fill(volume: &mut Volume<'_>) {
         volume.fuse(
             &view,
             Observation {
-                depth_m,
+                depth: DepthImage::Plain(depth_m),
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
-                noted: false,
             },
             &Serial,
         );

@@ -15,7 +15,7 @@ use dynvox_core::{
     geometry::{StereoRig, Transform, depth_from_disparity},
     image::{View, ViewMut},
     memory::Carver,
-    volume::{NoStore, Observation, Viewpoint, Volume, VolumeConfig},
+    volume::{DepthImage, NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -120,8 +120,12 @@ fn bench(criterion: &mut Criterion) {
                     let depth_m =
                         View::new(&frame.depth_m, frame.view.width, frame.view.height).unwrap();
                     let grey = View::new(&frame.grey, frame.view.width, frame.view.height).unwrap();
-                    let seen =
-                        Observation { depth_m, grey, colour: None, class: None, noted: false };
+                    let seen = Observation {
+                        depth: DepthImage::Plain(depth_m),
+                        grey,
+                        colour: None,
+                        class: None,
+                    };
                     let begin = std::time::Instant::now();
                     volume.allocate(&frame.view, depth_m, &mut NoStore, &Serial);
                     let middle = std::time::Instant::now();

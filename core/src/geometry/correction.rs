@@ -1,7 +1,7 @@
 //! What is left of a calibration's error in the disparity, and how it is taken out.
 
 use super::{Shares, StereoRig, scalar::floored_i32};
-use crate::image::{DISPARITY_FILLED, DISPARITY_ONE_PX};
+use crate::image::{DISPARITY_ONE_PX, DisparityQ8};
 
 /// Mean square of the distances of matches from the middle row, in shares of that of the first row:
 /// so much is taken off the square of each, and what grows over the rows says nothing of the
@@ -118,7 +118,7 @@ impl PixelCorrection {
     }
 
     /// Corrects row `v` of disparities, 1/256 px, 0 none. What would be less than 1/256 px after it
-    /// becomes none. The lowest bit stays: it marks what the matcher filled in.
+    /// becomes none. The mark of what the matcher filled in stays.
     #[inline(always)]
     pub(crate) fn correct_row(&self, v: usize, disparity_q8: &mut [u16]) {
         const ONE_PX: f32 = DISPARITY_ONE_PX as f32;
@@ -130,8 +130,7 @@ impl PixelCorrection {
             // What is below 0, and no number, becomes 0, which is none.
             let held = if value > 0.0 { value } else { 0.0 };
             let corrected = floored_i32(if held < MOST { held } else { MOST }) as u16;
-            let (corrected, mark) = (corrected & !DISPARITY_FILLED, *disparity & DISPARITY_FILLED);
-            *disparity = if (*disparity == 0) | (corrected == 0) { 0 } else { corrected | mark };
+            *disparity = DisparityQ8::new(*disparity).with_value(corrected).get();
         }
     }
 }
@@ -225,12 +224,9 @@ mod tests {
             correction.correct_row(v, &mut corrected);
             for (u, (&before, after)) in row.iter().zip(corrected).enumerate() {
                 let px = f32::from(before) / 256.0;
-                let plain = ((px + correction.at([u as f32 - px, v as f32])) * 256.0 + 0.5) as u16
-                    & !DISPARITY_FILLED;
-                assert_eq!(
-                    after,
-                    if before == 0 || plain == 0 { 0 } else { plain | before & DISPARITY_FILLED }
-                );
+                let plain =
+                    ((px + correction.at([u as f32 - px, v as f32])) * 256.0 + 0.5) as u16 & !1;
+                assert_eq!(after, if before == 0 || plain == 0 { 0 } else { plain | before & 1 });
             }
         }
     }

@@ -22,16 +22,37 @@ pub fn depth_from_disparity(
     disparity_q8: View<'_, u16>,
     depth_m: &mut ViewMut<'_, f32>,
 ) {
-    let scale = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
+    let depths = DepthRange::new(rig, near_m, far_m);
     let width = depth_m.width();
-    for (depths, disparities) in
+    for (row, disparities) in
         depth_m.pixels_mut().chunks_exact_mut(width.max(1)).zip(disparity_q8.rows())
     {
-        for (depth, &disparity) in depths.iter_mut().zip(disparities) {
-            // Disparity 0 gives infinity, which is beyond far.
-            let value = scale / f32::from(disparity);
-            *depth = if value >= near_m && value <= far_m { value } else { 0.0 };
+        for (depth, &disparity) in row.iter_mut().zip(disparities) {
+            *depth = depths.depth_m(disparity);
         }
+    }
+}
+
+/// Depths between two limits, as a rig measures them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthRange {
+    focal_baseline_q8_m: f32,
+    near_m: f32,
+    far_m: f32,
+}
+
+impl DepthRange {
+    pub(crate) fn new(rig: &StereoRig, near_m: f32, far_m: f32) -> Self {
+        let focal_baseline_q8_m = (rig.focal_baseline_px_m() * f64::from(DISPARITY_ONE_PX)) as f32;
+        Self { focal_baseline_q8_m, near_m, far_m }
+    }
+
+    /// Depth of a disparity in 1/256 px, m; 0 without disparity and outside the limits.
+    #[inline(always)]
+    pub(crate) fn depth_m(&self, disparity_q8: u16) -> f32 {
+        // Disparity 0 gives infinity, which is beyond far.
+        let depth_m = self.focal_baseline_q8_m / f32::from(disparity_q8);
+        if (depth_m >= self.near_m) & (depth_m <= self.far_m) { depth_m } else { 0.0 }
     }
 }
 

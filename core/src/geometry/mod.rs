@@ -13,6 +13,7 @@ mod transform;
 
 pub use correction::DisparityCorrection;
 pub(crate) use correction::{PixelCorrection, ROW_SQUARE_MEAN};
+pub(crate) use depth::DepthRange;
 pub use depth::depth_from_disparity;
 pub(crate) use oriented_box::OrientedBox;
 pub(crate) use rig::StereoObservation;

@@ -1,6 +1,7 @@
 //! Row-major image views over borrowed slices.
 
 use crate::slices::clipped;
+use bytemuck::TransparentWrapper;
 
 /// A read-only image. Rows are `stride` items apart.
 ///
@@ -109,6 +110,17 @@ impl<'a, T> View<'a, T> {
     }
 }
 
+impl<'a, W> View<'a, W> {
+    /// The image with the values that its pixels wrap.
+    pub(crate) fn peeled<T>(self) -> View<'a, T>
+    where
+        W: TransparentWrapper<T>,
+    {
+        let Self { data, width, height, stride } = self;
+        View { data: W::peel_slice(data), width, height, stride }
+    }
+}
+
 impl<'a, T: Copy> View<'a, T> {
     /// Pixel at column `u`, row `v`; `None` beyond the image.
     pub fn get(&self, u: usize, v: usize) -> Option<T> {
@@ -149,6 +161,14 @@ impl<'a, T> ViewMut<'a, T> {
     /// The pixels, row by row.
     pub fn pixels_mut(&mut self) -> &mut [T] {
         self.data
+    }
+
+    /// The image with the values that its pixels wrap, to be written.
+    pub(crate) fn peeled_mut<V>(&mut self) -> ViewMut<'_, V>
+    where
+        T: TransparentWrapper<V>,
+    {
+        ViewMut { data: T::peel_slice_mut(self.data), width: self.width, height: self.height }
     }
 
     /// The same image, read-only.

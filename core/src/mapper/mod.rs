@@ -303,7 +303,9 @@ impl<'s> Mapper<'s> {
         self.rectifier.grey(&self.rectified)
     }
 
-    /// Disparity of the last frame, 1/256 px, 0 none.
+    /// Disparity of the last frame, 1/256 px, 0 none. An odd value was filled in between measured
+    /// ones if the core matched the pair ([`crate::image::DisparityQ8::is_filled`]); the number can
+    /// be used as it is, since the mark is 1/256 px.
     pub fn disparity_q8(&self) -> View<'_, u16> {
         self.stereo.disparity_q8()
     }

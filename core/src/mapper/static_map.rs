@@ -5,8 +5,12 @@ use crate::{
     Executor, Stage,
     image::{View, ViewMut},
     tracking::{CameraMotion, Tracked},
-    volume::{AllocationReport, BlockStore, Observation, ObservedDepth, Viewpoint, Volume},
+    volume::{
+        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth,
+        Viewpoint, Volume,
+    },
 };
+use bytemuck::TransparentWrapper;
 
 /// The parts of a mapper that fuse a frame into the static map.
 pub(super) struct StaticMap<'m, 's> {
@@ -46,7 +50,8 @@ impl StaticMap<'_, '_> {
             height,
             t_world_camera: camera.t_world_camera,
         };
-        let Some(mut depth_m) = ViewMut::new(self.depth_m, width, height) else {
+        let noted = NotedDepth::wrap_slice_mut(self.depth_m);
+        let Some(mut depths) = ViewMut::new(noted, width, height) else {
             debug_assert!(false, "the depth image has the capacity's size");
             return AllocationReport::default();
         };
@@ -55,17 +60,17 @@ impl StaticMap<'_, '_> {
             rig: &view.rig,
             disparity_q8: self.disparity_q8,
         };
-        executor.stage(Stage::Fuse, || observed.write(&mut depth_m, executor));
+        executor.stage(Stage::Fuse, || observed.write(&mut depths, executor));
+        let mut depth_m = depths.peeled_mut();
         executor.stage(Stage::Instances, || tracked.mask_dynamic_depth(&mut depth_m));
         let observation = Observation {
-            depth_m: depth_m.as_view(),
+            depth: DepthImage::Noted(depths.as_view()),
             grey: frame.left,
             colour: frame.colour,
             class: frame.class,
-            noted: true,
         };
         let allocation = executor.stage(Stage::Allocate, || {
-            self.background.allocate(&view, observation.depth_m, store, executor)
+            self.background.allocate(&view, observation.depth.depth_m(), store, executor)
         });
         executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));
         allocation

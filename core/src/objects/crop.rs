@@ -20,6 +20,7 @@ use crate::{
     parallel::{Vectors, Work},
     slices::{clipped, clipped_mut},
     state::Visitor,
+    volume::{BLOCK, EDGE_Q8, Surroundings},
 };
 use bytemuck::{Pod, Zeroable};
 
@@ -27,36 +28,6 @@ use bytemuck::{Pod, Zeroable};
 pub(crate) const CROPS_MAX: usize = 128;
 /// Disparity units in a half pixel: the median is found to that, up to 256 px.
 const BIN: u16 = 128;
-
-/// How far an edge spoils what is behind it, px.
-const EDGE_REACH_PX: isize = 3;
-/// A neighbour nearer by more disparity than this is across an edge: within that distance a surface
-/// has no such step unless it is viewed edge-on.
-const EDGE_Q8: u16 = 384;
-
-/// Columns worked on at once: a word of a mask.
-const BLOCK: usize = 64;
-
-/// The largest disparity within [`EDGE_REACH_PX`] along row and column of each pixel of a block
-/// that begins at (`u`, `v`).
-#[inline(always)]
-fn nearest_around(disparity_q8: View<'_, u16>, u: usize, v: usize) -> [u16; BLOCK] {
-    let mut nearest = [0; BLOCK];
-    for px in 1..=EDGE_REACH_PX {
-        let beside = [(px, 0), (-px, 0), (0, px), (0, -px)];
-        for (du, dv) in beside {
-            let row = v.checked_add_signed(dv).map_or(&[][..], |v| disparity_q8.row(v));
-            // What would lie left of the image is skipped.
-            let outside = du.min(0).unsigned_abs().saturating_sub(u).min(BLOCK);
-            let row = row.get(u.saturating_add_signed(du)..).unwrap_or(&[]);
-            let nearest = clipped_mut(&mut nearest, outside..);
-            for (nearest, &other) in nearest.iter_mut().zip(row) {
-                *nearest = if other > *nearest { other } else { *nearest };
-            }
-        }
-    }
-    nearest
-}
 
 /// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask,
 /// just behind edges, and where the depth is farther than `extent_m` from the median. Returns how
@@ -120,6 +91,7 @@ impl Work for LeaveOut<'_> {
     #[inline(always)]
     fn run(self) -> u32 {
         let ([left, top], [width, height], [low, high]) = (self.origin, self.size, self.limits);
+        let surroundings = Surroundings { disparity_q8: self.disparity_q8 };
         let mut kept = 0;
         for (v, row) in (top..).zip(self.disparities.chunks_exact_mut(width)).take(height) {
             for (u, block) in (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
@@ -132,9 +104,7 @@ impl Work for LeaveOut<'_> {
                     block.fill(0);
                     continue;
                 }
-                for (disparity, nearest) in
-                    block.iter_mut().zip(nearest_around(self.disparity_q8, u, v))
-                {
+                for (disparity, nearest) in block.iter_mut().zip(surroundings.nearest(u, v)) {
                     let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
                     *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
                     kept += u32::from(*disparity > 0);

@@ -10,7 +10,7 @@ use crate::{
     image::{View, ViewMut},
     parallel::Executor,
     tracking::{Instance, MotionState, Track, Tracked, Tracker, Treatment},
-    volume::{NoStore, Observation, Viewpoint},
+    volume::{DepthImage, NoStore, Observation, Viewpoint},
 };
 
 /// What objects are fused from in a frame.
@@ -256,13 +256,13 @@ fn fuse_crop<E: Executor>(
     let t_object_camera = (crop.t_world_object.inverse() * crop.t_world_camera).normalized();
     let view = Viewpoint { rig, width, height, t_world_camera: t_object_camera };
     let observation = Observation {
-        depth_m: depth.as_view(),
+        depth: DepthImage::Plain(depth.as_view()),
         grey: picture.grey,
         colour: picture.colour,
         class: None,
-        noted: false,
     };
-    let allocation = object.volume.allocate(&view, observation.depth_m, &mut NoStore, executor);
+    let allocation =
+        object.volume.allocate(&view, observation.depth.depth_m(), &mut NoStore, executor);
     object.volume.fuse(&view, observation, executor);
     allocation.refused + allocation.beyond + allocation.unlisted
 }

@@ -16,12 +16,14 @@ mod fuse;
 mod history;
 mod index;
 mod lru_list;
+mod noted_depth;
 mod observed;
 mod pool;
 mod prune;
 mod request;
 mod sampler;
 mod store;
+mod surroundings;
 #[cfg(test)]
 pub(crate) mod tests;
 mod viewpoint;
@@ -35,11 +37,13 @@ pub use fuse::Observation;
 pub use history::VisibleHistory;
 pub use index::BlockIndex;
 pub(crate) use lru_list::LruList;
+pub use noted_depth::{DepthImage, NotedDepth};
 pub(crate) use observed::ObservedDepth;
 pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
+pub(crate) use surroundings::{BLOCK, EDGE_Q8, Surroundings};
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 

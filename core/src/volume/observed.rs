@@ -3,7 +3,7 @@
 //!
 //! *Edges.* The matcher widens what is near: beside its edge, what is behind gets its disparity.
 //! Pixels nearer than something within `edge_reach_px`, by more than [`EDGE_Q8`], are left out.
-//! What is left within [`COLOUR_REACH`] of an edge, or of a pixel without disparity, may still show
+//! What is left within [`EDGE_REACH_PX`](super::surroundings::EDGE_REACH_PX) of an edge, or of a pixel without disparity, may still show
 //! the colour of what is behind, or of the sky.
 //!
 //! *Obliqueness.* A plane's disparity is linear in the pixel. With slopes `a`, `b` of the disparity
@@ -12,49 +12,26 @@
 //! the two is `d / |normal|` times the length of a ray of depth 1, and distance along the normal is
 //! distance along z times `d / |normal|`.
 //!
-//! Both are written into the lowest bits of the depth: five of 24, 60 µm at 20 m. Memory: none.
-//! Time: linear in pixels.
+//! Both are written into [`NotedDepth`]. Memory: none. Time: linear in pixels.
 
-use super::{DistanceAlong, VolumeConfig};
+use super::{
+    DistanceAlong, NotedDepth, VolumeConfig,
+    noted_depth::LEVELS,
+    surroundings::{BLOCK, EDGE_Q8, Surroundings},
+};
 use crate::{
     geometry::{
-        StereoRig,
+        DepthRange, StereoRig,
         scalar::{floored_i32, min_f32},
     },
     image::{View, ViewMut},
     parallel::{Bands, Executor, Work, each, zip2},
-    slices::padded,
 };
 
-/// Columns worked on at once.
-const BLOCK: usize = 64;
-/// What differs by more than this is across an edge: 1.5 px.
-const EDGE_Q8: u16 = 384;
-/// How far an edge spoils colours, px.
-const COLOUR_REACH: usize = 3;
 /// Distance to the pixels a slope is taken from, px.
 const SLOPE_REACH: isize = 4;
 /// Largest difference to them within a surface: 6 px.
 const SLOPE_MOST_Q8: u16 = 4 * EDGE_Q8;
-/// Levels of obliqueness.
-const LEVELS: u32 = 16;
-/// Set where the colour may be another surface's.
-const SPOILED: u32 = LEVELS;
-/// All bits of a depth that are notes.
-const NOTES: u32 = (LEVELS - 1) | SPOILED;
-
-/// Distance along the normal over distance along z, from a depth's note.
-#[inline]
-pub(super) fn obliqueness(depth_m: f32) -> f32 {
-    ((depth_m.to_bits() & (LEVELS - 1)) + 1) as i32 as f32 * (1.0 / LEVELS as f32)
-}
-
-/// Whether the colour may be another surface's, from a depth's note.
-#[inline]
-pub(super) fn is_spoiled(depth_m: f32) -> bool {
-    depth_m.to_bits() & SPOILED != 0
-}
-
 /// A disparity image about to become depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObservedDepth<'a> {
@@ -65,35 +42,34 @@ pub(crate) struct ObservedDepth<'a> {
 }
 
 impl ObservedDepth<'_> {
-    /// Writes the depths with their notes; 0 where nothing is to be fused.
-    pub fn write<E: Executor>(&self, depth_m: &mut ViewMut<'_, f32>, executor: &E) {
-        let width = depth_m.width().max(1);
-        let bands = Bands::of(depth_m.pixels_mut().len() / width);
-        let jobs = zip2(bands.first(), bands.split_mut(depth_m.pixels_mut(), width));
+    /// Writes the depths with their notes; none where nothing is to be fused.
+    pub fn write<E: Executor>(&self, depths: &mut ViewMut<'_, NotedDepth>, executor: &E) {
+        let width = depths.width().max(1);
+        let bands = Bands::of(depths.pixels_mut().len() / width);
+        let jobs = zip2(bands.first(), bands.split_mut(depths.pixels_mut(), width));
         each(executor, jobs, |(first, depths)| {
             executor.vectors().run(WriteRows { observed: self, first, width, depths })
         });
     }
 
     #[inline(always)]
-    fn write_block(&self, first: usize, v: usize, depths: &mut [f32]) {
-        let here = self.tap(first, v, 0, 0);
-        let scale = (self.rig.focal_baseline_px_m() * 256.0) as f32;
-        let (near_m, far_m) = (self.config.near_m, self.config.far_m);
+    fn write_block(&self, first: usize, v: usize, depths: &mut [NotedDepth]) {
+        let surroundings = Surroundings { disparity_q8: self.disparity_q8 };
+        let here = surroundings.tap(first, v, [0, 0]);
+        let range = DepthRange::new(self.rig, self.config.near_m, self.config.far_m);
         let mut within = [0.0; BLOCK];
         for (within, &disparity) in within.iter_mut().zip(&here) {
-            // Disparity 0 gives infinity, which is beyond far.
-            let value = scale / f32::from(disparity);
-            *within = if (value >= near_m) & (value <= far_m) { value } else { 0.0 };
+            *within = range.depth_m(disparity);
         }
         // In half of an image nothing is: sky, and what is too far.
         if within.iter().fold(0, |any, value| any | value.to_bits()) == 0 {
-            depths.fill(0.0);
+            depths.fill(NotedDepth::NONE);
             return;
         }
-        let [behind, spoiling] = self.farthest(first, v);
+        let edge_reach_px = usize::from(self.config.edge_reach_px);
+        let [behind, spoiling] = surroundings.farthest(first, v, edge_reach_px);
         // Not by `map` of an array, which compilers leave as a call for the baseline.
-        let tap = |du, dv| self.tap(first, v, du, dv);
+        let tap = |du, dv| surroundings.tap(first, v, [du, dv]);
         let levels = match self.config.distance {
             DistanceAlong::Ray => [LEVELS as u16 - 1; BLOCK],
             DistanceAlong::Normal => {
@@ -107,56 +83,14 @@ impl ObservedDepth<'_> {
         for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in
             depths.iter_mut().zip(&within).zip(notes)
         {
-            let spoiled = if disparity > spoiling.saturating_add(EDGE_Q8) { SPOILED } else { 0 };
-            let noted = f32::from_bits(within.to_bits() & !NOTES | u32::from(level) | spoiled);
+            let is_spoiled = disparity > spoiling.saturating_add(EDGE_Q8);
+            let noted = NotedDepth::new(within, level, is_spoiled);
             *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) {
                 noted
             } else {
-                0.0
+                NotedDepth::NONE
             };
         }
-    }
-
-    /// The disparities of a block, moved by so many pixels; 0 outside the image.
-    #[inline(always)]
-    fn tap(&self, first: usize, v: usize, du: isize, dv: isize) -> [u16; BLOCK] {
-        let Some(v) = v.checked_add_signed(dv).filter(|&v| v < self.disparity_q8.height()) else {
-            return [0; BLOCK];
-        };
-        let outside = du.min(0).unsigned_abs().saturating_sub(first).min(BLOCK);
-        padded(self.disparity_q8.row(v), first.saturating_add_signed(du), outside, 0)
-    }
-
-    /// The least disparity about each pixel of a block: of what has one within the reach of edges,
-    /// and of all, none being 0, within that of colours.
-    #[inline(always)]
-    fn farthest(&self, first: usize, v: usize) -> [[u16; BLOCK]; 2] {
-        let edge_reach = usize::from(self.config.edge_reach_px);
-        let mut farthest = [[u16::MAX; BLOCK]; 2];
-        if edge_reach == 0 {
-            return farthest;
-        }
-        let [behind, spoiling] = &mut farthest;
-        for step in 1..=COLOUR_REACH.max(edge_reach) {
-            let px = step as isize;
-            for (du, dv) in [(px, 0), (-px, 0), (0, px), (0, -px)] {
-                let tap = self.tap(first, v, du, dv);
-                if step <= edge_reach {
-                    // None wraps around to the largest.
-                    behind
-                        .iter_mut()
-                        .zip(&tap)
-                        .for_each(|(least, tap)| *least = least_of(*least, tap.wrapping_sub(1)));
-                }
-                if step <= COLOUR_REACH {
-                    spoiling
-                        .iter_mut()
-                        .zip(&tap)
-                        .for_each(|(least, tap)| *least = least_of(*least, *tap));
-                }
-            }
-        }
-        farthest
     }
 
     /// Levels of obliqueness of a block with these slopes along columns and rows.
@@ -223,7 +157,7 @@ struct WriteRows<'a> {
     observed: &'a ObservedDepth<'a>,
     first: usize,
     width: usize,
-    depths: &'a mut [f32],
+    depths: &'a mut [NotedDepth],
 }
 
 impl Work for WriteRows<'_> {
@@ -237,11 +171,6 @@ impl Work for WriteRows<'_> {
             }
         }
     }
-}
-
-#[inline]
-fn least_of(a: u16, b: u16) -> u16 {
-    if a < b { a } else { b }
 }
 
 /// Slopes, px per px, from those of the two neighbours that lie on the same surface.
@@ -272,18 +201,21 @@ mod tests {
         StereoRig { focal_px: 200.0, center_u_px: 150.0, center_v_px: 40.0, baseline_m: 0.5 };
     const SIZE: [usize; 2] = [300, 80];
 
-    fn observed(config: &VolumeConfig, disparity_q8: impl Fn(usize, usize) -> u16) -> Vec<f32> {
+    fn observed(
+        config: &VolumeConfig,
+        disparity_q8: impl Fn(usize, usize) -> u16,
+    ) -> Vec<NotedDepth> {
         let [width, height] = SIZE;
         let pixels: Vec<u16> =
             (0..width * height).map(|at| disparity_q8(at % width, at / width)).collect();
-        let mut depth_m = std::vec![-1.0; width * height];
+        let mut depths = std::vec![NotedDepth::new(1.0, 0, true); width * height];
         let observed = ObservedDepth {
             config,
             rig: &RIG,
             disparity_q8: View::new(&pixels, width, height).unwrap(),
         };
-        observed.write(&mut ViewMut::new(&mut depth_m, width, height).unwrap(), &Serial);
-        depth_m
+        observed.write(&mut ViewMut::new(&mut depths, width, height).unwrap(), &Serial);
+        depths
     }
 
     #[test]
@@ -294,26 +226,29 @@ mod tests {
             observed(&config, |_, v| (256.0 * 0.5 * (v as f64 - RIG.center_v_px) / 1.5) as u16);
         let wall = observed(&config, |_, _| 10 * 256);
         for (u, v) in [(5, 70), (150, 60), (290, 72)] {
-            let depth_m = f64::from(road[v * SIZE[0] + u]);
+            let noted = road[v * SIZE[0] + u];
+            let depth_m = f64::from(noted.m());
             let exact = 1.5 / depth_m;
             // The normal is (0, 1, 0): distance along z times the product with the ray of depth 1
             // is the camera's height over depth.
             assert!(
-                (f64::from(obliqueness(depth_m as f32)) - exact).abs() < 1.0 / 16.0,
+                (f64::from(noted.obliqueness()) - exact).abs() < 1.0 / 16.0,
                 "{u} {v}: {depth_m} m, {exact}"
             );
             assert!((depth_m - 1.5 * RIG.focal_px / (v as f64 - RIG.center_v_px)).abs() < 0.1);
             let at_wall = wall[v * SIZE[0] + u];
             assert!(
-                (at_wall - 10.0).abs() < 1e-3
-                    && obliqueness(at_wall) == 1.0
-                    && !is_spoiled(at_wall)
+                (at_wall.m() - 10.0).abs() < 1e-3
+                    && at_wall.obliqueness() == 1.0
+                    && !at_wall.has_unreliable_colour()
             );
         }
         let along_z = observed(&VolumeConfig { distance: DistanceAlong::Ray, ..config }, |_, v| {
             256 * (2 + v as u16 / 4)
         });
-        assert!(along_z.iter().all(|&depth_m| obliqueness(depth_m) == 1.0 || depth_m == 0.0));
+        assert!(
+            along_z.iter().all(|&depth| depth.obliqueness() == 1.0 || depth == NotedDepth::NONE)
+        );
     }
 
     #[test]
@@ -333,7 +268,9 @@ mod tests {
     #[test]
     fn nothing_is_fused_where_all_is_too_far() {
         assert!(
-            observed(&VolumeConfig::default(), |_, _| 256).iter().all(|&depth_m| depth_m == 0.0)
+            observed(&VolumeConfig::default(), |_, _| 256)
+                .iter()
+                .all(|&depth| depth == NotedDepth::NONE)
         );
     }
 
@@ -344,17 +281,17 @@ mod tests {
         let depth_m =
             observed(&VolumeConfig { edge_reach_px: 2, ..VolumeConfig::default() }, disparity);
         let row = &depth_m[SIZE[0] * 30..][..SIZE[0]];
-        let fused: Vec<usize> = (95..105).filter(|&u| row[u] > 0.0).collect();
+        let fused: Vec<usize> = (95..105).filter(|&u| row[u].m() > 0.0).collect();
         assert_eq!(
             fused,
             [95, 96, 97, 98, 99, 102, 103, 104],
             "two pixels of the near side are the matcher's"
         );
         let spoiled: Vec<usize> =
-            (0..SIZE[0]).filter(|&u| row[u] > 0.0 && is_spoiled(row[u])).collect();
+            (0..SIZE[0]).filter(|&u| row[u].m() > 0.0 && row[u].has_unreliable_colour()).collect();
         assert_eq!(spoiled, [0, 1, 2, 102, 197, 198, 199], "three px beside an edge or nothing");
         let all =
             observed(&VolumeConfig { edge_reach_px: 0, ..VolumeConfig::default() }, disparity);
-        assert!(all[..200].iter().all(|&depth_m| depth_m > 0.0 && !is_spoiled(depth_m)));
+        assert!(all[..200].iter().all(|depth| depth.m() > 0.0 && !depth.has_unreliable_colour()));
     }
 }

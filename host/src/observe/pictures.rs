@@ -5,7 +5,7 @@ use super::MapView;
 use crate::evaluate::reference::{Region, Rule, Sample};
 use dynvox_core::Mapper;
 use dynvox_core::geometry::Transform;
-use dynvox_core::image::{DISPARITY_FILLED, DISPARITY_ONE_PX, View};
+use dynvox_core::image::{DISPARITY_ONE_PX, DisparityQ8, View};
 use dynvox_core::tracking::MotionState;
 use dynvox_core::view::{NORMAL_ONE, RaycastView, Raycaster};
 use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
@@ -164,7 +164,7 @@ pub fn disparity_errors(
             return Rgb([grey.get(at.0, at.1).unwrap_or_default() / 32 * 11; 3]);
         }
         let colour = error_colour(px(given), px(truth));
-        Rgb(if marked && given & DISPARITY_FILLED != 0 {
+        Rgb(if marked && DisparityQ8::new(given).is_filled() {
             colour.map(|channel| channel / 2)
         } else {
             colour

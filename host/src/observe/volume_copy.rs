@@ -112,7 +112,7 @@ mod tests {
     use dynvox_core::geometry::{StereoRig, Transform};
     use dynvox_core::image::View;
     use dynvox_core::view::Triangle;
-    use dynvox_core::volume::{NoStore, Observation, Viewpoint};
+    use dynvox_core::volume::{DepthImage, NoStore, Observation, Viewpoint};
 
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
@@ -136,11 +136,10 @@ mod tests {
                 (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();
             let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
             let seen = Observation {
-                depth_m,
+                depth: DepthImage::Plain(depth_m),
                 grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
                 colour: None,
                 class: None,
-                noted: false,
             };
             volume.allocate(&view, depth_m, &mut NoStore, &Serial);
             volume.fuse(&view, seen, &Serial);

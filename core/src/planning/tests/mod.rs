@@ -12,7 +12,7 @@ use crate::{
     image::View,
     memory::SLAB_ALIGN,
     parallel::Serial,
-    volume::{NoStore, Observation, Viewpoint, VolumeConfig},
+    volume::{DepthImage, NoStore, Observation, Viewpoint, VolumeConfig},
 };
 use nalgebra::Vector3;
 use std::{boxed::Box, vec, vec::Vec};
@@ -101,11 +101,10 @@ impl Scene {
         let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera };
         let depth_m = View::new(&depth_m, WIDTH, HEIGHT).unwrap();
         let seen = Observation {
-            depth_m,
+            depth: DepthImage::Plain(depth_m),
             grey: View::new(&grey, WIDTH, HEIGHT).unwrap(),
             colour: None,
             class: None,
-            noted: false,
         };
         self.volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         self.volume.fuse(&view, seen, &Serial);

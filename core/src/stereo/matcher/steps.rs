@@ -2,7 +2,7 @@
 
 use super::{ROWS, StereoMatcher};
 use crate::{
-    image::{DISPARITY_FILLED, DISPARITY_ONE_PX, InvalidPair, View},
+    image::{DISPARITY_ONE_PX, DisparityQ8, InvalidPair, View},
     parallel::{BANDS, Bands, Executor, each, zip2, zip3},
     sad::compare,
     slices::{clipped, clipped_mut},
@@ -278,8 +278,8 @@ impl StereoMatcher<'_> {
             } else {
                 (working & !FILLED, working & FILLED != 0)
             };
-            let value = px as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16);
-            *disparity = if filled && value > 0 { value | DISPARITY_FILLED } else { value };
+            let value = DisparityQ8::new(px as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16));
+            *disparity = if filled { value.filled() } else { value }.get();
         }
         if let Some(invalid) = invalid {
             invalid::remove(invalid, self.width, disparities);

@@ -7,10 +7,11 @@ use super::{
 use crate::{
     flags::bits,
     volume::{
+        NotedDepth,
         block::{LAYER_VOXELS, Layer},
-        observed::is_spoiled,
     },
 };
+use bytemuck::TransparentWrapper;
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
 const PAST_MAX: usize = 5;
@@ -92,7 +93,7 @@ impl Fusion<'_> {
         weight: &Layer<u8>,
     ) -> Layer<i16> {
         let [all, second, third, fourth, fifth, sixth] = COLOUR_SHARES;
-        let noted = self.seen.noted;
+        let is_noted = self.is_noted;
         let mut share = [0; LAYER_VOXELS];
         for (share, &weight) in share.iter_mut().zip(weight) {
             // By masks: a choice among five becomes branches.
@@ -104,7 +105,7 @@ impl Fusion<'_> {
                 + from(6, sixth - fifth);
         }
         for (share, &observed_m) in share.iter_mut().zip(&scratch.observed_m) {
-            *share &= -i16::from(!noted | !is_spoiled(observed_m));
+            *share &= -i16::from(!is_noted | !NotedDepth::wrap(observed_m).has_unreliable_colour());
         }
         for i in 0..LAYER_VOXELS {
             let colourless = -i16::from(planes[0][i] | planes[1][i] | planes[2][i] == 0);

@@ -9,11 +9,11 @@ use crate::{
     geometry::scalar::{clamp_f32, floored_i32, min_f32, rounded_i32},
     image::View,
     volume::{
-        BLOCK_SIDE, CLASS_COUNT,
+        BLOCK_SIDE, CLASS_COUNT, NotedDepth,
         block::{LAYER_VOXELS, Layer},
-        observed::obliqueness,
     },
 };
+use bytemuck::TransparentWrapper;
 use nalgebra::Vector3;
 
 /// Observation weights run up to this.
@@ -222,13 +222,17 @@ impl Fusion<'_> {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "below LAYER_VOXELS, the length of every layer")]
     fn measure(&self, scratch: &mut Scratch) -> bool {
-        let (truncation_m, behind_m, scale, noted) =
-            (self.config.truncation_m, self.behind_m, self.scale, self.seen.noted);
+        let (truncation_m, behind_m, scale, is_noted) =
+            (self.config.truncation_m, self.behind_m, self.scale, self.is_noted);
         let mut any = 0;
         for i in 0..LAYER_VOXELS {
             let observed_m = scratch.observed_m[i];
             let along_z_m = observed_m - scratch.z_m[i];
-            let distance_m = if noted { along_z_m * obliqueness(observed_m) } else { along_z_m };
+            let distance_m = if is_noted {
+                along_z_m * NotedDepth::wrap(observed_m).obliqueness()
+            } else {
+                along_z_m
+            };
             let hit = -i16::from(
                 (observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m),
             );

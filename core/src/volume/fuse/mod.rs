@@ -31,7 +31,7 @@ use self::{
     layer::{Scratch, Shares},
 };
 use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
-use super::{BLOCK_SIDE, BlockCoord, Viewpoint, Volume, VolumeConfig};
+use super::{BLOCK_SIDE, BlockCoord, DepthImage, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
     geometry::scalar::{floor_i32, max_f32, min_f32},
@@ -48,16 +48,14 @@ const CORNERS: usize = 8;
 /// What a camera saw, as the map takes it.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// Depth, m; 0 none. Without padding between rows.
-    pub depth_m: View<'a, f32>,
+    /// Depths. Without padding between rows.
+    pub depth: DepthImage<'a>,
     /// Grey image of the same size, fused as colour where `colour` is absent.
     pub grey: View<'a, u8>,
     /// Colour image of the same size.
     pub colour: Option<View<'a, [u8; 3]>>,
     /// Semantic class per pixel.
     pub class: Option<View<'a, u8>>,
-    /// Whether the lowest bits of the depths are notes, as the mapper writes them.
-    pub noted: bool,
 }
 
 /// Everything about a frame that blocks share.
@@ -84,6 +82,8 @@ struct Fusion<'a> {
     free_m: f32,
     /// The depth image, without padding.
     depth_m: &'a [f32],
+    /// Whether its lowest bits are notes.
+    is_noted: bool,
     width: u32,
     height: u32,
     /// Units of signed distance per metre.
@@ -102,7 +102,7 @@ impl<'a> Fusion<'a> {
         horizon: Option<Horizon<'a>>,
     ) -> Self {
         let (camera_from_world, camera) = view.camera_from_world();
-        let voxel_m = f64::from(config.voxel_size_m);
+        let (voxel_m, depth_m) = (f64::from(config.voxel_size_m), seen.depth.depth_m());
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         let steps = axes.map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
         Self {
@@ -122,9 +122,10 @@ impl<'a> Fusion<'a> {
             plain_weights: config.observation_weight.most() == 1 && seen.class.is_none(),
             past_per_m: config.observation_weight.past_per_m(),
             free_m: config.observation_weight.free_m(config.voxel_size_m),
-            depth_m: seen.depth_m.pixels(),
-            width: seen.depth_m.width() as u32,
-            height: seen.depth_m.height() as u32,
+            depth_m: depth_m.pixels(),
+            is_noted: seen.depth.is_noted(),
+            width: depth_m.width() as u32,
+            height: depth_m.height() as u32,
             scale: 32_767.0 / config.truncation_m,
             colour_band_m: config.colour_band * config.truncation_m,
             behind_m: max_f32(config.behind_m, 2.0 * config.voxel_size_m),
@@ -135,7 +136,7 @@ impl<'a> Fusion<'a> {
 impl Volume<'_> {
     /// Averages an observation from `view` into every visible block.
     pub fn fuse<E: Executor>(&mut self, view: &Viewpoint, seen: Observation<'_>, executor: &E) {
-        let horizon = Horizon::new(seen.depth_m, self.requested.scratch());
+        let horizon = Horizon::new(seen.depth.depth_m(), self.requested.scratch());
         let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());

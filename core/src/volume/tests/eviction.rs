@@ -66,7 +66,7 @@ fn run(
                 bumpy_depth().iter().map(|depth| depth * 0.5 + 0.01 * (i % 3) as f32).collect();
             let view = view([0.0; 3], [0.0, 0.0, z]);
             let seen = observation(&depth_m, &grey);
-            let report = volume.allocate(&view, seen.depth_m, store, &Serial);
+            let report = volume.allocate(&view, seen.depth.depth_m(), store, &Serial);
             assert_eq!(report.refused, 0);
             add(&mut sum, report.eviction);
             volume.fuse(&view, seen, &Serial);
@@ -149,7 +149,7 @@ fn a_map_set_to_refuse_evicts_nothing() {
             let seen = observation(&depth_m, &grey);
             let report = volume.allocate(
                 &view([0.0; 3], [0.0, 0.0, f64::from(i)]),
-                seen.depth_m,
+                seen.depth.depth_m(),
                 &mut NoStore,
                 &Serial,
             );

@@ -3,6 +3,7 @@
 use super::*;
 use crate::geometry::scalar::{max_f32, min_f32};
 use crate::volume::block::{Colour, Voxels};
+use bytemuck::TransparentWrapper;
 use nalgebra::Point3;
 use std::collections::BTreeSet;
 
@@ -166,13 +167,14 @@ fn fuse_slowly(
             continue;
         }
         let (u, v) = (column as usize, row as usize);
-        let depth = seen.depth_m.get(u, v).unwrap();
+        let depth = seen.depth.depth_m().get(u, v).unwrap();
         let distance = depth - at.z;
         if depth <= 0.0 || distance < -config.truncation_m {
             continue;
         }
         // The lowest five bits: sixteenths less one, and whether the colour is another's.
-        let notes = if seen.noted { depth.to_bits() & 31 } else { 15 };
+        let notes =
+            if matches!(seen.depth, DepthImage::Noted(_)) { depth.to_bits() & 31 } else { 15 };
         let distance = distance * ((notes & 15) + 1) as f32 / 16.0;
         if distance < -crate::geometry::scalar::max_f32(config.behind_m, 2.0 * config.voxel_size_m)
         {
@@ -238,6 +240,7 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
             let depth_m: Vec<f32> = shown_m
                 .map(|(depth, at)| if noted && depth > 0.0 { note((depth, at)) } else { depth })
                 .collect();
+            let noted_depths = View::new(NotedDepth::wrap_slice(&depth_m), WIDTH, HEIGHT).unwrap();
             let view = view([0.02 * f64::from(i), 0.1, -0.3], [0.1 * f64::from(i), 0.0, 0.2]);
             let stride = WIDTH + if i % 2 == 1 { 5 } else { 0 };
             let seen = Observation {
@@ -248,10 +251,14 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
                     None
                 },
                 class: if i % 3 < 2 { View::new(&class, WIDTH, HEIGHT) } else { None },
-                noted,
+                depth: if noted {
+                    DepthImage::Noted(noted_depths)
+                } else {
+                    observation(&depth_m, &grey).depth
+                },
                 ..observation(&depth_m, &grey)
             };
-            volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);
+            volume.allocate(&view, seen.depth.depth_m(), &mut NoStore, &Serial);
             let blocks = &volume.blocks;
             let slots = volume.visible().slots().iter();
             let twins: Vec<_> = slots
@@ -292,10 +299,10 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
                 let view = view([0.0, 0.05 * f64::from(i), 0.0], [0.0, 0.0, 0.3 * f64::from(i)]);
                 let seen = observation(&depth_m, &grey);
                 if threads {
-                    volume.allocate(&view, seen.depth_m, &mut NoStore, &TwoThreads);
+                    volume.allocate(&view, seen.depth.depth_m(), &mut NoStore, &TwoThreads);
                     volume.fuse(&view, seen, &TwoThreads)
                 } else {
-                    volume.allocate(&view, seen.depth_m, &mut NoStore, &Serial);
+                    volume.allocate(&view, seen.depth.depth_m(), &mut NoStore, &Serial);
                     volume.fuse(&view, seen, &Serial)
                 }
                 // In slot order: the slots are the same too.
@@ -496,7 +503,7 @@ fn a_class_of_weight_zero_stays_out_of_the_map_and_another_counts_thrice() {
     with_volume(&CAPACITY, &config, |volume| {
         let mut seen = observation(&depth_m, &grey);
         seen.class = View::new(&class, WIDTH, HEIGHT);
-        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth_m, &mut NoStore, &Serial);
+        volume.allocate(&view([0.0; 3], [0.0; 3]), seen.depth.depth_m(), &mut NoStore, &Serial);
         volume.fuse(&view([0.0; 3], [0.0; 3]), seen, &Serial);
         assert_eq!(volume.sampler().voxel([-10, 0, 60]), None);
         assert_eq!(volume.sampler().voxel([10, 0, 60]).unwrap().weight, 3);

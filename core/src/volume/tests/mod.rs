@@ -57,11 +57,10 @@ fn bumpy_depth() -> Vec<f32> {
 fn observation<'a>(depth_m: &'a [f32], grey: &'a [u8]) -> Observation<'a> {
     let depth_m = View::new(depth_m, WIDTH, HEIGHT).unwrap();
     Observation {
-        depth_m,
+        depth: DepthImage::Plain(depth_m),
         grey: View::new(grey, WIDTH, HEIGHT).unwrap(),
         colour: None,
         class: None,
-        noted: false,
     }
 }
 
@@ -72,7 +71,7 @@ fn fuse_once(
     grey: &[u8],
 ) -> AllocationReport {
     let seen = observation(depth_m, grey);
-    let report = volume.allocate(view, seen.depth_m, &mut NoStore, &Serial);
+    let report = volume.allocate(view, seen.depth.depth_m(), &mut NoStore, &Serial);
     volume.fuse(view, seen, &Serial);
     report
 }

@@ -237,7 +237,8 @@ class Mapper:
 
     @property
     def disparity_q8(self) -> NDArray[np.uint16]:
-        """Disparity of the last frame; 0 where there is none. It has size 1 x 1 before the first frame."""
+        """Disparity of the last frame in 1/256 px, 0 where there is none: divide by 256 for pixels. Where the mapper matched the pair itself, odd values were
+        filled in between measured ones, which are even. It has size 1 x 1 before the first frame."""
 
     @property
     def digest(self) -> int | None:

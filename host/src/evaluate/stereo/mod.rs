@@ -5,7 +5,7 @@
 //! off by more than 3 px and by more than 5 % of the truth. Shares are given of the pixels that
 //! have an estimate, and, as the benchmarks rank, of all pixels with truth after the estimate's
 //! holes are filled ([`filled`]). What the matcher itself filled in (the core marks it:
-//! [`DISPARITY_FILLED`]) is counted apart from what it measured. Pixels are counted over all pairs
+//! [`DisparityQ8::is_filled`]) is counted apart from what it measured. Pixels are counted over all pairs
 //! together. Regions: what is seen in both images (`noc`), all (`occ`), each once more for
 //! foreground and background where the benchmark has an `obj_map`.
 
@@ -19,7 +19,7 @@ pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
 
 use crate::evaluate::reference::Rule;
 use crate::formats::Image;
-use dynvox_core::image::DISPARITY_FILLED;
+use dynvox_core::image::DisparityQ8;
 use serde::Serialize;
 
 /// Plain thresholds, px.
@@ -100,7 +100,7 @@ impl StereoCounts {
                 let error = f64::from(px(given) - px(truth));
                 self.error_sums_px[0] += error.abs();
                 self.error_sums_px[1] += error;
-                let is_filled = estimate.marked && given & DISPARITY_FILLED != 0;
+                let is_filled = estimate.marked && DisparityQ8::new(given).is_filled();
                 self.parts[usize::from(is_filled)].add(px(given), px(truth));
             }
         }
