@@ -29,48 +29,67 @@ pub(crate) const CROPS_MAX: usize = 128;
 /// Disparity units in a half pixel: the median is found to that, up to 256 px.
 const BIN: u16 = 128;
 
-/// Copies the disparity under a mask into `crop`, row by row of the mask's box; 0 outside the mask,
-/// just behind edges, and where the depth is farther than `extent_m` from the median. Returns how
-/// many pixels have one.
-pub(super) fn crop(
-    rig: &StereoRig,
-    extent_m: f32,
-    disparity_q8: View<'_, u16>,
-    masks: &MaskStore<'_>,
-    mask: &MaskHandle,
-    disparities: &mut [u16],
-    vectors: Vectors,
-) -> u32 {
-    let PixelBox { left, top, width, height } = mask.pixels;
-    let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else { return 0 };
-    let size @ [columns, rows] = [width.max(1) as usize, height.max(0) as usize];
-    let mut found = Histogram::new();
-    for (v, row) in disparities.chunks_exact_mut(columns).enumerate().take(rows) {
-        let from = disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
-        for ((u, row), from) in
-            (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK))
-        {
-            let bits = masks.bits(mask, u, top + v as i32);
-            for (i, (to, &disparity)) in row.iter_mut().zip(from).enumerate() {
-                *to = if bits >> i & 1 == 1 { disparity } else { 0 };
-                if *to > 0 {
-                    found.add(usize::from(*to / BIN));
+/// What a crop is cut from.
+#[derive(Clone, Copy)]
+pub(super) struct CropSource<'a> {
+    pub rig: &'a StereoRig,
+    /// Greatest distance along z from the median of the depths, m.
+    pub extent_m: f32,
+    /// 1/256 px, 0 none.
+    pub disparity_q8: View<'a, u16>,
+    pub masks: &'a MaskStore<'a>,
+    pub mask: &'a MaskHandle,
+}
+
+impl CropSource<'_> {
+    /// Copies the disparity under the mask into `disparities`, row by row of the mask's box; 0
+    /// outside the mask, just behind edges, and where the depth is farther than `extent_m` from the
+    /// median. Returns how many pixels have one.
+    pub fn cut(&self, disparities: &mut [u16], vectors: Vectors) -> u32 {
+        let PixelBox { left, top, width, height } = self.mask.pixels;
+        let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else {
+            return 0;
+        };
+        let size = [width.max(1) as usize, height.max(0) as usize];
+        let median = self.copy(disparities).median().unwrap_or(0);
+        let focal_baseline = self.rig.focal_baseline_px_m();
+        let depth = focal_baseline / ((median as f64 + 0.5) * 0.5);
+        let extent_m = f64::from(self.extent_m);
+        let limits = [depth + extent_m, depth - extent_m].map(|depth_m| {
+            let disparity = focal_baseline / depth_m * 256.0;
+            if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
+        });
+        vectors.run(LeaveOut {
+            disparity_q8: self.disparity_q8,
+            origin: [left_u, top_v],
+            size,
+            limits,
+            disparities,
+        })
+    }
+
+    /// Copies what is under the mask, 0 elsewhere; counts by half pixels of disparity.
+    fn copy(&self, disparities: &mut [u16]) -> Histogram {
+        let PixelBox { left, top, width, height } = self.mask.pixels;
+        let [left_u, top_v] = [left, top].map(|side| side.max(0) as usize);
+        let [columns, rows] = [width.max(1) as usize, height.max(0) as usize];
+        let mut found = Histogram::new();
+        for (v, row) in disparities.chunks_exact_mut(columns).enumerate().take(rows) {
+            let from = self.disparity_q8.row(top_v + v).get(left_u..).unwrap_or(&[]);
+            for ((u, row), from) in
+                (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK))
+            {
+                let bits = self.masks.bits(self.mask, u, top + v as i32);
+                for (i, (to, &disparity)) in row.iter_mut().zip(from).enumerate() {
+                    *to = if bits >> i & 1 == 1 { disparity } else { 0 };
+                    if *to > 0 {
+                        found.add(usize::from(*to / BIN));
+                    }
                 }
             }
         }
+        found
     }
-    let depth = rig.focal_baseline_px_m() / ((found.median().unwrap_or(0) as f64 + 0.5) * 0.5);
-    let [low, high] = [depth + f64::from(extent_m), depth - f64::from(extent_m)].map(|depth_m| {
-        let disparity = rig.focal_baseline_px_m() / depth_m * 256.0;
-        if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
-    });
-    vectors.run(LeaveOut {
-        disparity_q8,
-        origin: [left_u, top_v],
-        size,
-        limits: [low, high],
-        disparities,
-    })
 }
 
 /// Leaves out of a crop what is too far or too near, or just behind an edge.

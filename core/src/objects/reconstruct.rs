@@ -2,7 +2,7 @@
 
 use super::{
     ObjectSink, ObjectSummary, Objects, ObjectsReport, Picture, Retirement,
-    crop::{self, Crop},
+    crop::{Crop, CropSource},
     object::{Object, ObjectVolumes},
 };
 use crate::{
@@ -24,6 +24,21 @@ pub(crate) struct ObjectFrame<'a> {
     pub picture: Picture<'a>,
     /// Its disparity, 1/256 px, 0 none.
     pub disparity_q8: View<'a, u16>,
+}
+
+/// A track that is detected in a frame.
+struct DetectedTrack<'a> {
+    tracker: &'a Tracker<'a>,
+    track: &'a Track,
+    instance: &'a Instance,
+    frame: &'a ObjectFrame<'a>,
+}
+
+/// A crop with its pixels: disparity row by row of its box, and picture.
+struct CropPixels<'a> {
+    crop: &'a Crop,
+    disparity_q8: &'a [u16],
+    picture: &'a Picture<'a>,
 }
 
 impl<'s> Objects<'s> {
@@ -51,7 +66,8 @@ impl<'s> Objects<'s> {
                 .tracks_with_instances()
                 .filter_map(|(track, instance)| Some((track, instance?)));
             detected.for_each(|(track, instance)| {
-                self.integrate(tracker, track, instance, frame, executor, sink)
+                let detected = DetectedTrack { tracker, track, instance, frame };
+                self.integrate(&detected, executor, sink)
             });
         }
         self.report.objects =
@@ -63,13 +79,11 @@ impl<'s> Objects<'s> {
     /// uncertain, keeps it for later.
     fn integrate<E: Executor>(
         &mut self,
-        tracker: &Tracker<'_>,
-        track: &Track,
-        instance: &Instance,
-        frame: &ObjectFrame<'_>,
+        detected: &DetectedTrack<'_>,
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
+        let &DetectedTrack { tracker, track, instance, frame } = detected;
         if track.segment_len == 0
             || track.class().treatment() != Treatment::Reconstruct
             || instance.tracked_only.get()
@@ -81,17 +95,14 @@ impl<'s> Objects<'s> {
             debug_assert!(false, "a box lies in the image");
             return;
         };
-        let extent_m = self.config.extent_m;
-        if crop::crop(
-            frame.rig,
-            extent_m,
-            frame.disparity_q8,
-            tracker.masks(),
-            &instance.mask,
-            disparity,
-            executor.vectors(),
-        ) == 0
-        {
+        let source = CropSource {
+            rig: frame.rig,
+            extent_m: self.config.extent_m,
+            disparity_q8: frame.disparity_q8,
+            masks: tracker.masks(),
+            mask: &instance.mask,
+        };
+        if source.cut(disparity, executor.vectors()) == 0 {
             return;
         }
         let crop = Crop {
@@ -111,7 +122,7 @@ impl<'s> Objects<'s> {
             }
             // A moving object's pose is extrapolated in a frame without a motion of its own.
             MotionState::Dynamic if !track.measured.get() => {}
-            _ => self.fuse(tracker.frame(), track, &crop, frame, executor, sink),
+            _ => self.fuse(detected, &crop, executor, sink),
         }
     }
 
@@ -119,13 +130,13 @@ impl<'s> Objects<'s> {
     /// if that is new, the crops that were kept for it first.
     fn fuse<E: Executor>(
         &mut self,
-        number: u32,
-        track: &Track,
+        detected: &DetectedTrack<'_>,
         crop: &Crop,
-        frame: &ObjectFrame<'_>,
         executor: &E,
         sink: &mut impl ObjectSink,
     ) {
+        let &DetectedTrack { tracker, track, frame, .. } = detected;
+        let number = tracker.frame();
         let known = self.volume_of(track, sink);
         let Some(at) = known.or_else(|| {
             self.volumes.allocate(&self.config, number, &mut self.report.retired, sink)
@@ -134,7 +145,7 @@ impl<'s> Objects<'s> {
             return;
         };
         if known.is_none() {
-            self.begin(at, number, track, frame.rig, executor);
+            self.begin(at, detected, executor);
         }
         let Some(picture) = frame.picture.part(&crop.pixels) else {
             debug_assert!(false, "a crop lies in the image");
@@ -142,8 +153,8 @@ impl<'s> Objects<'s> {
         };
         let ObjectVolumes { objects, depth_m, disparity_q8 } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
-        self.report.blocks_refused +=
-            fuse_crop(object, frame.rig, crop, disparity_q8, &picture, depth_m, executor);
+        let pixels = CropPixels { crop, disparity_q8, picture: &picture };
+        self.report.blocks_refused += fuse_crop(object, frame.rig, &pixels, depth_m, executor);
         self.report.fused += 1;
         if let Some(summary) = &mut object.summary {
             summary.class = track.class();
@@ -171,14 +182,9 @@ impl<'s> Objects<'s> {
     }
 
     /// Begins an object in the free volume at `at`, with the crops that were kept for it.
-    fn begin<E: Executor>(
-        &mut self,
-        at: usize,
-        number: u32,
-        track: &Track,
-        rig: &StereoRig,
-        executor: &E,
-    ) {
+    fn begin<E: Executor>(&mut self, at: usize, detected: &DetectedTrack<'_>, executor: &E) {
+        let &DetectedTrack { tracker, track, frame, .. } = detected;
+        let number = tracker.frame();
         let ObjectVolumes { objects, depth_m, .. } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
         self.report.begun += 1;
@@ -193,12 +199,12 @@ impl<'s> Objects<'s> {
             t_world_object: Transform::IDENTITY,
         });
         let is_static = track.motion_state.state() == MotionState::Static;
-        for (kept, disparity, picture) in self.crops.of(track.id) {
+        for (kept, disparity_q8, picture) in self.crops.of(track.id) {
             // A static object has the pose of the first frame in every frame.
             let t_world_object = if is_static { track.t_world_origin } else { kept.t_world_object };
             let crop = Crop { t_world_object, ..*kept };
-            self.report.blocks_refused +=
-                fuse_crop(object, rig, &crop, disparity, &picture, depth_m, executor);
+            let pixels = CropPixels { crop: &crop, disparity_q8, picture: &picture };
+            self.report.blocks_refused += fuse_crop(object, frame.rig, &pixels, depth_m, executor);
             self.report.caught_up += 1;
         }
         self.crops.forget(track.id);
@@ -233,12 +239,11 @@ impl<'s> Objects<'s> {
 fn fuse_crop<E: Executor>(
     object: &mut Object<'_>,
     rig: &StereoRig,
-    crop: &Crop,
-    disparity_q8: &[u16],
-    picture: &Picture<'_>,
+    pixels: &CropPixels<'_>,
     depth_m: &mut [f32],
     executor: &E,
 ) -> u32 {
+    let &CropPixels { crop, disparity_q8, picture } = pixels;
     let (width, height) = (picture.grey.width(), picture.grey.height());
     let (Some(disparity), Some(mut depth)) =
         (View::new(disparity_q8, width, height), ViewMut::new(depth_m, width, height))

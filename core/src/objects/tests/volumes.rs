@@ -1,6 +1,7 @@
 //! What gets into an object's volume, and what goes out of it.
 
 use super::*;
+use crate::objects::crop::CropSource;
 use crate::{masks::MaskHandle, parallel::Vectors, volume::BlockCoord};
 
 const SMALL: Board = Board { half_m: [0.8, 0.5], ..Board::CAR };
@@ -170,15 +171,14 @@ fn cropped(disparity_px: impl Fn(i32) -> f64) -> Vec<i32> {
     let row: Vec<u16> = (0..WIDTH as i32).map(|u| (disparity_px(u - 20) * 256.0) as u16).collect();
     let disparity = row.repeat(HEIGHT);
     let mut crop = vec![7u16; pixels.area() as usize];
-    let kept = crop::crop(
-        &RIG,
-        5.0,
-        View::new(&disparity, WIDTH, HEIGHT).unwrap(),
-        &store,
-        &mask,
-        &mut crop,
-        Vectors::detect(),
-    );
+    let source = CropSource {
+        rig: &RIG,
+        extent_m: 5.0,
+        disparity_q8: View::new(&disparity, WIDTH, HEIGHT).unwrap(),
+        masks: &store,
+        mask: &mask,
+    };
+    let kept = source.cut(&mut crop, Vectors::detect());
     let columns = |row: &[u16]| (0..60).filter(|&u| row[u as usize] > 0).collect::<Vec<i32>>();
     let first = columns(&crop[..60]);
     assert!(crop.chunks_exact(60).all(|row| columns(row) == first));
@@ -305,7 +305,14 @@ fn crops_equal_those_cut_pixel_by_pixel() {
         }
         for vectors in Vectors::available() {
             let mut crop = vec![7u16; pixels.area() as usize];
-            let count = crop::crop(&RIG, 3.0, disparity, &store, &mask, &mut crop, vectors);
+            let source = CropSource {
+                rig: &RIG,
+                extent_m: 3.0,
+                disparity_q8: disparity,
+                masks: &store,
+                mask: &mask,
+            };
+            let count = source.cut(&mut crop, vectors);
             assert_eq!(
                 crop,
                 plain_crop(3.0, disparity, |u, v| store.contains(&mask, u, v), &pixels),
