@@ -104,7 +104,7 @@ fn stereo(criterion: &mut Criterion) {
                     let mut spent = Duration::ZERO;
                     for _ in 0..times {
                         let mut last = Instant::now();
-                        matcher.compute_observed(&config, left, right, &Serial, |done| {
+                        matcher.compute_observed(&config, [left, right], &Serial, |done| {
                             let now = Instant::now();
                             if done == step {
                                 spent += now - last;

@@ -17,7 +17,7 @@ use crate::{
     rectify::{Pair, self_calibration::SelfCalibration},
     scene_flow::{FlowMatcher, FlowReport, Match},
     state::Hasher,
-    stereo::{StereoMatcher, StereoReport},
+    stereo::{RectifiedPair, StereoMatcher, StereoReport},
     tracking::{FrameMatches, GuidedMatching, TrackingReport},
     volume::{AllocationReport, BlockStore, NoStore, PruneReport},
 };
@@ -304,7 +304,10 @@ fn match_images<E: Executor>(
 ) -> (StereoReport, FlowReport) {
     let compute_disparity = || match frame.disparity_q8 {
         Some(given) => stereo.take(given),
-        None => stereo.compute_within(&config.stereo, frame.left, frame.right, invalid, executor),
+        None => {
+            let pair = RectifiedPair { left: frame.left, right: frame.right, invalid };
+            stereo.compute_within(&config.stereo, &pair, executor)
+        }
     };
     let match_features =
         || scene_flow.push_within(&config.scene_flow, frame.left, frame.right, invalid, executor);

@@ -97,6 +97,13 @@ const fn most_pixels(capacity: &Capacity) -> usize {
     at_least_one(capacity.image_width) * at_least_one(capacity.image_height)
 }
 
+/// A rectified pair, and the pixels of it that show nothing.
+pub(crate) struct RectifiedPair<'a> {
+    pub left: View<'a, u8>,
+    pub right: View<'a, u8>,
+    pub invalid: Option<&'a InvalidPair<'a>>,
+}
+
 impl<'s> StereoMatcher<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
@@ -171,7 +178,7 @@ impl<'s> StereoMatcher<'s> {
         right: View<'_, u8>,
         executor: &E,
     ) -> StereoReport {
-        self.compute_observed(config, left, right, executor, |_| ())
+        self.compute_observed(config, [left, right], executor, |_| ())
     }
 
     /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do
@@ -179,35 +186,33 @@ impl<'s> StereoMatcher<'s> {
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
-        left: View<'_, u8>,
-        right: View<'_, u8>,
-        invalid: Option<&InvalidPair<'_>>,
+        pair: &RectifiedPair<'_>,
         executor: &E,
     ) -> StereoReport {
-        self.compute_steps(config, [left, right], invalid, executor, |_| ())
+        self.compute_steps(config, pair, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], calling `done` after each step: no clock enters the core, so
+    /// As [`StereoMatcher::compute`], of a left and a right image, calling `done` after each step: no clock enters the core, so
     /// a caller that times the steps does it there.
     pub fn compute_observed<E: Executor>(
         &mut self,
         config: &StereoConfig,
-        left: View<'_, u8>,
-        right: View<'_, u8>,
+        [left, right]: [View<'_, u8>; 2],
         executor: &E,
         done: impl FnMut(StereoStep),
     ) -> StereoReport {
-        self.compute_steps(config, [left, right], None, executor, done)
+        let pair = RectifiedPair { left, right, invalid: None };
+        self.compute_steps(config, &pair, executor, done)
     }
 
     fn compute_steps<E: Executor>(
         &mut self,
         config: &StereoConfig,
-        [left, right]: [View<'_, u8>; 2],
-        invalid: Option<&InvalidPair<'_>>,
+        pair: &RectifiedPair<'_>,
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
+        let &RectifiedPair { left, right, invalid } = pair;
         let status = self.begin(config, left, right);
         let mut report = StereoReport {
             status,

@@ -79,6 +79,7 @@ mod tests;
 pub use config::{
     DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_CANDIDATE_STEP, MIN_GRID_SIZE, StereoConfig,
 };
+pub(crate) use matcher::RectifiedPair;
 pub use matcher::StereoMatcher;
 pub use report::{StereoReport, StereoStatus, StereoStep};
 

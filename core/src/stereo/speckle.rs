@@ -112,7 +112,8 @@ impl Work for RemoveSpeckles<'_> {
             return blanked;
         }
         let mut runs = Runs(runs);
-        find_segments(disparity, width, similarity.unsigned_abs(), &mut runs, ends, flags);
+        let image = Segmented { disparity, width, similarity: similarity.unsigned_abs() };
+        find_segments(&image, &mut runs, ends, flags);
         let mut run = 0;
         for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
             let mut start = 0;
@@ -137,6 +138,14 @@ impl Work for RemoveSpeckles<'_> {
     }
 }
 
+/// An image to be divided into segments.
+struct Segmented<'a> {
+    disparity: &'a [i16],
+    width: usize,
+    /// Largest difference of neighbours within a segment.
+    similarity: u16,
+}
+
 /// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its
 /// bit of filled pixels taken, too.
 #[inline(always)]
@@ -147,14 +156,8 @@ fn difference(a: i16, b: i16) -> u16 {
 /// Finds the runs of all rows, numbered in scan order, those without disparity included, and unites
 /// them.
 #[inline(always)]
-fn find_segments(
-    disparity: &[i16],
-    width: usize,
-    similarity: u16,
-    runs: &mut Runs<'_>,
-    ends: &mut [u16],
-    flags: &mut [u8],
-) {
+fn find_segments(image: &Segmented<'_>, runs: &mut Runs<'_>, ends: &mut [u16], flags: &mut [u8]) {
+    let &Segmented { disparity, width, similarity } = image;
     let width = width.max(1);
     let mut flags = flags.chunks_exact_mut(width);
     let (Some(mut breaks_above), Some(mut breaks), Some(touches)) =

@@ -31,13 +31,9 @@ pub(super) fn refine_row(
         let mut disparities = load(row, u);
         let mut fractions = [0; LANES];
         if config.subpixel && disparities != [NO_PLANE; LANES] {
-            fractions = find_fractions(
-                config,
-                eight(here, u, &mut spare),
-                other,
-                (u, disparities),
-                kernels,
-            );
+            let pixels =
+                Matched { points: eight(here, u, &mut spare), u, disparities_px: disparities };
+            fractions = find_fractions(config, &pixels, other, kernels);
         }
         for lane in 0..LANES {
             let px = disparities[lane];
@@ -48,17 +44,24 @@ pub(super) fn refine_row(
     }
 }
 
+/// Eight pixels from column `u` on, with their disparities.
+struct Matched<'a> {
+    points: &'a Eight<Descriptor>,
+    u: usize,
+    disparities_px: Eight<i16>,
+}
+
 /// The fractions of eight pixels from column `u` on, in working units; 0 for those whose disparity
 /// has no neighbours to compare it with.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "steps are below three, lanes below eight")]
 fn find_fractions(
     config: &StereoConfig,
-    points: &Eight<Descriptor>,
+    pixels: &Matched<'_>,
     other: &[Descriptor],
-    (u, px): (usize, Eight<i16>),
     kernels: &impl Kernels,
 ) -> Eight<i32> {
+    let &Matched { points, u, disparities_px: px } = pixels;
     // In the right image disparity grows to the left.
     let mut windows = [&[Descriptor::UNTEXTURED; 3]; LANES];
     for ((column, window), d) in (u..).zip(&mut windows).zip(px) {

@@ -4,7 +4,7 @@
 use super::{
     NORMAL_ONE,
     crossed::{CellId, CrossedCells},
-    hits::{Hit, Hits},
+    hits::{Hit, Hits, RowToHit},
     ray_camera::RayCamera,
     visibility::{Projection, Strip},
 };
@@ -86,18 +86,16 @@ impl Scene<'_, '_> {
                 continue;
             }
             let mut images = Row { depth_m, normal, colour, weight, layers };
-            let rays = self.ray_camera.row(v);
+            let to_hit = RowToHit {
+                cells: &self.cells,
+                rays: &self.ray_camera.row(v),
+                limits_m: self.limits_m,
+                rotation: &self.ray_camera.rotation,
+            };
             let mut show = |hits: &mut Hits<'_>, images: &mut Row<'_>| {
-                hits.take(
-                    &self.cells,
-                    &rays,
-                    self.limits_m,
-                    &self.ray_camera.rotation,
-                    vectors,
-                    |u, hit| {
-                        count += u32::from(images.show(u, &hit, self.layer));
-                    },
-                );
+                hits.take(&to_hit, vectors, |u, hit| {
+                    count += u32::from(images.show(u, &hit, self.layer));
+                });
             };
             for (u, &id) in
                 strip.row(row).iter().take(width).enumerate().filter(|(_, id)| **id != CellId::NONE)

@@ -79,13 +79,11 @@ impl<'a> Hits<'a> {
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
     pub fn take(
         &mut self,
-        cells: &CrossedCells<'_, '_>,
-        rays: &RowOfRays,
-        [near_m, far_m]: [f32; 2],
-        rotation: &[[f32; 3]; 3],
+        row: &RowToHit<'_, '_>,
         vectors: Vectors,
         mut show: impl FnMut(usize, Hit),
     ) {
+        let &RowToHit { cells, rays, limits_m: [near_m, far_m], rotation } = row;
         if self.len == 0 {
             return;
         }
@@ -95,15 +93,7 @@ impl<'a> Hits<'a> {
             if let Some(cell) = &self.cells[lane]
                 && depth_m <= far_m
             {
-                let colour = at_lane(&met.colour, lane).map(|channel| channel as u8);
-                let hit = hit(
-                    cells,
-                    cell,
-                    depth_m,
-                    at_lane(&met.point, lane),
-                    at_lane(&met.direction, lane),
-                    colour,
-                );
+                let hit = hit(cells, cell, &met.meeting(lane));
                 show(self.crossings.columns[lane] as usize, hit);
             }
         }
@@ -111,18 +101,22 @@ impl<'a> Hits<'a> {
     }
 }
 
+/// The row of pixels whose rays are met with cells.
+pub(super) struct RowToHit<'a, 's> {
+    pub cells: &'a CrossedCells<'a, 's>,
+    pub rays: &'a RowOfRays,
+    /// Nearest and farthest depth that is shown, m.
+    pub limits_m: [f32; 2],
+    /// Camera from world.
+    pub rotation: &'a [[f32; 3]; 3],
+}
+
 /// What is seen at a point of a cell, given in which direction from there, in camera axes, the
 /// field rises.
 #[inline]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
-fn hit(
-    cells: &CrossedCells<'_, '_>,
-    cell: &CrossedCell<'_>,
-    depth_m: f32,
-    point: [f32; 3],
-    [right, down, forward]: [f32; 3],
-    colour: [u8; 3],
-) -> Hit {
+fn hit(cells: &CrossedCells<'_, '_>, cell: &CrossedCell<'_>, meeting: &Meeting) -> Hit {
+    let &Meeting { depth_m, point, direction: [right, down, forward], colour } = meeting;
     let length = libm::sqrtf(right * right + down * down + forward * forward);
     let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
     let mut nearest = cell.at.first();
@@ -183,6 +177,30 @@ struct Met {
     /// Where the field rises to, in camera axes.
     direction: [Eight<f32>; 3],
     colour: [Eight<i32>; 3],
+}
+
+impl Met {
+    /// Where one lane's ray meets the surface.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+    fn meeting(&self, lane: usize) -> Meeting {
+        Meeting {
+            depth_m: self.depth_m[lane],
+            point: at_lane(&self.point, lane),
+            direction: at_lane(&self.direction, lane),
+            colour: at_lane(&self.colour, lane).map(|channel| channel as u8),
+        }
+    }
+}
+
+/// One ray's meeting with the surface.
+struct Meeting {
+    depth_m: f32,
+    /// In the cell's coordinates.
+    point: [f32; 3],
+    /// Direction in which the field rises, in camera axes.
+    direction: [f32; 3],
+    colour: [u8; 3],
 }
 
 /// The work on these rays: false position, which halves the weight of an end that stays (the

@@ -55,7 +55,7 @@ use core::fmt;
 use crossed::CrossedCells;
 use draw::{Band, Scene};
 use ray_camera::RayCamera;
-use surface::Surface;
+use surface::{Surface, SurfaceSought};
 use visibility::Visibility;
 
 /// Units of a normal's components: ±127 is ±1.
@@ -214,13 +214,9 @@ impl<'s> Raycaster<'s> {
     ) -> RaycastReport {
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
-        let in_view = self.surface.find(
-            volume,
-            ray_camera,
-            [near_m, self.config.far_m],
-            min_weight,
-            executor,
-        );
+        let sought =
+            SurfaceSought { ray_camera, limits_m: [near_m, self.config.far_m], min_weight };
+        let in_view = self.surface.find(volume, &sought, executor);
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();

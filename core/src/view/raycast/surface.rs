@@ -59,6 +59,15 @@ pub(super) struct InView {
     pub far_m: f32,
 }
 
+/// What surface is looked for.
+pub(super) struct SurfaceSought<'a> {
+    pub ray_camera: &'a RayCamera,
+    /// Nearest and farthest depth, m.
+    pub limits_m: [f32; 2],
+    /// Least weight of an observed voxel.
+    pub min_weight: u8,
+}
+
 /// Key of a block, never 0 in the table since an entry + 1 stands above it.
 #[inline]
 fn key([x, y, z]: [i32; 3]) -> u64 {
@@ -102,14 +111,12 @@ impl<'s> Surface<'s> {
     pub fn find<E: Executor>(
         &mut self,
         volume: &Volume<'_>,
-        ray_camera: &RayCamera,
-        limits_m: [f32; 2],
-        min_weight: u8,
+        sought: &SurfaceSought<'_>,
         executor: &E,
     ) -> InView {
-        let in_view = self.cull(volume, ray_camera, limits_m);
+        let in_view = self.cull(volume, sought.ray_camera, sought.limits_m);
         self.index();
-        self.read_signs(volume, min_weight, executor);
+        self.read_signs(volume, sought.min_weight, executor);
         self.join_neighbours();
         in_view
     }

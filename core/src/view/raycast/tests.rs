@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     geometry::{StereoRig, Transform},
     memory::SLAB_ALIGN,
-    parallel::{Serial, TwoThreads},
+    parallel::{Serial, TwoThreads, Vectors},
     random::Random,
     volume::{
         BlockCoord, VolumeConfig,

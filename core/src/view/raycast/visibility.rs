@@ -176,28 +176,27 @@ impl Projection<'_, '_, '_, '_> {
                 at: cells.at[lane],
                 fully_observed: cells.fully_observed[lane],
             };
-            let pixels =
-                [cells.columns[0][lane], cells.columns[1][lane], first, last].map(|at| at as usize);
-            self.cover(CellId::new(entry, cell.at), &cell, cells.nearest_m[lane], pixels, passing);
+            let covering = CoveringCell {
+                id: CellId::new(entry, cell.at),
+                cell,
+                nearest_m: cells.nearest_m[lane],
+                columns: [cells.columns[0][lane] as usize, cells.columns[1][lane] as usize],
+                rows: [first as usize, last as usize],
+            };
+            self.cover(&covering, passing);
         }
         cells.len = 0;
     }
 
-    /// Tries the rays of pixels from a first to a last column and row that show nothing nearer than
-    /// a cell.
+    /// Tries the rays of the pixels that a cell may cover and that show nothing nearer.
     #[inline(always)]
-    fn cover(
-        &mut self,
-        id: CellId,
-        cell: &CrossedCell<'_>,
-        nearest_m: f32,
-        [left, right, first, last]: [usize; 4],
-        passing: &mut Passing,
-    ) {
+    fn cover(&mut self, covering: &CoveringCell<'_>, passing: &mut Passing) {
+        let &CoveringCell { id, ref cell, nearest_m, columns, rows } = covering;
+        let ([left, right], [first, last]) = (columns, rows);
         // Of a cell that is hidden no corner is read.
         let mut target = None;
         for u in (left..right + 1).step_by(LANES) {
-            // What the pixels beyond it show is no matter of this cell.
+            // Mask out the lanes beyond the cell's last column.
             let own = lanes::first(right + 1 - u);
             for v in first..last + 1 {
                 let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else {
@@ -216,14 +215,9 @@ impl Projection<'_, '_, '_, '_> {
                     target = Some(Target { id, faces: self.cells.faces(cell), corners });
                 }
                 if let Some(target) = &target {
-                    target.meet(
-                        &self.ray_camera.row(v),
-                        u,
-                        self.limits_m,
-                        passing,
-                        enters_m,
-                        cells,
-                    );
+                    let rays = self.ray_camera.row(v);
+                    let rays = EightRays { rays: &rays, first: u, limits_m: self.limits_m };
+                    target.meet(&rays, passing, enters_m, cells);
                 }
             }
         }
@@ -298,6 +292,27 @@ impl Passing {
     }
 }
 
+/// A cell of a block, and the pixels it may cover.
+struct CoveringCell<'a> {
+    id: CellId,
+    cell: CrossedCell<'a>,
+    /// Below the depth at which any ray enters it, m.
+    nearest_m: f32,
+    /// First and last column.
+    columns: [usize; 2],
+    /// First and last row.
+    rows: [usize; 2],
+}
+
+/// Rays of eight pixels side by side.
+struct EightRays<'a> {
+    rays: &'a RowOfRays,
+    /// Column of the first.
+    first: usize,
+    /// Nearest and farthest depth that is shown, m.
+    limits_m: [f32; 2],
+}
+
 /// A cell as rays meet it.
 struct Target {
     id: CellId,
@@ -316,13 +331,12 @@ impl Target {
     )]
     fn meet(
         &self,
-        rays: &RowOfRays,
-        first: usize,
-        [near_m, far_m]: [f32; 2],
+        eight: &EightRays<'_>,
         passing: &mut Passing,
         nearest_m: &mut Eight<f32>,
         cells: &mut Eight<CellId>,
     ) {
+        let &EightRays { rays, first, limits_m: [near_m, far_m] } = eight;
         for lane in 0..LANES {
             let ray = rays.ray(first as f32 + lane as f32);
             let [enters_m, leaves_m] = depths_m(&ray, &self.faces, near_m);

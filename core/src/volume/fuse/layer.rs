@@ -160,6 +160,15 @@ fn loaded<T: Copy + Default>(items: &[T], index: &[u32; BLOCK_SIDE]) -> [T; BLOC
     loaded
 }
 
+/// Place of a layer of voxels.
+#[derive(Clone, Copy)]
+pub(super) struct LayerAt {
+    /// The block's first voxel in camera coordinates, m.
+    pub corner: Vector3<f32>,
+    /// Layer of the block.
+    pub z: usize,
+}
+
 impl Fusion<'_> {
     /// Fuses layer `z` of a block whose first voxel lies at `corner` in the camera. Whether any
     /// voxel changed; then `scratch` tells
@@ -167,12 +176,12 @@ impl Fusion<'_> {
     #[inline(always)]
     pub(super) fn layer(
         &self,
-        (corner, z): (Vector3<f32>, usize),
+        at: LayerAt,
         scratch: &mut Scratch,
         sdf: &mut Layer<i16>,
         weight: &mut Layer<u8>,
     ) -> bool {
-        self.project(corner, z, scratch);
+        self.project(at.corner, at.z, scratch);
         self.observe(scratch);
         if !self.measure(scratch) {
             return false;

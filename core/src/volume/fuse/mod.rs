@@ -28,7 +28,7 @@ mod layer;
 use self::{
     band::Band,
     horizon::Horizon,
-    layer::{Scratch, Shares},
+    layer::{LayerAt, Scratch, Shares},
 };
 use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
 use super::{BLOCK_SIDE, BlockCoord, DepthImage, Viewpoint, Volume, VolumeConfig};
@@ -198,7 +198,7 @@ impl Fusion<'_> {
         }
         let mut changed = false;
         for (z, (sdf, weight)) in voxels.layers_mut().enumerate() {
-            if self.layer((corner, z), scratch, sdf, weight) {
+            if self.layer(LayerAt { corner, z }, scratch, sdf, weight) {
                 changed = true;
                 if let Some(planes) =
                     colour.as_deref_mut().and_then(|colour| colour_layer_mut(colour, z))
