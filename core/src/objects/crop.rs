@@ -45,13 +45,13 @@ impl CropSource<'_> {
     /// Copies the disparity under the mask into `disparities`, row by row of the mask's box; 0
     /// outside the mask, just behind edges, and where the depth is farther than `extent_m` from the
     /// median. Returns how many pixels have one.
-    pub fn cut(&self, disparities: &mut [u16], vectors: Vectors) -> u32 {
+    pub fn copy_into(&self, disparities: &mut [u16], vectors: Vectors) -> u32 {
         let PixelBox { left, top, width, height } = self.mask.pixels;
         let (Ok(left_u), Ok(top_v)) = (usize::try_from(left), usize::try_from(top)) else {
             return 0;
         };
         let size = [width.max(1) as usize, height.max(0) as usize];
-        let median = self.copy(disparities).median().unwrap_or(0);
+        let median = self.copy_masked(disparities).median().unwrap_or(0);
         let focal_baseline = self.rig.focal_baseline_px_m();
         let depth = focal_baseline / ((median as f64 + 0.5) * 0.5);
         let extent_m = f64::from(self.extent_m);
@@ -69,7 +69,7 @@ impl CropSource<'_> {
     }
 
     /// Copies what is under the mask, 0 elsewhere; counts by half pixels of disparity.
-    fn copy(&self, disparities: &mut [u16]) -> Histogram {
+    fn copy_masked(&self, disparities: &mut [u16]) -> Histogram {
         let PixelBox { left, top, width, height } = self.mask.pixels;
         let [left_u, top_v] = [left, top].map(|side| side.max(0) as usize);
         let [columns, rows] = [width.max(1) as usize, height.max(0) as usize];

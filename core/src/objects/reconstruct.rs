@@ -102,7 +102,7 @@ impl<'s> Objects<'s> {
             masks: tracker.masks(),
             mask: &instance.mask,
         };
-        if source.cut(disparity, executor.vectors()) == 0 {
+        if source.copy_into(disparity, executor.vectors()) == 0 {
             return;
         }
         let crop = Crop {
