@@ -31,11 +31,11 @@ pub mod memory;
 pub mod objects;
 pub mod parallel;
 pub mod planning;
-pub mod problem;
 pub mod random;
 pub mod rectify;
 mod sad;
 pub mod scene_flow;
+pub mod settings;
 mod slices;
 mod state;
 pub mod stereo;
@@ -50,4 +50,4 @@ pub use mapper::{
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial, Stage};
-pub use problem::{Problem, Problems};
+pub use settings::{Problem, Problems};

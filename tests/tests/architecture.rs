@@ -14,7 +14,7 @@ type Layers = &'static [(&'static str, &'static [&'static str])];
 
 /// The core: leaves first.
 const CORE: Layers = &[
-    ("problem", &[]),
+    ("settings", &[]),
     ("invariants", &[]),
     ("digest", &[]),
     ("memory", &[]),
@@ -30,13 +30,13 @@ const CORE: Layers = &[
     ("random", &["state"]),
     (
         "rectify",
-        &["digest", "geometry", "image", "memory", "parallel", "slices", "problem", "state"],
+        &["digest", "geometry", "image", "memory", "parallel", "slices", "settings", "state"],
     ),
     (
         "stereo",
         &[
             "digest", "flags", "geometry", "image", "lanes", "memory", "parallel", "slices",
-            "problem", "sad",
+            "settings", "sad",
         ],
     ),
     (
@@ -50,14 +50,14 @@ const CORE: Layers = &[
             "memory",
             "parallel",
             "slices",
-            "problem",
+            "settings",
             "sad",
             "state",
         ],
     ),
     (
         "egomotion",
-        &["digest", "geometry", "image", "memory", "problem", "random", "scene_flow", "state"],
+        &["digest", "geometry", "image", "memory", "settings", "random", "scene_flow", "state"],
     ),
     ("masks", &["digest", "image", "memory", "slices", "state"]),
     (
@@ -71,7 +71,7 @@ const CORE: Layers = &[
             "masks",
             "memory",
             "slices",
-            "problem",
+            "settings",
             "random",
             "scene_flow",
             "state",
@@ -89,14 +89,14 @@ const CORE: Layers = &[
             "memory",
             "parallel",
             "slices",
-            "problem",
+            "settings",
             "state",
         ],
     ),
     (
         "view",
         &[
-            "flags", "geometry", "image", "lanes", "memory", "parallel", "slices", "problem",
+            "flags", "geometry", "image", "lanes", "memory", "parallel", "slices", "settings",
             "volume",
         ],
     ),
@@ -111,7 +111,7 @@ const CORE: Layers = &[
             "memory",
             "parallel",
             "slices",
-            "problem",
+            "settings",
             "state",
             "tracking",
             "volume",
@@ -120,7 +120,7 @@ const CORE: Layers = &[
     (
         "planning",
         &[
-            "digest", "geometry", "image", "memory", "slices", "problem", "state", "tracking",
+            "digest", "geometry", "image", "memory", "slices", "settings", "state", "tracking",
             "view", "volume",
         ],
     ),
@@ -137,7 +137,7 @@ const CORE: Layers = &[
             "objects",
             "parallel",
             "planning",
-            "problem",
+            "settings",
             "rectify",
             "scene_flow",
             "state",

@@ -5,7 +5,10 @@ use crate::{
     given::{output, read},
     raw::defaults,
 };
-use core::ffi::{CStr, c_char};
+use core::{
+    ffi::{CStr, c_char},
+    fmt::{self, Write},
+};
 use dynvox_core::{Config, SetError, geometry::StereoRig};
 
 /// Bytes of settings that a configuration holds.
@@ -174,15 +177,30 @@ pub unsafe extern "C" fn dynvox_config_problem(
         return DynvoxStatus::Null;
     }
     let Some(most) = len.checked_sub(1) else { return DynvoxStatus::TooSmall };
-    let problems = config.validate();
-    let parts = problems.first().map_or(["", "", ""], |problem| [problem.key, " ", problem.rule]);
-    let mut written = 0;
-    for byte in parts.into_iter().flat_map(str::bytes).take(most) {
-        // SAFETY: below `len`.
-        unsafe { text.add(written).write(byte as c_char) };
-        written += 1;
+    let mut truncated = Truncated { text, most, written: 0 };
+    if let Some(problem) = config.validate().first() {
+        let _ = write!(truncated, "{problem}");
     }
+    let written = truncated.written;
     // SAFETY: at most `len - 1`.
     unsafe { text.add(written).write(0) };
     DynvoxStatus::Ok
+}
+
+/// The caller's text under construction; what is beyond its bytes is left out.
+struct Truncated {
+    text: *mut c_char,
+    most: usize,
+    written: usize,
+}
+
+impl Write for Truncated {
+    fn write_str(&mut self, part: &str) -> fmt::Result {
+        for byte in part.bytes().take(self.most - self.written) {
+            // SAFETY: below `most`, which the caller of the function that made this answers for.
+            unsafe { self.text.add(self.written).write(byte as c_char) };
+            self.written += 1;
+        }
+        Ok(())
+    }
 }

@@ -1,8 +1,13 @@
 //! Settings of the motion estimate.
 
-use crate::problem::{Problems, require};
+use crate::settings::{
+    Problems, Range, Rule, Setting,
+    Value::{F32, F64, U8, U16},
+    check, rules,
+};
 
 /// Settings of the motion estimate. One set serves the camera; objects use another copy.
+/// [`EgomotionConfig::SETTINGS`] has the ranges, and DynSLAM's values where they differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -10,43 +15,32 @@ use crate::problem::{Problems, require};
     serde(default, deny_unknown_fields)
 )]
 pub struct EgomotionConfig {
-    /// Most hypotheses drawn from three matches each; 1..=10000. DynSLAM: 500, always all of them.
+    /// Most hypotheses, drawn from three matches each.
     pub samples: u16,
-    /// Probability with which one hypothesis should be free of outliers: drawing stops once it is
-    /// reached; in 0.5..1. DynSLAM: 1.
+    /// Probability with which one hypothesis should be free of outliers.
     pub confidence: f64,
-    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0.
-    /// DynSLAM: 2.
+    /// Largest reprojection error of an inlier over its four coordinates together, px.
     pub inlier_px: f32,
-    /// The same in the last rounds of refinement; above 0. DynSLAM: 2.
+    /// Largest reprojection error of an inlier in the last rounds of refinement, px.
     pub refined_inlier_px: f32,
-    /// Fewest matches, and fewest inliers, an estimate is made of; 3..=1000. DynSLAM: 6.
+    /// Fewest matches, and fewest inliers, of an estimate.
     pub matches_min: u16,
-    /// Least share of the matches that must be inliers; in 0..=1. DynSLAM: 0.
+    /// Least share of the matches that must be inliers.
     pub inlier_share_min: f32,
-    /// Largest acceleration of a camera, m/s²: a motion that needs a larger one is taken only where
-    /// the share of inliers is at least `inlier_share_strong`. Above 0. DynSLAM: none.
+    /// Largest acceleration of a camera, m/s².
     pub acceleration_max_m_s2: f64,
-    /// Share of inliers from which on any motion is believed; in 0..=1.
+    /// Share of inliers from which on any motion is believed.
     pub inlier_share_strong: f32,
-    /// Distance by which the right camera may seem to stand ahead of where the calibration has it,
-    /// or behind, m. A larger one comes of cameras that do not expose at the same time: a motion is
-    /// taken only where the share of inliers is at least `inlier_share_strong`, and none above four
-    /// times the distance ([`RightAhead::is_synchronous`](super::RightAhead::is_synchronous)).
-    /// Above 0. DynSLAM: none.
+    /// Farthest that the right camera may seem to stand ahead of its calibration, or behind, m.
     pub right_ahead_max_m: f64,
-    /// Most Gauss-Newton steps of a hypothesis; 1..=50. DynSLAM: about 12.
+    /// Most Gauss-Newton steps of a hypothesis.
     pub sample_steps: u8,
-    /// Most Gauss-Newton steps of a round of refinement; 1..=250. DynSLAM: about 250.
+    /// Most Gauss-Newton steps of a round of refinement.
     pub refine_steps: u8,
-    /// Distance from the middle column, as a share of it, at which what rectification left of the
-    /// lenses' errors weighs as much as the noise of a match. Those errors grow with the fourth
-    /// power: a match at share s has weight 1 / (1 + (s / knee)^8). Above 0; 10 weighs all alike.
-    /// DynSLAM: weights 1 / (s + 0.05), which leave twice the error in scale on the clips measured.
+    /// Distance from the middle column at which errors of the lenses weigh as much as the noise of
+    /// a match, share of the distance to the side.
     pub side_knee: f64,
-    /// Error of a match, px over its four coordinates, at which it weighs a quarter: at error e it
-    /// weighs 1 / (1 + (e / robust_px)²)². Above 0, at most 100, which weighs all alike. DynSLAM:
-    /// all alike.
+    /// Error of a match at which it weighs a quarter, px over its four coordinates.
     pub robust_px: f64,
 }
 
@@ -70,77 +64,85 @@ impl Default for EgomotionConfig {
     }
 }
 
+type Row = Setting<EgomotionConfig>;
+
 impl EgomotionConfig {
-    /// Notes what is wrong with the settings.
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::expert("egomotion.samples", "", |c| U16(&mut c.samples))
+            .range(Range::Within(1.0, 10_000.0))
+            .published("500, always all of them")
+            .text("Most hypotheses, drawn from three matches each."),
+        Row::expert("egomotion.confidence", "", |c| F64(&mut c.confidence))
+            .range(Range::FromBelow(0.5, 1.0))
+            .published("1")
+            .text(
+                "Probability with which one hypothesis should be free of outliers: drawing stops \
+                 once it is reached.",
+            ),
+        Row::expert("egomotion.inlier_px", "px", |c| F32(&mut c.inlier_px))
+            .range(Range::POSITIVE)
+            .text("Largest reprojection error of an inlier over its four coordinates together."),
+        Row::expert("egomotion.refined_inlier_px", "px", |c| F32(&mut c.refined_inlier_px))
+            .range(Range::POSITIVE)
+            .text("Largest reprojection error of an inlier in the last rounds of refinement."),
+        Row::expert("egomotion.matches_min", "", |c| U16(&mut c.matches_min))
+            .range(Range::Within(3.0, 1000.0))
+            .text("Fewest matches, and fewest inliers, of an estimate."),
+        Row::user("egomotion.inlier_share_min", "", |c| F32(&mut c.inlier_share_min))
+            .range(Range::SHARE)
+            .published("0")
+            .text("Least share of the matches that must be inliers."),
+        Row::user("egomotion.acceleration_max_m_s2", "m/s²", |c| F64(&mut c.acceleration_max_m_s2))
+            .range(Range::POSITIVE)
+            .published("none")
+            .text(
+                "Largest acceleration of a camera: a motion that needs a larger one is taken only \
+                 where the share of inliers is at least `inlier_share_strong`.",
+            ),
+        Row::expert("egomotion.inlier_share_strong", "", |c| F32(&mut c.inlier_share_strong))
+            .range(Range::SHARE)
+            .text("Share of inliers from which on any motion is believed."),
+        Row::user("egomotion.right_ahead_max_m", "m", |c| F64(&mut c.right_ahead_max_m))
+            .range(Range::POSITIVE)
+            .published("none")
+            .text(
+                "Farthest that the right camera may seem to stand ahead of where the calibration \
+                 has it, or behind. A larger distance comes of cameras that do not expose at the \
+                 same time: a motion is taken only where the share of inliers is at least \
+                 `inlier_share_strong`, and none above four times the distance.",
+            ),
+        Row::expert("egomotion.sample_steps", "", |c| U8(&mut c.sample_steps))
+            .range(Range::Within(1.0, 50.0))
+            .text("Most Gauss-Newton steps of a hypothesis."),
+        Row::expert("egomotion.refine_steps", "", |c| U8(&mut c.refine_steps))
+            .range(Range::Within(1.0, 250.0))
+            .published("about 250")
+            .text("Most Gauss-Newton steps of a round of refinement."),
+        Row::expert("egomotion.side_knee", "", |c| F64(&mut c.side_knee))
+            .range(Range::AboveTo(0.0, 10.0))
+            .published("weights 1 / (s + 0.05), which leave twice the error in scale")
+            .text(
+                "Distance from the middle column, as a share of it, at which what rectification \
+                 left of the lenses' errors weighs as much as the noise of a match. Those errors \
+                 grow with the fourth power: a match at share s has weight 1 / (1 + (s / knee)^8). \
+                 10 weighs all alike.",
+            ),
+        Row::expert("egomotion.robust_px", "px", |c| F64(&mut c.robust_px))
+            .range(Range::AboveTo(0.0, 100.0))
+            .published("all alike")
+            .text(
+                "Error of a match over its four coordinates at which it weighs a quarter: at error \
+                 e it weighs 1 / (1 + (e / robust_px)²)². 100 weighs all alike.",
+            ),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Notes everything wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(
-            problems,
-            (1..=10_000).contains(&self.samples),
-            "egomotion.samples",
-            "must be in 1..=10000",
-        );
-        require(
-            problems,
-            (0.5..1.0).contains(&self.confidence),
-            "egomotion.confidence",
-            "must be at least 0.5 and below 1",
-        );
-        require(problems, positive(self.inlier_px), "egomotion.inlier_px", "must be above 0");
-        require(
-            problems,
-            positive(self.refined_inlier_px),
-            "egomotion.refined_inlier_px",
-            "must be above 0",
-        );
-        require(
-            problems,
-            (3..=1000).contains(&self.matches_min),
-            "egomotion.matches_min",
-            "must be in 3..=1000",
-        );
-        let is_share = |value: f32| (0.0..=1.0).contains(&value);
-        require(
-            problems,
-            is_share(self.inlier_share_min),
-            "egomotion.inlier_share_min",
-            "must be in 0..=1",
-        );
-        require(
-            problems,
-            is_share(self.inlier_share_strong),
-            "egomotion.inlier_share_strong",
-            "must be in 0..=1",
-        );
-        let acceleration =
-            self.acceleration_max_m_s2.is_finite() && self.acceleration_max_m_s2 > 0.0;
-        require(problems, acceleration, "egomotion.acceleration_max_m_s2", "must be above 0");
-        let ahead = self.right_ahead_max_m.is_finite() && self.right_ahead_max_m > 0.0;
-        require(problems, ahead, "egomotion.right_ahead_max_m", "must be above 0");
-        require(
-            problems,
-            (1..=50).contains(&self.sample_steps),
-            "egomotion.sample_steps",
-            "must be in 1..=50",
-        );
-        require(
-            problems,
-            (1..=250).contains(&self.refine_steps),
-            "egomotion.refine_steps",
-            "must be in 1..=250",
-        );
-        require(
-            problems,
-            self.side_knee > 0.0 && self.side_knee <= 10.0,
-            "egomotion.side_knee",
-            "must be above 0 and at most 10",
-        );
-        require(
-            problems,
-            self.robust_px > 0.0 && self.robust_px <= 100.0,
-            "egomotion.robust_px",
-            "must be above 0 and at most 100",
-        );
+        check(Self::CHECKS, self, problems);
     }
 }
 
@@ -149,10 +151,10 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    type Setting = (&'static str, fn(&mut EgomotionConfig, f64), &'static [f64], &'static [f64]);
+    type Case = (&'static str, fn(&mut EgomotionConfig, f64), &'static [f64], &'static [f64]);
     const SHARE: (&[f64], &[f64]) = (&[0.0, 1.0], &[-0.01, 1.01, f64::NAN]);
     const ABOVE_0: (&[f64], &[f64]) = (&[1e-9, 1e9], &[0.0, -1.0, f64::NAN, f64::INFINITY]);
-    const SETTINGS: [Setting; 13] = [
+    const CASES: [Case; 13] = [
         (
             "egomotion.samples",
             |config, value| config.samples = value as u16,
@@ -235,7 +237,7 @@ mod tests {
 
     #[test]
     fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
-        for (key, change, good, bad) in SETTINGS {
+        for (key, change, good, bad) in CASES {
             let problems = |value: f64| {
                 let (mut problems, mut config) = (Problems::new(), EgomotionConfig::default());
                 change(&mut config, value);

@@ -1,6 +1,6 @@
 //! Why a mapper cannot be made, and why it refuses a frame.
 
-use crate::{memory::SlabError, problem::Problem, rectify::RectifierError};
+use crate::{memory::SlabError, rectify::RectifierError, settings::Problem};
 use core::fmt;
 
 /// Least image width the matchers can use, px.

@@ -188,9 +188,9 @@ impl Localization<'_, '_> {
             &rig,
             matches,
             &report.t_current_previous,
-            config.explained_px,
+            icp::EXPLAINED_PX,
         );
-        report.check_matches(config);
+        report.check_matches();
         self.camera.advance(report.motion());
         report
     }

@@ -11,7 +11,7 @@ use super::Mapper;
 use crate::{
     geometry::{StereoRig, Transform},
     objects::PosedObject,
-    planning::{BoxFit, Grid, MovingBox, Planning, PlanningReport, Sight, crossings},
+    planning::{BoxFit, Grid, MARGIN_PX, MovingBox, Planning, PlanningReport, Sight, crossings},
     tracking::{MotionState, Track},
 };
 
@@ -191,6 +191,6 @@ impl<'s> Mapper<'s> {
             of(&moving.center_m.map(f64::from)) - of(&camera)
         });
         let square = x * x + y * y;
-        (square * f64::from(self.config.planning.margin_px) / rig.focal_baseline_px_m()) as f32
+        (square * f64::from(MARGIN_PX) / rig.focal_baseline_px_m()) as f32
     }
 }

@@ -41,11 +41,7 @@ const REGISTRATION: IcpConfig = IcpConfig {
     distance_m: 0.1,
     noise_px: 0.3,
     pairs_min: 0.5,
-    held_min: 0.0005,
     step_max_m: 2.0,
-    step_max_rad: 0.35,
-    explained_min: 0.0,
-    explained_px: 5.0,
 };
 
 impl Localization<'_, '_> {

@@ -1,6 +1,10 @@
 //! Settings of the loop.
 
-use crate::problem::{Problems, require};
+use crate::settings::{
+    Problems, Range, Rule, Setting,
+    Value::{Choice, U32},
+    check, choices, rules,
+};
 
 /// Where the camera's motion comes from, unless a frame brings its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,6 +20,8 @@ pub enum MotionSource {
     /// From depth against the map: the baseline of [`crate::egomotion::icp`].
     Icp,
 }
+
+choices! { MotionSource { "stereo" = Stereo, "icp" = Icp } }
 
 /// Settings of the loop over frames.
 ///
@@ -34,11 +40,9 @@ pub enum MotionSource {
     serde(default, deny_unknown_fields)
 )]
 pub struct MapperConfig {
-    /// Where the camera's motion comes from; `stereo`.
+    /// Source of the camera's motion.
     pub egomotion: MotionSource,
-    /// Frames from one that is fused to the next: the camera and all tracks are followed in every
-    /// frame, maps grow in each `fuse_every`-th alone, and pruning's lag counts those. 1 and more;
-    /// 1.
+    /// Frames from one that is fused to the next.
     pub fuse_every: u32,
 }
 
@@ -48,9 +52,29 @@ impl Default for MapperConfig {
     }
 }
 
+type Row = Setting<MapperConfig>;
+
 impl MapperConfig {
-    /// Notes what is wrong with the settings.
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("mapper.egomotion", "", |c| Choice(&mut c.egomotion)).text(
+            "Source of the camera's motion: matches over two stereo pairs, or depth against the \
+             map.",
+        ),
+        Row::user("mapper.fuse_every", "frames", |c| U32(&mut c.fuse_every))
+            .range(Range::AtLeast(1.0))
+            .text(
+                "Frames from one that is fused to the next. The camera and all tracks are followed \
+                 in every frame; maps grow in each `fuse_every`-th only, and pruning's lag counts \
+                 those.",
+            ),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Notes everything wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        require(problems, self.fuse_every >= 1, "mapper.fuse_every", "must be 1 or more");
+        check(Self::CHECKS, self, problems);
     }
 }

@@ -29,6 +29,9 @@ use crate::{
 const HALF_DIAGONAL: f32 = 0.866_025_4;
 /// Units of disparity a pixel.
 const DISPARITY_ONE: f32 = 256.0;
+/// Disparity error to be expected, px: a cell is free where the surface behind it is seen beyond it
+/// in spite of such an error.
+pub(crate) const MARGIN_PX: f32 = 0.5;
 
 /// What a frame shows, as free space needs it.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +111,7 @@ impl<'a> Rays<'a> {
             near_m: config.near_m,
             far_m: config.far_m,
             half_m: HALF_DIAGONAL * cell_m as f32,
-            margin_q8: config.margin_px * DISPARITY_ONE,
+            margin_q8: MARGIN_PX * DISPARITY_ONE,
             focal_baseline_q8: sight.rig.focal_baseline_px_m() as f32 * DISPARITY_ONE,
         }
     }

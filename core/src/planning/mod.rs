@@ -41,6 +41,7 @@ pub use cells::{CellState, MAX_SIDE_CELLS};
 pub use config::{MAX_CELL_VOXELS, PlanningConfig};
 pub use distance::{DistanceField, NO_OBSTACLE};
 pub use fields::{Distance, Limits};
+pub(crate) use free_space::MARGIN_PX;
 pub use free_space::Sight;
 pub use grid::{Cell, Grid};
 pub use ground::Column;

@@ -1,13 +1,17 @@
 //! Settings of the scene flow.
 
-use crate::problem::{Problems, require};
+use crate::settings::{
+    Problems, Range, Rule, Setting,
+    Value::{Bool, U8, U16, U32},
+    check, rules,
+};
 
 /// Most features of an image by default: as many as the presets of [`crate::Capacity`] have memory
 /// for.
 pub(crate) const FEATURES_MAX: usize = 20_000;
 
 /// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement and no more
-/// features than motion gains by.
+/// features than motion gains by; [`SceneFlowConfig::SETTINGS`] has the ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -15,30 +19,19 @@ pub(crate) const FEATURES_MAX: usize = 20_000;
     serde(default, deny_unknown_fields)
 )]
 pub struct SceneFlowConfig {
-    /// Smallest filter response of a feature, grey levels times filter weights; 1..=2000. DynSLAM:
-    /// 50, which finds a third more features and no better motion.
+    /// Smallest filter response of a feature, grey levels times filter weights.
     pub response_min: u16,
-    /// Most features of an image, 100..=1,000,000; of more the strongest are used, and no more than
-    /// the capacity holds. 20,000 (docs/decisions/0048-the-strongest-of-each-cell.md); DynSLAM:
-    /// all.
+    /// Most features of an image.
     pub features_max: u32,
-    /// Farthest a feature moves between two frames or two cameras, px in each direction; 16..=500.
-    /// DynSLAM: 200.
+    /// Farthest that a feature moves between two frames or two cameras, px in each direction.
     pub search_radius_px: u16,
-    /// Rows two stereo partners may differ by; 0..=8. DynSLAM: 2.
+    /// Most rows by which two stereo partners differ.
     pub stereo_tolerance_px: u8,
-    /// Disparity neighbours may differ by and still support each other, px; above 0. DynSLAM: 5.
-    pub disparity_tolerance_px: f32,
-    /// Flow neighbours may differ by, in each direction, and still support each other, px; above 0.
-    /// DynSLAM: 5.
-    pub flow_tolerance_px: f32,
-    /// Neighbours that must support a match; 0 keeps all; 0..=8. DynSLAM: 4.
+    /// Fewest neighbours that must support a match.
     pub support_min: u8,
-    /// Whether matches are refined below the pixel. DynSLAM: no.
+    /// Refinement of matches below the pixel.
     pub refine: bool,
-    /// Side of the cells from which matches are selected for egomotion, px; 16..=500. DynSLAM: 50.
-    pub bucket_px: u16,
-    /// Matches selected per cell; 1..=64. DynSLAM: 15.
+    /// Most matches selected per cell.
     pub bucket_matches: u8,
 }
 
@@ -49,68 +42,52 @@ impl Default for SceneFlowConfig {
             features_max: FEATURES_MAX as u32,
             search_radius_px: 200,
             stereo_tolerance_px: 2,
-            disparity_tolerance_px: 5.0,
-            flow_tolerance_px: 5.0,
             support_min: 4,
             refine: true,
-            bucket_px: 50,
             bucket_matches: 15,
         }
     }
 }
 
+type Row = Setting<SceneFlowConfig>;
+
 impl SceneFlowConfig {
-    /// Notes what is wrong with the settings.
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::expert("scene_flow.response_min", "", |c| U16(&mut c.response_min))
+            .range(Range::Within(1.0, 2000.0))
+            .published("50, which finds a third more features and no better motion")
+            .text("Smallest filter response of a feature, grey levels times filter weights."),
+        Row::user("scene_flow.features_max", "", |c| U32(&mut c.features_max))
+            .range(Range::Within(100.0, 1e6))
+            .published("all")
+            .text(
+                "Most features of an image; of more, the strongest of each part of the image are \
+                 used, and no more than the capacity holds \
+                 ([decision 48](decisions/0048-the-strongest-of-each-cell.md)).",
+            ),
+        Row::user("scene_flow.search_radius_px", "px", |c| U16(&mut c.search_radius_px))
+            .range(Range::Within(16.0, 500.0))
+            .text("Farthest that a feature moves between two frames or two cameras, each way."),
+        Row::user("scene_flow.stereo_tolerance_px", "px", |c| U8(&mut c.stereo_tolerance_px))
+            .range(Range::Within(0.0, 8.0))
+            .text("Most rows by which two stereo partners differ."),
+        Row::expert("scene_flow.support_min", "", |c| U8(&mut c.support_min))
+            .range(Range::Within(0.0, 8.0))
+            .text("Fewest neighbours that must support a match; 0 keeps all."),
+        Row::expert("scene_flow.refine", "", |c| Bool(&mut c.refine))
+            .published("false")
+            .text("Refinement of matches below the pixel."),
+        Row::expert("scene_flow.bucket_matches", "", |c| U8(&mut c.bucket_matches))
+            .range(Range::Within(1.0, 64.0))
+            .text("Most matches selected for egomotion per cell of 50 px."),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Notes everything wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(
-            problems,
-            (1..=2000).contains(&self.response_min),
-            "scene_flow.response_min",
-            "must be in 1..=2000",
-        );
-        require(
-            problems,
-            (100..=1_000_000).contains(&self.features_max),
-            "scene_flow.features_max",
-            "must be in 100..=1000000",
-        );
-        require(
-            problems,
-            (16..=500).contains(&self.search_radius_px),
-            "scene_flow.search_radius_px",
-            "must be in 16..=500",
-        );
-        require(
-            problems,
-            self.stereo_tolerance_px <= 8,
-            "scene_flow.stereo_tolerance_px",
-            "must be in 0..=8",
-        );
-        require(
-            problems,
-            positive(self.disparity_tolerance_px),
-            "scene_flow.disparity_tolerance_px",
-            "must be above 0",
-        );
-        require(
-            problems,
-            positive(self.flow_tolerance_px),
-            "scene_flow.flow_tolerance_px",
-            "must be above 0",
-        );
-        require(problems, self.support_min <= 8, "scene_flow.support_min", "must be in 0..=8");
-        require(
-            problems,
-            (16..=500).contains(&self.bucket_px),
-            "scene_flow.bucket_px",
-            "must be in 16..=500",
-        );
-        require(
-            problems,
-            (1..=64).contains(&self.bucket_matches),
-            "scene_flow.bucket_matches",
-            "must be in 1..=64",
-        );
+        check(Self::CHECKS, self, problems);
     }
 }

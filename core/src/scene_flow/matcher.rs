@@ -25,6 +25,8 @@ use crate::{
 
 /// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
 const SPARSE_CELL_PX: usize = 24;
+/// Side of the cells from which matches are selected for egomotion, px, as in DynSLAM.
+const BUCKET_PX: usize = 50;
 
 /// Features and matches over the last two frames.
 #[derive(Debug)]
@@ -329,7 +331,7 @@ impl<'s> FlowMatcher<'s> {
         self.refine_supported(config, size, closed, executor);
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
-        let shape = Shape::new(size[0], size[1], usize::from(config.bucket_px).max(CELL_MIN_PX));
+        let shape = Shape::new(size[0], size[1], BUCKET_PX);
         let (refined, score) = (clipped(self.refined, ..self.refined_len), &*self.score);
         self.selection_len = select(
             refined,

@@ -19,6 +19,10 @@ use super::{
 const NEIGHBOURS: usize = 8;
 /// Largest distance to a neighbour, in cells.
 const RINGS: usize = 4;
+/// Largest difference of the disparities of neighbours that support each other, px, as in DynSLAM.
+const DISPARITY_TOLERANCE_PX: f32 = 5.0;
+/// Largest difference of their flow in each direction, px, as in DynSLAM.
+const FLOW_TOLERANCE_PX: f32 = 5.0;
 
 /// What must agree: disparity and flow in u and v, px. The fourth keeps rows of four.
 pub(super) type Motion = [f32; 4];
@@ -72,8 +76,7 @@ fn is_supported(
             };
             let run = clipped(motion, from as usize..to as usize);
             neighbours += run.len();
-            agreeing +=
-                run.iter().map(|other| usize::from(agree(own, *other, config))).sum::<usize>();
+            agreeing += run.iter().map(|other| usize::from(agree(own, *other))).sum::<usize>();
         }
         if neighbours > NEIGHBOURS {
             break;
@@ -83,9 +86,9 @@ fn is_supported(
     agreeing > needed && 2 * (agreeing - 1) >= neighbours - 1
 }
 
-fn agree(a: Motion, b: Motion, config: &SceneFlowConfig) -> bool {
+fn agree(a: Motion, b: Motion) -> bool {
     let near = |a: f32, b: f32, tolerance: f32| (a - b < tolerance) & (b - a < tolerance);
-    near(a[0], b[0], config.disparity_tolerance_px)
-        & near(a[1], b[1], config.flow_tolerance_px)
-        & near(a[2], b[2], config.flow_tolerance_px)
+    near(a[0], b[0], DISPARITY_TOLERANCE_PX)
+        & near(a[1], b[1], FLOW_TOLERANCE_PX)
+        & near(a[2], b[2], FLOW_TOLERANCE_PX)
 }

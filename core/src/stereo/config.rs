@@ -1,23 +1,26 @@
 //! Every parameter of the stereo matcher, with the values of the published presets.
 
-use crate::problem::{Problems, require};
+use crate::settings::{
+    Problems, Range, Rule, Setting,
+    Value::{Bool, Choice, F32, U8, U16, U32, Usize},
+    check, choices, rules,
+};
 
 /// Largest disparity the matcher can represent, px.
 pub const DISPARITY_LIMIT: u16 = 255;
-/// Smallest distance between two support candidates, px: the bound on support points follows from
-/// it.
-pub const MIN_CANDIDATE_STEP: usize = 5;
-/// Widest window to each side of a support point in which alike ones are counted, candidates.
-pub(super) const MAX_PLAUSIBLE_WINDOW: usize = 16;
+/// Distance between two support candidates, px, as published: the bound on support points follows
+/// from it.
+pub const CANDIDATE_STEP: usize = 5;
 /// Smallest cell of the grid prior, px: the bound on cells follows from it.
 pub const MIN_GRID_SIZE: usize = 10;
 /// Most passes of the adaptive mean.
 const MEAN_PASSES_MAX: u8 = 4;
 /// Widest search around the prior plane, px.
 pub const MAX_PLANE_RADIUS: usize = 16;
+/// Widest gap, px.
+const GAP_MAX: f32 = 4096.0;
 
-/// What fills a gap whose ends are two surfaces: they differ by [`StereoConfig::gap_discontinuity`]
-/// or more.
+/// Filling of a gap whose ends are two surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -32,11 +35,13 @@ pub enum GapEnds {
     Farther,
 }
 
+choices! { GapEnds { "surface" = Surface, "farther" = Farther } }
+
 /// Parameters of ELAS. [`StereoConfig::robotics`] is the authors' preset for driving,
 /// [`StereoConfig::dynslam`] DynSLAM's, which fills wider gaps; [`Default`] trusts the images more
 /// and the planes between support points less (docs/decisions/0049-still-less-trust-in-planes.md),
 /// fills gaps only within a surface, wide ones too (docs/decisions/0028-gaps-within-a-surface.md),
-/// and asks less of a support match.
+/// and asks less of a support match. [`StereoConfig::SETTINGS`] has the ranges.
 ///
 /// ```
 /// use dynvox_core::stereo::StereoConfig;
@@ -52,71 +57,37 @@ pub enum GapEnds {
     serde(default, deny_unknown_fields)
 )]
 pub struct StereoConfig {
-    /// Largest disparity searched, px, 10..=255. Published: 255.
+    /// Largest disparity searched, px.
     pub disparity_max: u16,
-    /// A support match must cost less than this share of the second best, above 0, at most 1. 0.9
-    /// (docs/decisions/0035-support-matches-below-nine-tenths.md); published: 0.85.
+    /// Largest cost of a support match, as a share of the second best.
     pub support_ratio: f32,
-    /// Least texture of a support point's descriptor: sum of gradient magnitudes over its 16
-    /// samples. Published: 10.
-    pub support_texture: u16,
-    /// Distance between support candidates, px, 5..=64. Published: 5.
-    pub candidate_step: usize,
-    /// Half the window in which a support point needs company, candidates, 1..=16. Published: 5.
-    pub plausible_window: usize,
-    /// Company is what differs by at most this, px. Published: 5.
-    pub plausible_threshold: u16,
-    /// Least number of support points in the window, itself included. Published: 5.
-    pub plausible_min: u16,
-    /// A support point between two alike ones at most so many candidates away, on a row or a
-    /// column, is redundant; 0 keeps all. 8; published: 5.
+    /// Reach within which a support point between two alike ones is redundant, candidates.
     pub redundant_distance: usize,
-    /// Alike is what differs by at most this, px. Published: 1.
-    pub redundant_threshold: u16,
-    /// Side of a cell of the grid prior, px, 10..=256. 16, two vectors; published: 20.
+    /// Side of a cell of the grid prior, px.
     pub grid_size: usize,
-    /// Weight of the descriptor distance against the prior (beta), above 0. Published: 0.02.
-    pub beta: f32,
-    /// Uniform share of the prior (gamma), above 0: the larger, the less a disparity far from the
-    /// plane costs. 10; published: 3.
+    /// Uniform share of the prior (gamma).
     pub gamma: f32,
-    /// Standard deviation of disparities about the prior plane (sigma), px, above 0. Published: 1.
-    pub sigma: f32,
-    /// Disparities searched to each side of the prior plane, in sigmas, 0..=16. 1; published: 2.
+    /// Disparities searched to each side of the prior plane, px: sigma is 1 px.
     pub plane_radius_sigmas: f32,
-    /// A triangle steeper than this bridges two surfaces: its plane is searched but not preferred.
-    /// Disparity per px, 0..=1000. Own choice: 0.7; without a limit 4.8 instead of 4.5 % are off on
-    /// KITTI 2012.
-    pub plane_slope_max: f32,
-    /// Least texture of a descriptor that is matched densely. Published: 1.
-    pub match_texture: u16,
-    /// Whether disparities are refined to fractions of a pixel before they are smoothed. Published:
-    /// no. On KITTI 2012 it takes the median error from 0.268 to 0.257 px and the share off by more
-    /// than 3 px from 4.8 to 4.5 %; on smooth surfaces it halves the error.
+    /// Refinement of disparities to fractions of a pixel before they are smoothed.
     pub subpixel: bool,
-    /// Largest difference between the disparities of left and right image, px. 1; published: 2.
+    /// Largest difference between the disparities of left and right image, px.
     pub consistency_threshold: u16,
-    /// Neighbours that differ by at most this belong to one segment, px. Published: 1.
+    /// Largest difference of neighbours that belong to one segment, px.
     pub speckle_similarity: u16,
-    /// Segments smaller than this are removed, px; 0 or 1 keeps all. Published: 200.
+    /// Size below which segments are removed, px.
     pub speckle_size: u32,
-    /// Lone segments smaller than this share of the image are removed as well: no pixel of another
-    /// one that is as similar is within `lone_gap` px along a row or column. 0..=1; 0 keeps all.
-    /// 0.002 (docs/decisions/0043-lone-segments.md); published: 0.
+    /// Size below which lone segments are removed, share of the image.
     pub lone_share: f32,
-    /// Widest gap to the next segment of the same surface, px: a segment with wider ones is lone.
-    /// No more than `gap_width` counts. 70.
+    /// Widest gap between a segment and the next of its surface, px.
     pub lone_gap: usize,
-    /// Widest gap filled along rows and columns, px; 0 fills none. 70; published: 3; DynSLAM: 21.
+    /// Widest gap filled along rows and columns, px.
     pub gap_width: usize,
-    /// Ends of a gap that differ by less than this are one surface, px. Published: 3.
-    pub gap_discontinuity: u16,
-    /// What fills a gap between two surfaces. Nothing; published: the farther one.
+    /// Filling of a gap between two surfaces.
     pub gap_ends: GapEnds,
-    /// How often an edge-preserving mean smooths the result, 0..=4. It also yields fractions of a
-    /// pixel. 2 (docs/decisions/0043-lone-segments.md); published: 1.
+    /// Passes of an edge-preserving mean over the result.
     pub adaptive_mean: u8,
-    /// Whether a 3 x 3 median follows. Published: no.
+    /// A 3 x 3 median at the end.
     pub median: bool,
 }
 
@@ -126,20 +97,10 @@ impl StereoConfig {
         Self {
             disparity_max: 255,
             support_ratio: 0.85,
-            support_texture: 10,
-            candidate_step: 5,
-            plausible_window: 5,
-            plausible_threshold: 5,
-            plausible_min: 5,
             redundant_distance: 5,
-            redundant_threshold: 1,
             grid_size: 20,
-            beta: 0.02,
             gamma: 3.0,
-            sigma: 1.0,
             plane_radius_sigmas: 2.0,
-            plane_slope_max: 0.7,
-            match_texture: 1,
             subpixel: true,
             consistency_threshold: 2,
             speckle_similarity: 1,
@@ -147,7 +108,6 @@ impl StereoConfig {
             lone_share: 0.0,
             lone_gap: 70,
             gap_width: 3,
-            gap_discontinuity: 3,
             gap_ends: GapEnds::Farther,
             adaptive_mean: 1,
             median: false,
@@ -161,61 +121,12 @@ impl StereoConfig {
 
     /// Notes everything that is wrong.
     pub fn validate(&self, problems: &mut Problems) {
-        let mut check = |satisfied, key, rule| require(problems, satisfied, key, rule);
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        check(
-            (10..=DISPARITY_LIMIT).contains(&self.disparity_max),
-            "stereo.disparity_max",
-            "must be within 10..=255 px",
-        );
-        check(
-            positive(self.support_ratio) && self.support_ratio <= 1.0,
-            "stereo.support_ratio",
-            "must be above 0 and at most 1",
-        );
-        check(
-            (MIN_CANDIDATE_STEP..=64).contains(&self.candidate_step),
-            "stereo.candidate_step",
-            "must be within 5..=64 px",
-        );
-        check(
-            (1..=MAX_PLAUSIBLE_WINDOW).contains(&self.plausible_window),
-            "stereo.plausible_window",
-            "must be within 1..=16 candidates",
-        );
-        check(
-            self.redundant_distance <= 64,
-            "stereo.redundant_distance",
-            "must be at most 64 candidates",
-        );
-        check(
-            (MIN_GRID_SIZE..=256).contains(&self.grid_size),
-            "stereo.grid_size",
-            "must be within 10..=256 px",
-        );
-        check(positive(self.beta), "stereo.beta", "must be above 0");
-        check(positive(self.gamma), "stereo.gamma", "must be above 0");
-        check(positive(self.sigma), "stereo.sigma", "must be above 0 px");
-        let radius = self.sigma * self.plane_radius_sigmas;
-        check(
-            (0.0..=MAX_PLANE_RADIUS as f32).contains(&radius),
-            "stereo.plane_radius_sigmas",
-            "times sigma must be within 0..=16 px",
-        );
-        check(
-            (0.0..=1e3).contains(&self.plane_slope_max),
-            "stereo.plane_slope_max",
-            "must be within 0..=1000",
-        );
-        check((0.0..=1.0).contains(&self.lone_share), "stereo.lone_share", "must be within 0..=1");
-        check(self.lone_gap <= 4_096, "stereo.lone_gap", "must be at most 4096 px");
-        check(self.gap_width <= 4_096, "stereo.gap_width", "must be at most 4096 px");
-        check(self.adaptive_mean <= MEAN_PASSES_MAX, "stereo.adaptive_mean", "must be at most 4");
+        check(Self::CHECKS, self, problems);
     }
 
     /// Disparities searched to each side of the prior plane, px.
     pub(super) fn plane_radius(&self) -> usize {
-        libm::ceilf(self.sigma * self.plane_radius_sigmas) as usize
+        libm::ceilf(self.plane_radius_sigmas) as usize
     }
 }
 
@@ -235,4 +146,93 @@ impl Default for StereoConfig {
             ..Self::robotics()
         }
     }
+}
+
+type Row = Setting<StereoConfig>;
+
+impl StereoConfig {
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("stereo.disparity_max", "px", |c| U16(&mut c.disparity_max))
+            .range(Range::Within(10.0, DISPARITY_LIMIT as f32))
+            .text("Largest disparity searched."),
+        Row::expert("stereo.support_ratio", "", |c| F32(&mut c.support_ratio))
+            .range(Range::AboveTo(0.0, 1.0))
+            .published("0.85")
+            .text(
+                "A support match must cost less than this share of the second best \
+                 ([decision 35](decisions/0035-support-matches-below-nine-tenths.md)).",
+            ),
+        Row::expert("stereo.redundant_distance", "candidates", |c| {
+            Usize(&mut c.redundant_distance)
+        })
+        .range(Range::Within(0.0, 64.0))
+        .published("5")
+        .text(
+            "A support point between two alike ones at most so far away, on a row or a column, \
+                 is redundant; 0 keeps all.",
+        ),
+        Row::expert("stereo.grid_size", "px", |c| Usize(&mut c.grid_size))
+            .range(Range::Within(MIN_GRID_SIZE as f32, 256.0))
+            .published("20")
+            .text("Side of a cell of the grid prior. The default is two vectors."),
+        Row::expert("stereo.gamma", "", |c| F32(&mut c.gamma))
+            .range(Range::POSITIVE)
+            .published("3")
+            .text(
+                "Uniform share of the prior (gamma): the larger, the less a disparity far from the \
+                 plane costs.",
+            ),
+        Row::expert("stereo.plane_radius_sigmas", "sigmas", |c| F32(&mut c.plane_radius_sigmas))
+            .range(Range::Within(0.0, MAX_PLANE_RADIUS as f32))
+            .published("2")
+            .text("Disparities searched to each side of the prior plane; sigma is 1 px."),
+        Row::expert("stereo.subpixel", "", |c| Bool(&mut c.subpixel)).published("false").text(
+            "Refinement of disparities to fractions of a pixel before they are smoothed. On KITTI \
+             2012 it takes the median error from 0.268 to 0.257 px and the share off by more than \
+             3 px from 4.8 to 4.5 %; on smooth surfaces it halves the error.",
+        ),
+        Row::expert("stereo.consistency_threshold", "px", |c| U16(&mut c.consistency_threshold))
+            .published("2")
+            .text("Largest difference between the disparities of left and right image."),
+        Row::expert("stereo.speckle_similarity", "px", |c| U16(&mut c.speckle_similarity))
+            .text("Largest difference of neighbours that belong to one segment."),
+        Row::user("stereo.speckle_size", "px", |c| U32(&mut c.speckle_size))
+            .text("Segments of fewer pixels are removed; 0 or 1 keeps all."),
+        Row::expert("stereo.lone_share", "", |c| F32(&mut c.lone_share))
+            .range(Range::SHARE)
+            .published("0")
+            .text(
+                "Lone segments smaller than this share of the image are removed as well: no pixel \
+                 of another one that is as similar is within `lone_gap` along a row or column; 0 \
+                 keeps all ([decision 43](decisions/0043-lone-segments.md)).",
+            ),
+        Row::expert("stereo.lone_gap", "px", |c| Usize(&mut c.lone_gap))
+            .range(Range::Within(0.0, GAP_MAX))
+            .text(
+                "Widest gap to the next segment of the same surface: a segment with wider ones is \
+                 lone. No more than `gap_width` counts.",
+            ),
+        Row::user("stereo.gap_width", "px", |c| Usize(&mut c.gap_width))
+            .range(Range::Within(0.0, GAP_MAX))
+            .published("3; DynSLAM: 21")
+            .text("Widest gap filled along rows and columns; 0 fills none."),
+        Row::expert("stereo.gap_ends", "", |c| Choice(&mut c.gap_ends)).published("farther").text(
+            "Filling of a gap between two surfaces, whose ends differ by 3 px or more: \
+                 nothing, or the farther one \
+                 ([decision 28](decisions/0028-gaps-within-a-surface.md)).",
+        ),
+        Row::expert("stereo.adaptive_mean", "passes", |c| U8(&mut c.adaptive_mean))
+            .range(Range::Within(0.0, MEAN_PASSES_MAX as f32))
+            .published("1")
+            .text(
+                "Passes of an edge-preserving mean over the result; it also yields fractions of a \
+                 pixel.",
+            ),
+        Row::expert("stereo.median", "", |c| Bool(&mut c.median))
+            .text("A 3 x 3 median at the end."),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
 }

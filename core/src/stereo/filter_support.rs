@@ -9,12 +9,20 @@ use crate::{
     slices::{clipped, clipped_mut, padded},
 };
 
-use super::{StereoConfig, config::MAX_PLAUSIBLE_WINDOW, support::NO_MATCH};
+use super::{StereoConfig, support::NO_MATCH};
 
 /// Candidates looked at together.
 const BLOCK: usize = 64;
 /// Those, and the widest window to both sides of them.
-const AROUND: usize = BLOCK + 2 * MAX_PLAUSIBLE_WINDOW;
+const AROUND: usize = BLOCK + 2 * PLAUSIBLE_WINDOW;
+/// Half the window in which a support point needs company, candidates, as published.
+const PLAUSIBLE_WINDOW: usize = 5;
+/// Largest difference of disparities that are company, px, as published.
+const PLAUSIBLE_THRESHOLD: u16 = 5;
+/// Fewest support points in the window, itself included, as published.
+const PLAUSIBLE_MIN: u16 = 5;
+/// Largest difference of disparities that make a point between them redundant, px, as published.
+const REDUNDANT_THRESHOLD: u16 = 1;
 
 /// Removes from a grid of candidates, `columns` wide, the implausible and then the redundant
 /// points; says how many of each went.
@@ -34,23 +42,17 @@ impl Work for FilterSupport<'_> {
         let Self { config, grid, columns, scratch } = self;
         let scratch = clipped_mut(scratch, ..grid.len());
         [
-            remove_implausible(config, grid, columns, scratch),
+            remove_implausible(grid, columns, scratch),
             remove_redundant(config, grid, columns, scratch),
         ]
     }
 }
 
-/// Removes the points with fewer than `plausible_min` alike ones in the window about them, all
+/// Removes the points with fewer than [`PLAUSIBLE_MIN`] alike ones in the window about them, all
 /// tested before any is removed.
 #[inline(always)]
-fn remove_implausible(
-    config: &StereoConfig,
-    grid: &mut [i16],
-    width: usize,
-    before: &mut [i16],
-) -> u32 {
-    let (window, threshold) =
-        (config.plausible_window.min(MAX_PLAUSIBLE_WINDOW), config.plausible_threshold);
+fn remove_implausible(grid: &mut [i16], width: usize, before: &mut [i16]) -> u32 {
+    let (window, threshold) = (PLAUSIBLE_WINDOW, PLAUSIBLE_THRESHOLD);
     let width = width.max(1);
     before.iter_mut().zip(&*grid).for_each(|(to, from)| *to = *from);
     let mut removed = 0;
@@ -69,8 +71,7 @@ fn remove_implausible(
                     }
                 }
                 for (lonely, (&found, &point)) in lonely.iter_mut().zip(found.iter().zip(&here)) {
-                    *lonely =
-                        u16::from(found < config.plausible_min) & u16::from(point != NO_MATCH);
+                    *lonely = u16::from(found < PLAUSIBLE_MIN) & u16::from(point != NO_MATCH);
                 }
                 // Most have found enough after a row or two.
                 if lonely.iter().fold(0, |any, lonely| any | lonely) == 0 {
@@ -107,8 +108,7 @@ fn remove_redundant(
 /// Removes the points that lie between two alike ones on their column, from the top down.
 #[inline(always)]
 fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
-    let (reach, threshold, width) =
-        (config.redundant_distance, config.redundant_threshold, width.max(1));
+    let (reach, threshold, width) = (config.redundant_distance, REDUNDANT_THRESHOLD, width.max(1));
     let mut removed = 0;
     for start in (0..grid.len()).step_by(width) {
         let Some((above, rest)) = grid.split_at_mut_checked(start) else { break };
@@ -190,23 +190,21 @@ mod tests {
         }
         grid[15 * 20 + 15] = 30;
         grid[2 * 20 + 4] = 90;
-        let removed = remove_implausible(&StereoConfig::robotics(), &mut grid, 20, &mut [0; 400]);
+        let removed = remove_implausible(&mut grid, 20, &mut [0; 400]);
         assert_eq!(removed, 2);
         assert_eq!(grid.iter().filter(|&&d| d != NO_MATCH).count(), 5);
     }
 
     #[test]
     fn the_implausible_are_those_whose_whole_window_has_too_few_alike() {
-        let config = StereoConfig::robotics();
-        let (window, threshold) = (config.plausible_window as i32, config.plausible_threshold);
+        let (window, threshold) = (PLAUSIBLE_WINDOW as i32, PLAUSIBLE_THRESHOLD);
         let mut random = Random::new(72);
         for (width, height, sparse) in [(23i32, 17i32, 4), (40, 9, 9), (5, 30, 2)] {
             let before: Vec<i16> = (0..width * height)
                 .map(|_| if random.below(sparse) > 0 { NO_MATCH } else { random.below(60) as i16 })
                 .collect();
             let mut grid = before.clone();
-            let removed =
-                remove_implausible(&config, &mut grid, width as usize, &mut vec![0; before.len()]);
+            let removed = remove_implausible(&mut grid, width as usize, &mut vec![0; before.len()]);
             let at = |u: i32, v: i32| before[(v * width + u) as usize];
             for (u, v) in (0..width)
                 .flat_map(|u| (0..height).map(move |v| (u, v)))
@@ -220,8 +218,7 @@ mod tests {
                         at(x, y) != NO_MATCH && at(x, y).abs_diff(at(u, v)) <= threshold
                     })
                     .count();
-                let expected =
-                    if alike < usize::from(config.plausible_min) { NO_MATCH } else { at(u, v) };
+                let expected = if alike < usize::from(PLAUSIBLE_MIN) { NO_MATCH } else { at(u, v) };
                 assert_eq!(grid[(v * width + u) as usize], expected);
             }
             assert_eq!(removed as usize, before.iter().zip(&grid).filter(|(a, b)| a != b).count());
@@ -266,7 +263,7 @@ mod tests {
                     let here = expected[at(i)];
                     let alike = |k: usize| {
                         expected[at(k)] != NO_MATCH
-                            && expected[at(k)].abs_diff(here) <= config.redundant_threshold
+                            && expected[at(k)].abs_diff(here) <= REDUNDANT_THRESHOLD
                     };
                     let reach = config.redundant_distance;
                     if (i.saturating_sub(reach)..i).any(alike)

@@ -4,7 +4,7 @@ mod steps;
 
 use super::{
     MAX_IMAGE_SIZE, MIN_IMAGE_SIZE, StereoConfig, StereoReport, StereoStatus, StereoStep,
-    config::{MIN_CANDIDATE_STEP, MIN_GRID_SIZE},
+    config::{CANDIDATE_STEP, MIN_GRID_SIZE},
     delaunay::Triangulation,
     descriptor::Descriptor,
     prior,
@@ -17,7 +17,7 @@ use crate::{
     image::{DISPARITY_ONE_PX, InvalidPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Executor, Work, each, zip2},
-    problem::Problems,
+    settings::Problems,
 };
 
 /// Descriptor rows per band: support points need two of each image.
@@ -77,8 +77,8 @@ impl core::fmt::Debug for StereoMatcher<'_> {
 
 /// Support points there can be: one per candidate.
 const fn most_points(capacity: &Capacity) -> usize {
-    support::candidates(capacity.image_width, MIN_CANDIDATE_STEP)
-        * support::candidates(capacity.image_height, MIN_CANDIDATE_STEP)
+    support::candidates(capacity.image_width, CANDIDATE_STEP)
+        * support::candidates(capacity.image_height, CANDIDATE_STEP)
 }
 
 /// Cells of the grid prior there can be.

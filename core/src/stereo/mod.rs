@@ -22,7 +22,7 @@
 //! pixel and 260 a column (14.8 at KITTI size). [`StereoMatcher::bytes`] is exact. No array on the
 //! stack exceeds 600 bytes.
 //!
-//! **Bounds.** Support points: one per candidate, at least 5 px apart ([`MIN_CANDIDATE_STEP`]), so
+//! **Bounds.** Support points: one per candidate, at least 5 px apart ([`CANDIDATE_STEP`]), so
 //! they always fit, as do their triangles, at most two a point. Two that meet at one pixel of the
 //! right image become one, counted. Larger images than the capacity's are refused.
 //!
@@ -77,7 +77,7 @@ mod support;
 mod tests;
 
 pub use config::{
-    DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_CANDIDATE_STEP, MIN_GRID_SIZE, StereoConfig,
+    CANDIDATE_STEP, DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_GRID_SIZE, StereoConfig,
 };
 pub(crate) use matcher::RectifiedPair;
 pub use matcher::StereoMatcher;

@@ -226,6 +226,9 @@ pub(super) fn mark_cells(
     }
 }
 
+/// Weight of the descriptor distance against the prior (beta), as published.
+const BETA: f32 = 0.02;
+
 /// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 /
 /// 2 sigma^2)) / beta at k px from it, lowered so that k = 0 costs nothing.
 pub(super) struct PlaneCost {
@@ -246,9 +249,9 @@ impl PlaneCost {
     /// The tables for a valid configuration.
     pub fn new(config: &StereoConfig) -> Self {
         let preference = |k: usize| {
-            let deviation = k as f32 / config.sigma;
+            let deviation = k as f32;
             let density = libm::expf(-0.5 * deviation * deviation);
-            libm::logf(1.0 + density / config.gamma) / config.beta * 16.0
+            libm::logf(1.0 + density / config.gamma) / BETA * 16.0
         };
         // Extreme parameters overflow to infinity or to nothing: both are clamped at what the
         // energies can bear.

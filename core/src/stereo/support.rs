@@ -16,7 +16,7 @@ use core::ops::RangeInclusive;
 
 use super::{
     StereoConfig,
-    config::DISPARITY_LIMIT,
+    config::{CANDIDATE_STEP, DISPARITY_LIMIT},
     descriptor::{Descriptor, Gradients, MARGIN, UNTEXTURED, describe_rows, eight, texture},
 };
 
@@ -24,6 +24,9 @@ use super::{
 pub(super) const NO_MATCH: i16 = -1;
 /// The corner descriptors stand so far from the candidate in both directions, px.
 const CORNER: usize = 2;
+/// Least texture of a support point's descriptor, as published: sum of gradient magnitudes over its
+/// 16 samples.
+const SUPPORT_TEXTURE: u32 = 10;
 /// A candidate needs at least so many disparities to choose from.
 const MIN_CHOICE: usize = 10;
 /// The second best match is sought farther than this from the best, px.
@@ -128,7 +131,7 @@ impl SupportMatching<'_> {
         scratch: &mut [Descriptor],
         kernels: &impl Kernels,
     ) {
-        let (width, step) = (self.left.width, self.config.candidate_step);
+        let (width, step) = (self.left.width, CANDIDATE_STEP);
         grid.fill(NO_MATCH);
         let Some((left, right)) = scratch.split_at_mut_checked(2 * width) else { return };
         let (Some((l0, l1)), Some((r0, r1))) =
@@ -169,7 +172,7 @@ impl SupportMatching<'_> {
         let most = usize::from(self.config.disparity_max);
         let tolerance = usize::from(self.config.consistency_threshold);
         for (i, out) in out.iter_mut().enumerate() {
-            let u = i * self.config.candidate_step;
+            let u = i * CANDIDATE_STEP;
             if u < first || u >= end {
                 continue;
             }
@@ -200,7 +203,7 @@ impl SupportMatching<'_> {
         kernels: &impl Kernels,
     ) -> Option<usize> {
         let point = point?;
-        if point.iter().any(|corner| texture(corner) < u32::from(self.config.support_texture)) {
+        if point.iter().any(|corner| texture(corner) < SUPPORT_TEXTURE) {
             return None;
         }
         let first = *columns.start();

@@ -4,7 +4,7 @@
 use super::motion_segmentation::SegmentationConfig;
 use crate::{
     egomotion::EgomotionConfig,
-    problem::{Problems, require},
+    settings::{Problems, require},
 };
 
 /// Image width to which areas in px refer.

@@ -67,6 +67,7 @@ mod motion_state;
 mod motions;
 mod occlusion;
 mod report;
+mod settings;
 mod stages;
 #[cfg(test)]
 pub(crate) mod tests;

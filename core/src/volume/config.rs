@@ -1,6 +1,10 @@
 //! How depth becomes a map.
 
-use crate::problem::{Problems, require};
+use crate::settings::{
+    Problems, Range, Relation, Rule, Setting,
+    Value::{Bytes, Choice, F32, U8, U32},
+    check, choices, rules,
+};
 
 /// Semantic classes that can carry a weight of their own.
 pub const CLASS_COUNT: usize = 32;
@@ -90,7 +94,14 @@ pub enum WhenFull {
     Refuse,
 }
 
-/// Parameters of the map. Defaults are the original's published ones.
+choices! {
+    ObservationWeight { "one" = One, "nearest" = Nearest, "depth" = Depth, "band" = Band }
+    DistanceAlong { "ray" = Ray, "normal" = Normal }
+    WhenFull { "evict" = Evict, "refuse" = Refuse }
+}
+
+/// Parameters of the map. [`VolumeConfig::SETTINGS`] has their ranges, and the original's values
+/// where they differ.
 ///
 /// ```
 /// use dynvox_core::volume::VolumeConfig;
@@ -107,51 +118,37 @@ pub enum WhenFull {
     serde(default, deny_unknown_fields)
 )]
 pub struct VolumeConfig {
-    /// Distance between lattice points, m. Above 0; 0.05 in the paper.
+    /// Distance between lattice points, m.
     pub voxel_size_m: f32,
-    /// Distance from the surface up to which voxels are kept, m. At least two voxels; 0.75 (the
-    /// paper's experiments: 0.50).
+    /// Distance from the surface up to which voxels are kept, m.
     pub truncation_m: f32,
-    /// Nearest depth fused, m. Above 0; 0.5.
+    /// Nearest depth fused, m.
     pub near_m: f32,
-    /// Farthest depth fused, m. Above `near_m`; 20.
+    /// Farthest depth fused, m.
     pub far_m: f32,
-    /// Weight at which the average stops forgetting less, 1 to 255; 50.
+    /// Upper bound of a voxel's weight.
     pub max_weight: u8,
-    /// What one observation weighs; nearest (the original: one).
+    /// Weight of one observation.
     pub observation_weight: ObservationWeight,
-    /// Factor on an observation's weight by semantic class (Vineet et al., *Incremental Dense
-    /// Semantic Stereo Fusion*, 2015); 0 keeps a class out of the map. All 1.
+    /// Factor on an observation's weight by semantic class.
     pub class_weight: [u8; CLASS_COUNT],
-    /// Share of the truncation on either side of the surface within which colour is averaged, 0 to
-    /// 1; 0.25.
-    pub colour_band: f32,
-    /// What happens when a block is to be made and the pool is full.
+    /// Action when a block is to be made and the pool is full.
     pub when_full: WhenFull,
-    /// Voxels seen at most this often are reset when their block leaves the window; 0 is off, below
-    /// `max_weight`; 1.
+    /// Largest weight of voxels that pruning resets.
     pub prune_weight: u8,
-    /// Length of the window, frames. At least 1; 200 (the paper's text: 300, its pruning
-    /// experiment: 40).
+    /// Length of the pruning window, frames.
     pub prune_lag: u32,
-    /// A block not visible in the window whose smallest |distance| is above this share of the
-    /// truncation goes as a whole, 0 to 1; 0 is off. With two voxels, 0.13 at the defaults,
-    /// surfaces stay.
+    /// Distance from the surface beyond which pruning frees whole blocks, share of the truncation.
     pub prune_distance: f32,
-    /// Most blocks visited in one frame; the rest follows in the next. At least 1; 20,000.
+    /// Most blocks that pruning visits in one frame.
     pub prune_blocks_per_frame: u32,
-    /// Pixels so near to what is farther by more than 1.5 px of disparity are not fused, for the
-    /// matcher widens what is near, and pixels within 3 px of it, or of no disparity, give colour
-    /// only to voxels without colour; 0 is off, at most 16; 2.
+    /// Distance from the edge of something nearer within which pixels are not fused, px.
     pub edge_reach_px: u8,
-    /// Along what distance is measured.
+    /// Direction along which distance is measured.
     pub distance: DistanceAlong,
-    /// How far behind the surface voxels are observed, m, above 0: at least two voxels, at most the
-    /// truncation; 0.3.
+    /// Distance behind the surface up to which voxels are observed, m.
     pub behind_m: f32,
-    /// How far before and behind the surface blocks are made, along the ray, m, above 0: at least
-    /// two voxels and half of the way in depth to the pixels beside, at most the truncation; 0.2
-    /// (the original: the truncation). Blocks that exist are fused wherever they are in view.
+    /// Distance before and behind the surface within which blocks are made, m.
     pub allocation_m: f32,
 }
 
@@ -165,7 +162,6 @@ impl Default for VolumeConfig {
             max_weight: 50,
             observation_weight: ObservationWeight::Nearest,
             class_weight: [1; CLASS_COUNT],
-            colour_band: 0.25,
             when_full: WhenFull::Evict,
             prune_weight: 1,
             prune_lag: 200,
@@ -179,68 +175,114 @@ impl Default for VolumeConfig {
     }
 }
 
+type Row = Setting<VolumeConfig>;
+
 impl VolumeConfig {
-    /// Whether anything is pruned.
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("volume.voxel_size_m", "m", |c| F32(&mut c.voxel_size_m))
+            .range(Range::Within(0.001, 10.0))
+            .text("Distance between lattice points."),
+        Row::user("volume.truncation_m", "m", |c| F32(&mut c.truncation_m))
+            .range(Range::POSITIVE)
+            .relation(&Relation {
+                holds: |c| (2.0..=64.0).contains(&(c.truncation_m / c.voxel_size_m)),
+                rule: "must be from 2 to 64 voxels",
+            })
+            .published("0.5 in the paper's experiments")
+            .text("Distance from the surface up to which voxels are kept."),
+        Row::user("volume.near_m", "m", |c| F32(&mut c.near_m))
+            .range(Range::POSITIVE)
+            .text("Nearest depth fused."),
+        Row::user("volume.far_m", "m", |c| F32(&mut c.far_m))
+            .range(Range::POSITIVE)
+            .relation(&Relation {
+                holds: |c| c.far_m > c.near_m,
+                rule: "must be above volume.near_m",
+            })
+            .text("Farthest depth fused."),
+        Row::expert("volume.max_weight", "", |c| U8(&mut c.max_weight))
+            .range(Range::Within(1.0, 255.0))
+            .text(
+                "Upper bound of a voxel's weight; at the bound old observations fade \
+                 exponentially.",
+            ),
+        Row::expert("volume.observation_weight", "", |c| Choice(&mut c.observation_weight))
+            .published("one")
+            .text(
+                "Weight of one observation: 1; 1 against a past that weighs at most one for every \
+                 2 m of depth (`nearest`); 100 / depth, held within 1 and 10 (`depth`); or a \
+                 quarter of that farther than four voxels before the surface (`band`).",
+            ),
+        Row::user("volume.class_weight", "", |c| Bytes(&mut c.class_weight)).text(
+            "Factor on an observation's weight by semantic class (Vineet et al., *Incremental \
+             Dense Semantic Stereo Fusion*, 2015); 0 keeps a class out of the map.",
+        ),
+        Row::user("volume.when_full", "", |c| Choice(&mut c.when_full)).text(
+            "Action when a block is to be made and the pool is full: `evict` lets the block unseen \
+             for longest leave, `refuse` the new one.",
+        ),
+        Row::user("volume.prune_weight", "", |c| U8(&mut c.prune_weight))
+            .range(Range::Within(0.0, 254.0))
+            .relation(&Relation {
+                holds: |c| c.prune_weight < c.max_weight,
+                rule: "must be below volume.max_weight",
+            })
+            .text(
+                "Voxels seen at most this often are reset when their block leaves the window; 0 is \
+                 off.",
+            ),
+        Row::user("volume.prune_lag", "frames", |c| U32(&mut c.prune_lag))
+            .range(Range::AtLeast(1.0))
+            .published("300 in the paper's text, 40 in its pruning experiment")
+            .text("Length of the pruning window."),
+        Row::expert("volume.prune_distance", "", |c| F32(&mut c.prune_distance))
+            .range(Range::SHARE)
+            .text(
+                "A block not visible in the window whose smallest distance is above this share of \
+                 the truncation is freed as a whole; 0 is off. With two voxels, 0.13 at the \
+                 defaults, surfaces stay.",
+            ),
+        Row::expert("volume.prune_blocks_per_frame", "blocks", |c| {
+            U32(&mut c.prune_blocks_per_frame)
+        })
+        .range(Range::AtLeast(1.0))
+        .text("Most blocks that pruning visits in one frame; the rest follows in the next."),
+        Row::expert("volume.edge_reach_px", "px", |c| U8(&mut c.edge_reach_px))
+            .range(Range::Within(0.0, 16.0))
+            .text(
+                "Pixels so near to what is farther by more than 1.5 px of disparity are not fused, \
+                 because the matcher widens what is near. Pixels within 3 px of it, or of no \
+                 disparity, give colour only to voxels without colour. 0 is off.",
+            ),
+        Row::expert("volume.distance", "", |c| Choice(&mut c.distance)).published("ray").text(
+            "Direction along which distance is measured: the camera's z axis, or the surface's \
+             normal (Pan et al., *Voxfield*, IROS 2022).",
+        ),
+        Row::expert("volume.behind_m", "m", |c| F32(&mut c.behind_m)).range(Range::POSITIVE).text(
+            "Distance behind the surface up to which voxels are observed, held between two voxels \
+             and the truncation.",
+        ),
+        Row::expert("volume.allocation_m", "m", |c| F32(&mut c.allocation_m))
+            .range(Range::POSITIVE)
+            .published("the truncation")
+            .text(
+                "Distance before and behind the surface, along the ray, within which blocks are \
+                 made: at least two voxels and half of the way in depth to the pixels beside, at \
+                 most the truncation. Blocks that exist are fused wherever they are in view.",
+            ),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Tells whether anything is pruned.
     pub const fn prunes(&self) -> bool {
         self.prune_weight > 0 || self.prune_distance > 0.0
     }
 
     /// Notes everything wrong with the figures.
     pub fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(
-            problems,
-            positive(self.voxel_size_m) && (0.001..=10.0).contains(&self.voxel_size_m),
-            "volume.voxel_size_m",
-            "must be from 0.001 to 10 m",
-        );
-        require(
-            problems,
-            positive(self.truncation_m)
-                && (2.0..=64.0).contains(&(self.truncation_m / self.voxel_size_m)),
-            "volume.truncation_m",
-            "must be from 2 to 64 voxels",
-        );
-        require(problems, positive(self.near_m), "volume.near_m", "must be above 0");
-        require(
-            problems,
-            positive(self.far_m) && self.far_m > self.near_m,
-            "volume.far_m",
-            "must be above volume.near_m",
-        );
-        require(problems, self.max_weight >= 1, "volume.max_weight", "must be from 1 to 255");
-        require(
-            problems,
-            (0.0..=1.0).contains(&self.colour_band),
-            "volume.colour_band",
-            "must be from 0 to 1",
-        );
-        require(
-            problems,
-            self.prune_weight < self.max_weight,
-            "volume.prune_weight",
-            "must be below volume.max_weight",
-        );
-        require(problems, self.prune_lag >= 1, "volume.prune_lag", "must be at least 1 frame");
-        require(
-            problems,
-            (0.0..=1.0).contains(&self.prune_distance),
-            "volume.prune_distance",
-            "must be from 0 to 1",
-        );
-        require(problems, positive(self.behind_m), "volume.behind_m", "must be above 0");
-        require(problems, positive(self.allocation_m), "volume.allocation_m", "must be above 0");
-        require(
-            problems,
-            self.edge_reach_px <= 16,
-            "volume.edge_reach_px",
-            "must be at most 16 px",
-        );
-        require(
-            problems,
-            self.prune_blocks_per_frame >= 1,
-            "volume.prune_blocks_per_frame",
-            "must be at least 1",
-        );
+        check(Self::CHECKS, self, problems);
     }
 }

@@ -179,7 +179,7 @@ fn every_kth_frame_alone_is_fused_and_the_map_is_not_affected() {
     let refused =
         dynvox(root.path(), &[&["run", "--out", "x", "--fuse-every", "0"], &street[..]].concat());
     assert!(
-        output_text(&refused).contains("mapper.fuse_every must be 1 or more"),
+        output_text(&refused).contains("mapper.fuse_every must be at least 1"),
         "{}",
         output_text(&refused)
     );

@@ -38,6 +38,15 @@ use pyramid::Pyramid;
 
 /// Fewest pairs a motion is sought with.
 const PAIRS_MIN: u32 = 100;
+/// Least share of the pairs that must hold the direction held worst: a flat wall holds none.
+const HELD_MIN: f32 = 0.0005;
+/// Largest rotation between two frames, rad.
+const STEP_MAX_RAD: f32 = 0.35;
+/// Least share of the matches of the images, which the tracker does not use, that its motion must
+/// explain.
+const EXPLAINED_MIN: f32 = 0.5;
+/// Distance within which a match counts as explained, px over its four coordinates.
+pub(crate) const EXPLAINED_PX: f32 = 5.0;
 /// Step below which a level is done, rad and m: a tenth of a voxel at most.
 const STEP_MIN: f64 = 1e-4;
 /// Noise of a point in addition to that of its disparity, m.
@@ -112,9 +121,9 @@ impl IcpReport {
 
     /// Contradicts the motion where too few of the matches counted in `matches` agree with it.
     /// Without matches it stands.
-    pub(crate) fn check_matches(&mut self, config: &IcpConfig) {
+    pub(crate) fn check_matches(&mut self) {
         let [agreeing, all] = self.matches.map(f64::from);
-        if self.status == IcpStatus::Tracked && agreeing < f64::from(config.explained_min) * all {
+        if self.status == IcpStatus::Tracked && agreeing < f64::from(EXPLAINED_MIN) * all {
             self.status = IcpStatus::Contradicted;
         }
     }
@@ -178,12 +187,11 @@ fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
         IcpStatus::TooFewPairs
-    } else if report.held < f64::from(config.held_min) {
+    } else if report.held < f64::from(HELD_MIN) {
         IcpStatus::NotHeld
     } else if f64::from(report.pairs) < f64::from(config.pairs_min) * f64::from(report.points) {
         IcpStatus::OffTheMap
-    } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(config.step_max_rad))
-    {
+    } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(STEP_MAX_RAD)) {
         IcpStatus::TooFar
     } else {
         IcpStatus::Tracked

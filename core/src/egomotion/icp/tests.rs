@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     geometry::Transform,
     image::{DISPARITY_ONE_PX, ViewMut},
-    problem::Problems,
+    settings::Problems,
 };
 use std::{vec, vec::Vec};
 
@@ -152,13 +152,12 @@ fn depth_off_the_map_is_no_estimate() {
 
 #[test]
 fn matches_can_contradict_the_motion() {
-    let config = IcpConfig::default();
     let mut report = IcpReport { matches: [49, 100], ..IcpReport::default() };
-    report.check_matches(&config);
+    report.check_matches();
     assert_eq!(report.status, IcpStatus::Contradicted);
     for matches in [[50, 100], [0, 0]] {
         let mut report = IcpReport { matches, ..IcpReport::default() };
-        report.check_matches(&config);
+        report.check_matches();
         assert_eq!(report.status, IcpStatus::Tracked);
     }
 }
@@ -174,7 +173,7 @@ fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
     type Setting = (&'static str, fn(&mut IcpConfig, f32), &'static [f32], &'static [f32]);
     const SHARE: (&[f32], &[f32]) = (&[0.0, 1.0], &[-0.01, 1.01, f32::NAN]);
     const ABOVE_0: (&[f32], &[f32]) = (&[1e-9, 1e9], &[0.0, -1.0, f32::NAN, f32::INFINITY]);
-    let settings: [Setting; 10] = [
+    let settings: [Setting; 6] = [
         ("icp.levels", |config, value| config.levels = value as u8, &[1.0, 4.0], &[0.0, 5.0]),
         ("icp.steps", |config, value| config.steps = value as u8, &[1.0, 50.0], &[0.0, 51.0]),
         ("icp.distance_m", |config, value| config.distance_m = value, ABOVE_0.0, ABOVE_0.1),
@@ -185,11 +184,7 @@ fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
             &[-0.01, f32::NAN, f32::INFINITY],
         ),
         ("icp.pairs_min", |config, value| config.pairs_min = value, SHARE.0, SHARE.1),
-        ("icp.held_min", |config, value| config.held_min = value, SHARE.0, SHARE.1),
         ("icp.step_max_m", |config, value| config.step_max_m = value, ABOVE_0.0, ABOVE_0.1),
-        ("icp.step_max_rad", |config, value| config.step_max_rad = value, ABOVE_0.0, ABOVE_0.1),
-        ("icp.explained_min", |config, value| config.explained_min = value, SHARE.0, SHARE.1),
-        ("icp.explained_px", |config, value| config.explained_px = value, ABOVE_0.0, ABOVE_0.1),
     ];
     for (key, change, good, bad) in settings {
         good.iter()

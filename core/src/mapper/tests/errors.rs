@@ -6,8 +6,8 @@ use crate::{
     geometry::RigProblem,
     mapper::{CapacityProblem, Digested},
     memory::SlabError,
-    problem::Problem,
     rectify::{LensProblem, RectifierError, RectifyProblem},
+    settings::Problem,
     view::RaycastError,
     volume::Full,
 };
@@ -73,7 +73,7 @@ fn a_snapshot_that_is_refused_says_why() {
 
 #[test]
 fn a_mapper_that_cannot_be_made_hands_on_the_reason() {
-    let problem = Problem { key: "volume.far_m", rule: "must be above 0" };
+    let problem = Problem::new("volume.far_m", "must be above volume.near_m");
     let rectification = RectifierError::RawTooLarge { width: 752, height: 480 };
     let texts = all_differ(&[
         NewError::from(SlabError::RegionTooSmall),
@@ -82,7 +82,10 @@ fn a_mapper_that_cannot_be_made_hands_on_the_reason() {
         NewError::Rectification(rectification),
     ]);
     assert!(texts[0].contains("a bug of dynvox-core") && texts[1].contains("a bug of dynvox-core"));
-    assert_eq!(texts[2], "the configuration cannot be used: volume.far_m must be above 0");
+    assert_eq!(
+        texts[2],
+        "the configuration cannot be used: volume.far_m must be above volume.near_m"
+    );
     assert_eq!(texts[3], rectification.to_string());
 }
 

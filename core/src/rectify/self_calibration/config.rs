@@ -2,7 +2,11 @@
 
 use crate::{
     geometry::{DisparityCorrection, RowCorrection},
-    problem::{Problems, require},
+    settings::{
+        Problems, Range, Rule, Setting,
+        Value::{Choice, F64},
+        check, choices, rules,
+    },
 };
 
 /// What is done with the disparity error found while driving.
@@ -22,7 +26,9 @@ pub enum SelfCalibrationMode {
     Off,
 }
 
-/// Settings of the rig in addition to its calibration.
+choices! { SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off } }
+
+/// Settings of the rig in addition to its calibration. [`RigConfig::SETTINGS`] has their ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -30,17 +36,15 @@ pub enum SelfCalibrationMode {
     serde(default, deny_unknown_fields)
 )]
 pub struct RigConfig {
-    /// What is done with the disparity error found while driving; `apply`.
+    /// Use of the disparity error found while driving.
     pub self_calibration: SelfCalibrationMode,
-    /// Factor on the calibrated baseline; in 0.5..=2; 1. No picture shows the baseline, so nothing
-    /// checks it: compare with a distance known from elsewhere. KITTI's 0.5372 m are 0.54 m in
-    /// truth.
+    /// Factor on the calibrated baseline.
     pub baseline_scale: f64,
-    /// What is added to disparities from the first frame on, as another run found it; each of the
-    /// four within 5 px; all 0. With self-calibration the search begins there.
+    /// Correction of disparities from the first frame on, as another run found it; with
+    /// self-calibration the search begins there.
     pub disparity_correction: DisparityCorrection,
-    /// What is added to the right image's rows from the first frame on, as another run found it;
-    /// each of the six within 5 px; all 0. With self-calibration the search begins there.
+    /// Correction of the right image's rows from the first frame on, as another run found it; with
+    /// self-calibration the search begins there.
     pub row_correction: RowCorrection,
 }
 
@@ -55,35 +59,106 @@ impl Default for RigConfig {
     }
 }
 
+type Row = Setting<RigConfig>;
+
+/// Range of each part of a correction to begin with, px.
+const CORRECTION: Range =
+    Range::Within(-RigConfig::CORRECTION_MAX_PX as f32, RigConfig::CORRECTION_MAX_PX as f32);
+
 impl RigConfig {
     /// Largest part of a correction to begin with, px.
     pub(crate) const CORRECTION_MAX_PX: f64 = 5.0;
 
-    /// Notes what is wrong with the settings.
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("rig.self_calibration", "", |c| Choice(&mut c.self_calibration)).text(
+            "Use of the disparity error found while driving: it is found, reported and taken out; \
+             found and reported; or not looked for.",
+        ),
+        Row::user("rig.baseline_scale", "", |c| F64(&mut c.baseline_scale))
+            .range(Range::Within(0.5, 2.0))
+            .text(
+                "Factor on the calibrated baseline. No picture shows the baseline, so nothing \
+                 checks it: compare with a distance known from elsewhere. KITTI's 0.5372 m are \
+                 0.54 m in truth.",
+            ),
+        Row::expert("rig.disparity_correction.offset_px", "px", |c| {
+            F64(&mut c.disparity_correction.offset_px)
+        })
+        .range(CORRECTION)
+        .text("Added to disparities from the first frame on, as another run found it: everywhere alike."),
+        Row::expert("rig.disparity_correction.slope_px", "px", |c| {
+            F64(&mut c.disparity_correction.slope_px)
+        })
+        .range(CORRECTION)
+        .text("Added to disparities: growth with the column, at the right side."),
+        Row::expert("rig.disparity_correction.quartic_px", "px", |c| {
+            F64(&mut c.disparity_correction.quartic_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to disparities: growth with the fourth power of the distance from the middle \
+             column, at the sides.",
+        ),
+        Row::expert("rig.disparity_correction.row_quadratic_px", "px", |c| {
+            F64(&mut c.disparity_correction.row_quadratic_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to disparities: growth with the square of the distance from the middle row, from \
+             there to the first row.",
+        ),
+        Row::expert("rig.row_correction.constant_px", "px", |c| {
+            F64(&mut c.row_correction.constant_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to the right image's rows from the first frame on, as another run found it: \
+             everywhere alike.",
+        ),
+        Row::expert("rig.row_correction.column_px", "px", |c| {
+            F64(&mut c.row_correction.column_px)
+        })
+        .range(CORRECTION)
+        .text("Added to the right image's rows: growth with the column, at the right side."),
+        Row::expert("rig.row_correction.row_px", "px", |c| {
+            F64(&mut c.row_correction.row_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to the right image's rows: growth from the middle row to the first one, there.",
+        ),
+        Row::expert("rig.row_correction.column_quadratic_px", "px", |c| {
+            F64(&mut c.row_correction.column_quadratic_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to the right image's rows: growth with the square of the distance from the \
+             middle column, at the sides.",
+        ),
+        Row::expert("rig.row_correction.product_px", "px", |c| {
+            F64(&mut c.row_correction.product_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to the right image's rows: growth with column and row, in the last column of \
+             the first row.",
+        ),
+        Row::expert("rig.row_correction.row_quadratic_px", "px", |c| {
+            F64(&mut c.row_correction.row_quadratic_px)
+        })
+        .range(CORRECTION)
+        .text(
+            "Added to the right image's rows: growth with the square of the distance from the \
+             middle row, at the first row.",
+        ),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Notes everything wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        require(
-            problems,
-            (0.5..=2.0).contains(&self.baseline_scale),
-            "rig.baseline_scale",
-            "must be in 0.5..=2",
-        );
-        let DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px } =
-            self.disparity_correction;
-        let rows = self.row_correction;
-        for (key, part) in [
-            ("rig.disparity_correction.offset_px", offset_px),
-            ("rig.disparity_correction.slope_px", slope_px),
-            ("rig.disparity_correction.quartic_px", quartic_px),
-            ("rig.disparity_correction.row_quadratic_px", row_quadratic_px),
-            ("rig.row_correction.constant_px", rows.constant_px),
-            ("rig.row_correction.column_px", rows.column_px),
-            ("rig.row_correction.row_px", rows.row_px),
-            ("rig.row_correction.column_quadratic_px", rows.column_quadratic_px),
-            ("rig.row_correction.product_px", rows.product_px),
-            ("rig.row_correction.row_quadratic_px", rows.row_quadratic_px),
-        ] {
-            let within = (-Self::CORRECTION_MAX_PX..=Self::CORRECTION_MAX_PX).contains(&part);
-            require(problems, within, key, "must be in -5..=5");
-        }
+        check(Self::CHECKS, self, problems);
     }
 }

@@ -196,7 +196,7 @@ fn observations_that_make_no_sense_change_nothing() {
 
 #[test]
 fn settings_out_of_range_are_named() {
-    let mut problems = crate::problem::Problems::new();
+    let mut problems = crate::settings::Problems::new();
     RigConfig::default().validate(&mut problems);
     assert!(problems.is_empty());
     let wrong = DisparityCorrection {

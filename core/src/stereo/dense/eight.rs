@@ -21,6 +21,8 @@ use crate::{
 
 /// Set in a key that does not count: above every key, and still a positive `i32`.
 const BARRED: u32 = 1 << 30;
+/// Least texture of a descriptor that is matched densely, as published.
+pub(super) const MATCH_TEXTURE: u32 = 1;
 /// No plane: as wide as keys are.
 const NOTHING: i32 = NO_PLANE as i32;
 
@@ -63,7 +65,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
             here,
             other,
             cost,
-            least_texture: u32::from(config.match_texture),
+            least_texture: MATCH_TEXTURE,
             most: i32::from(config.disparity_max),
             spare: UNTEXTURED,
         }

@@ -1,6 +1,6 @@
 //! The twin of dense matching: one pixel and one candidate at a time.
 
-use super::*;
+use super::{eight::MATCH_TEXTURE, *};
 use crate::{
     parallel::Vectors,
     random::Random,
@@ -147,7 +147,7 @@ impl Scene {
         let inside = (MARGIN..self.width - MARGIN).contains(&u);
         if plane == NO_PLANE
             || !inside
-            || distance(&here[u], &Descriptor::UNTEXTURED) < u32::from(self.config.match_texture)
+            || distance(&here[u], &Descriptor::UNTEXTURED) < MATCH_TEXTURE
         {
             return None;
         }
@@ -196,7 +196,7 @@ fn every_level_of_vector_instructions_gives_what_one_pixel_at_a_time_gives() {
     let preset = StereoConfig { disparity_max: 70, ..StereoConfig::robotics() };
     let configs = [
         preset,
-        StereoConfig { grid_size: 11, subpixel: false, match_texture: 0, ..preset },
+        StereoConfig { grid_size: 11, subpixel: false, ..preset },
         StereoConfig {
             plane_radius_sigmas: 6.0,
             disparity_max: 255,

@@ -2,7 +2,7 @@
 //! never panics.
 
 use super::{scenes::surface, *};
-use crate::{parallel::TwoThreads, problem::Problems, random::Random};
+use crate::{parallel::TwoThreads, random::Random, settings::Problems};
 
 fn noise(width: usize, height: usize, seed: u64) -> Grey {
     let mut random = Random::new(seed);
@@ -92,14 +92,14 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
         assert_eq!(status(&config, noise(101, 50, 1), noise(101, 50, 1)), StereoStatus::TooLarge);
         assert_eq!(status(&config, noise(100, 51, 1), noise(100, 51, 1)), StereoStatus::TooLarge);
         assert_eq!(status(&config, noise(15, 50, 1), noise(15, 50, 1)), StereoStatus::TooSmall);
-        let step = StereoConfig { candidate_step: 4, ..config };
+        let cells = StereoConfig { grid_size: 9, ..config };
         assert_eq!(
-            status(&step, noise(100, 50, 1), noise(100, 50, 1)),
+            status(&cells, noise(100, 50, 1), noise(100, 50, 1)),
             StereoStatus::ConfigRefused
         );
-        let beta = StereoConfig { beta: f32::NAN, ..config };
+        let gamma = StereoConfig { gamma: f32::NAN, ..config };
         assert_eq!(
-            status(&beta, noise(100, 50, 1), noise(100, 50, 1)),
+            status(&gamma, noise(100, 50, 1), noise(100, 50, 1)),
             StereoStatus::ConfigRefused
         );
         assert_ne!(status(&config, noise(16, 16, 1), noise(16, 16, 1)), StereoStatus::TooSmall);
@@ -124,53 +124,20 @@ fn a_buffer_without_width_or_height_refuses_every_pair() {
 
 /// Configurations at the limits of what `validate` lets pass.
 fn extremes() -> Vec<StereoConfig> {
-    let base = StereoConfig {
-        support_texture: 0,
-        match_texture: 0,
-        median: true,
-        ..StereoConfig::default()
-    };
+    let base = StereoConfig { median: true, ..StereoConfig::default() };
     vec![
         base,
-        StereoConfig { disparity_max: 10, gap_width: 4_096, gap_discontinuity: u16::MAX, ..base },
+        StereoConfig { disparity_max: 10, gap_width: 4_096, ..base },
         StereoConfig {
             support_ratio: 1.0,
-            plausible_min: 0,
             redundant_distance: 0,
             consistency_threshold: u16::MAX,
             ..base
         },
-        StereoConfig {
-            plausible_threshold: u16::MAX,
-            plausible_window: 16,
-            redundant_threshold: u16::MAX,
-            redundant_distance: 64,
-            ..base
-        },
-        StereoConfig { candidate_step: 64, plausible_min: 1, grid_size: 256, ..base },
-        StereoConfig {
-            grid_size: 10,
-            beta: 1e-30,
-            gamma: 1e-30,
-            sigma: 1e-30,
-            plane_radius_sigmas: 16.0,
-            ..base
-        },
-        StereoConfig {
-            beta: 1e30,
-            gamma: 1e30,
-            sigma: 16.0,
-            plane_radius_sigmas: 1.0,
-            plane_slope_max: 1e3,
-            ..base
-        },
-        StereoConfig {
-            plane_slope_max: 0.0,
-            sigma: 1e30,
-            plane_radius_sigmas: 0.0,
-            speckle_similarity: u16::MAX,
-            ..base
-        },
+        StereoConfig { redundant_distance: 64, grid_size: 256, ..base },
+        StereoConfig { grid_size: 10, gamma: 1e-30, plane_radius_sigmas: 16.0, ..base },
+        StereoConfig { gamma: 1e30, plane_radius_sigmas: 16.0, ..base },
+        StereoConfig { plane_radius_sigmas: 0.0, speckle_similarity: u16::MAX, ..base },
         StereoConfig { speckle_size: u32::MAX, ..base },
         StereoConfig {
             lone_share: 1.0,

@@ -1,6 +1,6 @@
 //! Settings of motion segmentation.
 
-use crate::problem::{Problems, require};
+use crate::settings::{Problems, require};
 
 /// How moving objects are found by their motion. Off by default: it adds to detections, or stands
 /// in for them.

@@ -1,6 +1,6 @@
-//! How a map becomes triangles.
+//! Settings of the mesh.
 
-use crate::problem::{Problems, require};
+use crate::settings::{Problems, Range, Rule, Setting, Value::U8, check, rules};
 
 /// Parameters of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,8 +10,7 @@ use crate::problem::{Problems, require};
     serde(default, deny_unknown_fields)
 )]
 pub struct MeshConfig {
-    /// Observations a lattice point needs to count as seen, 1 to 255; 1 (the original meshes all it
-    /// has).
+    /// Fewest observations with which a lattice point counts as seen.
     pub min_weight: u8,
 }
 
@@ -21,9 +20,23 @@ impl Default for MeshConfig {
     }
 }
 
+type Row = Setting<MeshConfig>;
+
 impl MeshConfig {
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] =
+        &[Row::user("mesh.min_weight", "", |c| U8(&mut c.min_weight))
+            .range(Range::Within(1.0, 255.0))
+            .text(
+                "Fewest observations with which a lattice point counts as seen; the original \
+                 meshes all it has.",
+            )];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
     /// Notes everything wrong with the figures.
     pub fn validate(&self, problems: &mut Problems) {
-        require(problems, self.min_weight >= 1, "mesh.min_weight", "must be from 1 to 255");
+        check(Self::CHECKS, self, problems);
     }
 }

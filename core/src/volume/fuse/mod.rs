@@ -12,7 +12,7 @@
 //! `p = min(w, d / 2 m)` (`volume.observation_weight`),
 //!
 //! where `v / (p + v)` is a 15-bit fraction from a table. Colour is averaged likewise within
-//! `colour_band` of the surface, with a weight of at most 5, so that its 8 bits keep following.
+//! [`COLOUR_BAND`] of the surface, with a weight of at most 5, so that its 8 bits keep following.
 //!
 //! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others
 //! 64 voxels are fused at a time (`layer`).
@@ -42,6 +42,8 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 /// Blocks nearer than this are never left out, m.
 const NEAREST_CULLED_M: f32 = 0.1;
+/// Share of the truncation on either side of the surface within which colour is averaged.
+pub(super) const COLOUR_BAND: f32 = 0.25;
 /// Corners of a block.
 const CORNERS: usize = 8;
 
@@ -127,7 +129,7 @@ impl<'a> Fusion<'a> {
             width: depth_m.width() as u32,
             height: depth_m.height() as u32,
             scale: 32_767.0 / config.truncation_m,
-            colour_band_m: config.colour_band * config.truncation_m,
+            colour_band_m: COLOUR_BAND * config.truncation_m,
             behind_m: max_f32(config.behind_m, 2.0 * config.voxel_size_m),
         }
     }

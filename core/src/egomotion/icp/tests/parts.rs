@@ -180,14 +180,9 @@ fn a_pair_counts_by_its_distance_from_the_plane_and_its_noise() {
 
 #[test]
 fn each_test_of_a_motion_decides_by_itself() {
-    let config = IcpConfig {
-        pairs_min: 0.25,
-        held_min: 0.125,
-        step_max_m: 2.0,
-        step_max_rad: 0.5,
-        ..IcpConfig::default()
-    };
-    let good = IcpReport { points: 400, pairs: 100, held: 0.125, ..IcpReport::default() };
+    let config = IcpConfig { pairs_min: 0.25, step_max_m: 2.0, ..IcpConfig::default() };
+    let good =
+        IcpReport { points: 400, pairs: 100, held: f64::from(HELD_MIN), ..IcpReport::default() };
     let status = |change: &dyn Fn(&mut IcpReport)| {
         let mut report = good;
         change(&mut report);
@@ -195,14 +190,14 @@ fn each_test_of_a_motion_decides_by_itself() {
     };
     assert_eq!(status(&|_| ()), IcpStatus::Tracked, "each at its bound");
     assert_eq!(status(&|report| (report.pairs, report.points) = (99, 99)), IcpStatus::TooFewPairs);
-    assert_eq!(status(&|report| report.held = 0.1249), IcpStatus::NotHeld);
+    assert_eq!(status(&|report| report.held = 0.000_499), IcpStatus::NotHeld);
     assert_eq!(status(&|report| report.points = 401), IcpStatus::OffTheMap);
     for (way_m, turn_rad, expected) in [
         (2.0, 0.0, IcpStatus::Tracked),
         (2.001, 0.0, IcpStatus::TooFar),
-        (0.0, 0.5, IcpStatus::Tracked),
+        (0.0, 0.35, IcpStatus::Tracked),
         // The length of the quaternion's vector, twice: the angle but for its cube.
-        (0.0, 0.506, IcpStatus::TooFar),
+        (0.0, 0.353, IcpStatus::TooFar),
         (f64::NAN, 0.0, IcpStatus::TooFar),
     ] {
         let motion = walk([0.0, -turn_rad, 0.0], [way_m, 0.0, 0.0]);
@@ -255,6 +250,6 @@ fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
     assert_eq!(IcpReport::unpaired().motion(), None);
     let mut off =
         IcpReport { status: IcpStatus::OffTheMap, matches: [0, 100], ..IcpReport::default() };
-    off.check_matches(&IcpConfig::default());
+    off.check_matches();
     assert_eq!(off.status, IcpStatus::OffTheMap, "what failed before keeps its reason");
 }

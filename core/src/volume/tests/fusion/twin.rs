@@ -1,6 +1,7 @@
 //! Fusion against a plain twin, voxel by voxel.
 
 use super::*;
+use crate::volume::fuse::COLOUR_BAND;
 /// The colour that a pixel shows.
 fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
     seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap())
@@ -92,8 +93,7 @@ fn fuse_slowly(
             averaged(i32::from(sdf[voxel]), observed, gain, past(config, w, depth) + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
         let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
-        if distance.abs() > config.colour_band * config.truncation_m || !is_blank && notes & 16 != 0
-        {
+        if distance.abs() > COLOUR_BAND * config.truncation_m || !is_blank && notes & 16 != 0 {
             continue;
         }
         let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };

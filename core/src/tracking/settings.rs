@@ -1,0 +1,302 @@
+//! Rows of the settings of tracking.
+
+use super::{Overlap, TrackingConfig};
+use crate::settings::{
+    Range, Relation, Rule, Setting,
+    Value::{Bool, Choice, F32, U8, U16, U32},
+    choices, rules,
+};
+
+choices! { Overlap { "mask" = Mask, "box" = Box } }
+
+/// Largest area of a box that can be asked for, px.
+const AREA: Range = Range::Within(0.0, 1_048_576.0);
+/// Range of numbers of matches.
+const MATCHES: Range = Range::Within(6.0, 1000.0);
+/// Range of numbers of frames that confirm a state.
+const FRAMES: Range = Range::Within(1.0, 100.0);
+
+type Row = Setting<TrackingConfig>;
+
+impl TrackingConfig {
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("tracking.dynamic", "", |c| Bool(&mut c.dynamic)).text(
+            "Objects that may move are kept out of the static map. Without, everything goes into \
+             one map (the paper's robust odometry baseline).",
+        ),
+        Row::user("tracking.frame_interval_s", "s", |c| F32(&mut c.frame_interval_s))
+            .range(Range::POSITIVE)
+            .text("Time between two frames; a run sets it by its data set."),
+        Row::user("tracking.score_min", "", |c| F32(&mut c.score_min))
+            .range(Range::SHARE)
+            .text("Least score of a detection; others are ignored."),
+        Row::user("tracking.area_min_px", "px", |c| U32(&mut c.area_min_px)).range(AREA).text(
+            "A detection's box must be larger than this to be reconstructed, and to be kept out of \
+             the static map in every state, at an image width of 1242; at other widths in \
+             proportion to the width squared.",
+        ),
+        Row::user("tracking.track_area_min_px", "px", |c| U32(&mut c.track_area_min_px))
+            .range(AREA)
+            .published("as `area_min_px`")
+            .text(
+                "A detection's box must be larger than this to be tracked, and kept out of the \
+                 static map once it is known to move. The default is what 18 matches take, 7 px \
+                 apart.",
+            ),
+        Row::expert("tracking.delete_permille", "1/1000", |c| U16(&mut c.delete_permille))
+            .range(Range::Within(1000.0, 4000.0))
+            .text("Scale of the mask under which nothing enters the static map."),
+        Row::expert("tracking.small_permille", "1/1000", |c| U16(&mut c.small_permille))
+            .text("Boxes below this many times the least area are scaled twice."),
+        Row::expert("tracking.overlap", "", |c| Choice(&mut c.overlap)).published("box").text(
+            "Intersection over union by which a detection is associated with a track: that of \
+             masks or of boxes.",
+        ),
+        Row::expert("tracking.association_min", "", |c| F32(&mut c.association_min))
+            .range(Range::SHARE)
+            .text(
+                "Overlap times the geometric mean of both scores times the discount for frames \
+                 missed must be above this.",
+            ),
+        Row::expert("tracking.extent_frames", "frames", |c| U16(&mut c.extent_frames))
+            .range(Range::Within(0.0, 1000.0))
+            .published("0")
+            .text(
+                "Frames without a detection over which a track is found again by how far it \
+                 reached when it was last seen whole; 0 never.",
+            ),
+        Row::user("tracking.forget_frames", "frames", |c| U16(&mut c.forget_frames))
+            .range(Range::Within(1.0, 10_000.0))
+            .text("Frames after which a track not detected again is forgotten."),
+        Row::expert("tracking.large_share", "", |c| F32(&mut c.large_share))
+            .range(Range::SHARE)
+            .published("1")
+            .text(
+                "Share of the image beyond which an object of unknown state is kept out of the \
+                 camera's egomotion.",
+            ),
+        Row::expert("tracking.motion.matches_min", "", |c| U16(&mut c.motion.matches_min))
+            .range(MATCHES)
+            .published("18")
+            .text("Fewest matches for a first motion."),
+        Row::expert("tracking.motion.matches_again", "", |c| U16(&mut c.motion.matches_again))
+            .range(MATCHES)
+            .published("18")
+            .text("Fewest matches once a motion is known."),
+        Row::expert("tracking.motion.matches_enough", "", |c| U16(&mut c.motion.matches_enough))
+            .range(Range::Within(0.0, 10_000.0))
+            .published("sparse ones only")
+            .text("Refined matches from which on sparse ones are not used."),
+        Row::expert("tracking.motion.samples", "", |c| U16(&mut c.motion.samples))
+            .range(Range::Within(1.0, 10_000.0))
+            .published("500")
+            .text("Most hypotheses."),
+        Row::expert("tracking.motion.inlier_px", "px", |c| F32(&mut c.motion.inlier_px))
+            .range(Range::POSITIVE)
+            .text(
+                "Largest reprojection error of an inlier over its four coordinates together; three \
+                 quarters of it at the last refinement.",
+            ),
+        Row::expert("tracking.motion.noise_px", "px", |c| F32(&mut c.motion.noise_px))
+            .range(Range::POSITIVE)
+            .text("Least error of a match coordinate."),
+        Row::expert("tracking.motion.extent_m", "m", |c| F32(&mut c.motion.extent_m))
+            .range(Range::POSITIVE)
+            .text(
+                "Largest distance of a match from the median depth to be on the object; its error \
+                 comes on top.",
+            ),
+        Row::expert("tracking.motion.independent_matches", "", |c| {
+            U16(&mut c.motion.independent_matches)
+        })
+        .range(Range::Within(3.0, 1000.0))
+        .text("Most of an object's matches that count as independent: their errors correlate."),
+        Row::expert("tracking.motion.yaw_rad_s", "rad/s", |c| F32(&mut c.motion.yaw_rad_s))
+            .range(Range::POSITIVE)
+            .text("Rotation of an object about the vertical when first detected, one sigma."),
+        Row::expert("tracking.motion.tilt_rad_s", "rad/s", |c| F32(&mut c.motion.tilt_rad_s))
+            .range(Range::POSITIVE)
+            .text("Rotation of an object about any other axis when first detected, one sigma."),
+        Row::user("tracking.motion.speed_m_s", "m/s", |c| F32(&mut c.motion.speed_m_s))
+            .range(Range::POSITIVE)
+            .text("Speed of an object when first detected, one sigma."),
+        Row::expert("tracking.motion.acceleration_m_s2", "m/s²", |c| {
+            F32(&mut c.motion.acceleration_m_s2)
+        })
+        .range(Range::POSITIVE)
+        .text("Change of an object's speed within a second, one sigma."),
+        Row::expert("tracking.motion.yaw_acceleration_rad_s2", "rad/s²", |c| {
+            F32(&mut c.motion.yaw_acceleration_rad_s2)
+        })
+        .range(Range::POSITIVE)
+        .text("Change of an object's rotation about the vertical within a second, one sigma."),
+        Row::expert("tracking.motion.tilt_acceleration_rad_s2", "rad/s²", |c| {
+            F32(&mut c.motion.tilt_acceleration_rad_s2)
+        })
+        .range(Range::POSITIVE)
+        .text("Change of an object's rotation about any other axis within a second, one sigma."),
+        Row::user("tracking.motion.bias_px", "px", |c| F32(&mut c.motion.bias_px))
+            .range(Range::NOT_NEGATIVE)
+            .text(
+                "By how much all disparities may be too small. To a moving camera a static object \
+                 then seems to move, by twice this share of its disparity of the speed it passes \
+                 by.",
+            ),
+        Row::user("tracking.motion.lens_px", "px", |c| F32(&mut c.motion.lens_px))
+            .range(Range::NOT_NEGATIVE)
+            .text(
+                "By how much disparities may be too small at the left and right edge of the \
+                 picture, by the lens distortion that rectification left. It grows with the fourth \
+                 power of the distance from the middle. The default is that of KITTI's colour \
+                 cameras, as parked cars 30 m away show.",
+            ),
+        Row::user("tracking.motion.camera_rad", "rad", |c| F32(&mut c.motion.camera_rad))
+            .range(Range::NOT_NEGATIVE)
+            .text(
+                "Error of the camera's own rotation per frame, one sigma: at a distance it looks \
+                 like speed.",
+            ),
+        Row::user("tracking.state.dynamic_m_s", "m/s", |c| F32(&mut c.state.dynamic_m_s))
+            .range(Range::POSITIVE)
+            .relation(&Relation {
+                holds: |c| c.state.dynamic_m_s >= c.state.static_m_s,
+                rule: "must be at least tracking.state.static_m_s",
+            })
+            .published("5.5 (0.55 m a frame), in its experiments 2")
+            .text("An object that is certainly faster is dynamic."),
+        Row::expert("tracking.state.static_m_s", "m/s", |c| F32(&mut c.state.static_m_s))
+            .range(Range::POSITIVE)
+            .text(
+                "An object that is possibly slower than this, and likely slower than `slow_m_s`, \
+                 is static.",
+            ),
+        Row::user("tracking.state.slow_m_s", "m/s", |c| F32(&mut c.state.slow_m_s))
+            .range(Range::POSITIVE)
+            .relation(&Relation {
+                holds: |c| c.state.slow_m_s >= c.state.static_m_s,
+                rule: "must be at least tracking.state.static_m_s",
+            })
+            .text(
+                "An object that is not known to move is static only if it is likely slower than \
+                 this: slower than a pedestrian. A dynamic object becomes static only if it is \
+                 likely slower than `dynamic_m_s`.",
+            ),
+        Row::expert("tracking.state.sigmas", "sigmas", |c| F32(&mut c.state.sigmas))
+            .range(Range::NOT_NEGATIVE)
+            .published("0")
+            .text("Sigmas that are \"certainly\"."),
+        Row::expert("tracking.state.static_sigmas", "sigmas", |c| F32(&mut c.state.static_sigmas))
+            .range(Range::NOT_NEGATIVE)
+            .published("0")
+            .text("Sigmas that are \"likely\"."),
+        Row::expert("tracking.state.confirm_frames", "frames", |c| U8(&mut c.state.confirm_frames))
+            .range(FRAMES)
+            .published("1")
+            .text("Consecutive frames that confirm an uncertain object as dynamic."),
+        Row::expert("tracking.state.confirm_static_frames", "frames", |c| {
+            U8(&mut c.state.confirm_static_frames)
+        })
+        .range(FRAMES)
+        .published("1")
+        .text(
+            "Consecutive frames that confirm an uncertain object as static: after 2 the filter has \
+             averaged over several frames.",
+        ),
+        Row::expert("tracking.state.change_frames", "frames", |c| U8(&mut c.state.change_frames))
+            .range(FRAMES)
+            .published("no such change")
+            .text("Consecutive frames that change a dynamic object to static, or back."),
+        Row::expert("tracking.state.static_frames", "frames", |c| U8(&mut c.state.static_frames))
+            .range(Range::Within(0.0, 255.0))
+            .text("Frames without a motion over which a static object stays static."),
+        Row::expert("tracking.state.dynamic_frames", "frames", |c| U8(&mut c.state.dynamic_frames))
+            .range(Range::Within(0.0, 255.0))
+            .published("1, in its experiments 2")
+            .text(
+                "Frames without a motion over which a dynamic object stays dynamic: the filter \
+                 predicts its motion.",
+            ),
+        Row::user("tracking.segmentation.enabled", "", |c| Bool(&mut c.segmentation.enabled))
+            .text("Moving objects are searched for by their motion."),
+        Row::expert("tracking.segmentation.noise_px", "px", |c| F32(&mut c.segmentation.noise_px))
+            .range(Range::POSITIVE)
+            .text("Error of a match coordinate, one sigma."),
+        Row::expert("tracking.segmentation.disparity_noise_px", "px", |c| {
+            F32(&mut c.segmentation.disparity_noise_px)
+        })
+        .range(Range::POSITIVE)
+        .text("Error of a disparity, one sigma."),
+        Row::expert("tracking.segmentation.camera_m", "m", |c| F32(&mut c.segmentation.camera_m))
+            .range(Range::NOT_NEGATIVE)
+            .text("Error of the camera's translation in a frame, one sigma."),
+        Row::expert("tracking.segmentation.camera_rad", "rad", |c| {
+            F32(&mut c.segmentation.camera_rad)
+        })
+        .range(Range::NOT_NEGATIVE)
+        .text("Error of the camera's rotation in a frame, one sigma."),
+        Row::expert("tracking.segmentation.candidate_chi_square", "", |c| {
+            F32(&mut c.segmentation.candidate_chi_square)
+        })
+        .range(Range::POSITIVE)
+        .text(
+            "Squared Mahalanobis distance from the static prediction beyond which a match is a \
+             candidate. The default is chi-square, 3 degrees of freedom, 0.1 %.",
+        ),
+        Row::user("tracking.segmentation.far_m", "m", |c| F32(&mut c.segmentation.far_m))
+            .range(Range::POSITIVE)
+            .text("Farthest depth searched."),
+        Row::expert("tracking.segmentation.members_min", "", |c| {
+            U16(&mut c.segmentation.members_min)
+        })
+        .range(Range::Within(3.0, 1000.0))
+        .text("Fewest members of a group."),
+        Row::expert("tracking.segmentation.far_members_min", "", |c| {
+            U16(&mut c.segmentation.far_members_min)
+        })
+        .range(Range::Within(3.0, 1000.0))
+        .text("Fewest members of a group beyond `sparse_from_m`."),
+        Row::expert("tracking.segmentation.sparse_from_m", "m", |c| {
+            F32(&mut c.segmentation.sparse_from_m)
+        })
+        .range(Range::NOT_NEGATIVE)
+        .text("Depth from which on groups are smaller."),
+        Row::expert("tracking.segmentation.candidate_share_min", "", |c| {
+            F32(&mut c.segmentation.candidate_share_min)
+        })
+        .range(Range::SHARE)
+        .text("Least share of candidates among all matches within a group's box."),
+        Row::expert("tracking.segmentation.motion_min_m", "m", |c| {
+            F32(&mut c.segmentation.motion_min_m)
+        })
+        .range(Range::NOT_NEGATIVE)
+        .text(
+            "Least motion of a group in a frame; 0.0008 m for each square metre of squared depth \
+             comes on top.",
+        ),
+        Row::expert("tracking.segmentation.confirm_frames", "frames", |c| {
+            U8(&mut c.segmentation.confirm_frames)
+        })
+        .range(Range::Within(1.0, 3.0))
+        .text(
+            "Of the last three frames, in how many a group's motion must agree before it is an \
+             object.",
+        ),
+        Row::expert("tracking.segmentation.predict_frames", "frames", |c| {
+            U8(&mut c.segmentation.predict_frames)
+        })
+        .range(Range::Within(0.0, 10.0))
+        .text("Frames without a group over which an object's mask is predicted."),
+        Row::expert("tracking.segmentation.erase_frames", "frames", |c| {
+            U8(&mut c.segmentation.erase_frames)
+        })
+        .range(Range::Within(0.0, 30.0))
+        .text(
+            "Frames before an object was known to move, over which what it left in the static map \
+             is erased; 0 is off.",
+        ),
+    ];
+
+    pub(crate) const CHECKS: &'static [Rule<Self>] =
+        &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+}
