@@ -11,8 +11,8 @@
 //! geometry.
 
 use dynvox::synth::{
-    CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, Street, StreetConfig, SynthFrame,
-    Traffic,
+    CAMERA_HEIGHT_M, CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, Street, StreetConfig,
+    SynthFrame, Traffic,
 };
 use dynvox_core::memory::{Carver, SLAB_ALIGN};
 use dynvox_core::planning::DistanceField;
@@ -195,7 +195,7 @@ fn street(seed: u64) -> anyhow::Result<Street> {
 
 /// Takes in a frame's exact walls.
 fn add_walls(walls: &mut HashMap<[i32; 2], [f64; 2]>, street: &Street, frame: &SynthFrame) {
-    let (rig, ground_m) = (street.rig(), street.config().camera_height_m);
+    let (rig, ground_m) = (street.rig(), CAMERA_HEIGHT_M);
     for (at, depth) in frame
         .depth_m
         .iter()
@@ -243,7 +243,7 @@ fn map(
         let (key, value) = setting.split_once('=').unwrap_or_default();
         config.set(key, value)?;
     }
-    config.planning.camera_height_m = street.config().camera_height_m as f32;
+    config.planning.camera_height_m = CAMERA_HEIGHT_M as f32;
     let mut mapper = Mapper::new(capacity, &config, slab)?;
     let (mut walls, mut cars) = (HashMap::new(), Vec::new());
     for index in 0..frames {

@@ -16,6 +16,9 @@ const YAW: [(f64, f64); 2] = [(0.0080, 0.17), (0.0015, 0.71)];
 const BOUNCE_M: [(f64, f64); 2] = [(0.012, 0.61), (0.006, 1.53)];
 const DRIFT_M: [(f64, f64); 2] = [(0.14, 0.06), (0.03, 0.23)];
 
+/// Height of the cameras above the road, m.
+pub const CAMERA_HEIGHT_M: f64 = 1.65;
+
 /// How far along the street the camera is at a time, m.
 pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
     config.speed_m_s * time_s
@@ -35,7 +38,7 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
     let (pitch, roll, yaw, bounce, drift) =
         (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
     let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
-    let height = Vector3::new(0.0, bounce - config.camera_height_m, 0.0);
+    let height = Vector3::new(0.0, bounce - CAMERA_HEIGHT_M, 0.0);
     on_road
         * Transform::new(Vector3::zeros(), height)
         * Transform::new(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())

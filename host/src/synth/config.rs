@@ -1,5 +1,6 @@
 //! The street's parameters and all their defaults.
 
+use dynvox_core::settings::{Problems, check};
 use serde::{Deserialize, Serialize};
 
 use super::lens::{RigError, StreetLens};
@@ -10,9 +11,9 @@ use super::lens::{RigError, StreetLens};
 pub struct StreetConfig {
     /// Chooses the street: houses, cars, trees, bends, noise.
     pub seed: u64,
-    /// Image width, px, 32 to 8192.
+    /// Image width, px.
     pub width: u32,
-    /// Image height, px, 32 to 8192.
+    /// Image height, px.
     pub height: u32,
     /// Frames a writer or a run takes; the street itself is endless.
     pub frames: u32,
@@ -22,14 +23,12 @@ pub struct StreetConfig {
     pub focal_px: Option<f64>,
     /// Distance between the cameras, m.
     pub baseline_m: f64,
-    /// Height of the cameras above the road, m.
-    pub camera_height_m: f64,
     /// Speed of the camera along the street, m/s. The camera never brakes: scripted cars in its
     /// lane must be faster or leave it.
     pub speed_m_s: f64,
     /// Whether the street bends; straight on otherwise.
     pub curvature: bool,
-    /// Steepest rise of the street, rise over run, 0 to 0.3: it goes up and down once in 60 m; 0 is
+    /// Steepest rise of the street, rise over run: it goes up and down once in 60 m; 0 is
     /// level.
     pub hills: f64,
     /// Scale of the camera's pitch, roll and bounce; 0 is a rail.
@@ -39,9 +38,7 @@ pub struct StreetConfig {
     pub noise_sigma: f64,
     /// How much brighter the right camera is, as a share of the light.
     pub gain_difference: f64,
-    /// Noise of a LiDAR range, m (1 sigma).
-    pub lidar_noise_m: f64,
-    /// Share of parking spaces that are taken, 0 to 1.
+    /// Share of parking spaces that are taken.
     pub parked_density: f64,
     /// The lens of both cameras. With one, images come raw; depth, masks and poses stay those of
     /// the ideal rig they are rectified to.
@@ -62,14 +59,12 @@ impl Default for StreetConfig {
             rate_hz: 10.0,
             focal_px: None,
             baseline_m: 0.54,
-            camera_height_m: 1.65,
             speed_m_s: 9.0,
             curvature: true,
             hills: 0.0,
             shake: 1.0,
             noise_sigma: 1.6,
             gain_difference: 0.03,
-            lidar_noise_m: 0.0,
             parked_density: 0.6,
             lens: StreetLens::Ideal,
             rig_error: RigError::default(),
@@ -89,41 +84,11 @@ impl StreetConfig {
         self.focal_px.unwrap_or(0.58 * f64::from(self.width))
     }
 
-    /// What is wrong with the figures, if anything, in one sentence.
+    /// The first problem of the figures, in one sentence.
     pub fn problem(&self) -> Option<String> {
-        let positive = [
-            ("rate_hz", self.rate_hz),
-            ("focal_px", self.focal_px()),
-            ("baseline_m", self.baseline_m),
-            ("camera_height_m", self.camera_height_m),
-        ];
-        let held = [
-            ("speed_m_s", self.speed_m_s, 0.0, 60.0),
-            ("hills", self.hills, 0.0, 0.3),
-            ("shake", self.shake, 0.0, 5.0),
-            ("noise_sigma", self.noise_sigma, 0.0, 50.0),
-            ("gain_difference", self.gain_difference, -0.5, 0.5),
-            ("lidar_noise_m", self.lidar_noise_m, 0.0, 5.0),
-            ("parked_density", self.parked_density, 0.0, 1.0),
-        ];
-        for (name, size) in [("width", self.width), ("height", self.height)] {
-            if !(32..=8192).contains(&size) {
-                return Some(format!("street.{name} is {size}; it must lie within 32 to 8192 px"));
-            }
-        }
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Some(format!("street.{name} is {value}; it must be a positive number"));
-            }
-        }
-        for (name, value, low, high) in held {
-            if !(low..=high).contains(&value) {
-                return Some(format!(
-                    "street.{name} is {value}; it must lie within {low} to {high}"
-                ));
-            }
-        }
-        self.rig_error.problem().or_else(|| self.traffic.problem())
+        let mut problems = Problems::new();
+        check(Self::CHECKS, self, &mut problems);
+        problems.first().map(ToString::to_string).or_else(|| self.traffic.problem())
     }
 }
 
@@ -146,22 +111,7 @@ impl Default for Traffic {
 impl Traffic {
     fn problem(&self) -> Option<String> {
         let Self::Moving(moving) = self else { return None };
-        for (name, gap) in [
-            ("oncoming_gap_m", moving.oncoming_gap_m),
-            ("overtaking_gap_m", moving.overtaking_gap_m),
-        ] {
-            if !(gap == 0.0 || (30.0..=1e6).contains(&gap)) {
-                return Some(format!(
-                    "street.traffic.{name} is {gap}; it must be 0 (no such cars) or at least 30 m"
-                ));
-            }
-        }
-        let speeds = [moving.oncoming_speed_m_s, moving.overtaking_speed_m_s];
-        if speeds
-            .into_iter()
-            .chain(moving.cars.iter().map(|car| car.profile.speed_m_s()))
-            .any(|speed| !(0.0..=60.0).contains(&speed))
-        {
+        if moving.cars.iter().any(|car| !(0.0..=60.0).contains(&car.profile.speed_m_s())) {
             return Some("a speed in street.traffic lies outside 0 to 60 m/s".to_owned());
         }
         moving.cars.iter().find_map(|car| match car.profile {
@@ -182,12 +132,8 @@ impl Traffic {
 pub struct MovingTraffic {
     /// Mean distance between oncoming cars, m; 0 for none.
     pub oncoming_gap_m: f64,
-    /// Speed of the oncoming cars, m/s.
-    pub oncoming_speed_m_s: f64,
     /// Mean distance between overtaking cars, m; 0 for none.
     pub overtaking_gap_m: f64,
-    /// Speed of the overtaking cars, m/s.
-    pub overtaking_speed_m_s: f64,
     /// Cars with a script of their own.
     pub cars: Vec<ScriptedCar>,
 }
@@ -203,9 +149,7 @@ impl Default for MovingTraffic {
         };
         Self {
             oncoming_gap_m: 70.0,
-            oncoming_speed_m_s: 8.0,
             overtaking_gap_m: 90.0,
-            overtaking_speed_m_s: 13.0,
             cars: vec![
                 car(
                     CarKind::Hatchback,

@@ -120,17 +120,4 @@ impl RigError {
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
-
-    /// What is out of range, in one sentence.
-    pub fn problem(&self) -> Option<String> {
-        let all = [
-            ("disparity_offset_px", self.disparity_offset_px, 20.0),
-            ("vertical_shift_px", self.vertical_shift_px, 20.0),
-            ("roll_deg", self.roll_deg, 10.0),
-            ("pitch_deg", self.pitch_deg, 10.0),
-        ];
-        let outside = all.into_iter().find(|(_, value, most)| !(-most..=*most).contains(value))?;
-        let (name, value, most) = outside;
-        Some(format!("street.rig_error.{name} is {value}; it must lie within -{most} to {most}"))
-    }
 }

@@ -1,7 +1,7 @@
 //! A spinning LiDAR above the camera: 64 beams, 2000 directions, one revolution without the
 //! camera's motion in it.
 //!
-//! Every beam is tested against every triangle that may cross it, so ranges are exact before noise.
+//! Every beam is tested against every triangle that may cross it, so ranges are exact.
 //! Axes are the sensor's: x forward, y left, z up. Time: a few tens of milliseconds a scan.
 
 use dynvox_core::geometry::Transform;
@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use super::mesh::Point;
 use super::paint::SurfacePoint;
-use super::random::{hash, unit};
 use super::scene::Scene;
 use super::street::Street;
 
@@ -65,7 +64,6 @@ impl Street {
                     points.push(self.echo(
                         scene,
                         &faces[face as usize],
-                        index,
                         (beam, direction),
                         1.0 / nearness,
                     ));
@@ -112,7 +110,6 @@ impl Street {
         &self,
         scene: &Scene,
         face: &Face,
-        index: u32,
         (beam, direction): (usize, usize),
         range_m: f64,
     ) -> [f32; 4] {
@@ -137,12 +134,6 @@ impl Street {
             object.coat,
         );
         let [red, green, blue] = painted.tone;
-        let noise_m = self.config().lidar_noise_m;
-        let range_m = if noise_m > 0.0 {
-            range_m + noise_m * normal(self.config().seed, index, (beam, direction))
-        } else {
-            range_m
-        };
         let point = ray * range_m;
         [
             point.x as f32,
@@ -151,13 +142,6 @@ impl Street {
             (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0),
         ]
     }
-}
-
-/// A nearly normal draw for one echo.
-fn normal(seed: u64, index: u32, (beam, direction): (usize, usize)) -> f64 {
-    let bits = hash(seed ^ 0x11DA2, i64::from(index), (beam * DIRECTIONS + direction) as i64);
-    let sum: f32 = (0..4).map(|k| unit(((bits >> (16 * k)) as u32) << 16)).sum();
-    f64::from(sum - 2.0) * 1.732
 }
 
 fn elevation(beam: usize) -> f64 {

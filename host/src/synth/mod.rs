@@ -47,6 +47,7 @@ mod render;
 mod scene;
 mod segment;
 mod sensor;
+mod settings;
 mod shadow;
 mod street;
 mod surface;
@@ -57,6 +58,7 @@ mod traffic;
 mod window_paint;
 mod writer;
 
+pub use camera::CAMERA_HEIGHT_M;
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
 pub use lens::{

@@ -118,6 +118,11 @@ pub fn drivers(
     drivers
 }
 
+/// Speed of the oncoming cars of the flow, m/s.
+const ONCOMING_SPEED_M_S: f64 = 8.0;
+/// Speed of the overtaking cars of the flow, m/s.
+const OVERTAKING_SPEED_M_S: f64 = 13.0;
+
 /// The endless flow in one lane: car j stands in slot j of a belt that moves with the lane's speed.
 fn flow(
     config: &StreetConfig,
@@ -129,10 +134,8 @@ fn flow(
     drivers: &mut Vec<Driver>,
 ) {
     let (gap, speed, sign, first_id) = match lane {
-        Lane::Oncoming => {
-            (moving.oncoming_gap_m, moving.oncoming_speed_m_s, -1.0, layout::ONCOMING_IDS)
-        }
-        _ => (moving.overtaking_gap_m, moving.overtaking_speed_m_s, 1.0, layout::OVERTAKING_IDS),
+        Lane::Oncoming => (moving.oncoming_gap_m, ONCOMING_SPEED_M_S, -1.0, layout::ONCOMING_IDS),
+        _ => (moving.overtaking_gap_m, OVERTAKING_SPEED_M_S, 1.0, layout::OVERTAKING_IDS),
     };
     if gap <= 0.0 {
         return;

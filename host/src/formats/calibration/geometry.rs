@@ -4,6 +4,7 @@ use super::{StereoCalibration, read_rig};
 use crate::formats::{FormatError, read_text};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{Rectification, Sizing};
+use dynvox_core::settings::{Range, Setting, Value::Number};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -28,11 +29,27 @@ pub struct RectifiedSize {
     pub focal_px: Option<f64>,
 }
 
+type Row = Setting<RectifiedSize>;
+
 impl RectifiedSize {
     /// Least side, px.
     const LEAST_PX: u32 = 32;
     /// Largest side, px.
     const MOST_PX: u32 = 4_096;
+
+    /// One row per setting.
+    pub const SETTINGS: &'static [Row] = &[
+        Row::user("rectify.width_px", "px", |c| Number(c.width_px.map(f64::from)))
+            .range(Range::Within(Self::LEAST_PX as f32, Self::MOST_PX as f32))
+            .text("Width of rectified images; with `height_px` or not at all."),
+        Row::user("rectify.height_px", "px", |c| Number(c.height_px.map(f64::from)))
+            .range(Range::Within(Self::LEAST_PX as f32, Self::MOST_PX as f32))
+            .text("Height of rectified images."),
+        Row::user("rectify.focal_px", "px", |c| Number(c.focal_px)).range(Range::POSITIVE).text(
+            "Focal length of rectified images, with a size only; the least that leaves no pixel \
+             without image when absent.",
+        ),
+    ];
 
     /// The core's own, or what is wrong, in one sentence.
     ///
