@@ -22,6 +22,7 @@ mod manual;
 mod output;
 mod rectified;
 mod run;
+mod settings;
 mod signals;
 mod sweep;
 mod synth;
@@ -45,6 +46,7 @@ Examples:
   dynvox run --resume out/long                  resume an interrupted run from its last snapshot
   dynvox run ~/raw-rig --calibration camchain.yaml   images as the cameras deliver them
   dynvox calibration camchain.yaml              what a calibration means
+  dynvox settings volume.voxel_size_m           what a setting means, its range and its default
   dynvox budget --profile small                 where the bytes of a profile go
   dynvox budget --memory 48MiB --image 752x480   bounds that fit a number of bytes
   dynvox run ~/my-rig --memory 48MiB            the same, for the images that come
@@ -91,6 +93,8 @@ enum Command {
     Sweep(Box<sweep::SweepArgs>),
     /// Write the synthetic street in KITTI's layout, with its ground truth
     Synth(synth::SynthArgs),
+    /// Describe the settings: all, one section, or one with its unit, range and default
+    Settings(settings::SettingsArgs),
     /// Turn the map of a finished run in the browser, frame by frame
     View(view::ViewArgs),
     /// Name the first frame and stage in which two runs diverge
@@ -124,6 +128,7 @@ pub fn main() -> ExitCode {
         Some(Command::Evaluate(args)) => evaluate::run(&args),
         Some(Command::Sweep(args)) => sweep::run(&args),
         Some(Command::Synth(args)) => synth::run(&args),
+        Some(Command::Settings(args)) => settings::run(&args),
         Some(Command::View(args)) => view::run(&args),
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Bench(args)) => bench::run(&args),

@@ -48,6 +48,7 @@ pub use options::Options;
 pub use plan::Plan;
 pub use poses::Poses;
 pub use settings::Settings;
+pub(crate) use settings::leaves;
 pub use sizes::{Bytes, ImageSize, WindowSize};
 pub use storage::{Storage, Streaming};
 

@@ -11,6 +11,7 @@ use dynvox_core::objects::ObjectsConfig;
 use dynvox_core::planning::PlanningConfig;
 use dynvox_core::rectify::{Rectification, self_calibration::RigConfig};
 use dynvox_core::scene_flow::SceneFlowConfig;
+use dynvox_core::settings::constant;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::tracking::TrackingConfig;
 use dynvox_core::view::{MeshConfig, RaycastConfig};
@@ -231,6 +232,9 @@ impl Layers {
     /// Sets one key and checks at once that it is known and its value of the right kind, so that
     /// the error can name it.
     fn set(&mut self, key: &str, value: Value) -> anyhow::Result<()> {
+        if let Some(constant) = constant(key) {
+            bail!("`{key}` is a constant now, {constant}: leave it out");
+        }
         let known = self.table.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         match key.split_once('.') {
             None => bail!(
@@ -252,7 +256,7 @@ impl Layers {
 }
 
 /// Every value below a table that is not a table itself, with its full key.
-fn leaves(prefix: &str, table: &Table) -> Vec<(String, Value)> {
+pub(crate) fn leaves(prefix: &str, table: &Table) -> Vec<(String, Value)> {
     let mut found = Vec::new();
     for (key, value) in table {
         let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
@@ -371,6 +375,7 @@ mod tests {
         );
         assert!(refusal("far_m=1").contains("`far_m` is not a key"));
         assert!(refusal("volume.far_m").contains("has no value"));
+        assert!(refusal("stereo.beta=0.02").contains("`stereo.beta` is a constant now, 0.02"));
         assert!(refusal("volume.far_m=wide").contains("`volume.far_m`"));
         assert!(refusal("street.wdith=100").contains("`street.wdith`"));
         let folder = tempfile::TempDir::new().unwrap();
