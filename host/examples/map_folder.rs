@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p dynvox --example map_folder -- fixtures/street-320x96`
 
-use dynvox::input::layouts::{OpenOptions, open};
+use dynvox::input::{OpenOptions, open};
 use dynvox_core::mapper::BudgetOptions;
 use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, memory::SLAB_ALIGN};
 

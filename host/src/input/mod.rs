@@ -7,6 +7,8 @@
 //! what they cannot use is an [`InputError`] that says what to do.
 
 pub mod bags;
+mod data_set;
+mod data_sets;
 pub mod depth;
 pub mod diagnosis;
 pub mod faults;
@@ -15,12 +17,11 @@ pub mod masks;
 pub mod source;
 pub mod stream;
 
-pub use layouts::{
-    CameraPair, Found, Layout, OpenOptions, Sequence, Stacking, StreetFrames, open, sequences_at,
-    survey,
-};
+pub use data_set::{CameraPair, DataSet, Layout, OpenOptions, Topics};
+pub use data_sets::{DATA_SETS, Found, open, sequences_at, survey};
+pub use layouts::{Sequence, StreetFrames};
 pub use source::{
     AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError,
-    InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, StereoImages, StopRequest,
-    StreamState, TrueObject, read_given_poses,
+    InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, Stacking, StereoImages,
+    StopRequest, StreamState, TrueObject, read_given_poses,
 };

@@ -1,7 +1,7 @@
 //! Source of the images.
 
 use super::{Request, RequestError, stream};
-use crate::input::bags::Topics;
+use crate::input::Topics;
 use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
 use crate::input::{

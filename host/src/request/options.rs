@@ -8,7 +8,7 @@ use super::{
 };
 use crate::formats::Axes;
 use crate::formats::calibration::RectifiedSize;
-use crate::input::bags::Topics;
+use crate::input::Topics;
 use crate::input::depth::DepthChoice;
 use crate::input::faults::Faults;
 use crate::input::masks::MaskChoice;

@@ -13,9 +13,8 @@ mod topics;
 #[cfg(test)]
 mod tests;
 
-pub use topics::Topics;
-
-use super::layouts::{OpenOptions, nearest_stamps};
+use super::data_set::{DataSet, Layout, OpenOptions, no_sequences};
+use super::layouts::nearest_stamps;
 use super::source::{FrameSource, InputError, LidarScan, StereoImages, StreamState, require_size};
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, StereoCalibration};
 use crate::formats::significant_bits;
@@ -92,11 +91,21 @@ pub fn conversion(path: &Path) -> Option<String> {
     ))
 }
 
+/// Recordings of ROS 2.
+pub const DATA_SET: Layout = Layout::new(&DataSet {
+    name: "mcap",
+    summary: "ROS 2: an MCAP file, or the folder of a recording with one",
+    describe: |_| "ROS 2: an MCAP file, stamps and calibration of its messages".to_owned(),
+    matches: |path| file_at(path).is_some(),
+    sequences: no_sequences,
+    open: |path, options| Ok(Box::new(open(path, options)?)),
+});
+
 /// Opens the file.
 ///
 /// # Errors
 /// It is truncated or has no index, its topics cannot be told, or there is no calibration.
-pub fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
+fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
     let path = file_at(path).ok_or_else(|| InputError::File { path: path.to_path_buf() })?;
     let file = BagFile::open(&path)?;
     let topics = topics::choose(&file, options.topics.as_ref())?;

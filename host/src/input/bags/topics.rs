@@ -1,9 +1,8 @@
 //! Which topics are the two cameras.
 
 use super::file::{BagFile, Topic};
+use crate::input::data_set::Topics;
 use crate::input::source::InputError;
-use serde::{Deserialize, Serialize};
-use std::str::FromStr;
 
 /// Names of a camera's side in topics, left and right.
 const SIDES: [[&str; 2]; 7] = [
@@ -15,22 +14,6 @@ const SIDES: [[&str; 2]; 7] = [
     ["image_0", "image_1"],
     ["Left", "Right"],
 ];
-
-/// The two topics by name: `LEFT,RIGHT`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Topics(pub [String; 2]);
-
-impl FromStr for Topics {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let sides =
-            text.split_once(',').filter(|(left, right)| !left.is_empty() && !right.is_empty());
-        sides
-            .map(|(left, right)| Self([left.to_owned(), right.to_owned()]))
-            .ok_or_else(|| "must be LEFT,RIGHT".to_owned())
-    }
-}
 
 fn is_image(topic: &Topic) -> bool {
     matches!(topic.kind.as_str(), "sensor_msgs/Image" | "sensor_msgs/CompressedImage")

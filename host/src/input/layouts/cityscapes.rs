@@ -2,12 +2,12 @@
 //! images likewise, and a camera file for each sequence. One sequence of 30 frames is one
 //! recording.
 
-use super::OpenOptions;
 use super::kitti::{chosen, sequences};
 use super::names::{pictures_in, stem_of};
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
 use crate::formats::{FormatError, read_text};
+use crate::input::data_set::{DataSet, Layout, OpenOptions};
 use crate::input::source::InputError;
 use dynvox_core::geometry::StereoRig;
 use serde::Deserialize;
@@ -39,8 +39,18 @@ struct Intrinsic {
     v0: f64,
 }
 
+/// Cityscapes.
+pub const DATA_SET: Layout = Layout::new(&DataSet {
+    name: "cityscapes",
+    summary: "Cityscapes: `leftImg8bit_sequence`, `rightImg8bit_sequence`, `camera`",
+    describe: |_| "Cityscapes: left and right images of each sequence".to_owned(),
+    matches: |path| left_root(path).is_some(),
+    sequences: |path| Ok(sequences_of(path)?.into_keys().collect()),
+    open: |path, options| Ok(Box::new(open(path, options)?)),
+});
+
 /// Opens a sequence, named `aachen_000000`.
-pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let all = sequences_of(path)?;
     let names: Vec<String> = all.keys().cloned().collect();
     let name = chosen(path, options.sequence.as_deref(), &names)?;
@@ -81,13 +91,8 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
 }
 
 /// The folder of all left images, if this is the data set.
-pub fn left_root(path: &Path) -> Option<PathBuf> {
+fn left_root(path: &Path) -> Option<PathBuf> {
     LEFT.iter().map(|side| path.join(side)).find(|side| side.is_dir())
-}
-
-/// The names of all sequences.
-pub fn names(path: &Path) -> Result<Vec<String>, InputError> {
-    Ok(sequences_of(path)?.into_keys().collect())
 }
 
 /// Each sequence with its folder below that of the side: `train/aachen`.

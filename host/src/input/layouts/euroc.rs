@@ -1,18 +1,28 @@
 //! EuRoC's layout, which TUM VI shares: `mav0/cam0/data`, `mav0/cam1/data`, and `data.csv` with the
 //! time stamp of each image.
 
-use super::OpenOptions;
 use super::camera_folders::camera_in;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
 use crate::formats::calibration::{CameraGeometry, beside};
+use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
 /// Folder of all sensors.
 const SENSORS: &str = "mav0";
 
+/// EuRoC and TUM VI.
+pub const DATA_SET: Layout = Layout::new(&DataSet {
+    name: "euroc",
+    summary: "EuRoC and TUM VI: `mav0/{cam0,cam1}/data`, `data.csv`",
+    describe: |_| "EuRoC or TUM VI: mav0/cam0 and mav0/cam1, times of data.csv".to_owned(),
+    matches: |path| sensors_of(path).is_some(),
+    sequences: no_sequences,
+    open: |path, options| Ok(Box::new(open(path, options)?)),
+});
+
 /// Opens the recording. `path` is its root or `mav0` in it.
-pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let sensors = sensors_of(path)
         .ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let action = "A recording of EuRoC or TUM VI has mav0/cam0 and mav0/cam1: fetch the other half";
@@ -49,7 +59,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
 }
 
 /// The folder of the sensors, if there is one with a camera.
-pub fn sensors_of(path: &Path) -> Option<PathBuf> {
+fn sensors_of(path: &Path) -> Option<PathBuf> {
     let is_mav = path.file_name().is_some_and(|name| name == SENSORS);
     let sensors = if is_mav { path.to_path_buf() } else { path.join(SENSORS) };
     sensors.join("cam0").is_dir().then_some(sensors)

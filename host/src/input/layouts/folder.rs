@@ -1,23 +1,32 @@
 //! Any two folders of images, one folder with prefixes or suffixes, or images that hold both
 //! cameras; beside them `calib.txt`, and if known `times.txt` and `poses.txt`.
 
-use super::OpenOptions;
 use super::camera_folders::{camera_in, side_folders, split_by_mark};
 use super::names::pictures_in;
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, camera_files, present, stamps_in_names};
-use super::stacked::Stacking;
 use crate::formats::calibration::{CameraGeometry, beside};
 use crate::formats::{calibration, picture_size, read_poses, read_times};
-use crate::input::source::InputError;
+use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
+use crate::input::source::{InputError, Stacking};
 use std::path::{Path, PathBuf};
 
 /// How far a principal point lies from the middle of an image at most, as a share of its side.
 const CENTRAL: f64 = 0.2;
 
+/// Any folder of stereo pairs.
+pub const DATA_SET: Layout = Layout::new(&DataSet {
+    name: "folder",
+    summary: "Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`",
+    describe: describe,
+    matches: is_stereo_folder,
+    sequences: no_sequences,
+    open: |path, options| Ok(Box::new(open(path, options)?)),
+});
+
 /// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see
 /// [`calibration::read_rig`]); without it a calibration of raw images is looked for ([`beside`]).
-pub fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
@@ -58,12 +67,12 @@ pub fn name_of(path: &Path) -> String {
 }
 
 /// Whether the folder has this layout.
-pub fn is_stereo_folder(path: &Path) -> bool {
+fn is_stereo_folder(path: &Path) -> bool {
     side_folders(path).is_some() || (path.join("calib.txt").is_file() && pictures_in(path).is_ok())
 }
 
 /// How the images lie there, as `inspect` says it.
-pub fn describe(path: &Path) -> String {
+pub(super) fn describe(path: &Path) -> String {
     let name =
         |folder: &PathBuf| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     match side_folders(path) {

@@ -4,9 +4,9 @@ use super::labels;
 use super::lidar::LidarFiles;
 use super::names::{natural_order, pictures_in};
 use super::sequence::{ImageFiles, Parts, Sequence, present};
-use super::{CameraPair, OpenOptions};
 use crate::formats::calibration::KittiCalibration;
 use crate::formats::{read_poses, read_times};
+use crate::input::data_set::{CameraPair, DataSet, Layout, OpenOptions};
 use crate::input::source::{InputError, read_failed};
 use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,31 @@ use std::path::{Path, PathBuf};
 /// Time between two frames of the tracking benchmark, s.
 const LABELS_INTERVAL_S: f64 = 0.1;
 
+/// The odometry benchmark.
+pub const ODOMETRY: Layout = Layout::new(&DataSet {
+    name: "kitti-odometry",
+    summary: "KITTI odometry: `sequences/NN/{image_0,image_1,calib.txt}`",
+    describe: |_| "KITTI odometry: image_0 to image_3 of each sequence".to_owned(),
+    matches: |path| odometry_root(path).is_some() || is_odometry_sequence(path),
+    sequences: |path| odometry_root(path).map_or(Ok(Vec::new()), |root| sequences(&root)),
+    open: |path, options| Ok(Box::new(open_odometry(path, options)?)),
+});
+
+/// The tracking benchmark.
+pub const TRACKING: Layout = Layout::new(&DataSet {
+    name: "kitti-tracking",
+    summary: "KITTI tracking: `training/{image_02,image_03}/NNNN`, `training/calib/NNNN.txt`",
+    describe: |_| "KITTI tracking: image_02 and image_03 of each sequence".to_owned(),
+    matches: |path| tracking_split(path).is_some(),
+    sequences: |path| {
+        tracking_split(path).map_or(Ok(Vec::new()), |split| tracking_sequences(&split))
+    },
+    open: |path, options| Ok(Box::new(open_tracking(path, options)?)),
+});
+
 /// Opens a sequence of the odometry benchmark. `path` is its root (with `sequences/`), the
 /// `sequences` folder or one sequence.
-pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let folder = odometry_folder(path, options.sequence.as_deref())?;
     let number =
         folder.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -87,7 +109,7 @@ pub fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
 
 /// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing`
 /// folder.
-pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let split = tracking_split(path)
         .ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let names = tracking_sequences(&split)?;
@@ -136,7 +158,7 @@ pub fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, Inp
 }
 
 /// The sequences folder of an odometry root, if it is one.
-pub fn odometry_root(path: &Path) -> Option<PathBuf> {
+fn odometry_root(path: &Path) -> Option<PathBuf> {
     let below = path.join("sequences");
     if below.is_dir() {
         return Some(below);
@@ -146,13 +168,13 @@ pub fn odometry_root(path: &Path) -> Option<PathBuf> {
 }
 
 /// Whether the folder is one sequence of the odometry benchmark.
-pub fn is_odometry_sequence(path: &Path) -> bool {
+fn is_odometry_sequence(path: &Path) -> bool {
     path.join("calib.txt").is_file()
         && ["image_0", "image_2"].iter().any(|camera| path.join(camera).is_dir())
 }
 
 /// The split (`training`, `testing`) of a tracking root, if it is one.
-pub fn tracking_split(path: &Path) -> Option<PathBuf> {
+fn tracking_split(path: &Path) -> Option<PathBuf> {
     let is_split = |folder: &Path| {
         // Images directly below image_02 would be another layout: here each sequence has a folder
         // of its own.
@@ -177,7 +199,7 @@ pub fn sequences(folder: &Path) -> Result<Vec<String>, InputError> {
 }
 
 /// Names of the sequences of a tracking split.
-pub fn tracking_sequences(split: &Path) -> Result<Vec<String>, InputError> {
+fn tracking_sequences(split: &Path) -> Result<Vec<String>, InputError> {
     sequences(&split.join("image_02"))
 }
 

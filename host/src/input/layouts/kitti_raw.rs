@@ -5,17 +5,41 @@ use super::camera_folders::camera_in;
 use super::folder::name_of;
 use super::kitti::{chosen, sequences};
 use super::sequence::{ImageFiles, Parts, Sequence, present};
-use super::{CameraPair, OpenOptions};
 use crate::formats::calibration::KittiCalibration;
+use crate::input::data_set::{CameraPair, DataSet, Layout, OpenOptions};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
 /// Folder of all drives of KITTI-360.
 const DRIVES_360: &str = "data_2d_raw";
 
+/// KITTI's raw drives.
+pub const KITTI_RAW: Layout = Layout::new(&DataSet {
+    name: "kitti-raw",
+    summary: "KITTI raw: `DAY/DRIVE_sync/{image_00,image_01}/data`, `DAY/calib_cam_to_cam.txt`",
+    describe: |_| {
+        "KITTI raw: image_00 to image_03 of each drive, times of timestamps.txt".to_owned()
+    },
+    matches: |path| is_drive(path) || drives(path).is_ok_and(|drives| !drives.is_empty()),
+    sequences: |path| if is_drive(path) { Ok(Vec::new()) } else { drives(path) },
+    open: |path, options| Ok(Box::new(open_raw(path, options)?)),
+});
+
+/// KITTI-360.
+pub const KITTI_360: Layout = Layout::new(&DataSet {
+    name: "kitti-360",
+    summary: "KITTI-360: `data_2d_raw/DRIVE/{image_00,image_01}/data_rect`, `calibration/perspective.txt`",
+    describe: |_| {
+        "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned()
+    },
+    matches: |path| drives_360(path).is_some() || is_drive_360(path),
+    sequences: |path| drives_360(path).map_or(Ok(Vec::new()), |drives| sequences(&drives)),
+    open: |path, options| Ok(Box::new(open_360(path, options)?)),
+});
+
 /// Opens a drive of KITTI raw. `path` is the drive (`2011_09_26_drive_0001_sync`) or the day with
 /// its calibration.
-pub fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let drive = if is_drive(path) {
         path.to_path_buf()
     } else {
@@ -34,7 +58,7 @@ pub fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputErr
 }
 
 /// Opens a drive of KITTI-360. `path` is the root of the data set or one drive in `data_2d_raw`.
-pub fn open_360(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
+fn open_360(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let (root, drive) = match drives_360(path) {
         Some(drives) => (
             path.to_path_buf(),
@@ -83,12 +107,12 @@ fn open_drive(
 }
 
 /// Whether the folder is one drive of KITTI raw.
-pub fn is_drive(path: &Path) -> bool {
+fn is_drive(path: &Path) -> bool {
     ["image_00", "image_02"].iter().any(|camera| path.join(camera).join("data").is_dir())
 }
 
 /// The drives of a day of KITTI raw; empty where the folder is none.
-pub fn drives(path: &Path) -> Result<Vec<String>, InputError> {
+fn drives(path: &Path) -> Result<Vec<String>, InputError> {
     if !path.join("calib_cam_to_cam.txt").is_file() {
         return Ok(Vec::new());
     }
@@ -96,11 +120,11 @@ pub fn drives(path: &Path) -> Result<Vec<String>, InputError> {
 }
 
 /// The folder of the drives of KITTI-360.
-pub fn drives_360(path: &Path) -> Option<PathBuf> {
+fn drives_360(path: &Path) -> Option<PathBuf> {
     Some(path.join(DRIVES_360)).filter(|drives| drives.is_dir())
 }
 
 /// Whether the folder is one drive of KITTI-360.
-pub fn is_drive_360(path: &Path) -> bool {
+fn is_drive_360(path: &Path) -> bool {
     path.join("image_00/data_rect").is_dir()
 }

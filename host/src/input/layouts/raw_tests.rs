@@ -1,7 +1,7 @@
 //! Raw recordings: KITTI's unrectified frames against the rectified ones of the same drive.
 
-use super::{OpenOptions, open};
 use crate::formats::read_picture;
+use crate::input::{OpenOptions, open};
 use dynvox_core::{
     Capacity, Serial,
     memory::{Carver, SLAB_ALIGN},

@@ -4,14 +4,12 @@
 use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
 use super::pairing::{CameraFiles, Pairing};
-use super::stacked::Stacking;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
 use crate::input::source::{
-    AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, StereoImages, StreamState,
-    require_size,
+    ASSUMED_HZ, AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, Stacking,
+    StereoImages, StreamState, require_size,
 };
-use crate::input::stream::ASSUMED_HZ;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 use std::path::{Path, PathBuf};

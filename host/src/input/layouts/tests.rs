@@ -5,7 +5,8 @@ mod folders;
 
 use super::*;
 use crate::formats::luma;
-use crate::input::source::{FrameSource, Scaled};
+use crate::input::source::{FrameSource, Scaled, Stacking};
+use crate::input::{CameraPair, DATA_SETS, Layout, OpenOptions, open, survey};
 use ::image::{GrayImage, ImageBuffer, Luma, RgbImage};
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -7,6 +7,7 @@ mod lidar;
 mod masks;
 mod overlay;
 mod scaled;
+mod stacking;
 mod stop;
 mod truth;
 
@@ -19,6 +20,7 @@ pub use masks::{
 };
 pub use overlay::{Overlay, OverlaySource};
 pub use scaled::Scaled;
+pub use stacking::Stacking;
 pub use stop::StopRequest;
 pub use truth::{ObjectsTruth, TrueObject};
 
@@ -26,6 +28,9 @@ use crate::formats::{Decoded, Image};
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
 use std::path::PathBuf;
+
+/// Frames a second assumed of images without times.
+pub const ASSUMED_HZ: f64 = 10.0;
 
 /// One stereo pair, decoded.
 #[derive(Clone, Debug)]

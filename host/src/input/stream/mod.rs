@@ -15,7 +15,8 @@ mod tests;
 pub use queue::WhenLate;
 
 use super::source::{
-    FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState, require_size,
+    ASSUMED_HZ, FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState,
+    require_size,
 };
 use crate::formats::Decoded;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
@@ -26,8 +27,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Pairs that wait for the mapper, at most.
 pub const QUEUE: usize = 2;
-/// Frames a second where nothing tells.
-pub const ASSUMED_HZ: f64 = 10.0;
 
 /// Left and right image of a frame.
 pub type Pair = [Decoded; 2];

@@ -6,8 +6,7 @@
 
 use super::Pair;
 use crate::formats::{Decoded, decode_picture, significant_bits};
-use crate::input::layouts::Stacking;
-use crate::input::source::InputError;
+use crate::input::source::{InputError, Stacking};
 use std::io::{ErrorKind, Read};
 
 /// Widest and highest image, px: beyond it a header is damaged rather than an image that large.

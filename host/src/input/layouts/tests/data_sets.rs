@@ -75,10 +75,10 @@ fn write_euroc(root: &Path) {
 fn every_data_set_gives_the_same_frames_rig_and_times() {
     type Write = fn(&Path);
     let layouts: [(Layout, Write); 4] = [
-        (Layout::KittiRaw, write_kitti_raw),
-        (Layout::Kitti360, write_kitti_360),
-        (Layout::Cityscapes, write_cityscapes),
-        (Layout::Euroc, write_euroc),
+        (kitti_raw::KITTI_RAW, write_kitti_raw),
+        (kitti_raw::KITTI_360, write_kitti_360),
+        (cityscapes::DATA_SET, write_cityscapes),
+        (euroc::DATA_SET, write_euroc),
     ];
     for (layout, write) in layouts {
         let root = TempDir::new().unwrap();
@@ -101,12 +101,22 @@ fn every_data_set_gives_the_same_frames_rig_and_times() {
                 expected.each_ref().map(Vec::as_slice),
                 "{layout:?} frame {at}"
             );
-            let ns = if layout == Layout::Cityscapes {
+            let ns = if layout == cityscapes::DATA_SET {
                 at as u64 * 1_000_000_000 / 17
             } else {
                 START_NS + at as u64 * STEP_NS
             };
             assert_eq!(dataset.stamp_ns(at), Some(ns), "{layout:?} frame {at}");
         }
+    }
+}
+
+#[test]
+fn the_documentation_lists_every_data_set() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/inputs.md");
+    let page = fs::read_to_string(page).unwrap();
+    for layout in DATA_SETS {
+        let row = format!("| `{}` |", layout.name());
+        assert!(page.contains(&row), "docs/inputs.md lacks: {row}");
     }
 }
