@@ -123,12 +123,13 @@ pub struct Options {
     #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
     #[serde(deserialize_with = "words::parsed")]
     pub depth: Option<DepthChoice>,
-    /// Source of instance masks: auto (files where the data set has them, and motion), motion
-    /// (moving objects are found by their motion alone), none, files:DIR (PNG and list), mots:DIR
-    /// or FILE (KITTI-MOTS), mnc:DIR, coco:FILE, yolo:DIR, boxes:FILE (KITTI labels, MOT), ids:DIR
-    /// (PNG of numbers), onnx:FILE[,FILE] (networks), exact or noisy[:SEED] (the synthetic street)
-    /// [default: auto]
-    #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
+    /// Source of instance masks
+    #[arg(
+        long,
+        value_name = "SOURCE",
+        help_heading = "Mapping",
+        help = format!("{} [default: auto]", MaskChoice::help())
+    )]
     #[serde(deserialize_with = "words::parsed")]
     pub instances: Option<MaskChoice>,
     /// Take masks in every K-th frame of the data set alone, as of a slow network; tracks carry on

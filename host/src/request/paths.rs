@@ -25,19 +25,11 @@ impl Request {
             paths.push(path);
         }
         match depth {
-            DepthChoice::Files(path) | DepthChoice::Disparity(path) | DepthChoice::Depth(path) => {
-                paths.push(path);
-            }
+            DepthChoice::Files(_, path) => paths.push(path),
             DepthChoice::Elas | DepthChoice::Exact => {}
         }
         match &mut masks.source {
-            MaskChoice::Files(path)
-            | MaskChoice::Mots(path)
-            | MaskChoice::Mnc(path)
-            | MaskChoice::Coco(path)
-            | MaskChoice::Yolo(path)
-            | MaskChoice::Boxes(path)
-            | MaskChoice::Ids(path) => paths.push(path),
+            MaskChoice::Files(_, path) => paths.push(path),
             MaskChoice::Networks(files) => paths.extend(files),
             MaskChoice::Auto
             | MaskChoice::None

@@ -7,6 +7,7 @@ use crate::input::source::{
 };
 use dynvox_core::geometry::StereoRig;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -15,19 +16,67 @@ const ENDINGS: [&str; 3] = ["png", "pfm", "xml"];
 /// Folder the original puts its files in, below the one it is told.
 const INNER: &str = "Frames";
 
-/// Where depth comes from, as the command line says it.
+/// Folder of files of depth or disparity, named like the left images.
+pub struct DepthFolder {
+    /// Name on the command line, before the colon.
+    pub name: &'static str,
+    /// Quantity that the files of a folder hold.
+    quantity: fn(&Path) -> Quantity,
+}
+
+/// A kind of folder as its name.
+mod kind {
+    use super::{DEPTH_FOLDERS, DepthFolder};
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::Serializer;
+
+    pub fn serialize<S: Serializer>(
+        kind: &&'static DepthFolder,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(kind.name)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<&'static DepthFolder, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let kind = DEPTH_FOLDERS.iter().find(|kind| kind.name == name);
+        kind.ok_or_else(|| D::Error::custom(format!("no folder of depth is named {name}")))
+    }
+}
+
+/// All kinds of folders.
+pub static DEPTH_FOLDERS: &[DepthFolder] = &[
+    DepthFolder { name: "files", quantity: quantity_of },
+    DepthFolder { name: "disparity", quantity: |_| Quantity::DisparityPx },
+    DepthFolder { name: "depth", quantity: |_| Quantity::DepthM },
+];
+
+/// Two kinds are equal if their names are.
+impl PartialEq for DepthFolder {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for DepthFolder {}
+
+impl fmt::Debug for DepthFolder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// Source of depth, as the command line names it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DepthChoice {
     /// The core's stereo matching.
     #[default]
     Elas,
-    /// A folder of files; its name tells whether they hold disparity or depth.
-    Files(PathBuf),
-    /// A folder of disparities: PNG in 1/256 px, PFM in px.
-    Disparity(PathBuf),
-    /// A folder of depths: PNG and XML in mm, PFM in m.
-    Depth(PathBuf),
+    /// Files of a kind, in a folder.
+    Files(#[serde(with = "kind")] &'static DepthFolder, PathBuf),
     /// The synthetic street's exact depth.
     Exact,
 }
@@ -36,21 +85,35 @@ impl FromStr for DepthChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let folder = |path: &str| {
-            if path.is_empty() {
-                Err(format!("{text} names no folder"))
-            } else {
-                Ok(PathBuf::from(path))
-            }
+        let known = || {
+            let folders: Vec<_> =
+                DEPTH_FOLDERS.iter().map(|kind| format!("{}:DIR", kind.name)).collect();
+            format!("one of elas, {}, exact", folders.join(", "))
         };
-        Ok(match text.split_once(':') {
-            None if text == "elas" => Self::Elas,
-            None if text == "exact" => Self::Exact,
-            Some(("files", path)) => Self::Files(folder(path)?),
-            Some(("disparity", path)) => Self::Disparity(folder(path)?),
-            Some(("depth", path)) => Self::Depth(folder(path)?),
-            _ => return Err("one of elas, files:DIR, disparity:DIR, depth:DIR, exact".to_owned()),
-        })
+        match text.split_once(':') {
+            None if text == "elas" => Ok(Self::Elas),
+            None if text == "exact" => Ok(Self::Exact),
+            None => Err(known()),
+            Some((name, path)) => {
+                let kind = DEPTH_FOLDERS.iter().find(|kind| kind.name == name);
+                let kind = kind.ok_or_else(known)?;
+                if path.is_empty() {
+                    return Err(format!("{text} names no folder"));
+                }
+                Ok(Self::Files(kind, PathBuf::from(path)))
+            }
+        }
+    }
+}
+
+/// The text that [`DepthChoice::from_str`] reads.
+impl fmt::Display for DepthChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Elas => f.write_str("elas"),
+            Self::Files(kind, path) => write!(f, "{}:{}", kind.name, path.display()),
+            Self::Exact => f.write_str("exact"),
+        }
     }
 }
 
@@ -73,9 +136,7 @@ pub fn attach(
         DepthChoice::Exact => {
             return Ok(Box::new(Overlay::new(dataset, Source::Exact, "exact depth".to_owned())));
         }
-        DepthChoice::Files(folder) => (folder, quantity_of(folder)),
-        DepthChoice::Disparity(folder) => (folder, Quantity::DisparityPx),
-        DepthChoice::Depth(folder) => (folder, Quantity::DepthM),
+        DepthChoice::Files(kind, folder) => (folder, (kind.quantity)(folder)),
     };
     if !folder.is_dir() {
         return Err(InputError::depth(folder, "there is no such folder".to_owned()));

@@ -14,4 +14,4 @@ mod files;
 #[cfg(test)]
 mod tests;
 
-pub use files::{DepthChoice, attach};
+pub use files::{DEPTH_FOLDERS, DepthChoice, DepthFolder, attach};

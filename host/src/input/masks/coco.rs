@@ -3,6 +3,7 @@
 //! or a `bbox` alone.
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
+use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::shapes::{Polygons, around_runs, mask_of_runs};
 use super::{Frames, class_of, coco_class};
 use crate::formats::{FormatError, read_text, rle};
@@ -14,6 +15,17 @@ use std::path::{Path, PathBuf};
 
 /// Numbers of COCO's categories that no object has.
 const UNUSED: [u64; 11] = [12, 26, 29, 30, 45, 66, 68, 69, 71, 83, 91];
+
+/// COCO JSON.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "coco",
+    value: "FILE",
+    summary: "",
+    open: |path, dataset| {
+        let (objects, there) = Coco::open(path, frames_of(dataset))?;
+        OpenedMasks::boxes(objects, there, dataset)
+    },
+};
 
 /// A file of either kind.
 #[derive(Deserialize)]

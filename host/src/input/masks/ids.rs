@@ -2,6 +2,7 @@
 //! of no class, taken as a car. Or Cityscapes' `*_instanceIds.png`: `label * 1000 + k` an instance,
 //! numbers below 1000 are regions without instances.
 
+use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::{Frames, MaskSource, read_labels};
 use crate::input::source::{FrameMasks, InputError, StereoImages, bounding_boxes};
 use dynvox_core::tracking::Class;
@@ -22,6 +23,17 @@ const CITYSCAPES: [Class; 10] = [
     Class::Motorcycle,
     Class::Bicycle,
 ];
+
+/// PNGs of instance numbers.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "ids",
+    value: "DIR",
+    summary: "PNG of numbers",
+    open: |path, dataset| {
+        let (masks, there) = Ids::open(path, frames_of(dataset));
+        Ok(OpenedMasks::masks(masks, there))
+    },
+};
 
 /// A folder of instance numbers.
 pub(super) struct Ids {

@@ -2,10 +2,22 @@
 //! `NNNNNN.txt`, one row an instance: `id class score x1 y1 x2 y2`. Lines that begin with `#` are
 //! comments. The box is read but that of the mask is used.
 
+use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::{Frames, MaskSource, class_of, read_labels, read_text};
 use crate::input::source::{FrameMasks, InputError, StereoImages, bounding_boxes};
 use dynvox_core::tracking::Class;
 use std::path::{Path, PathBuf};
+
+/// Instance PNGs with lists.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "files",
+    value: "DIR",
+    summary: "PNG and list",
+    open: |path, dataset| {
+        let (masks, there) = Indexed::open(path, frames_of(dataset));
+        Ok(OpenedMasks::masks(masks, there))
+    },
+};
 
 /// A folder of instance PNGs.
 pub(super) struct Indexed {

@@ -4,6 +4,7 @@
 //! class 1 to 20 in PASCAL VOC's order, and `<image file>.<nnnn>.mask.txt`, a matrix of 0 and 1 as
 //! large as the box. The first number without a file ends the list.
 
+use super::format::{MaskFormat, OpenedMasks, all_if_any, frames_of};
 use super::{Frames, MaskSource, read_text};
 use crate::input::source::{FrameMasks, InputError, InstanceMask, StereoImages};
 use dynvox_core::masks::PixelBox;
@@ -33,6 +34,17 @@ const VOC: [Class; 20] = [
     Class::Train,      // train
     Class::Other,      // monitor
 ];
+
+/// Dumps of MNC.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "mnc",
+    value: "DIR",
+    summary: "",
+    open: |path, dataset| {
+        let (dumps, there) = Mnc::open(path, frames_of(dataset));
+        Ok(OpenedMasks::masks(dumps, all_if_any(there, dataset)))
+    },
+};
 
 /// A folder of dumps.
 pub(super) struct Mnc {

@@ -16,6 +16,7 @@ mod boxes;
 mod choice;
 mod coco;
 mod exact;
+mod format;
 mod ids;
 mod indexed;
 mod mnc;
@@ -31,7 +32,9 @@ mod shapes;
 mod tests;
 mod yolo;
 
-pub use choice::MaskChoice;
+pub use choice::{MASK_FORMATS, MaskChoice};
+pub use format::MaskFormat;
+pub use indexed::FORMAT as INDEXED_PNGS;
 pub use open::attach;
 pub use pairs::{LabelPair, label_pairs};
 pub use save::{save_masks, save_masks_in_order};

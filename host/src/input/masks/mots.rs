@@ -6,6 +6,7 @@
 //! and [`crate::formats::rle`] for the runs. Class 1 is car, 2 pedestrian, 10 the region to ignore.
 //! There are no scores: all are 1. The tracks in the numbers are not used.
 
+use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::shapes::{around_runs, mask_of_runs};
 use super::{Frames, MaskSource, read_labels};
 use crate::formats::rle;
@@ -30,6 +31,21 @@ fn class(number: u16, masks: &mut FrameMasks) -> Class {
         }
     }
 }
+
+/// KITTI-MOTS, as pictures or text.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "mots",
+    value: "DIR or FILE",
+    summary: "KITTI-MOTS",
+    open: |path, dataset| {
+        let frames = frames_of(dataset);
+        if path.is_file() {
+            return Ok(OpenedMasks::masks(MotsText::open(path, frames)?, dataset.len()));
+        }
+        let (pictures, there) = MotsPictures::open(path, frames);
+        Ok(OpenedMasks::masks(pictures, there))
+    },
+};
 
 /// A folder of PNGs.
 pub(super) struct MotsPictures {

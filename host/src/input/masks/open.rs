@@ -1,13 +1,12 @@
 //! Laying a source of masks over a data set.
 
-use super::boxes::{BoxFiles, BoxMasks, BoxTable, DetectionSource};
+#[cfg(feature = "onnx")]
+use super::boxes::BoxMasks;
+use super::format::{OpenedMasks, frames_of};
+use super::indexed::Indexed;
 #[cfg(feature = "onnx")]
 use super::network::Networks;
-use super::{
-    Frames, MaskChoice, MaskSource, exact::Exact, indexed::Indexed, mnc::Mnc, mots::MotsPictures,
-    mots::MotsText, noisy::Noisy,
-};
-use super::{coco::Coco, ids::Ids, yolo::Yolo};
+use super::{MaskChoice, MaskFormat, MaskSource, exact::Exact, noisy::Noisy};
 use crate::input::source::{
     AvailableMasks, FrameMasks, FrameSource, InputError, Overlay, OverlaySource, StereoImages,
 };
@@ -53,13 +52,7 @@ fn open(
             "exact masks with a detector's faults",
         )?,
         MaskChoice::Auto => return Ok(available(dataset)),
-        MaskChoice::Files(path)
-        | MaskChoice::Mots(path)
-        | MaskChoice::Mnc(path)
-        | MaskChoice::Ids(path)
-        | MaskChoice::Coco(path)
-        | MaskChoice::Yolo(path)
-        | MaskChoice::Boxes(path) => given(dataset, choice, path)?,
+        MaskChoice::Files(format, path) => given(dataset, format, path)?,
         MaskChoice::Networks(paths) => networks(dataset, paths)?,
     };
     Ok(Some(opened))
@@ -83,7 +76,7 @@ fn exact(
 /// The masks that come with a data set.
 fn available(dataset: &dyn FrameSource) -> Option<OpenedSource> {
     let AvailableMasks::Folder(folder) = dataset.masks() else { return None };
-    let (source, there) = Indexed::open(&folder, frames(dataset));
+    let (source, there) = Indexed::open(&folder, frames_of(dataset));
     let note = note(dataset, &folder, there);
     (there > 0).then(|| OpenedSource { source: Box::new(source), note, fits_scaled: false })
 }
@@ -91,38 +84,13 @@ fn available(dataset: &dyn FrameSource) -> Option<OpenedSource> {
 /// Masks, or boxes to make masks of, from files.
 fn given(
     dataset: &dyn FrameSource,
-    choice: &MaskChoice,
+    format: &MaskFormat,
     path: &Path,
 ) -> Result<OpenedSource, InputError> {
     if !path.exists() {
         return Err(InputError::masks(path, "there is no such file or folder".to_owned()));
     }
-    let frames = frames(dataset);
-    let fits_scaled =
-        matches!(choice, MaskChoice::Coco(_) | MaskChoice::Yolo(_) | MaskChoice::Boxes(_));
-    let (source, there) = match choice {
-        MaskChoice::Mots(_) if path.is_file() => {
-            boxed((MotsText::open(path, frames)?, dataset.len()))
-        }
-        MaskChoice::Mots(_) => boxed(MotsPictures::open(path, frames)),
-        MaskChoice::Mnc(_) => {
-            let (dumps, there) = Mnc::open(path, frames);
-            // A frame without a dump is one in which nothing was found: only a folder without any
-            // is wrong.
-            boxed((dumps, if there > 0 { dataset.len() } else { 0 }))
-        }
-        MaskChoice::Ids(_) => boxed(Ids::open(path, frames)),
-        MaskChoice::Coco(_) => masked(Coco::open(path, frames)?, dataset)?,
-        MaskChoice::Yolo(_) => {
-            let (yolo, there) = Yolo::open(path, frames)?;
-            masked((yolo, if there > 0 { dataset.len() } else { 0 }), dataset)?
-        }
-        MaskChoice::Boxes(_) if path.is_file() => {
-            masked((BoxTable::open(path, frames)?, dataset.len()), dataset)?
-        }
-        MaskChoice::Boxes(_) => masked(BoxFiles::open(path, frames), dataset)?,
-        _ => boxed(Indexed::open(path, frames)),
-    };
+    let OpenedMasks { source, there, fits_scaled } = (format.open)(path, dataset)?;
     if there == 0 {
         let example = dataset.stem(0).unwrap_or_else(|| "000000".to_owned());
         return Err(InputError::masks(
@@ -155,15 +123,6 @@ fn networks(_: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, Inpu
     ))
 }
 
-fn frames(dataset: &dyn FrameSource) -> Frames {
-    Frames {
-        stems: (0..dataset.len())
-            .map(|index| dataset.stem(index).unwrap_or_else(|| format!("{index:06}")))
-            .collect(),
-        size: dataset.full_size(),
-    }
-}
-
 fn note(dataset: &dyn FrameSource, path: &Path, there: usize) -> String {
     match dataset.len() {
         all if all == there => format!("masks from {}", path.display()),
@@ -172,19 +131,6 @@ fn note(dataset: &dyn FrameSource, path: &Path, there: usize) -> String {
             path.display()
         ),
     }
-}
-
-/// A source of masks and how many frames it has some for.
-fn boxed<S: MaskSource + 'static>((source, there): (S, usize)) -> (Box<dyn MaskSource>, usize) {
-    (Box::new(source), there)
-}
-
-/// The same of a source of boxes.
-fn masked<S: DetectionSource + 'static>(
-    (source, there): (S, usize),
-    dataset: &dyn FrameSource,
-) -> Result<(Box<dyn MaskSource>, usize), InputError> {
-    Ok((Box::new(BoxMasks::new(source, dataset)?), there))
 }
 
 /// Masks, fitted to the images.

@@ -3,11 +3,23 @@
 //! the classes are the lines of `classes.txt` in the folder or the one above it, else COCO's.
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
+use super::format::{MaskFormat, OpenedMasks, all_if_any, frames_of};
 use super::shapes::Polygons;
 use super::{Frames, class_of, coco_class, read_text};
 use crate::input::source::{InputError, StereoImages};
 use dynvox_core::tracking::Class;
 use std::path::{Path, PathBuf};
+
+/// YOLO text.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "yolo",
+    value: "DIR",
+    summary: "",
+    open: |path, dataset| {
+        let (rows, there) = Yolo::open(path, frames_of(dataset))?;
+        OpenedMasks::boxes(rows, all_if_any(there, dataset), dataset)
+    },
+};
 
 /// A folder of YOLO text.
 pub(super) struct Yolo {

@@ -15,9 +15,10 @@ mod mask;
 mod tables;
 
 pub(super) use disparity::FrameDisparity;
-pub(super) use tables::{BoxFiles, BoxTable};
+pub(super) use tables::FORMAT;
 
 use super::MaskSource;
+use super::format::OpenedMasks;
 use crate::formats::Image;
 use crate::input::source::{
     FrameMasks, FrameSource, InputError, InstanceMask, StereoImages, bounding_boxes,
@@ -26,6 +27,21 @@ use dynvox_core::geometry::StereoRig;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::Class;
 use mask::Scene;
+
+impl OpenedMasks {
+    /// Masks made of boxes for `there` frames.
+    ///
+    /// # Errors
+    /// The images are not rectified.
+    pub fn boxes(
+        source: impl DetectionSource + 'static,
+        there: usize,
+        dataset: &dyn FrameSource,
+    ) -> Result<Self, InputError> {
+        let source = Box::new(BoxMasks::new(source, dataset)?);
+        Ok(Self { source, there, fits_scaled: true })
+    }
+}
 
 /// A detector's box in the left image.
 #[derive(Clone, Copy, Debug, PartialEq)]

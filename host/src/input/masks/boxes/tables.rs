@@ -2,6 +2,7 @@
 //! dynvox's own lists of a frame.
 
 use super::{DetectedBox, DetectionSource, Detections};
+use crate::input::masks::format::{MaskFormat, OpenedMasks, frames_of};
 use crate::input::masks::{Frames, class_of, read_text};
 use crate::input::source::{FrameMasks, InputError, StereoImages};
 use dynvox_core::tracking::Class;
@@ -28,6 +29,21 @@ const MOT: [Class; 13] = [
 /// A row: its frame where the table names it, the class or `None` for an unknown one, score and
 /// edges. A region to ignore is `None`.
 type Row = Option<(Option<usize>, Option<Class>, f32, [f64; 4])>;
+
+/// Boxes of a sequence or of each frame.
+pub static FORMAT: MaskFormat = MaskFormat {
+    name: "boxes",
+    value: "FILE",
+    summary: "KITTI labels, MOT",
+    open: |path, dataset| {
+        let frames = frames_of(dataset);
+        if path.is_file() {
+            return OpenedMasks::boxes(BoxTable::open(path, frames)?, dataset.len(), dataset);
+        }
+        let (lists, there) = BoxFiles::open(path, frames);
+        OpenedMasks::boxes(lists, there, dataset)
+    },
+};
 
 /// A table of a sequence: KITTI tracking labels or MOTChallenge text.
 pub(in super::super) struct BoxTable {

@@ -6,29 +6,25 @@ use crate::input::masks::boxes::{BoxMasks, DetectedBox, DetectionSource, Detecti
 use crate::input::source::StereoImages;
 
 /// Frame 0 of the folder with masks of a file that `write` fills.
-fn of_file(
-    name: &str,
-    text: &str,
-    choice: fn(PathBuf) -> MaskChoice,
-) -> Result<FrameMasks, InputError> {
+fn of_file(name: &str, text: &str, format: &'static MaskFormat) -> Result<FrameMasks, InputError> {
     let root = rig();
     let path = root.path().join(name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(&path, text).unwrap();
-    first(root.path(), &choice(path))
+    first(root.path(), &MaskChoice::Files(format, path))
 }
 
 /// The same of a folder with one file.
 fn of_folder(
     name: &str,
     text: &str,
-    choice: fn(PathBuf) -> MaskChoice,
+    format: &'static MaskFormat,
 ) -> Result<FrameMasks, InputError> {
     let root = rig();
     let folder = root.path().join("given");
     fs::create_dir(&folder).unwrap();
     fs::write(folder.join(name), text).unwrap();
-    first(root.path(), &choice(folder))
+    first(root.path(), &MaskChoice::Files(format, folder))
 }
 
 fn found(masks: &FrameMasks) -> Vec<(Class, f32, PixelBox)> {
@@ -53,7 +49,7 @@ fn coco_has_polygons_runs_and_boxes() {
             {{"image_id": 8, "category_id": 2, "bbox": [4, 10, 10, 20]}}]}}"#,
         runs.replace('\\', "\\\\")
     );
-    let masks = of_file("coco.json", &text, MaskChoice::Coco).unwrap();
+    let masks = of_file("coco.json", &text, &coco::FORMAT).unwrap();
     let runs_box = PixelBox { left: 20, top: 0, width: 5, height: 4 };
     assert_eq!(
         found(&masks),
@@ -66,7 +62,7 @@ fn coco_has_polygons_runs_and_boxes() {
     assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
     let results = r#"[{"image_id": 0, "category_id": 8, "score": 0.75, "bbox": [4, 10, 10, 20]}, {"image_id": 1, "category_id": 3, "bbox": [0, 0, 9, 9]}]"#;
     assert_eq!(
-        found(&of_file("results.json", results, MaskChoice::Coco).unwrap()),
+        found(&of_file("results.json", results, &coco::FORMAT).unwrap()),
         [(Class::Truck, 0.75, SHRUNK_CAR)]
     );
     for (text, reason) in [
@@ -84,7 +80,7 @@ fn coco_has_polygons_runs_and_boxes() {
             "nothing for any frame",
         ),
     ] {
-        let message = refusal_of(of_file("coco.json", text, MaskChoice::Coco));
+        let message = refusal_of(of_file("coco.json", text, &coco::FORMAT));
         assert!(message.contains(reason) && message.contains("--instances"), "{message}");
     }
 }
@@ -93,7 +89,7 @@ fn coco_has_polygons_runs_and_boxes() {
 fn yolo_text_has_boxes_and_polygons_of_cocos_or_its_own_classes() {
     // The same car as a box with a score, and as a polygon.
     let text = "2 0.225 0.5555556 0.25 0.5555556 0.5\n0 0.5 0 0.75 0 0.75 0.25 0.5 0.25\n";
-    let masks = of_folder("000000.txt", text, MaskChoice::Yolo).unwrap();
+    let masks = of_folder("000000.txt", text, &yolo::FORMAT).unwrap();
     let person = PixelBox { left: 20, top: 0, width: 10, height: 9 };
     assert_eq!(found(&masks), [(Class::Person, 1.0, person), (Class::Car, 0.5, SHRUNK_CAR)]);
     let root = rig();
@@ -102,10 +98,10 @@ fn yolo_text_has_boxes_and_polygons_of_cocos_or_its_own_classes() {
     fs::write(folder.join("000001.txt"), "").unwrap();
     fs::write(folder.join("000000.txt"), "1 0.5 0.5 0.2 0.2\n7 0.5 0.5 0.1 0.1\n").unwrap();
     fs::write(root.path().join("classes.txt"), "car\ntram\n").unwrap();
-    let masks = first(root.path(), &MaskChoice::Yolo(folder)).unwrap();
+    let masks = first(root.path(), &MaskChoice::Files(&yolo::FORMAT, folder)).unwrap();
     assert_eq!((masks.instances[0].class, masks.refusals.unknown_class), (Class::Train, 1));
     for wrong in ["2 0.5 0.5 0.25", "car 0.5 0.5 0.2 0.2", "2 0.5 0.5 0.2 nan", "2 0 0 1 0 1 1 0"] {
-        let message = refusal_of(of_folder("000000.txt", wrong, MaskChoice::Yolo));
+        let message = refusal_of(of_folder("000000.txt", wrong, &yolo::FORMAT));
         assert!(message.contains("line 1 is neither"), "{message}");
     }
 }
@@ -116,29 +112,44 @@ fn boxes_come_as_labels_of_kitti_as_mot_text_and_as_lists() {
     let none = "0 -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10\n";
     let expected = [(Class::Car, 1.0, SHRUNK_CAR)];
     let tracking = format!("{none}0 7 {label}\n1 7 {label}\n1 8 {label}\n");
-    assert_eq!(found(&of_file("labels.txt", &tracking, MaskChoice::Boxes).unwrap()), expected);
+    assert_eq!(
+        found(&of_file("labels.txt", &tracking, &super::super::boxes::FORMAT).unwrap()),
+        expected
+    );
     assert_eq!(
         found(
-            &of_file("mot.csv", "1,-1,5,11,10,20,1,3,1\n2,-1,1,1,9,9,1,3,1\n", MaskChoice::Boxes)
-                .unwrap()
+            &of_file(
+                "mot.csv",
+                "1,-1,5,11,10,20,1,3,1\n2,-1,1,1,9,9,1,3,1\n",
+                &super::super::boxes::FORMAT
+            )
+            .unwrap()
         ),
         expected
     );
-    assert_eq!(found(&of_folder("000000.txt", label, MaskChoice::Boxes).unwrap()), expected);
+    assert_eq!(
+        found(&of_folder("000000.txt", label, &super::super::boxes::FORMAT).unwrap()),
+        expected
+    );
     assert_eq!(
         found(
-            &of_folder("000000.txt", "# a list\n3 car 1.0 4 10 14 30\n", MaskChoice::Boxes)
-                .unwrap()
+            &of_folder(
+                "000000.txt",
+                "# a list\n3 car 1.0 4 10 14 30\n",
+                &super::super::boxes::FORMAT
+            )
+            .unwrap()
         ),
         expected
     );
-    let missing = of_folder("000001.txt", label, MaskChoice::Boxes).unwrap();
+    let missing = of_folder("000001.txt", label, &super::super::boxes::FORMAT).unwrap();
     assert_eq!((missing.instances.len(), missing.refusals.missing), (0, 1));
     assert!(
-        refusal_of(of_file("mot.csv", "1,2,3\n", MaskChoice::Boxes)).contains("line 1 is neither")
+        refusal_of(of_file("mot.csv", "1,2,3\n", &super::super::boxes::FORMAT))
+            .contains("line 1 is neither")
     );
     assert!(
-        refusal_of(of_folder("000000.txt", "Car 0 1\n", MaskChoice::Boxes))
+        refusal_of(of_folder("000000.txt", "Car 0 1\n", &super::super::boxes::FORMAT))
             .contains("line 1 is neither")
     );
 }
@@ -149,11 +160,11 @@ fn numbers_without_a_list_are_cars_and_cityscapes_numbers_have_classes() {
     let folder = root.path().join("ids");
     fs::create_dir(&folder).unwrap();
     labels(&folder.join("000000.png"), &[1, 2], false);
-    let masks = first(root.path(), &MaskChoice::Ids(folder.clone())).unwrap();
+    let masks = first(root.path(), &MaskChoice::Files(&ids::FORMAT, folder.clone())).unwrap();
     assert_eq!(found(&masks), [(Class::Car, 1.0, pixels_of(1)), (Class::Car, 1.0, pixels_of(2))]);
     fs::remove_file(folder.join("000000.png")).unwrap();
     labels(&folder.join("000000_gtFine_instanceIds.png"), &[7, 24_000, 33_002, 60_001], true);
-    let masks = first(root.path(), &MaskChoice::Ids(folder)).unwrap();
+    let masks = first(root.path(), &MaskChoice::Files(&ids::FORMAT, folder)).unwrap();
     assert_eq!(
         masks.instances.iter().map(|one| one.class).collect::<Vec<_>>(),
         [Class::Person, Class::Bicycle, Class::Other]
