@@ -4,7 +4,7 @@ use crate::{
     DynvoxConfig, DynvoxRig, DynvoxStatus, dynvox_config_default,
     given::{output, read},
 };
-use dynvox_core::rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, Sizing};
+use dynvox_core::rectify::{LENS_MODELS, Lens, RawCamera, RawRig, Rectification, Sizing};
 use dynvox_core::{Config, geometry::StereoRig};
 
 /// A lens by its model. Numbers as in dynvox's own table of models.
@@ -47,16 +47,12 @@ impl DynvoxRawCamera {
     };
 
     fn camera(&self) -> Result<RawCamera, DynvoxStatus> {
-        let [a, b, c, d, e, f, g, h] = self.parameters;
-        let model = match self.model {
-            DYNVOX_LENS_RADIAL_TANGENTIAL => {
-                LensModel::RadialTangential { radial: [a, b, c, d, e, f], tangential: [g, h] }
-            }
-            DYNVOX_LENS_EQUIDISTANT => LensModel::Equidistant { radial: [a, b, c, d] },
-            DYNVOX_LENS_DOUBLE_SPHERE => LensModel::DoubleSphere { xi: a, alpha: b },
-            DYNVOX_LENS_EXTENDED_UNIFIED => LensModel::ExtendedUnified { alpha: a, beta: b },
-            _ => return Err(DynvoxStatus::Unknown),
-        };
+        let kind = usize::try_from(self.model).ok().and_then(|at| LENS_MODELS.get(at));
+        let mut model = kind.ok_or(DynvoxStatus::Unknown)?.typical;
+        let mut given = self.parameters.into_iter();
+        model.visit_parameters(|_, values| {
+            values.iter_mut().zip(given.by_ref()).for_each(|(value, given)| *value = given);
+        });
         let lens =
             Lens::new(self.focal_px, self.center_px, model).map_err(|_| DynvoxStatus::Config)?;
         Ok(RawCamera { lens, width: self.width, height: self.height })

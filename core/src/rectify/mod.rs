@@ -1,7 +1,7 @@
 //! Raw pairs become rectified ones.
 //!
 //! Real cameras bend rays and do not stand exactly side by side. [`Lens`] says how each bends them
-//! (four models), [`RawRig`] how the two stand, [`Rectification`] how both are turned so that their
+//! (models: [`LENS_MODELS`]), [`RawRig`] how the two stand, [`Rectification`] how both are turned so that their
 //! rows agree, how large the result is and at which scale. A [`Rectifier`] makes one map a camera,
 //! once, in `f64` with `libm`, and remaps each pair in integers.
 //!
@@ -37,13 +37,10 @@
 
 mod align;
 mod align_rows;
-mod double_sphere;
-mod equidistant;
-mod extended_unified;
 mod lens;
 mod map;
+mod models;
 mod monotonic;
-mod radial_tangential;
 mod rectification;
 mod rectifier;
 pub mod self_calibration;
@@ -52,10 +49,11 @@ mod tests;
 
 pub use align::{Alignment, RawCamera, RawRig, RectifyProblem, WIDEST_ANGLE_RAD};
 pub(crate) use align_rows::AlignedImage;
-pub use lens::{Lens, LensModel, LensProblem};
+pub use lens::Lens;
 pub use map::INVALID_MARGIN_PX;
+pub use models::MAX_STEPS as MAX_PLANE_STEPS;
+pub use models::{LENS_MODELS, LensKind, LensModel, LensParameter, LensProblem};
 pub use monotonic::MAX_STEPS as MAX_RADIAL_STEPS;
-pub use radial_tangential::MAX_STEPS as MAX_PLANE_STEPS;
 pub use rectification::{MAX_RAW_SIDE, Rectification, Sizing, TurnedCamera};
 pub use rectifier::{Pair, RectifiedImages, Rectifier, RectifierError};
 

@@ -1,11 +1,11 @@
 //! `dynvox calibration`.
 
 use super::rectified::RectifiedArgs;
-use crate::formats::calibration::{RectifiedSize, StereoCalibration, to_toml};
+use crate::formats::calibration::{RectifiedSize, StereoCalibration, lens_table, to_toml};
 use crate::request::ImageSize;
 use anyhow::Context;
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::{LensModel, RawCamera, Rectification, TurnedCamera};
+use dynvox_core::rectify::{RawCamera, Rectification, TurnedCamera};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -73,7 +73,7 @@ fn print(calibration: &StereoCalibration, rectification: &Rectification, rig: &S
             format!("{}, {} x {} px", camera.lens.model().name(), camera.width, camera.height),
         );
         line("", format!("focal length {fx:.2}, {fy:.2} px, centre {cx:.2}, {cy:.2} px"));
-        line("", distortion(camera.lens.model()));
+        line("", lens_table::shown(camera.lens.model(), 6));
         line("", field_of_view(camera));
     }
     line("baseline", format!("{:.4} m", calibration.baseline_m()));
@@ -106,20 +106,6 @@ fn print(calibration: &StereoCalibration, rectification: &Rectification, rig: &S
             100.0 * right
         ),
     );
-}
-
-fn distortion(model: &LensModel) -> String {
-    let list = |values: &[f64]| {
-        values.iter().map(|value| format!("{value:.6}")).collect::<Vec<_>>().join(" ")
-    };
-    match model {
-        LensModel::RadialTangential { radial, tangential } => {
-            format!("k1 to k6 {}; p1 p2 {}", list(radial), list(tangential))
-        }
-        LensModel::Equidistant { radial } => format!("k1 to k4 {}", list(radial)),
-        LensModel::DoubleSphere { xi, alpha } => format!("xi {xi:.6}, alpha {alpha:.6}"),
-        LensModel::ExtendedUnified { alpha, beta } => format!("alpha {alpha:.6}, beta {beta:.6}"),
-    }
 }
 
 /// Angles between the rays of opposite sides' middles.

@@ -61,9 +61,7 @@ mod writer;
 pub use camera::CAMERA_HEIGHT_M;
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use frame::{ObjectTruth, SynthFrame};
-pub use lens::{
-    DoubleSphere, Equidistant, ExtendedUnified, RadialTangential, RigError, StreetLens,
-};
+pub use lens::{RigError, StreetLens};
 pub use path::SEGMENT_M;
 pub use street::{Street, SynthError};
 pub use writer::write_kitti;

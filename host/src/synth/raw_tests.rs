@@ -5,6 +5,7 @@ use crate::formats::calibration::StereoCalibration;
 use dynvox_core::Serial;
 use dynvox_core::image::View;
 use dynvox_core::memory::{Capacity, Carver, SLAB_ALIGN};
+use dynvox_core::rectify::{LENS_MODELS, LensModel};
 use dynvox_core::rectify::{Pair, RectifiedImages, Rectifier};
 
 const WIDTH: u32 = 240;
@@ -24,16 +25,33 @@ fn street(lens: StreetLens, rig_error: RigError) -> Street {
     .unwrap()
 }
 
-fn lenses() -> [StreetLens; 5] {
-    let rational =
-        RadialTangential { radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05], tangential: [1e-4, 1e-4] };
-    [
-        StreetLens::RadialTangential(RadialTangential::default()),
-        StreetLens::RadialTangential(rational),
-        StreetLens::Equidistant(Equidistant::default()),
-        StreetLens::DoubleSphere(DoubleSphere::default()),
-        StreetLens::ExtendedUnified(ExtendedUnified::default()),
-    ]
+/// A typical lens of every model, and a rational one.
+fn lenses() -> Vec<StreetLens> {
+    let rational = LensModel::RadialTangential {
+        radial: [0.9, 0.2, 0.01, 1.2, 0.4, 0.05],
+        tangential: [1e-4, 1e-4],
+    };
+    let typical = LENS_MODELS.iter().map(|kind| kind.typical);
+    typical.chain([rational]).map(StreetLens::Bent).collect()
+}
+
+#[test]
+fn a_lens_is_a_table_whose_missing_keys_are_typical() {
+    for lens in lenses() {
+        let text = toml::to_string(&lens).unwrap();
+        assert_eq!(toml::from_str::<StreetLens>(&text).unwrap(), lens, "{text}");
+    }
+    for kind in LENS_MODELS {
+        let text = format!("model = \"{}\"", kind.name);
+        let lens = toml::from_str::<StreetLens>(&text).unwrap();
+        assert_eq!(lens, StreetLens::Bent(kind.typical));
+    }
+    assert_eq!(toml::from_str::<StreetLens>("model = \"ideal\"").unwrap(), StreetLens::Ideal);
+    let refused = |text: &str| toml::from_str::<StreetLens>(text).unwrap_err().to_string();
+    assert!(refused("model = \"fov\"").contains("use one of radial_tangential"));
+    assert!(refused("model = \"double_sphere\"\nxy = 1").contains("unknown field `xy`"));
+    assert!(refused("model = \"equidistant\"\nradial = [1]").contains("1 numbers, not 4"));
+    assert!(refused("radial = [1]").contains("missing field `model`"));
 }
 
 /// By how many columns and rows `a` is moved against `b`, px, near a guess: where the squared
@@ -160,7 +178,7 @@ fn both_written_calibrations_tell_of_the_same_cameras() {
         );
         let Ok(kalibr) = read("camchain.yaml") else {
             assert!(
-                matches!(lens, StreetLens::RadialTangential(RadialTangential { radial, .. }) if radial[3] != 0.0),
+                matches!(lens, StreetLens::Bent(LensModel::RadialTangential { radial, .. }) if radial[3] != 0.0),
                 "{lens:?}"
             );
             continue;
@@ -179,7 +197,7 @@ fn what_cannot_be_rendered_is_named() {
         let config = StreetConfig { lens, rig_error, ..StreetConfig::static_street() };
         Street::new(config).err().map(|error| error.to_string()).unwrap_or_default()
     };
-    let spheres = StreetLens::DoubleSphere(DoubleSphere { xi: -0.2, alpha: 2.0 });
+    let spheres = StreetLens::Bent(LensModel::DoubleSphere { xi: -0.2, alpha: 2.0 });
     assert!(refusal(spheres, RigError::default()).contains("street.lens cannot be used"));
     let off = RigError { roll_deg: 90.0, ..RigError::default() };
     assert!(refusal(StreetLens::Ideal, off).contains("street.rig_error.roll_deg is 90"));

@@ -2,6 +2,7 @@
 
 mod geometry;
 mod kitti;
+pub mod lens_table;
 mod plain;
 mod raw;
 
@@ -9,7 +10,8 @@ pub use geometry::{CameraGeometry, FittedGeometry, LARGEST_PX, RectifiedSize, be
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
 pub use raw::{
-    LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M, StereoCalibration, to_kalibr, to_toml,
+    CALIBRATION_FORMATS, CalibrationFormat, LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M,
+    StereoCalibration, to_kalibr, to_toml,
 };
 
 use crate::formats::FormatError;

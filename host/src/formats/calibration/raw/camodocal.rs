@@ -1,6 +1,7 @@
 //! camodocal: one YAML file a camera, and `extrinsics.yaml`, whose transform maps left camera
 //! coordinates to right ones.
 
+use super::format::CalibrationFormat;
 use super::{
     Placement, StereoCalibration, lens,
     tree::{Node, Tree},
@@ -9,8 +10,70 @@ use crate::formats::FormatError;
 use dynvox_core::rectify::{LensModel, RawCamera};
 use nalgebra::{Matrix3, Vector3};
 
+/// camodocal's files.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "camodocal",
+    files: "one YAML file for each camera, and `extrinsics.yaml`",
+    matches: |files| files.has("model_type"),
+    read: |files| read(&files.roots()),
+    example: &[
+        (
+            "left.yaml",
+            r"%YAML:1.0
+---
+model_type: PINHOLE
+image_width: 752
+image_height: 480
+distortion_parameters:
+   k1: -0.28
+   k2: 0.07
+   p1: 0.0002
+   p2: 0.00002
+projection_parameters:
+   fx: 458.6
+   fy: 457.2
+   cx: 367.2
+   cy: 248.3
+",
+        ),
+        (
+            "right.yaml",
+            r"%YAML:1.0
+---
+model_type: PINHOLE
+image_width: 752
+image_height: 480
+distortion_parameters:
+   k1: -0.28
+   k2: 0.07
+   p1: 0.0002
+   p2: 0.00002
+projection_parameters:
+   fx: 458.6
+   fy: 457.2
+   cx: 367.2
+   cy: 248.3
+",
+        ),
+        (
+            "extrinsics.yaml",
+            r"%YAML:1.0
+---
+transform:
+   q_x: 0.
+   q_y: 0.
+   q_z: 0.
+   q_w: 1.
+   t_x: -0.11
+   t_y: 0.
+   t_z: 0.
+",
+        ),
+    ],
+};
+
 /// Reads two camera files; the extrinsics from a third, or from `extrinsics.yaml` beside the first.
-pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
+fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let (&[left, right], rest) = roots
         .split_first_chunk::<2>()
         .ok_or_else(|| super::euroc::two_files(roots, "camera file"))?;
@@ -36,7 +99,7 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
             r_right_left,
             t_right_left_m: Vector3::new(number("t_x")?, number("t_y")?, number("t_z")?),
         },
-        format: "camodocal",
+        format: FORMAT.name,
     })
 }
 

@@ -1,11 +1,50 @@
 //! EuRoC's `sensor.yaml`, one a camera: `T_BS` maps camera coordinates to the body's. TUM VI's
 //! files are alike.
 
+use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration, kalibr, tree::Node};
 use crate::formats::FormatError;
 
+/// EuRoC's and TUM VI's files.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "EuRoC",
+    files: "EuRoC and TUM VI: `sensor.yaml`, one for each camera",
+    matches: |files| files.has("T_BS"),
+    read: |files| read(&files.roots()),
+    example: &[
+        (
+            "left.yaml",
+            r"sensor_type: camera
+T_BS:
+  cols: 4
+  rows: 4
+  data: [1, 0, 0, -0.02, 0, 1, 0, 0.02, 0, 0, 1, 0.01, 0, 0, 0, 1]
+resolution: [752, 480]
+camera_model: pinhole
+intrinsics: [458.6, 457.2, 367.2, 248.3]
+distortion_model: radial-tangential
+distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002]
+",
+        ),
+        (
+            "right.yaml",
+            r"sensor_type: camera
+T_BS:
+  cols: 4
+  rows: 4
+  data: [1, 0, 0, 0.09, 0, 1, 0, 0.02, 0, 0, 1, 0.01, 0, 0, 0, 1]
+resolution: [752, 480]
+camera_model: pinhole
+intrinsics: [458.6, 457.2, 367.2, 248.3]
+distortion_model: radial-tangential
+distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002]
+",
+        ),
+    ],
+};
+
 /// Reads the left and the right camera's file.
-pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
+fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let [left, right] = *roots else {
         return Err(two_files(roots, "sensor.yaml"));
     };
@@ -19,7 +58,7 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
             r_right_left: to_right * r_body_left,
             t_right_left_m: to_right * (t_body_left - t_body_right),
         },
-        format: "EuRoC",
+        format: FORMAT.name,
     })
 }
 

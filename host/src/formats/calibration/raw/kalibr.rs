@@ -1,20 +1,50 @@
 //! Kalibr's `camchain.yaml`: `cam0` is left, `cam1` right; `T_cn_cnm1` maps coordinates of the
 //! first to the second.
 
+use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration, lens, tree::Node};
 use crate::formats::FormatError;
 use dynvox_core::rectify::{LensModel, RawCamera, RawRig};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
+/// Kalibr's file.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "Kalibr",
+    files: "`camchain.yaml`: `cam0` left, `cam1` right",
+    matches: |files| files.has("cam0"),
+    read: |files| read(files.root()?),
+    example: &[(
+        "camchain.yaml",
+        r"cam0:
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.6, 457.2, 367.2, 248.3]
+  resolution: [752, 480]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.11]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.6, 457.2, 367.2, 248.3]
+  resolution: [752, 480]
+",
+    )],
+};
+
 /// Reads both cameras.
-pub fn read(root: Node<'_>) -> Result<StereoCalibration, FormatError> {
+fn read(root: Node<'_>) -> Result<StereoCalibration, FormatError> {
     let [left, right] = [root.need("cam0")?, root.need("cam1")?];
     let (r_right_left, t_right_left_m) = rigid(right.need("T_cn_cnm1")?)?;
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
         placement: Placement::Motion { r_right_left, t_right_left_m },
-        format: "Kalibr",
+        format: FORMAT.name,
     })
 }
 

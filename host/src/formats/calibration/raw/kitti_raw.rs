@@ -2,6 +2,7 @@
 //! rectification (`R_rect_00`, `P_rect_00`, `S_rect_00`) of cameras 0 (left) and 1 (right), the
 //! grey pair; of 2 and 3, the colour pair, where there is no grey one.
 
+use super::format::CalibrationFormat;
 use super::{
     Placement, StereoCalibration, lens, ros,
     tree::{Node, Tree},
@@ -11,8 +12,33 @@ use dynvox_core::rectify::RawCamera;
 use nalgebra::Matrix3;
 use std::path::Path;
 
+/// KITTI's file.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "KITTI raw",
+    files: "`calib_cam_to_cam.txt`",
+    matches: |files| files.ends_in("txt"),
+    read: |files| read(files.text(), files.path()),
+    example: &[(
+        "calib_cam_to_cam.txt",
+        r"calib_time: 09-Jan-2012 13:57:47
+S_00: 7.52e+02 4.80e+02
+K_00: 458.6 0 367.2 0 457.2 248.3 0 0 1
+D_00: -0.28 0.07 0.0002 0.00002 0
+S_rect_00: 700 400
+R_rect_00: 1 0 0 0 1 0 0 0 1
+P_rect_00: 400 0 370 0 0 400 250 0 0 0 1 0
+S_01: 7.52e+02 4.80e+02
+K_01: 458.6 0 367.2 0 457.2 248.3 0 0 1
+D_01: -0.28 0.07 0.0002 0.00002 0
+S_rect_01: 700 400
+R_rect_01: 1 0 0 0 1 0 0 0 1
+P_rect_01: 400 0 370 -44 0 400 250 0 0 0 1 0
+",
+    )],
+};
+
 /// Reads the file's first pair.
-pub fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
+fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
     let pair = if text.lines().any(|line| line.starts_with("K_00:")) { GREY } else { COLOUR };
     read_pair(text, path, pair)
 }
@@ -50,7 +76,7 @@ fn read_pair(
             rig,
             size: root.need(left[3])?.size()?,
         },
-        format: "KITTI raw",
+        format: FORMAT.name,
     })
 }
 

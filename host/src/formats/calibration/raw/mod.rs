@@ -1,20 +1,12 @@
 //! Calibrations of raw pairs: lenses, and how the cameras stand.
 //!
-//! | format | files | known by |
-//! |---|---|---|
-//! | own | one `.toml` | its ending; [`own`] |
-//! | KITTI raw | `calib_cam_to_cam.txt` | lines `K_00:`, `P_rect_00:` |
-//! | Kalibr | `camchain.yaml` | `cam0:` and `cam1:` |
-//! | EuRoC, TUM VI | two `sensor.yaml` | `T_BS` |
-//! | ROS CameraInfo | two YAML files | `projection_matrix` |
-//! | camodocal | two camera files, and `extrinsics.yaml` as a third or beside them | `model_type` |
-//! | OpenCV | one or two files, YAML or XML | `M1 D1 M2 D2 R T`, or the long names |
-//!
+//! Each format is a file with a row of the table [`CALIBRATION_FORMATS`].
 //! The result of every format is checked here: baseline, sizes, rotations. Units are metres and
 //! pixels.
 
 mod camodocal;
 mod euroc;
+mod format;
 mod kalibr;
 mod kitti_raw;
 mod lens;
@@ -25,22 +17,34 @@ mod ros;
 mod tests;
 mod tree;
 
+pub use format::CalibrationFormat;
 pub use kalibr::to_kalibr;
 pub use own::to_toml;
 
-use crate::formats::{FormatError, read_text};
+use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{
     RawCamera, RawRig, Rectification, RectifyProblem, Sizing, TurnedCamera,
 };
+use format::Files;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
-use tree::{Node, Tree};
 
 /// Longest distance of two cameras that is taken for metres.
 pub const LONGEST_BASELINE_M: f64 = 10.0;
 /// Shortest distance of two cameras that is taken for metres.
 pub const SHORTEST_BASELINE_M: f64 = 0.001;
+
+/// All formats. Files are of the first that matches them, so that what asks for less stands later.
+pub static CALIBRATION_FORMATS: &[&CalibrationFormat] = &[
+    &own::FORMAT,
+    &kitti_raw::FORMAT,
+    &kalibr::FORMAT,
+    &euroc::FORMAT,
+    &ros::FORMAT,
+    &camodocal::FORMAT,
+    &opencv::FORMAT,
+];
 
 /// How the two cameras of a pair stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +89,7 @@ impl StereoCalibration {
     /// # Errors
     /// What is wrong with which file, and what to do.
     pub fn read(paths: &[&Path], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
-        let (Some(&first), 1..=3) = (paths.first(), paths.len()) else {
+        if !(1..=3).contains(&paths.len()) {
             let action =
                 "Give one file with both cameras, or --calibration LEFT --calibration RIGHT";
             return Err(FormatError::content(
@@ -93,20 +97,8 @@ impl StereoCalibration {
                 "a calibration is 1 to 3 files",
                 action,
             ));
-        };
-        let ending = first
-            .extension()
-            .map(|ending| ending.to_string_lossy().to_ascii_lowercase())
-            .unwrap_or_default();
-        let calibration = match ending.as_str() {
-            "toml" => own::read(&read_text(first)?, first)?,
-            "txt" => kitti_raw::read(&read_text(first)?, first)?,
-            _ => Self::from_trees(
-                &paths.iter().map(|path| Tree::read(path)).collect::<Result<Vec<_>, _>>()?,
-                image_size,
-            )?,
-        };
-        calibration.checked(first)
+        }
+        Self::from_files(Files::read(paths, image_size)?)
     }
 
     /// Of a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path` names
@@ -115,27 +107,21 @@ impl StereoCalibration {
     /// # Errors
     /// As [`StereoCalibration::read`].
     pub fn of_camera_infos(path: &Path, texts: &[String; 2]) -> Result<Self, FormatError> {
-        let trees =
-            texts.iter().map(|text| Tree::of_yaml(text, path)).collect::<Result<Vec<_>, _>>()?;
-        Self::from_trees(&trees, None)?.checked(path)
+        let files = texts.iter().map(|text| (path.to_path_buf(), text.clone())).collect();
+        Self::from_files(Files::new(files, None))
     }
 
-    fn from_trees(trees: &[Tree], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
-        let roots: Vec<Node<'_>> = trees.iter().map(Tree::root).collect();
-        let first = roots.first().copied();
-        let has = |key: &str| roots.iter().any(|root| root.get(key).is_some());
-        match first {
-            Some(root) if has("cam0") => kalibr::read(root),
-            Some(_) if has("T_BS") => euroc::read(&roots),
-            Some(_) if has("projection_matrix") || has("rectification_matrix") => ros::read(&roots),
-            Some(_) if has("model_type") => camodocal::read(&roots),
-            Some(root) if opencv::is_one(&roots) => opencv::read(&roots, image_size, root),
-            Some(root) => Err(root.refuse(
-                "its keys are of no known calibration",
-                "Known are EuRoC sensor.yaml, Kalibr camchain.yaml, OpenCV (M1 D1 M2 D2 R T), ROS CameraInfo, camodocal, KITTI raw \
-                 calib_cam_to_cam.txt and dynvox's own TOML, which `dynvox calibration` writes",
-            )),
-            None => Err(FormatError::content(Path::new(""), "there is no file", "Give one with --calibration FILE")),
+    /// Reads files by the first format that matches them.
+    fn from_files(files: Files) -> Result<Self, FormatError> {
+        match CALIBRATION_FORMATS.iter().find(|format| (format.matches)(&files)) {
+            Some(format) => (format.read)(&files)?.checked(files.path()),
+            None => {
+                let known = |format: &&CalibrationFormat| {
+                    format!("{} ({})", format.name, format.files.replace('`', ""))
+                };
+                let known: Vec<String> = CALIBRATION_FORMATS.iter().map(known).collect();
+                Err(files.refuse(&known.join("; ")))
+            }
         }
     }
 

@@ -3,10 +3,39 @@
 //! (`cameraMatrix1 distCoeffs1 ...`), or a file a camera (`cameraMatrix distCoeffs`, also
 //! `camera_matrix distortion_coefficients`) with `R` and `T` in one of them.
 
+use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration, lens, tree::Node};
 use crate::formats::FormatError;
 use dynvox_core::rectify::RawCamera;
 use nalgebra::{Matrix3, Vector3};
+
+/// OpenCV's files.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "OpenCV",
+    files: "YAML or XML: `M1 D1 M2 D2 R T`, `cameraMatrix1 distCoeffs1 ...`, or one file for each camera",
+    matches: |files| is_one(&files.roots()),
+    read: |files| read(&files.roots(), files.image_size, files.root()?),
+    example: &[(
+        "stereo.yml",
+        r"%YAML:1.0
+---
+image_width: 752
+image_height: 480
+M1: !!opencv-matrix
+   data: [ 458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1. ]
+D1: !!opencv-matrix
+   data: [ -0.28, 0.07, 0.0002, 0.00002, 0. ]
+M2: !!opencv-matrix
+   data: [ 458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1. ]
+D2: !!opencv-matrix
+   data: [ -0.28, 0.07, 0.0002, 0.00002, 0. ]
+R: !!opencv-matrix
+   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]
+T: !!opencv-matrix
+   data: [ -0.11, 0., 0. ]
+",
+    )],
+};
 
 /// Names of camera matrix and distortion in files that hold both cameras.
 const PAIRS: [[[&str; 2]; 2]; 6] = [
@@ -31,13 +60,13 @@ const SINGLE: [[&str; 2]; 3] = [
 ];
 
 /// Whether the files look like it.
-pub fn is_one(roots: &[Node<'_>]) -> bool {
+fn is_one(roots: &[Node<'_>]) -> bool {
     let matrices = PAIRS.iter().flatten().chain(&SINGLE).map(|[matrix, _]| *matrix);
     matrices.clone().any(|key| roots.iter().any(|root| root.get(key).is_some()))
 }
 
 /// Reads the pair.
-pub fn read(
+fn read(
     roots: &[Node<'_>],
     image_size: Option<[u32; 2]>,
     first: Node<'_>,
@@ -74,7 +103,7 @@ pub fn read(
         left,
         right,
         placement: Placement::Motion { r_right_left, t_right_left_m },
-        format: "OpenCV",
+        format: FORMAT.name,
     })
 }
 

@@ -1,12 +1,47 @@
 //! Our own format: TOML with units in its keys.
 
+use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration};
 use crate::formats::FormatError;
+use crate::formats::calibration::lens_table;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{Lens, LensModel, RawCamera};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// Our own file.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "dynvox",
+    files: "TOML with units in its keys",
+    matches: |files| files.ends_in("toml"),
+    read: |files| read(files.text(), files.path()),
+    example: &[(
+        "own.toml",
+        r#"[left]
+width_px = 752
+height_px = 480
+focal_px = [458.6, 457.2]
+center_px = [367.2, 248.3]
+[left.lens]
+model = "radial_tangential"
+radial = [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0]
+tangential = [0.0002, 0.00002]
+[right]
+width_px = 752
+height_px = 480
+focal_px = [458.6, 457.2]
+center_px = [367.2, 248.3]
+[right.lens]
+model = "radial_tangential"
+radial = [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0]
+tangential = [0.0002, 0.00002]
+[right_from_left]
+rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+translation_m = [-0.11, 0.0, 0.0]
+"#,
+    )],
+};
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -26,16 +61,8 @@ struct Camera {
     height_px: u32,
     focal_px: [f64; 2],
     center_px: [f64; 2],
-    lens: LensTable,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
-enum LensTable {
-    RadialTangential { radial: [f64; 6], tangential: [f64; 2] },
-    Equidistant { radial: [f64; 4] },
-    DoubleSphere { xi: f64, alpha: f64 },
-    ExtendedUnified { alpha: f64, beta: f64 },
+    #[serde(with = "lens_table")]
+    lens: LensModel,
 }
 
 /// Left camera coordinates to right ones.
@@ -66,30 +93,6 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
     matrix.transpose().into()
 }
 
-impl LensTable {
-    fn of(model: &LensModel) -> Self {
-        match *model {
-            LensModel::RadialTangential { radial, tangential } => {
-                Self::RadialTangential { radial, tangential }
-            }
-            LensModel::Equidistant { radial } => Self::Equidistant { radial },
-            LensModel::DoubleSphere { xi, alpha } => Self::DoubleSphere { xi, alpha },
-            LensModel::ExtendedUnified { alpha, beta } => Self::ExtendedUnified { alpha, beta },
-        }
-    }
-
-    fn model(&self) -> LensModel {
-        match *self {
-            Self::RadialTangential { radial, tangential } => {
-                LensModel::RadialTangential { radial, tangential }
-            }
-            Self::Equidistant { radial } => LensModel::Equidistant { radial },
-            Self::DoubleSphere { xi, alpha } => LensModel::DoubleSphere { xi, alpha },
-            Self::ExtendedUnified { alpha, beta } => LensModel::ExtendedUnified { alpha, beta },
-        }
-    }
-}
-
 impl Camera {
     fn of(camera: &RawCamera) -> Self {
         Self {
@@ -97,21 +100,20 @@ impl Camera {
             height_px: camera.height,
             focal_px: camera.lens.focal_px(),
             center_px: camera.lens.center_px(),
-            lens: LensTable::of(camera.lens.model()),
+            lens: *camera.lens.model(),
         }
     }
 
     fn raw(&self, path: &Path) -> Result<RawCamera, FormatError> {
-        let lens =
-            Lens::new(self.focal_px, self.center_px, self.lens.model()).map_err(|problem| {
-                FormatError::content(path, problem.to_string(), "Correct the lens's numbers")
-            })?;
+        let lens = Lens::new(self.focal_px, self.center_px, self.lens).map_err(|problem| {
+            FormatError::content(path, problem.to_string(), "Correct the lens's numbers")
+        })?;
         Ok(RawCamera { lens, width: self.width_px, height: self.height_px })
     }
 }
 
 /// Reads a file.
-pub(super) fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
+fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
     let file: File = toml::from_str(text).map_err(|error| {
         let reason = error.message().trim().replace('\n', " ");
         FormatError::content(
@@ -148,7 +150,7 @@ pub(super) fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatE
         left: file.left.raw(path)?,
         right: file.right.raw(path)?,
         placement,
-        format: "dynvox",
+        format: FORMAT.name,
     })
 }
 

@@ -1,14 +1,55 @@
 //! ROS `CameraInfo` as `camera_calibration` writes it: one YAML file a camera, with the
 //! rectification and its projection.
 
+use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration, euroc, lens, tree::Node};
 use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::RawCamera;
 use nalgebra::Matrix3;
 
+/// ROS's files.
+pub static FORMAT: CalibrationFormat = CalibrationFormat {
+    name: "ROS CameraInfo",
+    files: "`CameraInfo` of `camera_calibration`, one YAML file for each camera",
+    matches: |files| files.has("projection_matrix") || files.has("rectification_matrix"),
+    read: |files| read(&files.roots()),
+    example: &[
+        (
+            "left.yaml",
+            r"image_width: 752
+image_height: 480
+camera_matrix:
+  data: [458.6, 0, 367.2, 0, 457.2, 248.3, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  data: [-0.28, 0.07, 0.0002, 0.00002, 0]
+rectification_matrix:
+  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]
+projection_matrix:
+  data: [400, 0, 370, 0, 0, 400, 250, 0, 0, 0, 1, 0]
+",
+        ),
+        (
+            "right.yaml",
+            r"image_width: 752
+image_height: 480
+camera_matrix:
+  data: [458.6, 0, 367.2, 0, 457.2, 248.3, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  data: [-0.28, 0.07, 0.0002, 0.00002, 0]
+rectification_matrix:
+  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]
+projection_matrix:
+  data: [400, 0, 370, -44, 0, 400, 250, 0, 0, 0, 1, 0]
+",
+        ),
+    ],
+};
+
 /// Reads the left and the right camera's file.
-pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
+fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let [left, right] = *roots else {
         return Err(euroc::two_files(roots, "CameraInfo file"));
     };
@@ -28,7 +69,7 @@ pub fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
             rig: rectified_rig(right, &p_left, &p_right)?,
             size: [left.need("image_width")?.pixels()?, left.need("image_height")?.pixels()?],
         },
-        format: "ROS CameraInfo",
+        format: FORMAT.name,
     })
 }
 

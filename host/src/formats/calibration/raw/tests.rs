@@ -7,10 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
-    intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\ncam1:\n  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.11]\n  - [0.0, 1.0, 0.0, 0.0]\n  \
-    - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  \
-    distortion_model: radtan\n  intrinsics: [458.6, 457.2, 367.2, 248.3]\n  resolution: [752, 480]\n";
+const KALIBR: &str = kalibr::FORMAT.example[0].1;
 
 fn euroc(x: f64) -> String {
     format!(
@@ -59,26 +56,7 @@ fn opencv_xml() -> String {
     )
 }
 
-fn ros(shift: f64) -> String {
-    format!(
-        "image_width: 752\nimage_height: 480\ncamera_name: left\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [458.6, 0, 367.2, 0, 457.2, 248.3, 0, 0, 1]\n\
-         distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.28, 0.07, 0.0002, 0.00002, 0]\n\
-         rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n\
-         projection_matrix:\n  rows: 3\n  cols: 4\n  data: [400, 0, 370, {shift}, 0, 400, 250, 0, 0, 0, 1, 0]\n"
-    )
-}
-
-fn camodocal() -> String {
-    "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   k1: -0.28\n   k2: 0.07\n   \
-     p1: 0.0002\n   p2: 0.00002\nprojection_parameters:\n   fx: 458.6\n   fy: 457.2\n   cx: 367.2\n   cy: 248.3\n"
-        .to_owned()
-}
-
-const EXTRINSICS: &str = "%YAML:1.0\n---\ntransform:\n   q_x: 0.\n   q_y: 0.\n   q_z: 0.\n   q_w: 1.\n   t_x: -0.11\n   t_y: 0.\n   t_z: 0.\n";
-
-const KITTI: &str = "calib_time: 09-Jan-2012 13:57:47\nS_00: 7.52e+02 4.80e+02\nK_00: 458.6 0 367.2 0 457.2 248.3 0 0 1\nD_00: -0.28 0.07 0.0002 0.00002 0\n\
-    S_rect_00: 700 400\nR_rect_00: 1 0 0 0 1 0 0 0 1\nP_rect_00: 400 0 370 0 0 400 250 0 0 0 1 0\nS_01: 752 480\nK_01: 458.6 0 367.2 0 457.2 248.3 0 0 1\n\
-    D_01: -0.28 0.07 0.0002 0.00002 0\nR_rect_01: 1 0 0 0 1 0 0 0 1\nP_rect_01: 400 0 370 -44 0 400 250 0 0 0 1 0\n";
+const KITTI: &str = kitti_raw::FORMAT.example[0].1;
 
 /// Files with these names and texts, in a folder that lives as long as they are read.
 fn written(files: &[(&str, &str)]) -> (TempDir, Vec<PathBuf>) {
@@ -103,45 +81,14 @@ fn refusal(files: &[(&str, &str)]) -> String {
 
 #[test]
 fn all_formats_tell_of_the_same_rig() {
-    let (short, long) = (opencv_short(), opencv_long());
-    let (left, right) = (euroc(-0.02), euroc(0.09));
-    let files: [(&str, Vec<(&str, &str)>); 9] = [
-        ("Kalibr", vec![("camchain.yaml", KALIBR)]),
-        ("EuRoC", vec![("a.yaml", &left), ("b.yaml", &right)]),
-        ("OpenCV", vec![("intrinsics.yml", &short[0]), ("extrinsics.yml", &short[1])]),
-        ("OpenCV", vec![("left.yaml", &long[0]), ("right.yaml", &long[1])]),
-        (
-            "OpenCV",
-            vec![("stereo.xml", &opencv_xml())]
-                .into_iter()
-                .map(|(name, text)| (name, Box::leak(text.clone().into_boxed_str()) as &str))
-                .collect(),
-        ),
-        (
-            "ROS CameraInfo",
-            vec![
-                ("left.yaml", Box::leak(ros(0.0).into_boxed_str())),
-                ("right.yaml", Box::leak(ros(-44.0).into_boxed_str())),
-            ],
-        ),
-        (
-            "camodocal",
-            vec![
-                ("l.yaml", Box::leak(camodocal().into_boxed_str())),
-                ("r.yaml", Box::leak(camodocal().into_boxed_str())),
-                ("extrinsics.yaml", EXTRINSICS),
-            ],
-        ),
-        ("KITTI raw", vec![("calib_cam_to_cam.txt", KITTI)]),
-        (
-            "dynvox",
-            vec![(
-                "own.toml",
-                Box::leak(to_toml(&read(&[("camchain.yaml", KALIBR)]).unwrap()).into_boxed_str()),
-            )],
-        ),
+    let (short, long, xml) = (opencv_short(), opencv_long(), opencv_xml());
+    let variants = [
+        ("OpenCV", vec![("intrinsics.yml", &*short[0]), ("extrinsics.yml", &*short[1])]),
+        ("OpenCV", vec![("left.yaml", &*long[0]), ("right.yaml", &*long[1])]),
+        ("OpenCV", vec![("stereo.xml", &*xml)]),
     ];
-    for (format, files) in files {
+    let examples = CALIBRATION_FORMATS.iter().map(|row| (row.name, row.example.to_vec()));
+    for (format, files) in examples.chain(variants) {
         let calibration = read(&files).unwrap_or_else(|error| panic!("{format}: {error}"));
         assert_eq!(calibration.format, format);
         for camera in [calibration.left, calibration.right] {
@@ -169,6 +116,26 @@ fn all_formats_tell_of_the_same_rig() {
         );
         assert_eq!(rectification.left.raw, calibration.left);
     }
+}
+
+#[test]
+fn the_documentation_lists_every_format() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/inputs.md");
+    let page = fs::read_to_string(page).unwrap();
+    for row in CALIBRATION_FORMATS {
+        let line = format!("| {} | {} |", row.name, row.files);
+        assert!(page.contains(&line), "docs/inputs.md lacks: {line}");
+    }
+}
+
+#[test]
+fn files_of_no_format_are_told_all_that_are_known() {
+    let message = refusal(&[(
+        "rig.yaml",
+        "focal: 3
+",
+    )]);
+    assert!(CALIBRATION_FORMATS.iter().all(|row| message.contains(row.name)), "{message}");
 }
 
 #[test]
@@ -367,8 +334,9 @@ fn damaged_numbers_are_named_with_the_next_action() {
         refusal(&[("intrinsics.yml", &short[0]), ("extrinsics.yml", &sizeless)]),
         &["does not say the size"],
     );
+    let camodocal = camodocal::FORMAT.example[0].1;
     contains_all(
-        refusal(&[("l.yaml", &camodocal()), ("r.yaml", &camodocal())]),
+        refusal(&[("l.yaml", camodocal), ("r.yaml", camodocal)]),
         &["extrinsics.yaml", "cannot be read"],
     );
 }

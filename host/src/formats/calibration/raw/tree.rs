@@ -19,18 +19,17 @@ pub struct Node<'t> {
 }
 
 impl Tree {
-    /// Reads XML where the file ends so, else YAML.
+    /// Reads a file as [`Tree::from_text`] does.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
-        let text = read_text(path)?;
-        let xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
-            || text.trim_start().starts_with("<?xml");
-        let value = if xml { from_xml(&text, path)? } else { from_yaml(&text, path)? };
-        Ok(Self { path: path.to_path_buf(), value })
+        Self::from_text(&read_text(path)?, path)
     }
 
-    /// YAML that lies in memory.
-    pub fn of_yaml(text: &str, path: &Path) -> Result<Self, FormatError> {
-        Ok(Self { path: path.to_path_buf(), value: from_yaml(text, path)? })
+    /// Parses XML if the file's name or text says so, else YAML. `path` names the text in errors.
+    pub fn from_text(text: &str, path: &Path) -> Result<Self, FormatError> {
+        let xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
+            || text.trim_start().starts_with("<?xml");
+        let value = if xml { from_xml(text, path)? } else { from_yaml(text, path)? };
+        Ok(Self { path: path.to_path_buf(), value })
     }
 
     /// Lines `key: word word ...`.

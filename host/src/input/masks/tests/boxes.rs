@@ -231,7 +231,7 @@ fn boxes_over_the_streets_disparity_become_masks_close_to_the_exact_ones() {
 #[test]
 fn boxes_on_raw_images_are_refused() {
     let config = StreetConfig {
-        lens: crate::synth::StreetLens::Equidistant(Default::default()),
+        lens: crate::synth::StreetLens::Bent(dynvox_core::rectify::LENS_MODELS[1].typical),
         ..StreetConfig::default()
     };
     let street: Box<dyn FrameSource> = Box::new(StreetFrames::new(config).unwrap());

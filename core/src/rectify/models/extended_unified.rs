@@ -1,6 +1,14 @@
 //! Extended unified camera model: Khomutenko, Garcia and Martinet, *An enhanced unified camera
 //! model* (RA-L 2016); beta 1 is the unified model of Geyer and Daniilidis, Barreto and Mei.
 
+use super::{LensKind, LensModel};
+
+/// Row of the table of models.
+pub(super) const KIND: LensKind = LensKind {
+    name: "extended_unified",
+    typical: LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 },
+};
+
 /// Where a ray meets the image, in units of the focal length.
 pub(super) fn distort(alpha: f64, beta: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let distance = libm::sqrt(beta * (x * x + y * y) + z * z);

@@ -5,7 +5,14 @@
 //! With a the angle from the optical axis: `a' = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8)` is the
 //! distance from the middle.
 
-use super::monotonic;
+use super::{LensKind, LensModel};
+use crate::rectify::monotonic;
+
+/// Row of the table of models.
+pub(super) const KIND: LensKind = LensKind {
+    name: "equidistant",
+    typical: LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] },
+};
 
 /// Distorted angle and its derivative.
 fn polynomial([k1, k2, k3, k4]: &[f64; 4], angle: f64) -> [f64; 2] {

@@ -1,6 +1,14 @@
 //! Double sphere: Usenko, Demmel and Cremers, *The double sphere camera model* (3DV 2018),
 //! equations 40 to 52.
 
+use super::{LensKind, LensModel};
+
+/// Row of the table of models.
+pub(super) const KIND: LensKind = LensKind {
+    name: "double_sphere",
+    typical: LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 },
+};
+
 /// Where a ray meets the image, in units of the focal length.
 pub(super) fn distort(xi: f64, alpha: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let first = libm::sqrt(x * x + y * y + z * z);

@@ -5,7 +5,17 @@
 //! `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)`,
 //! `x' = x g + 2 p1 x y + p2 (r^2 + 2 x^2)`, `y' = y g + p1 (r^2 + 2 y^2) + 2 p2 x y`.
 
-use super::monotonic;
+use super::{LensKind, LensModel};
+use crate::rectify::monotonic;
+
+/// Row of the table of models.
+pub(super) const KIND: LensKind = LensKind {
+    name: "radial_tangential",
+    typical: LensModel::RadialTangential {
+        radial: [-0.28, 0.07, 0.0, 0.0, 0.0, 0.0],
+        tangential: [2e-4, -3e-4],
+    },
+};
 
 /// Most of Newton's steps in the plane: each doubles the right digits, and the radial part is exact
 /// before the first.
