@@ -21,7 +21,7 @@ pub use data_set::{CameraPair, DataSet, Layout, OpenOptions, Topics};
 pub use data_sets::{DATA_SETS, Found, open, sequences_at, survey};
 pub use layouts::{Sequence, StreetFrames};
 pub use source::{
-    AvailableMasks, DepthRefusals, ExactFrame, FrameMasks, FrameSource, GivenDepth, InputError,
-    InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, Stacking, StereoImages,
-    StopRequest, StreamState, TrueObject, read_given_poses,
+    AvailableMasks, DepthRefusals, ExactFrame, FrameInfo, FrameMasks, FrameSource, GivenDepth,
+    InputError, InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, SourceInfo, Stacking,
+    StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
 };

@@ -15,12 +15,14 @@ mod tests;
 
 use super::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use super::layouts::nearest_stamps;
-use super::source::{FrameSource, InputError, LidarScan, StereoImages, StreamState, require_size};
-use crate::formats::calibration::{CameraGeometry, FittedGeometry, StereoCalibration};
+use super::source::{
+    FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState,
+    require_size,
+};
+use crate::formats::calibration::{CameraGeometry, StereoCalibration};
 use crate::formats::significant_bits;
 use cdr::CameraInfo;
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::Rectification;
 use file::BagFile;
 use std::path::{Path, PathBuf};
 
@@ -38,14 +40,12 @@ struct Entry {
 
 /// The stereo pairs of an MCAP file.
 pub struct Bag {
-    name: String,
+    info: SourceInfo,
     file: BagFile,
     topics: [String; 2],
     pairs: Vec<[Entry; 2]>,
     image_size: (usize, usize),
     bits: Option<u32>,
-    geometry: FittedGeometry,
-    notes: Vec<String>,
 }
 
 /// The MCAP file at a path: itself, or the one in the folder of a recording.
@@ -134,7 +134,8 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
     let name = path
         .file_stem()
         .map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    Ok(Bag { name, file, topics, pairs, image_size, bits, geometry, notes })
+    let info = SourceInfo { notes, ..SourceInfo::new(name, pairs.len(), &geometry) };
+    Ok(Bag { info, file, topics, pairs, image_size, bits })
 }
 
 /// The cameras as they are given, else by the bag's `CameraInfo`.
@@ -182,36 +183,17 @@ fn rectified(path: &Path, left: &CameraInfo, right: &CameraInfo) -> Result<Stere
 }
 
 impl FrameSource for Bag {
-    fn name(&self) -> &str {
-        &self.name
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
-    fn len(&self) -> usize {
-        self.pairs.len()
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        let stamp_ns = self.pairs.get(index).map(|[left, _]| left.stamp_ns);
+        let time_s = stamp_ns.map_or(0.0, |stamp_ns| stamp_ns as f64 / 1e9);
+        FrameInfo { stem: None, stamp_ns, time_s }
     }
-
     fn stream(&self) -> Option<StreamState> {
         None
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.geometry.size
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.geometry.rig
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.geometry.rectification.as_ref()
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
-        self.pairs.get(index).map(|[left, _]| left.stamp_ns)
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.stamp_ns(index).map_or(0.0, |stamp_ns| stamp_ns as f64 / 1e9)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
@@ -229,9 +211,5 @@ impl FrameSource for Bag {
 
     fn lidar(&self, _: usize) -> Result<Option<LidarScan>, InputError> {
         Ok(None)
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }

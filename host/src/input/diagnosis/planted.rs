@@ -2,11 +2,9 @@
 
 use super::tests::data;
 use super::*;
-use crate::input::source::{AvailableMasks, LidarScan, StereoImages, StreamState};
+use crate::input::source::{FrameInfo, LidarScan, SourceInfo, StereoImages, StreamState};
 use crate::input::{OpenOptions, StreetFrames, open};
 use crate::synth::StreetConfig;
-use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::Rectification;
 
 /// How a recording is spoilt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +25,7 @@ struct Spoilt<'s> {
     source: &'s dyn FrameSource,
     frames: &'s [StereoImages],
     planted: Planted,
+    info: SourceInfo,
 }
 
 fn bilinear(image: &Image<u8>, u: f64, v: f64) -> u8 {
@@ -54,38 +53,15 @@ fn resampled(from: &Image<u8>, at: impl Fn(f64, f64) -> [f64; 2]) -> Image<u8> {
 }
 
 impl FrameSource for Spoilt<'_> {
-    fn name(&self) -> &str {
-        self.source.name()
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        FrameInfo { time_s: self.source.time_s(index), ..FrameInfo::default() }
+    }
     fn stream(&self) -> Option<StreamState> {
         None
-    }
-
-    fn len(&self) -> usize {
-        self.frames.len()
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.source.size()
-    }
-
-    fn masks(&self) -> AvailableMasks {
-        self.source.masks()
-    }
-
-    fn rig(&self) -> StereoRig {
-        let rig = self.source.rig();
-        let factor = if self.planted == Planted::Millimetres { 1e3 } else { 1.0 };
-        StereoRig { baseline_m: factor * rig.baseline_m, ..rig }
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.source.rectification()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.source.time_s(index)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
@@ -135,7 +111,11 @@ fn frames(source: &dyn FrameSource, count: usize) -> Vec<StereoImages> {
 }
 
 fn found(source: &dyn FrameSource, frames: &[StereoImages], planted: Planted) -> Vec<Finding> {
-    let spoilt = Spoilt { source, frames, planted };
+    let mut info = SourceInfo { frames: frames.len(), notes: Vec::new(), ..source.info().clone() };
+    if planted == Planted::Millimetres {
+        info.rig.baseline_m *= 1e3;
+    }
+    let spoilt = Spoilt { source, frames, planted, info };
     examine(&spoilt, &(0..spoilt.len()).collect::<Vec<_>>()).unwrap()
 }
 

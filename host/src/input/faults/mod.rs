@@ -12,11 +12,9 @@ mod tests;
 pub use spec::{Fault, FaultKind, Faults, Side};
 
 use super::source::{
-    AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState,
+    FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState,
 };
-use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::random::Random;
-use dynvox_core::rectify::Rectification;
 use order::{Delivery, deliveries};
 
 /// A recording with faults, if there are any to be injected.
@@ -38,8 +36,7 @@ pub struct FaultySource {
     inner: Box<dyn FrameSource>,
     faults: Faults,
     order: Vec<Delivery>,
-    truth: Option<Vec<Transform>>,
-    notes: Vec<String>,
+    info: SourceInfo,
 }
 
 impl FaultySource {
@@ -52,12 +49,12 @@ impl FaultySource {
             return Err("--faults needs a recording, and this is a stream. Save its frames to a folder first".to_owned());
         }
         let order = deliveries(inner.len(), &faults);
-        let truth = inner
+        let mut info = SourceInfo { frames: order.len(), ..inner.info().clone() };
+        info.truth = inner
             .truth()
             .map(|truth| order.iter().filter_map(|one| truth.get(one.frame).copied()).collect());
-        let mut notes = inner.notes().to_vec();
-        notes.push(format!("faults are injected, {} in all", faults.list.len()));
-        Ok(Self { inner, faults, order, truth, notes })
+        info.notes.push(format!("faults are injected, {} in all", faults.list.len()));
+        Ok(Self { inner, faults, order, info })
     }
 
     /// The source's frame that is delivered at a position.
@@ -76,6 +73,24 @@ impl FaultySource {
 }
 
 impl FrameSource for FaultySource {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn frame_info(&self, position: usize) -> FrameInfo {
+        match self.order.get(position) {
+            Some(one) => FrameInfo {
+                stem: self.inner.frame_info(one.frame).stem,
+                ..self.inner.frame_info(one.stamp)
+            },
+            None => FrameInfo {
+                stem: None,
+                stamp_ns: None,
+                time_s: self.inner.frame_info(position).time_s,
+            },
+        }
+    }
+
     fn frame(&self, position: usize) -> Result<StereoImages, InputError> {
         let mut images = self.inner.frame(self.delivered(position)?.frame)?;
         for (number, fault) in
@@ -101,48 +116,8 @@ impl FrameSource for FaultySource {
         Ok(images)
     }
 
-    fn name(&self) -> &str {
-        self.inner.name()
-    }
-
-    fn len(&self) -> usize {
-        self.order.len()
-    }
-
     fn stream(&self) -> Option<StreamState> {
         None
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.inner.size()
-    }
-
-    fn full_size(&self) -> (usize, usize) {
-        self.inner.full_size()
-    }
-
-    fn stem(&self, position: usize) -> Option<String> {
-        self.inner.stem(self.order.get(position)?.frame)
-    }
-
-    fn masks(&self) -> AvailableMasks {
-        self.inner.masks()
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.inner.rig()
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.inner.rectification()
-    }
-
-    fn stamp_ns(&self, position: usize) -> Option<u64> {
-        self.inner.stamp_ns(self.order.get(position)?.stamp)
-    }
-
-    fn time_s(&self, position: usize) -> f64 {
-        self.inner.time_s(self.order.get(position).map_or(position, |one| one.stamp))
     }
 
     fn has_lidar(&self, position: usize) -> bool {
@@ -151,13 +126,5 @@ impl FrameSource for FaultySource {
 
     fn lidar(&self, position: usize) -> Result<Option<LidarScan>, InputError> {
         self.inner.lidar(self.delivered(position)?.frame)
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.truth.as_deref()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }

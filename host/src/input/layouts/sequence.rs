@@ -7,11 +7,10 @@ use super::pairing::{CameraFiles, Pairing};
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
 use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
 use crate::input::source::{
-    ASSUMED_HZ, AvailableMasks, FrameSource, InputError, LidarScan, ObjectsTruth, Stacking,
-    StereoImages, StreamState, require_size,
+    ASSUMED_HZ, AvailableMasks, FrameInfo, FrameSource, InputError, LidarScan, ObjectsTruth,
+    SourceInfo, Stacking, StereoImages, StreamState, require_size,
 };
-use dynvox_core::geometry::{StereoRig, Transform};
-use dynvox_core::rectify::Rectification;
+use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
 
 /// Pictures whose largest value tells how many bits of 16 are significant.
@@ -21,7 +20,7 @@ const NS_PER_S: f64 = 1e9;
 /// Stereo pairs in files.
 #[derive(Debug)]
 pub struct Sequence {
-    name: String,
+    info: SourceInfo,
     pairs: Vec<[PathBuf; 2]>,
     /// How the two images lie in one file, where they do: both paths of a pair are then the same.
     stacking: Option<Stacking>,
@@ -29,16 +28,12 @@ pub struct Sequence {
     image_size: (usize, usize),
     /// Significant bits of 16-bit images.
     bits: Option<u32>,
-    geometry: FittedGeometry,
     /// One a frame, ns; `None` where nothing tells them.
     stamps_ns: Option<Vec<u64>>,
     /// Numbers of the frames; times are assumed from them where no file has times.
     numbers: Vec<usize>,
-    truth: Option<Vec<Transform>>,
-    masks: AvailableMasks,
     objects: Vec<ObjectsTruth>,
     lidar: Option<LidarFiles>,
-    notes: Vec<String>,
 }
 
 /// The image files of a sequence.
@@ -142,20 +137,22 @@ impl Sequence {
             AvailableMasks::Absent
         };
         let objects = numbers.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
+        let info = SourceInfo {
+            masks,
+            truth,
+            notes,
+            ..SourceInfo::new(parts.name, pairs.len(), &geometry)
+        };
         Ok(Self {
-            name: parts.name,
+            info,
             pairs,
             stacking,
             image_size,
             bits,
-            geometry,
             stamps_ns,
             numbers,
-            truth,
-            masks,
             objects,
             lidar: parts.lidar,
-            notes,
         })
     }
 
@@ -250,45 +247,22 @@ fn rows_of<T: Copy>(table: &[T], rows: &[usize]) -> Option<Vec<T>> {
 }
 
 impl FrameSource for Sequence {
-    fn name(&self) -> &str {
-        &self.name
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
-    fn len(&self) -> usize {
-        self.pairs.len()
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        let stamp_ns = self.stamps_ns.as_ref().and_then(|stamps| stamps.get(index).copied());
+        let assumed = || self.numbers.get(index).map_or(0.0, |&number| number as f64 / ASSUMED_HZ);
+        FrameInfo {
+            stem: self.pairs.get(index).map(|[left, _]| stem_of(left)),
+            stamp_ns,
+            time_s: stamp_ns.map_or_else(assumed, |stamp_ns| stamp_ns as f64 / NS_PER_S),
+        }
     }
 
     fn stream(&self) -> Option<StreamState> {
         None
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.geometry.size
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.geometry.rig
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.geometry.rectification.as_ref()
-    }
-
-    fn stem(&self, index: usize) -> Option<String> {
-        self.pairs.get(index).map(|[left, _]| stem_of(left))
-    }
-
-    fn masks(&self) -> AvailableMasks {
-        self.masks.clone()
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
-        self.stamps_ns.as_ref()?.get(index).copied()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        let assumed = || self.numbers.get(index).map_or(0.0, |&number| number as f64 / ASSUMED_HZ);
-        self.stamp_ns(index).map_or_else(assumed, |stamp_ns| stamp_ns as f64 / NS_PER_S)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
@@ -310,14 +284,6 @@ impl FrameSource for Sequence {
             return Ok(None);
         };
         lidar.read(&stem)
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.truth.as_deref()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }
 

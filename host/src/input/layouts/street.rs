@@ -2,20 +2,16 @@
 
 use crate::formats::Image;
 use crate::input::source::{
-    AvailableMasks, ExactFrame, FrameMasks, FrameSource, InputError, LidarScan, ObjectsTruth,
-    StereoImages, StreamState, TrueObject,
+    AvailableMasks, ExactFrame, FrameInfo, FrameMasks, FrameSource, InputError, LidarScan,
+    ObjectsTruth, SourceInfo, StereoImages, StreamState, TrueObject,
 };
 use crate::synth::{Street, StreetConfig, SynthFrame};
-use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::masks::PixelBox;
-use dynvox_core::rectify::Rectification;
 
 /// Frames of a street.
 pub struct StreetFrames {
     street: Street,
-    frames: usize,
-    truth: Vec<Transform>,
-    rectification: Option<Rectification>,
+    info: SourceInfo,
 }
 
 impl StreetFrames {
@@ -24,46 +20,33 @@ impl StreetFrames {
         let frames = config.frames;
         let street = Street::new(config)
             .map_err(|error| InputError::Street { reason: error.to_string() })?;
-        Ok(Self {
-            truth: (0..frames).map(|index| street.t_world_camera(index)).collect(),
+        let size = (street.config().width as usize, street.config().height as usize);
+        let info = SourceInfo {
+            name: "street".to_owned(),
             frames: frames as usize,
+            size,
+            full_size: size,
+            rig: street.rig(),
             rectification: street.rectification(),
-            street,
-        })
+            masks: AvailableMasks::Exact,
+            truth: Some((0..frames).map(|index| street.t_world_camera(index)).collect()),
+            notes: Vec::new(),
+        };
+        Ok(Self { street, info })
     }
 }
 
 impl FrameSource for StreetFrames {
-    fn name(&self) -> &str {
-        "street"
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
-    fn len(&self) -> usize {
-        self.frames
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        let time_s = self.street.time_s(index as u32);
+        FrameInfo { stem: None, stamp_ns: Some((time_s * 1e9).round() as u64), time_s }
     }
-
     fn stream(&self) -> Option<StreamState> {
         None
-    }
-
-    fn size(&self) -> (usize, usize) {
-        (self.street.config().width as usize, self.street.config().height as usize)
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.street.rig()
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
-        Some((self.time_s(index) * 1e9).round() as u64)
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.rectification.as_ref()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.street.time_s(index as u32)
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
@@ -92,12 +75,8 @@ impl FrameSource for StreetFrames {
         })
     }
 
-    fn masks(&self) -> AvailableMasks {
-        AvailableMasks::Exact
-    }
-
     fn has_lidar(&self, index: usize) -> bool {
-        index < self.frames
+        index < self.info.frames
     }
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
@@ -105,11 +84,7 @@ impl FrameSource for StreetFrames {
         let point =
             |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
         let points_m = self.street.lidar(index as u32).iter().map(point).collect();
-        Ok((index < self.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        Some(&self.truth)
+        Ok((index < self.info.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod depth;
 mod error;
+mod frames;
 mod given_poses;
 mod lidar;
 mod masks;
@@ -13,6 +14,7 @@ mod truth;
 
 pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
 pub use error::{InputError, read_failed};
+pub use frames::{FrameInfo, FrameSource, SourceInfo};
 pub use given_poses::read_given_poses;
 pub use lidar::LidarScan;
 pub use masks::{
@@ -25,8 +27,6 @@ pub use stop::StopRequest;
 pub use truth::{ObjectsTruth, TrueObject};
 
 use crate::formats::{Decoded, Image};
-use dynvox_core::geometry::{StereoRig, Transform};
-use dynvox_core::rectify::Rectification;
 use std::path::PathBuf;
 
 /// Frames a second assumed of images without times.
@@ -116,84 +116,4 @@ pub enum AvailableMasks {
 pub struct StreamState {
     /// Frames that came while the mapper was busy, and were dropped.
     pub dropped: u64,
-}
-
-/// A list of stereo pairs with one rig.
-pub trait FrameSource: Send + Sync {
-    /// Short name, fit for a folder: `kitti-odometry-06`.
-    fn name(&self) -> &str;
-
-    /// Frames in all; 0 of a stream, whose end is unknown.
-    fn len(&self) -> usize;
-
-    /// Whether it is known that there is no frame.
-    fn is_empty(&self) -> bool {
-        self.len() == 0 && self.stream().is_none()
-    }
-
-    /// What is known of a stream: frames come once, in order, and their number shows only when
-    /// asking for one beyond the last is answered by
-    /// [`InputError::PastEnd`]. `None` for a recording. Without a default, so that no source laid over a stream hides it.
-    fn stream(&self) -> Option<StreamState>;
-
-    /// Width and height of every image as it is mapped, px.
-    fn size(&self) -> (usize, usize);
-
-    /// The same of the images as they are stored, before any scaling: masks in files have this
-    /// size.
-    fn full_size(&self) -> (usize, usize) {
-        self.size()
-    }
-
-    /// Name of a frame's left image without its ending, where it is a file: masks in files have the
-    /// same names.
-    fn stem(&self, _: usize) -> Option<String> {
-        None
-    }
-
-    /// Masks that come with the data set.
-    fn masks(&self) -> AvailableMasks {
-        AvailableMasks::Absent
-    }
-
-    /// The rig, equal for all frames.
-    fn rig(&self) -> StereoRig;
-
-    /// How the mapper is to rectify raw images; `None` where they come rectified. With one,
-    /// [`FrameSource::size`] and [`FrameSource::rig`] are those of the rectified pair, and a
-    /// frame's images are raw. Without a default, so that no source laid over another loses it.
-    fn rectification(&self) -> Option<&Rectification>;
-
-    /// When a frame was taken, ns since any moment that stays the same; `None` where nothing tells.
-    fn stamp_ns(&self, _: usize) -> Option<u64> {
-        None
-    }
-
-    /// Time of a frame, s: by its stamp, else by an assumed rate.
-    fn time_s(&self, index: usize) -> f64;
-
-    /// Decodes or renders a frame.
-    fn frame(&self, index: usize) -> Result<StereoImages, InputError>;
-
-    /// Whether frames come with exact depth ([`StereoImages::exact`]).
-    fn has_exact_depth(&self) -> bool {
-        self.masks() == AvailableMasks::Exact
-    }
-
-    /// Whether there is a LiDAR scan for a frame. Without a default, so that no data set laid over
-    /// another loses its scans.
-    fn has_lidar(&self, index: usize) -> bool;
-
-    /// The scan of a frame, where there is one. Nothing is read of it before.
-    fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError>;
-
-    /// True `t_world_camera` of every frame's left camera, where known.
-    fn truth(&self) -> Option<&[Transform]> {
-        None
-    }
-
-    /// What was assumed or left aside, as sentences.
-    fn notes(&self) -> &[String] {
-        &[]
-    }
 }

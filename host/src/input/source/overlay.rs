@@ -1,8 +1,6 @@
 //! A source of frames with depth or masks laid over it.
 
-use super::{AvailableMasks, FrameSource, InputError, LidarScan, StereoImages, StreamState};
-use dynvox_core::geometry::{StereoRig, Transform};
-use dynvox_core::rectify::Rectification;
+use super::{FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState};
 
 /// Adds depth or masks to the frames of a data set.
 pub trait OverlaySource: Send + Sync {
@@ -22,71 +20,35 @@ pub trait OverlaySource: Send + Sync {
 pub struct Overlay<L> {
     dataset: Box<dyn FrameSource>,
     source: L,
-    notes: Vec<String>,
+    info: SourceInfo,
 }
 
 impl<L: OverlaySource> Overlay<L> {
     /// Lays `source` over `dataset`; `note` is a note about it for the user.
     pub fn new(dataset: Box<dyn FrameSource>, source: L, note: String) -> Self {
-        let mut notes = dataset.notes().to_vec();
-        notes.push(note);
-        Self { dataset, source, notes }
+        let mut info = dataset.info().clone();
+        info.notes.push(note);
+        Self { dataset, source, info }
     }
 }
 
 impl<L: OverlaySource> FrameSource for Overlay<L> {
+    fn info(&self) -> &SourceInfo {
+        &self.info
+    }
+
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        self.dataset.frame_info(index)
+    }
+
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let mut images = self.dataset.frame(index)?;
         self.source.add(self.dataset.as_ref(), index, &mut images)?;
         Ok(images)
     }
 
-    fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
-    fn name(&self) -> &str {
-        self.dataset.name()
-    }
-
-    fn len(&self) -> usize {
-        self.dataset.len()
-    }
-
     fn stream(&self) -> Option<StreamState> {
         self.dataset.stream()
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.dataset.size()
-    }
-
-    fn full_size(&self) -> (usize, usize) {
-        self.dataset.full_size()
-    }
-
-    fn stem(&self, index: usize) -> Option<String> {
-        self.dataset.stem(index)
-    }
-
-    fn masks(&self) -> AvailableMasks {
-        self.dataset.masks()
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.dataset.rig()
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
-        self.dataset.stamp_ns(index)
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.dataset.rectification()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.dataset.time_s(index)
     }
 
     fn has_lidar(&self, index: usize) -> bool {
@@ -95,9 +57,5 @@ impl<L: OverlaySource> FrameSource for Overlay<L> {
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
         self.dataset.lidar(index)
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.dataset.truth()
     }
 }

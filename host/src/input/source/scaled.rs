@@ -2,12 +2,11 @@
 //! rig shrinks with it.
 
 use super::{
-    AvailableMasks, ExactFrame, FrameSource, GivenDepth, InputError, LidarScan, StereoImages,
-    StreamState,
+    ExactFrame, FrameInfo, FrameSource, GivenDepth, InputError, LidarScan, SourceInfo,
+    StereoImages, StreamState,
 };
 use crate::formats::Image;
-use dynvox_core::geometry::{StereoRig, Transform};
-use dynvox_core::rectify::Rectification;
+use dynvox_core::geometry::StereoRig;
 
 /// Least side of a scaled image, px.
 const LEAST_SIDE_PX: usize = 32;
@@ -20,9 +19,7 @@ pub struct Scaled {
     scale: f64,
     columns: Vec<Span>,
     rows: Vec<Span>,
-    /// Raw images stay as they are: the rectified ones are made smaller.
-    rectification: Option<Rectification>,
-    notes: Vec<String>,
+    info: SourceInfo,
 }
 
 /// Pixels one output pixel covers along one axis.
@@ -39,24 +36,23 @@ impl Scaled {
         if !(scale > 0.0 && scale <= 1.0) || side(width).min(side(height)) < LEAST_SIDE_PX {
             return Err(InputError::Scale { scale, width, height, least: LEAST_SIDE_PX });
         }
-        let mut notes = inner.notes().to_vec();
-        notes.push(format!(
-            "images scaled from {width} x {height} to {} x {} px",
-            side(width),
-            side(height)
-        ));
-        let rectification = inner.rectification().map(|of| Rectification {
-            width: side(width) as u32,
-            height: side(height) as u32,
-            ..*of
-        });
+        let scaled = (side(width), side(height));
+        let mut info =
+            SourceInfo { size: scaled, rig: shrunk(inner.rig(), scale), ..inner.info().clone() };
+        let (to_width, to_height) = scaled;
+        info.notes
+            .push(format!("images scaled from {width} x {height} to {to_width} x {to_height} px"));
+        // Raw images stay as they are: the rectified ones are made smaller.
+        if let Some(rectification) = &mut info.rectification {
+            rectification.width = to_width as u32;
+            rectification.height = to_height as u32;
+        }
         Ok(Self {
-            rectification,
             columns: spans(side(width), width, scale),
             rows: spans(side(height), height, scale),
             inner,
             scale,
-            notes,
+            info,
         })
     }
 
@@ -107,6 +103,18 @@ impl Scaled {
     }
 }
 
+/// Rig of images scaled by `scale`.
+fn shrunk(rig: StereoRig, scale: f64) -> StereoRig {
+    // Pixel centres lie at whole numbers, areas begin half a pixel before them.
+    let center = |center_px: f64| (center_px + 0.5) * scale - 0.5;
+    StereoRig {
+        focal_px: rig.focal_px * scale,
+        center_u_px: center(rig.center_u_px),
+        center_v_px: center(rig.center_v_px),
+        baseline_m: rig.baseline_m,
+    }
+}
+
 /// For each of `count` output pixels: the input pixels it covers and their shares, which sum to
 /// [`ONE`] exactly.
 fn spans(count: usize, input: usize, scale: f64) -> Vec<Span> {
@@ -126,61 +134,21 @@ fn spans(count: usize, input: usize, scale: f64) -> Vec<Span> {
 }
 
 impl FrameSource for Scaled {
-    fn name(&self) -> &str {
-        self.inner.name()
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
-    fn len(&self) -> usize {
-        self.inner.len()
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        self.inner.frame_info(index)
     }
 
     fn stream(&self) -> Option<StreamState> {
         self.inner.stream()
     }
 
-    fn size(&self) -> (usize, usize) {
-        (self.columns.len(), self.rows.len())
-    }
-
-    fn full_size(&self) -> (usize, usize) {
-        self.inner.full_size()
-    }
-
-    fn stem(&self, index: usize) -> Option<String> {
-        self.inner.stem(index)
-    }
-
-    fn masks(&self) -> AvailableMasks {
-        self.inner.masks()
-    }
-
-    fn rig(&self) -> StereoRig {
-        let rig = self.inner.rig();
-        // Pixel centres lie at whole numbers, areas begin half a pixel before them.
-        let center = |center_px: f64| (center_px + 0.5) * self.scale - 0.5;
-        StereoRig {
-            focal_px: rig.focal_px * self.scale,
-            center_u_px: center(rig.center_u_px),
-            center_v_px: center(rig.center_v_px),
-            baseline_m: rig.baseline_m,
-        }
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
-        self.inner.stamp_ns(index)
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.rectification.as_ref()
-    }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.inner.time_s(index)
-    }
-
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let frame = self.inner.frame(index)?;
-        if self.rectification.is_some() {
+        if self.info.rectification.is_some() {
             return Ok(frame);
         }
         let (width, height) = self.inner.size();
@@ -214,14 +182,6 @@ impl FrameSource for Scaled {
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
         Ok(self.inner.lidar(index)?.map(|scan| scan.scaled(self.scale)))
-    }
-
-    fn truth(&self) -> Option<&[Transform]> {
-        self.inner.truth()
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }
 

@@ -15,13 +15,11 @@ mod tests;
 pub use queue::WhenLate;
 
 use super::source::{
-    ASSUMED_HZ, FrameSource, InputError, LidarScan, StereoImages, StopRequest, StreamState,
-    require_size,
+    ASSUMED_HZ, FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages,
+    StopRequest, StreamState, require_size,
 };
 use crate::formats::Decoded;
-use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
-use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::Rectification;
+use crate::formats::calibration::{CameraGeometry, RectifiedSize};
 use queue::{Arrived, Queue};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -50,12 +48,11 @@ pub struct StreamOptions {
 /// A source of frames over an iterator of pairs.
 pub struct Stream {
     options: StreamOptions,
-    geometry: FittedGeometry,
+    info: SourceInfo,
     image_size: (usize, usize),
     queue: Arc<Queue>,
     stop: StopRequest,
     cursor: Mutex<Cursor>,
-    notes: Vec<String>,
 }
 
 /// How far a stream is read.
@@ -102,7 +99,9 @@ impl Stream {
             }
         };
         let cursor = Mutex::new(Cursor { taken: 0, number: first.number, first: Some(pair) });
-        Ok(Self { geometry, image_size, queue, stop, cursor, notes: vec![rate], options })
+        let info =
+            SourceInfo { notes: vec![rate], ..SourceInfo::new(options.name.clone(), 0, &geometry) };
+        Ok(Self { info, image_size, queue, stop, cursor, options })
     }
 
     /// Time of frame number `number`, s.
@@ -150,38 +149,19 @@ impl Drop for Stream {
 }
 
 impl FrameSource for Stream {
-    fn name(&self) -> &str {
-        &self.options.name
+    fn info(&self) -> &SourceInfo {
+        &self.info
     }
 
-    fn len(&self) -> usize {
-        0
-    }
-
-    fn stream(&self) -> Option<StreamState> {
-        Some(StreamState { dropped: self.queue.dropped() })
-    }
-
-    fn size(&self) -> (usize, usize) {
-        self.geometry.size
-    }
-
-    fn rig(&self) -> StereoRig {
-        self.geometry.rig
-    }
-
-    fn rectification(&self) -> Option<&Rectification> {
-        self.geometry.rectification.as_ref()
-    }
-
-    fn stamp_ns(&self, index: usize) -> Option<u64> {
+    fn frame_info(&self, index: usize) -> FrameInfo {
+        let time_s = self.at_s(self.number_of(index));
         // Where frames may be dropped, the mapper must know how much later the next one was taken.
         let known = self.options.rate_hz.is_some() || self.options.when_late == WhenLate::Drop;
-        known.then(|| (self.time_s(index) * 1e9).round() as u64)
+        let stamp_ns = known.then(|| (time_s * 1e9).round() as u64);
+        FrameInfo { stem: None, stamp_ns, time_s }
     }
-
-    fn time_s(&self, index: usize) -> f64 {
-        self.at_s(self.number_of(index))
+    fn stream(&self) -> Option<StreamState> {
+        Some(StreamState { dropped: self.queue.dropped() })
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
@@ -198,9 +178,5 @@ impl FrameSource for Stream {
 
     fn lidar(&self, _: usize) -> Result<Option<LidarScan>, InputError> {
         Ok(None)
-    }
-
-    fn notes(&self) -> &[String] {
-        &self.notes
     }
 }

@@ -4,6 +4,7 @@ use super::netpbm::NetpbmPairs;
 use super::*;
 use crate::formats::Image;
 use crate::input::Stacking;
+use dynvox_core::geometry::StereoRig;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 

@@ -113,10 +113,10 @@ fn camera_keys(camera: &RawCamera) -> Option<String> {
             radial: [k1, k2, 0.0, 0.0, 0.0, 0.0],
             tangential: [p1, p2],
         } => ("pinhole", "radtan", vec![k1, k2, p1, p2], vec![]),
-        LensModel::RadialTangential { .. } => return None,
         LensModel::Equidistant { radial } => ("pinhole", "equidistant", radial.to_vec(), vec![]),
         LensModel::DoubleSphere { xi, alpha } => ("ds", "none", vec![], vec![xi, alpha]),
         LensModel::ExtendedUnified { alpha, beta } => ("eucm", "none", vec![], vec![alpha, beta]),
+        _ => return None,
     };
     Some(format!(
         "  camera_model: {model}\n  distortion_coeffs: [{}]\n  distortion_model: {name}\n  intrinsics: [{}]\n  resolution: [{}, {}]\n",
