@@ -100,58 +100,70 @@ impl PlyVertices {
     }
 }
 
+/// Header of a file.
+struct Header {
+    layout: VertexLayout,
+    /// Vertices and faces.
+    counts: [u64; 2],
+}
+
+/// Reads the header, up to the first vertex.
+fn header(file: &mut BufReader<File>, path: &Path) -> Result<Header, FormatError> {
+    let refuse = |reason: &str| {
+        FormatError::content(path, reason, "Give a binary little-endian PLY of triangles")
+    };
+    let (mut layout, mut counts, mut element, mut binary) =
+        (VertexLayout::default(), [0u64; 2], String::new(), false);
+    loop {
+        let mut line = String::new();
+        // A file without line breaks is no PLY: 4 KiB of a line are enough.
+        let read =
+            file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            ["end_header"] => break,
+            ["format", "binary_little_endian", _] => binary = true,
+            ["element", name, count] => {
+                let count =
+                    count.parse().map_err(|_| refuse("a number of its header cannot be read"))?;
+                match name {
+                    "vertex" => counts[0] = count,
+                    "face" => counts[1] = count,
+                    _ => return Err(refuse("it holds more than vertices and faces")),
+                }
+                element = name.to_owned();
+            }
+            ["property", "list", "uchar", "uint" | "int", _] if element == "face" => {}
+            ["property", kind, name] if element == "vertex" => {
+                layout
+                    .add(kind, name)
+                    .ok_or_else(|| refuse("a type of its header is not known"))?;
+            }
+            ["comment", ..] => {
+                layout.axes = Axes::ALL
+                    .into_iter()
+                    .find(|axes| line.contains(axes.description()))
+                    .unwrap_or(layout.axes);
+            }
+            ["ply"] => {}
+            _ if read == 0 => return Err(refuse("it has no header of a PLY file")),
+            _ => return Err(refuse("its header cannot be read")),
+        }
+    }
+    if !binary || layout.position.is_none() {
+        return Err(refuse("it is not binary, or its vertices have no positions"));
+    }
+    Ok(Header { layout, counts })
+}
+
 impl PlyMesh {
     /// Opens a mesh as [`super::PlyWriter`] writes it, other properties of vertices allowed.
     ///
     /// # Errors
     /// It cannot be read, or is no such mesh.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
-        let refuse = |reason: &str| {
-            FormatError::content(path, reason, "Give a binary little-endian PLY of triangles")
-        };
         let mut file = BufReader::new(File::open(path).map_err(FormatError::read(path))?);
-        let (mut layout, mut counts, mut element, mut binary) =
-            (VertexLayout::default(), [0u64; 2], String::new(), false);
-        loop {
-            let mut line = String::new();
-            // A file without line breaks is no PLY: 4 KiB of a line are enough.
-            let read =
-                file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
-            let words: Vec<&str> = line.split_whitespace().collect();
-            match words[..] {
-                ["end_header"] => break,
-                ["format", "binary_little_endian", _] => binary = true,
-                ["element", name, count] => {
-                    let count = count
-                        .parse()
-                        .map_err(|_| refuse("a number of its header cannot be read"))?;
-                    match name {
-                        "vertex" => counts[0] = count,
-                        "face" => counts[1] = count,
-                        _ => return Err(refuse("it holds more than vertices and faces")),
-                    }
-                    element = name.to_owned();
-                }
-                ["property", "list", "uchar", "uint" | "int", _] if element == "face" => {}
-                ["property", kind, name] if element == "vertex" => {
-                    layout
-                        .add(kind, name)
-                        .ok_or_else(|| refuse("a type of its header is not known"))?;
-                }
-                ["comment", ..] => {
-                    layout.axes = Axes::ALL
-                        .into_iter()
-                        .find(|axes| line.contains(axes.description()))
-                        .unwrap_or(layout.axes);
-                }
-                ["ply"] => {}
-                _ if read == 0 => return Err(refuse("it has no header of a PLY file")),
-                _ => return Err(refuse("its header cannot be read")),
-            }
-        }
-        if !binary || layout.position.is_none() {
-            return Err(refuse("it is not binary, or its vertices have no positions"));
-        }
+        let Header { layout, counts } = header(&mut file, path)?;
         let ([vertices, triangles], vertices_at) =
             (counts, file.stream_position().map_err(FormatError::read(path))?);
         let faces_at = vertices_at + vertices * layout.bytes as u64;

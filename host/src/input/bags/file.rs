@@ -9,6 +9,7 @@ use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
 use mcap::{McapError, Summary};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// Longest record or chunk, bytes: beyond it a length is damaged.
@@ -72,12 +73,12 @@ impl BagFile {
         topics
     }
 
-    /// Hands each message of some topics, logged from `from_ns` to `to_ns`, to `take` with its
+    /// Hands each message of some topics, logged at `logged_ns`, to `take` with its
     /// topic and time, until that returns false.
     fn messages(
         &self,
         topics: &[&str],
-        (from_ns, to_ns): (u64, u64),
+        logged_ns: RangeInclusive<u64>,
         take: &mut dyn FnMut(&str, u64, &[u8]) -> bool,
     ) -> Result<(), InputError> {
         let damaged = |error: McapError| {
@@ -86,8 +87,8 @@ impl BagFile {
         let failed = |error: std::io::Error| damaged(McapError::Io(error));
         let options = IndexedReaderOptions::new()
             .include_topics(topics.iter().copied())
-            .starting_at(from_ns)
-            .ending_at(to_ns)
+            .starting_at(*logged_ns.start())
+            .ending_at(*logged_ns.end())
             .with_record_length_limit(LONGEST);
         let mut reader =
             IndexedReader::new_with_options(&self.summary, options).map_err(damaged)?;
@@ -124,7 +125,7 @@ impl BagFile {
     /// Every image of a topic by the time it was taken.
     pub fn entries(&self, topic: &str) -> Result<Vec<Entry>, InputError> {
         let mut entries = Vec::new();
-        self.messages(&[topic], (0, u64::MAX), &mut |_, log_ns, data| {
+        self.messages(&[topic], 0..=u64::MAX, &mut |_, log_ns, data| {
             entries.extend(stamp_ns(data).map(|stamp_ns| Entry { log_ns, stamp_ns }));
             true
         })?;
@@ -136,7 +137,7 @@ impl BagFile {
     /// The first calibration of a topic.
     pub fn camera_info(&self, topic: &str) -> Result<CameraInfo, InputError> {
         let mut info = None;
-        self.messages(&[topic], (0, u64::MAX), &mut |_, _, data| {
+        self.messages(&[topic], 0..=u64::MAX, &mut |_, _, data| {
             info = CameraInfo::read(data);
             false
         })?;
@@ -166,7 +167,7 @@ impl BagFile {
             .iter()
             .any(|known| known.name == topic && known.kind.ends_with("CompressedImage"));
         let mut found = None;
-        self.messages(&[topic], (entry.log_ns, entry.log_ns), &mut |_, _, data| {
+        self.messages(&[topic], entry.log_ns..=entry.log_ns, &mut |_, _, data| {
             if stamp_ns(data) != Some(entry.stamp_ns) {
                 return true;
             }

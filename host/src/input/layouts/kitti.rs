@@ -53,21 +53,8 @@ fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         calibration: own.map_or_else(|| options.calibration.clone(), |file| vec![file]),
         ..options.clone()
     };
-    let has = |cameras: [&str; 2]| cameras.iter().all(|camera| folder.join(camera).is_dir());
-    let (grey, colour) = (has(["image_0", "image_1"]), has(["image_2", "image_3"]));
     let mut notes = Vec::new();
-    let (left, right) = match options.cameras {
-        CameraPair::Grey => (0, 1),
-        CameraPair::Colour => (2, 3),
-        CameraPair::Auto if grey => {
-            if colour {
-                notes.push("grey and colour images are there: the grey ones are used; --images colour takes the others".to_owned());
-            }
-            (0, 1)
-        }
-        CameraPair::Auto if colour => (2, 3),
-        CameraPair::Auto => (0, 1),
-    };
+    let (left, right) = odometry_pair(&folder, options.cameras, &mut notes);
     let camera = |number: usize| {
         present(
             folder.join(format!("image_{number}")),
@@ -105,6 +92,24 @@ fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         objects: Vec::new(),
         lidar: LidarFiles::at(folder.join("velodyne"), &calibration, [left, right])?,
     })
+}
+
+/// Numbers of the left and the right camera of a sequence.
+fn odometry_pair(folder: &Path, cameras: CameraPair, notes: &mut Vec<String>) -> (usize, usize) {
+    let has = |pair: [&str; 2]| pair.iter().all(|camera| folder.join(camera).is_dir());
+    let (grey, colour) = (has(["image_0", "image_1"]), has(["image_2", "image_3"]));
+    match cameras {
+        CameraPair::Grey => (0, 1),
+        CameraPair::Colour => (2, 3),
+        CameraPair::Auto if grey => {
+            if colour {
+                notes.push("grey and colour images are there: the grey ones are used; --images colour takes the others".to_owned());
+            }
+            (0, 1)
+        }
+        CameraPair::Auto if colour => (2, 3),
+        CameraPair::Auto => (0, 1),
+    }
 }
 
 /// Opens a sequence of the tracking benchmark. `path` is its root, its `training` or `testing`

@@ -109,11 +109,7 @@ impl Sequence {
         };
         let numbers: Vec<usize> = positions.iter().map(number).collect();
         let stamps_ns = match parts.times {
-            Some((path, times)) => Some(rows_of(&times, &numbers).ok_or_else(|| InputError::Table {
-                reason: format!("it has {} times, but there are images up to number {}", times.len(), numbers.iter().max().unwrap_or(&0)),
-                action: format!("Give one line per image, or move the file away: {ASSUMED_HZ} Hz are then assumed"),
-                path,
-            })?),
+            Some((path, times)) => Some(times_of(path, &times, &numbers)?),
             None => left.stamps_ns.as_ref().and_then(|stamps| rows_of(stamps, &positions)),
         };
         if stamps_ns.is_none() {
@@ -131,11 +127,8 @@ impl Sequence {
             }
             found
         });
-        let masks = if parts.instances.is_dir() {
-            AvailableMasks::Folder(parts.instances)
-        } else {
-            AvailableMasks::Absent
-        };
+        let masks = Some(parts.instances).filter(|folder| folder.is_dir());
+        let masks = masks.map_or(AvailableMasks::Absent, AvailableMasks::Folder);
         let objects = numbers.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
         let info = SourceInfo {
             masks,
@@ -239,6 +232,21 @@ fn detected_bits(
         notes.push(format!("16-bit images: {bits} bits are taken as significant, by the largest value {largest} of {RANGE_PICTURES} images; --bits says otherwise"));
     }
     Ok(bits)
+}
+
+/// The times of frames by their numbers, of a table in a file.
+fn times_of(path: PathBuf, times: &[u64], numbers: &[usize]) -> Result<Vec<u64>, InputError> {
+    rows_of(times, numbers).ok_or_else(|| InputError::Table {
+        reason: format!(
+            "it has {} times, but there are images up to number {}",
+            times.len(),
+            numbers.iter().max().unwrap_or(&0)
+        ),
+        action: format!(
+            "Give one line per image, or move the file away: {ASSUMED_HZ} Hz are then assumed"
+        ),
+        path,
+    })
 }
 
 /// The chosen rows of a table; `None` where one is missing.

@@ -2,77 +2,74 @@
 
 use super::*;
 
-#[test]
-fn every_arrangement_and_format_gives_the_same_frames() {
-    type Write = fn(&Path, u32, &[GrayImage; 2]);
-    let arrangements: [(&str, Write); 9] = [
-        ("two folders, left and right", |root, at, [l, r]| {
-            save(l, root.join(format!("left/{}.png", at + 8)));
-            save(r, root.join(format!("right/{}.png", at + 8)));
-        }),
-        ("two folders, cam0 and cam1", |root, at, [l, r]| {
-            save(l, root.join(format!("cam0/data/{at:06}.pgm")));
-            save(r, root.join(format!("cam1/data/{at:06}.pgm")));
-        }),
-        ("two folders, infra1 and infra2", |root, at, [l, r]| {
-            save(l, root.join(format!("infra1/a_{at}.tiff")));
-            save(r, root.join(format!("infra2/b_{at:04}.bmp")));
-        }),
-        ("two folders, Left and Right", |root, at, [l, r]| {
-            let deep = |image: &GrayImage, path: PathBuf| {
-                fs::create_dir_all(path.parent().unwrap()).unwrap();
-                ImageBuffer::from_fn(40, 32, |u, v| {
-                    Luma([u16::from(image.get_pixel(u, v)[0]) << 8])
-                })
+/// Writes a frame's pair below a folder.
+type Write = fn(&Path, u32, &[GrayImage; 2]);
+/// Names of arrangements, and the writer of frame `at`.
+const ARRANGEMENTS: [(&str, Write); 9] = [
+    ("two folders, left and right", |root, at, [l, r]| {
+        save(l, root.join(format!("left/{}.png", at + 8)));
+        save(r, root.join(format!("right/{}.png", at + 8)));
+    }),
+    ("two folders, cam0 and cam1", |root, at, [l, r]| {
+        save(l, root.join(format!("cam0/data/{at:06}.pgm")));
+        save(r, root.join(format!("cam1/data/{at:06}.pgm")));
+    }),
+    ("two folders, infra1 and infra2", |root, at, [l, r]| {
+        save(l, root.join(format!("infra1/a_{at}.tiff")));
+        save(r, root.join(format!("infra2/b_{at:04}.bmp")));
+    }),
+    ("two folders, Left and Right", |root, at, [l, r]| {
+        let deep = |image: &GrayImage, path: PathBuf| {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            ImageBuffer::from_fn(40, 32, |u, v| Luma([u16::from(image.get_pixel(u, v)[0]) << 8]))
                 .save(path)
                 .unwrap();
-            };
-            deep(l, root.join(format!("Left/{at}.png")));
-            deep(r, root.join(format!("Right/{at}.png")));
-        }),
-        ("two folders, image_0 and image_1", |root, at, [l, r]| {
-            // The right camera is a millisecond late.
-            save(
-                l,
-                root.join(format!(
-                    "image_0/{}.png",
-                    1_403_636_579_000_000_000 + u64::from(at) * 50_000_000
-                )),
-            );
-            save(
-                r,
-                root.join(format!(
-                    "image_1/{}.png",
-                    1_403_636_579_001_000_000 + u64::from(at) * 50_000_000
-                )),
-            );
-        }),
-        ("one folder, the camera in the files' names", |root, at, [l, r]| {
-            save(l, root.join(format!("left_{}.png", at + 8)));
-            save(r, root.join(format!("right_{}.png", at + 8)));
-        }),
-        ("one folder, the camera in the files' names", |root, at, [l, r]| {
-            save(l, root.join(format!("{at:03}_0.ppm")));
-            save(r, root.join(format!("{at:03}_1.ppm")));
-        }),
-        ("one folder, both images in one file", |root, at, [l, r]| {
-            save(
-                &GrayImage::from_fn(80, 32, |u, v| {
-                    *if u < 40 { l } else { r }.get_pixel(u % 40, v)
-                }),
-                root.join(format!("{at}.png")),
-            );
-        }),
-        ("one folder, both images in one file", |root, at, [l, r]| {
-            save(
-                &GrayImage::from_fn(40, 64, |u, v| {
-                    *if v < 32 { l } else { r }.get_pixel(u, v % 32)
-                }),
-                root.join(format!("{at}.png")),
-            );
-        }),
-    ];
-    for (arrangement, write) in arrangements {
+        };
+        deep(l, root.join(format!("Left/{at}.png")));
+        deep(r, root.join(format!("Right/{at}.png")));
+    }),
+    ("two folders, image_0 and image_1", |root, at, [l, r]| {
+        // The right camera is a millisecond late.
+        save(
+            l,
+            root.join(format!(
+                "image_0/{}.png",
+                1_403_636_579_000_000_000 + u64::from(at) * 50_000_000
+            )),
+        );
+        save(
+            r,
+            root.join(format!(
+                "image_1/{}.png",
+                1_403_636_579_001_000_000 + u64::from(at) * 50_000_000
+            )),
+        );
+    }),
+    ("one folder, the camera in the files' names", |root, at, [l, r]| {
+        save(l, root.join(format!("left_{}.png", at + 8)));
+        save(r, root.join(format!("right_{}.png", at + 8)));
+    }),
+    ("one folder, the camera in the files' names", |root, at, [l, r]| {
+        save(l, root.join(format!("{at:03}_0.ppm")));
+        save(r, root.join(format!("{at:03}_1.ppm")));
+    }),
+    ("one folder, both images in one file", |root, at, [l, r]| {
+        save(
+            &GrayImage::from_fn(80, 32, |u, v| *if u < 40 { l } else { r }.get_pixel(u % 40, v)),
+            root.join(format!("{at}.png")),
+        );
+    }),
+    ("one folder, both images in one file", |root, at, [l, r]| {
+        save(
+            &GrayImage::from_fn(40, 64, |u, v| *if v < 32 { l } else { r }.get_pixel(u, v % 32)),
+            root.join(format!("{at}.png")),
+        );
+    }),
+];
+
+#[test]
+fn every_arrangement_and_format_gives_the_same_frames() {
+    for (arrangement, write) in ARRANGEMENTS {
         let root = TempDir::new().unwrap();
         fs::write(root.path().join("calib.txt"), CALIB).unwrap();
         (0..4).for_each(|at| write(root.path(), at, &pair(at)));
