@@ -13,6 +13,7 @@ pub mod rust_page {}
 pub mod pin_your_rig_page {}
 
 pub mod fuzz;
+pub mod parameters;
 pub mod source;
 
 use dynvox::input::InstanceMask;

@@ -1,11 +1,23 @@
 //! No function is longer than a screen and no file longer than can be read in one go.
 
-use dynvox_tests::source::{files, parts, text};
+use dynvox_tests::{
+    parameters::parameter_lists,
+    source::{files, parts, text},
+};
+use std::{collections::BTreeMap, path::Path};
 
 /// Most lines of a function, from its `fn` to its closing brace.
 const FUNCTION_LINES: usize = 112;
 /// Most lines of a file.
 const FILE_LINES: usize = 565;
+
+/// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
+const WIDE: usize = 6;
+/// Most wide functions of the repository, tests included. The figure only ever falls.
+const WIDE_MAX: usize = 94;
+/// Most functions that are not wide and take a tuple apart in their parameter list, which hides
+/// parameters. The figure only ever falls.
+const TAKING_APART_MAX: usize = 43;
 
 /// Name, first line and number of lines of each function with a body.
 fn functions(rust: &str) -> Vec<(String, usize, usize)> {
@@ -64,6 +76,45 @@ fn no_file_is_longer_than_its_bound() {
     let list: Vec<_> =
         long.iter().map(|path| format!("{}: {} lines", path.display(), lines(path))).collect();
     assert!(list.is_empty(), "{} files above {FILE_LINES} lines:\n{}", list.len(), list.join("\n"));
+}
+
+/// Folder of a file, at most three levels deep: `core/src/stereo`.
+fn folder(path: &Path) -> String {
+    let parts = path.parent().into_iter().flat_map(Path::components).take(3);
+    parts.collect::<std::path::PathBuf>().display().to_string()
+}
+
+/// Checks that at most so many functions are listed, each by folder and description; prints them
+/// by folder.
+fn assert_at_most(most: usize, what: &str, functions: &[(String, String)]) {
+    let mut folders = BTreeMap::<_, Vec<_>>::new();
+    for (folder, function) in functions {
+        folders.entry(folder).or_default().push(function.as_str());
+    }
+    let list = folders.iter().map(|(folder, functions)| {
+        format!("{} in {folder}\n  {}\n", functions.len(), functions.join("\n  "))
+    });
+    let list = format!("{} functions {what}:\n{}", functions.len(), list.collect::<String>());
+    println!("{list}");
+    assert!(functions.len() <= most, "at most {most}, and fewer from change to change: {list}");
+}
+
+#[test]
+fn few_functions_take_six_parameters_or_more() {
+    let (mut wide, mut taking_apart) = (Vec::new(), Vec::new());
+    for path in files(&["rs"]) {
+        for list in parameter_lists(&text(&path)) {
+            let at = format!("{}:{}: {}", path.display(), list.line, list.name);
+            let function = (folder(&path), format!("{at} has {}", list.count));
+            if list.count >= WIDE {
+                wide.push(function);
+            } else if list.takes_apart {
+                taking_apart.push(function);
+            }
+        }
+    }
+    assert_at_most(WIDE_MAX, "take six parameters or more", &wide);
+    assert_at_most(TAKING_APART_MAX, "take fewer, and hide some in a tuple", &taking_apart);
 }
 
 #[test]
