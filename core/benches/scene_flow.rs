@@ -8,7 +8,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
-    egomotion::{EgomotionConfig, Estimator},
+    egomotion::{EgomotionConfig, Estimator, MotionHypotheses},
     geometry::StereoRig,
     image::View,
     memory::Carver,
@@ -110,8 +110,7 @@ fn bench(criterion: &mut Criterion) {
                 &config,
                 &RIG,
                 matcher.bucketed(),
-                &mut Random::new(1),
-                None,
+                MotionHypotheses::from_draws(&mut Random::new(1)),
             ))
         });
     });

@@ -61,7 +61,7 @@ pub struct MotionEstimate {
     pub inliers: u32,
     /// Root mean square error of one coordinate over the inliers, px.
     pub residual_rms_px: f64,
-    /// Hypotheses drawn.
+    /// MotionHypotheses drawn.
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
@@ -82,6 +82,23 @@ impl MotionEstimate {
             steps: 0,
             right_ahead: None,
         }
+    }
+}
+
+/// Origin of an estimate's hypotheses: the first one, and the draws of the others.
+#[derive(Debug)]
+pub struct MotionHypotheses<'a> {
+    /// Draws that belong to this purpose alone.
+    pub random: &'a mut Random,
+    /// First hypothesis, from which the others are refined as well; standing still where it is
+    /// absent.
+    pub initial: Option<&'a Transform>,
+}
+
+impl<'a> MotionHypotheses<'a> {
+    /// Hypotheses that begin with a camera that stands still.
+    pub fn from_draws(random: &'a mut Random) -> Self {
+        Self { random, initial: None }
     }
 }
 
@@ -119,16 +136,13 @@ impl<'s> Estimator<'s> {
     /// Estimates the motion that carries the matches' points from the previous camera to the
     /// current one.
     ///
-    /// `initial` is where hypotheses begin, standing still where it is absent; it is also the first
-    /// hypothesis. `random` belongs to this purpose alone. Matches beyond `capacity.matches` are
-    /// ignored.
+    /// Matches beyond `capacity.matches` are ignored.
     pub fn estimate<'m>(
         &mut self,
         config: &EgomotionConfig,
         rig: &StereoRig,
         matches: impl IntoIterator<Item = &'m Match>,
-        random: &mut Random,
-        initial: Option<&Transform>,
+        MotionHypotheses { random, initial }: MotionHypotheses<'_>,
     ) -> MotionEstimate {
         self.inlier_len = 0;
         if rig.validate().is_err() {
@@ -281,7 +295,7 @@ impl<'s> Estimator<'s> {
     }
 }
 
-/// Hypotheses to draw so that one is free of outliers with the configured probability, given the
+/// MotionHypotheses to draw so that one is free of outliers with the configured probability, given the
 /// most inliers so far.
 fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     let share = f64::from(inliers) / points as f64;

@@ -14,7 +14,7 @@
 //!
 //! **Memory.** 36 bytes per match.
 //!
-//! **Time.** Hypotheses times matches, in single precision and without branches; the rest is small
+//! **Time.** MotionHypotheses times matches, in single precision and without branches; the rest is small
 //! compared with it.
 //!
 //! **What can go wrong.** [`MotionStatus`] names it. A motion without enough inliers, or whose
@@ -22,7 +22,7 @@
 //! other orders give other last bits.
 //!
 //! ```
-//! use dynvox_core::{Capacity, egomotion::{EgomotionConfig, Estimator, MotionStatus}, geometry::StereoRig, memory::Carver, random::Random};
+//! use dynvox_core::{Capacity, egomotion::{EgomotionConfig, Estimator, MotionHypotheses, MotionStatus}, geometry::StereoRig, memory::Carver, random::Random};
 //!
 //! let capacity = Capacity { matches: 50, ..Capacity::TINY };
 //! let mut slab = vec![0; Estimator::bytes(&capacity) + 64];
@@ -30,7 +30,9 @@
 //! let mut carver = Carver::new(&mut slab[lead..], Estimator::bytes(&capacity)).unwrap();
 //! let mut estimator = Estimator::new_in(&capacity, &mut carver);
 //! let rig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.54 };
-//! let estimate = estimator.estimate(&EgomotionConfig::default(), &rig, [], &mut Random::new(1), None);
+//! let mut random = Random::new(1);
+//! let hypotheses = MotionHypotheses::from_draws(&mut random);
+//! let estimate = estimator.estimate(&EgomotionConfig::default(), &rig, [], hypotheses);
 //! assert_eq!(estimate.status, MotionStatus::TooFewMatches);
 //! assert!(estimate.t_current_previous.is_none());
 //! ```
@@ -44,9 +46,9 @@ mod synchrony;
 mod track;
 
 pub use config::EgomotionConfig;
-pub use estimate::{Estimator, MotionEstimate, MotionStatus};
+pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};
 pub use synchrony::RightAhead;
-pub use track::{Egomotion, REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
+pub use track::{Egomotion, REFERENCE_FRAMES_MAX, SEGMENT_GAP_M, TimedMatches};
 
 #[cfg(test)]
 mod tests;

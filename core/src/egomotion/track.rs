@@ -1,6 +1,8 @@
 //! The camera's motion from frame to frame, also where it cannot be estimated.
 
-use super::{EgomotionConfig, Estimator, MotionEstimate, MotionStatus, RightAhead};
+use super::{
+    EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, RightAhead,
+};
 use crate::{
     geometry::{StereoRig, Transform},
     random::Random,
@@ -25,6 +27,15 @@ pub const REFERENCE_FRAMES_MAX: u32 = 8;
 /// Height by which a segment of the map stands above where its first pose was guessed, m: farther
 /// than any frame is fused, so that no block of it is one of another segment.
 pub const SEGMENT_GAP_M: f64 = 100.0;
+
+/// Matches of a frame with the reference, and when it was taken.
+#[derive(Clone, Debug)]
+pub struct TimedMatches<M> {
+    /// Time since the last frame, s.
+    pub interval_s: f32,
+    /// Matches with the reference: the last frame whose pose is not a guess.
+    pub matches: M,
+}
 
 /// Where the camera is and how it last moved.
 #[derive(Clone, Debug)]
@@ -67,19 +78,20 @@ impl Default for Egomotion {
 
 impl Egomotion {
     /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity).
-    /// `matches` are with the reference: the last frame whose pose is not a guess. The estimate is
-    /// of the motion since then. `interval_s` is the time since the last frame.
+    /// The estimate is of the motion since the reference.
     pub fn step<'m>(
         &mut self,
         config: &EgomotionConfig,
         rig: &StereoRig,
-        interval_s: f32,
-        matches: impl IntoIterator<Item = &'m Match, IntoIter: Clone>,
+        TimedMatches { interval_s, matches }: TimedMatches<
+            impl IntoIterator<Item = &'m Match, IntoIter: Clone>,
+        >,
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
         let (expected, matches) = (self.expected(), matches.into_iter());
         let right_ahead = RightAhead::of(rig, matches.clone());
-        let found = estimator.estimate(config, rig, matches, &mut self.random, Some(&expected));
+        let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
+        let found = estimator.estimate(config, rig, matches, hypotheses);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         self.reference_s += f64::from(interval_s);
         let frames = self.since_reference + 1;

@@ -1,5 +1,6 @@
 //! Which pixels of an image show anything.
 
+use super::View;
 use crate::{bits::set_bits, slices::clipped};
 
 /// Pixels a word has bits for.
@@ -49,6 +50,17 @@ pub(crate) struct InvalidPair<'a> {
     pub left: InvalidPixels<'a>,
     /// Pixels of the right image.
     pub right: InvalidPixels<'a>,
+}
+
+/// A grey pair with the pixels of it that are not to be used.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaskedPair<'a> {
+    /// Left image.
+    pub left: View<'a, u8>,
+    /// Right image.
+    pub right: View<'a, u8>,
+    /// Pixels not to be used; `None` where all are.
+    pub invalid: Option<&'a InvalidPair<'a>>,
 }
 
 #[cfg(test)]

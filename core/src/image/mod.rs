@@ -4,6 +4,6 @@ mod coverage;
 mod disparity;
 mod view;
 
-pub(crate) use coverage::{InvalidPair, InvalidPixels};
+pub(crate) use coverage::{InvalidPair, InvalidPixels, MaskedPair};
 pub use disparity::{DISPARITY_ONE_PX, DisparityQ8};
 pub use view::{View, ViewMut};

@@ -1,37 +1,24 @@
 //! The camera's pose in a frame: given, or estimated from matches or from depth.
 
-use super::{Config, MotionSource, PoseOrigin, StereoFrame};
+use super::{Config, MotionSource, PoseOrigin, matched::MatchedFrame, static_map::StaticMap};
 use crate::{
-    egomotion::{
-        Egomotion, Estimator, MotionEstimate,
-        icp::{self, IcpConfig, IcpReport, MapPicture},
-    },
+    Capacity,
+    egomotion::{Egomotion, Estimator, MotionEstimate, TimedMatches, icp::IcpReport},
     geometry::{StereoObservation, StereoRig, Transform},
-    image::View,
+    memory::Carver,
     parallel::Executor,
     rectify::self_calibration::SelfCalibration,
-    scene_flow::{FlowMatcher, FlowStatus, Match},
+    scene_flow::{FlowStatus, Match},
+    state::Visitor,
     tracking::{CameraMotion, EgomotionMask},
-    view::Raycaster,
-    volume::{Viewpoint, Volume},
 };
 
-/// The parts of a mapper that localize the camera.
-pub(super) struct Localization<'m, 's> {
-    pub config: &'m Config,
-    pub frame: u32,
-    /// Time since the frame before, s.
-    pub interval_s: f32,
-    pub disparity_q8: View<'m, u16>,
-    pub scene_flow: &'m FlowMatcher<'s>,
-    pub background: &'m Volume<'s>,
-    pub camera: &'m mut Egomotion,
-    pub self_calibration: &'m mut SelfCalibration,
-    pub estimator: &'m mut Estimator<'s>,
-    pub raycaster: &'m mut Raycaster<'s>,
-    /// The depth image is computed anew when the frame is fused: until then it is scratch for ICP's
-    /// pyramid.
-    pub depth_m: &'m mut [f32],
+/// The camera, what its motion says about the rig, and the memory that an estimate needs.
+#[derive(Debug)]
+pub(super) struct Localization<'s> {
+    pub camera: Egomotion,
+    pub self_calibration: SelfCalibration,
+    pub estimator: Estimator<'s>,
 }
 
 /// The camera's pose in a frame.
@@ -67,35 +54,56 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     aligned.then(|| pairs.map(|(left, right)| rig.observation(left, right)))
 }
 
-impl Localization<'_, '_> {
+impl<'s> Localization<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        Estimator::bytes(capacity)
+    }
+
+    /// Places a camera that has not moved at the world's origin.
+    pub fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
+        Self {
+            camera: Egomotion::default(),
+            self_calibration: SelfCalibration::new(&config.rig_settings),
+            estimator: Estimator::new_in(capacity, carver),
+        }
+    }
+
+    /// Visits what lives from frame to frame.
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
+        // Estimates keep nothing.
+        let Self { camera, self_calibration, estimator: _ } = self;
+        camera.visit(visitor);
+        self_calibration.visit(visitor);
+    }
+
     /// Sets the pose the frame brings, or estimates it.
     pub fn locate<E: Executor>(
         &mut self,
-        frame: &StereoFrame<'_>,
-        status: FlowStatus,
+        seen: &MatchedFrame<'_, '_>,
         mask: &EgomotionMask<'_, '_>,
+        static_map: &mut StaticMap<'_>,
         executor: &E,
     ) -> Located {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
-        let found = if let Some(t_world_camera) = &frame.t_world_camera {
+        let found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
-            Found::new(if self.frame == 0 { PoseOrigin::First } else { PoseOrigin::Given })
-        } else if self.config.mapper.egomotion == MotionSource::Icp {
-            let icp = (self.frame > 0)
-                .then(|| self.register_depth([frame.left.width(), frame.left.height()], executor));
+            Found::new(if seen.number == 0 { PoseOrigin::First } else { PoseOrigin::Given })
+        } else if seen.config.mapper.egomotion == MotionSource::Icp {
+            let icp = (seen.number > 0).then(|| self.register_depth(seen, static_map, executor));
             Found { icp, ..Found::new(self.origin(icp.is_some())) }
         } else {
-            match status {
-                FlowStatus::Frozen => self.hold(),
+            match seen.flow_status {
+                FlowStatus::Frozen => self.hold(seen),
                 FlowStatus::Repeated
-                    if !self.camera.may_stand(&self.config.egomotion, self.interval_s) =>
+                    if !self.camera.may_stand(&seen.config.egomotion, seen.interval_s) =>
                 {
-                    self.hold()
+                    self.hold(seen)
                 }
                 FlowStatus::Matched | FlowStatus::Repeated => {
-                    self.estimate_from_matches(frame, mask, executor)
+                    self.estimate_from_matches(seen, mask, static_map, executor)
                 }
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
@@ -119,8 +127,8 @@ impl Localization<'_, '_> {
     }
 
     /// Moves the camera on as before.
-    fn hold(&mut self) -> Found {
-        self.camera.hold(self.interval_s);
+    fn hold(&mut self, seen: &MatchedFrame<'_, '_>) -> Found {
+        self.camera.hold(seen.interval_s);
         Found::new(self.origin(true))
     }
 
@@ -136,23 +144,23 @@ impl Localization<'_, '_> {
     /// Estimates the motion from the matches the mask includes.
     fn estimate_from_matches<E: Executor>(
         &mut self,
-        frame: &StereoFrame<'_>,
+        seen: &MatchedFrame<'_, '_>,
         mask: &EgomotionMask<'_, '_>,
+        static_map: &mut StaticMap<'_>,
         executor: &E,
     ) -> Found {
-        let (selection, refined) = (self.scene_flow.selection(), self.scene_flow.refined());
+        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
         // Masks are of the frame before; matches over several frames are left to RANSAC.
         let over_several = self.camera.since_reference() > 0;
         let included = selection.iter().filter(|&&index| over_several || mask.includes(index));
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
-        let (rig, was_lost) = (self.config.scaled_rig(), self.camera.is_lost());
+        let (rig, was_lost) = (seen.config.scaled_rig(), self.camera.is_lost());
         let estimate = self.camera.step(
-            &self.config.egomotion,
+            &seen.config.egomotion,
             &rig,
-            self.interval_s,
-            matches.clone(),
-            self.estimator,
+            TimedMatches { interval_s: seen.interval_s, matches: matches.clone() },
+            &mut self.estimator,
         );
         // A motion few matches agree with says nothing about the rig.
         if let Some(motion) =
@@ -165,7 +173,7 @@ impl Localization<'_, '_> {
             );
         }
         let ends_loss = was_lost && !self.camera.is_lost();
-        let is_found = ends_loss && self.end_loss(frame, executor);
+        let is_found = ends_loss && self.end_loss(seen, static_map, executor);
         Found {
             egomotion: Some(estimate),
             matches_excluded: excluded as u32,
@@ -175,56 +183,24 @@ impl Localization<'_, '_> {
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture
     /// counts, what moves as well: the baseline knows no objects.
-    fn register_depth<E: Executor>(&mut self, size: [usize; 2], executor: &E) -> IcpReport {
-        let config = &self.config.icp;
-        let t_world_camera = *self.camera.t_world_camera();
-        let is_cast = self.cast(&t_world_camera, size, executor);
-        let mut report = if is_cast { self.register(config) } else { IcpReport::unpaired() };
-        let refined = self.scene_flow.refined();
-        let matches =
-            self.scene_flow.selection().iter().filter_map(|&index| refined.get(index as usize));
-        let rig = self.config.scaled_rig();
+    fn register_depth<E: Executor>(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        static_map: &mut StaticMap<'_>,
+        executor: &E,
+    ) -> IcpReport {
+        let config = &seen.config.icp;
+        let is_cast = static_map.cast(&seen.view(self.camera.t_world_camera()), executor);
+        let mut report =
+            if is_cast { static_map.register(seen, config) } else { IcpReport::unpaired() };
         report.matches = self.estimator.count_inliers(
-            &rig,
-            matches,
+            &seen.config.scaled_rig(),
+            seen.selected(),
             &report.t_current_previous,
             icp::EXPLAINED_PX,
         );
         report.check_matches();
         self.camera.advance(report.motion());
         report
-    }
-
-    /// Looks at the map from a pose; whether that could be done.
-    pub(super) fn cast<E: Executor>(
-        &mut self,
-        t_world_camera: &Transform,
-        [width, height]: [usize; 2],
-        executor: &E,
-    ) -> bool {
-        let view = Viewpoint {
-            rig: self.config.scaled_rig(),
-            width,
-            height,
-            t_world_camera: *t_world_camera,
-        };
-        self.raycaster.cast(self.background, &view, executor).is_ok()
-    }
-
-    /// Registers the depth with the map as it was cast last.
-    pub(super) fn register(&mut self, config: &IcpConfig) -> IcpReport {
-        let (rig, limits_m) =
-            (self.config.scaled_rig(), [self.config.volume.near_m, self.config.volume.far_m]);
-        match (self.raycaster.depth_m(), self.raycaster.normal()) {
-            (Some(depth_m), Some(normal)) => icp::track(
-                config,
-                &rig,
-                limits_m,
-                self.disparity_q8,
-                &MapPicture { depth_m, normal },
-                self.depth_m,
-            ),
-            _ => IcpReport::unpaired(),
-        }
     }
 }

@@ -8,6 +8,7 @@ mod digests;
 mod error;
 mod frame;
 mod localization;
+mod matched;
 mod plan;
 mod raycast;
 mod relocalization;
@@ -31,22 +32,21 @@ pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
 
 use clock::Clock;
+use localization::Localization;
+use static_map::StaticMap;
 
 use crate::{
     Capacity, Footprint,
-    egomotion::{Egomotion, Estimator},
     geometry::{StereoRig, Transform},
     image::View,
-    memory::{Carver, SlabError, region_bytes},
+    memory::{Carver, SlabError},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
-    rectify::{
-        AlignedImage, RawCamera, RectifiedImages, Rectifier, self_calibration::SelfCalibration,
-    },
+    rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier},
     scene_flow::FlowMatcher,
     stereo::StereoMatcher,
     tracking::{InstanceAt, TrackReport, Tracker},
-    view::{Raycaster, Triangle},
+    view::Triangle,
     volume::{BlockStore, EvictionReport, PruneReport, Volume},
 };
 
@@ -73,14 +73,10 @@ pub struct Mapper<'s> {
     aligned: AlignedImage<'s>,
     stereo: StereoMatcher<'s>,
     scene_flow: FlowMatcher<'s>,
-    estimator: Estimator<'s>,
-    camera: Egomotion,
-    self_calibration: SelfCalibration,
+    localization: Localization<'s>,
     tracker: Tracker<'s>,
     objects: Objects<'s>,
-    depth_m: &'s mut [f32],
-    background: Volume<'s>,
-    raycaster: Raycaster<'s>,
+    static_map: StaticMap<'s>,
     planning: Planning<'s>,
     /// Width and height of the frames, known from the first one on.
     size: Option<[usize; 2]>,
@@ -102,12 +98,10 @@ impl Capacity {
     pub const fn bytes(&self) -> usize {
         StereoMatcher::bytes(self)
             + FlowMatcher::bytes(self)
-            + Estimator::bytes(self)
+            + Localization::bytes(self)
             + Tracker::bytes(self)
             + Objects::bytes(self)
-            + region_bytes::<f32>(self.pixels())
-            + Volume::bytes(self)
-            + Raycaster::bytes(self)
+            + StaticMap::bytes(self)
             + Planning::bytes(self)
             + Rectifier::bytes(self)
             + RectifiedImages::bytes(self)
@@ -174,14 +168,10 @@ impl<'s> Mapper<'s> {
             capacity: *capacity,
             stereo: StereoMatcher::new_in(capacity, carver),
             scene_flow: FlowMatcher::new_in(capacity, carver),
-            estimator: Estimator::new_in(capacity, carver),
-            camera: Egomotion::default(),
-            self_calibration: SelfCalibration::new(&config.rig_settings),
+            localization: Localization::new_in(capacity, config, carver),
             tracker: Tracker::new_in(capacity, &config.tracking, carver),
             objects: Objects::new_in(capacity, &config.objects, carver),
-            depth_m: carver.alloc("depth_m", capacity.pixels()),
-            background: Volume::new_in(capacity, &config.volume, carver),
-            raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
+            static_map: StaticMap::new_in(capacity, config, carver),
             planning: Planning::new_in(
                 capacity,
                 &config.planning,
@@ -197,8 +187,9 @@ impl<'s> Mapper<'s> {
         }
     }
 
-    /// Checks a frame against the capacity and the frames before; the size of the rectified images.
-    fn validate(&mut self, frame: &StereoFrame<'_>) -> Result<[usize; 2], StepError> {
+    /// Checks a frame against the capacity and the frames before, and keeps the size of the
+    /// rectified images.
+    fn validate(&mut self, frame: &StereoFrame<'_>) -> Result<(), StepError> {
         let given = [frame.left.width(), frame.left.height()];
         // Sizes of the left image, of the right one, and of the rectified ones.
         let [left, right, size] = match self.rectifier.rectification() {
@@ -241,7 +232,7 @@ impl<'s> Mapper<'s> {
             return Err(StepError::SizeChanged);
         }
         self.size = Some(size);
-        Ok(size)
+        Ok(())
     }
 
     /// Ends a run: prunes what is still in the window. Objects are lost; see
@@ -253,12 +244,12 @@ impl<'s> Mapper<'s> {
     /// As [`Mapper::finish`], with a sink for the remaining objects.
     pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
         self.objects.finish(objects);
-        self.background.finish()
+        self.static_map.volume.finish()
     }
 
     /// Where the left camera was in the last frame: camera to world; the identity before the first.
     pub fn t_world_camera(&self) -> &Transform {
-        self.camera.t_world_camera()
+        self.localization.camera.t_world_camera()
     }
 
     /// The settings it was made with.
@@ -284,17 +275,17 @@ impl<'s> Mapper<'s> {
     /// Lets every block of the static map leave into `store`, so that the store holds the whole
     /// map.
     pub fn stream_out<S: BlockStore>(&mut self, store: &mut S) -> EvictionReport {
-        self.background.stream_out(store)
+        self.static_map.volume.stream_out(store)
     }
 
     /// The static map's triangles, one after the other, in world coordinates. How many there were.
     pub fn triangles(&self, sink: &mut impl FnMut(Triangle)) -> u64 {
-        self.background.triangles(&self.config.mesh, sink)
+        self.static_map.volume.triangles(&self.config.mesh, sink)
     }
 
     /// The static map.
     pub fn background(&self) -> &Volume<'s> {
-        &self.background
+        &self.static_map.volume
     }
 
     /// Left and right grey image of the last frame as they were rectified; `None` where pairs come
@@ -313,10 +304,10 @@ impl<'s> Mapper<'s> {
     /// Every region of the slab, with its use now and at most.
     pub fn footprint(&self) -> Footprint {
         let mut footprint = self.capacity.footprint();
-        self.background.note_use(&mut footprint);
+        self.static_map.volume.note_use(&mut footprint);
         self.tracker.note_use(&mut footprint);
         self.objects.note_use(&mut footprint);
-        self.raycaster.note_use(&mut footprint);
+        self.static_map.raycaster.note_use(&mut footprint);
         footprint
     }
 }

@@ -48,7 +48,7 @@ impl<'s> Mapper<'s> {
         if self.planning.is_empty() {
             return PlanningReport::default();
         }
-        self.planning.read(&self.background);
+        self.planning.read(&self.static_map.volume);
         let is_static = |posed: &PosedObject<'_, '_>| posed.summary.state != MotionState::Dynamic;
         for posed in self.objects.posed(&self.tracker).filter(is_static) {
             self.planning.add_static(posed.object.volume(), &posed.t_world_object);

@@ -36,9 +36,9 @@ impl<'s> Mapper<'s> {
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(view.into())?;
-        executor
-            .stage(Stage::Raycast, || self.raycaster.cast(&self.background, &view, executor))?;
-        Ok(&self.raycaster)
+        let map = &mut self.static_map;
+        executor.stage(Stage::Raycast, || map.raycaster.cast(&map.volume, &view, executor))?;
+        Ok(&map.raycaster)
     }
 
     /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is
@@ -51,11 +51,12 @@ impl<'s> Mapper<'s> {
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
         let view = self.viewpoint(view.into())?;
+        let map = &mut self.static_map;
         executor.stage(Stage::Raycast, || {
-            self.raycaster.cast(&self.background, &view, executor)?;
+            map.raycaster.cast(&map.volume, &view, executor)?;
             for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
                 // An object too far away for its coordinates is too far away to be seen.
-                let _ = self.raycaster.cast_over(
+                let _ = map.raycaster.cast_over(
                     posed.object.volume(),
                     &from_object(&view, &posed),
                     layer,
@@ -64,7 +65,7 @@ impl<'s> Mapper<'s> {
             }
             Ok::<(), RaycastError>(())
         })?;
-        Ok(&self.raycaster)
+        Ok(&map.raycaster)
     }
 
     /// Looks at nothing but the object of a track, where it is now.
@@ -82,9 +83,9 @@ impl<'s> Mapper<'s> {
             .ok_or(RaycastError::Object)?;
         let view = from_object(&view, &posed);
         executor.stage(Stage::Raycast, || {
-            self.raycaster.cast(posed.object.volume(), &view, executor)
+            self.static_map.raycaster.cast(posed.object.volume(), &view, executor)
         })?;
-        Ok(&self.raycaster)
+        Ok(&self.static_map.raycaster)
     }
 
     /// The objects that are in the world after the last frame.

@@ -10,7 +10,7 @@
 //! **Time.** Seven raycasts and two registrations, in the one frame that ends a loss. **Memory.**
 //! The raycaster's.
 
-use super::{StereoFrame, localization::Localization};
+use super::{localization::Localization, matched::MatchedFrame, static_map::StaticMap};
 use crate::{
     egomotion::icp::{IcpConfig, IcpStatus},
     geometry::Transform,
@@ -44,33 +44,45 @@ const REGISTRATION: IcpConfig = IcpConfig {
     step_max_m: 2.0,
 };
 
-impl Localization<'_, '_> {
+impl Localization<'_> {
     /// Ends a loss after a motion was estimated: the camera is found, or a segment begins. Returns
     /// whether it is found. Where no map is yet, the guess is as good as any pose.
-    pub(super) fn end_loss<E: Executor>(&mut self, frame: &StereoFrame<'_>, executor: &E) -> bool {
-        if self.background.pool().is_empty() {
+    pub(super) fn end_loss<E: Executor>(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        static_map: &mut StaticMap<'_>,
+        executor: &E,
+    ) -> bool {
+        if static_map.volume.pool().is_empty() {
             return false;
         }
-        let found = self.relocalize(frame.left, executor);
+        let found = static_map.relocalize(seen, self.camera.t_world_camera(), executor);
         match &found {
             Some(t_world_camera) => self.camera.relocalize(t_world_camera),
             None => self.camera.begin_segment(),
         }
         found.is_some()
     }
+}
 
-    /// The pose near the guessed one from which the map looks like the image.
-    fn relocalize<E: Executor>(&mut self, grey: View<'_, u8>, executor: &E) -> Option<Transform> {
-        let mut t_world_camera = *self.camera.t_world_camera();
-        let mut correlation = self.correlation_at(grey, &t_world_camera, executor)?;
+impl StaticMap<'_> {
+    /// Finds the pose near a guessed one from which the map looks like the image.
+    fn relocalize<E: Executor>(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        guess: &Transform,
+        executor: &E,
+    ) -> Option<Transform> {
+        let mut t_world_camera = *guess;
+        let mut correlation = self.correlation_at(seen, &t_world_camera, executor)?;
         let mut best = (correlation, t_world_camera, self.mean_depth_m());
         for _ in 0..REGISTRATIONS {
-            let report = self.register(&REGISTRATION);
+            let report = self.register(seen, &REGISTRATION);
             if report.status != IcpStatus::Tracked {
                 break;
             }
             t_world_camera = (t_world_camera * report.t_current_previous.inverse()).normalized();
-            correlation = self.correlation_at(grey, &t_world_camera, executor).unwrap_or(0.0);
+            correlation = self.correlation_at(seen, &t_world_camera, executor).unwrap_or(0.0);
             if correlation > best.0 {
                 best = (correlation, t_world_camera, self.mean_depth_m());
             }
@@ -78,7 +90,7 @@ impl Localization<'_, '_> {
         let (correlation, t_world_camera, depth_m) = best;
         let is_less_like = |aside: &Transform| {
             let there =
-                self.correlation_at(grey, &(t_world_camera * *aside).normalized(), executor);
+                self.correlation_at(seen, &(t_world_camera * *aside).normalized(), executor);
             is_clearer(correlation, there.unwrap_or(0.0))
         };
         let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
@@ -92,12 +104,12 @@ impl Localization<'_, '_> {
     /// How much the map from a pose looks like the image; `None` where it shows too little of it.
     fn correlation_at<E: Executor>(
         &mut self,
-        grey: View<'_, u8>,
+        seen: &MatchedFrame<'_, '_>,
         t_world_camera: &Transform,
         executor: &E,
     ) -> Option<f64> {
-        let is_cast = self.cast(t_world_camera, [grey.width(), grey.height()], executor);
-        edge_correlation(self.raycaster.colour().filter(|_| is_cast)?, grey)
+        let is_cast = self.cast(&seen.view(t_world_camera), executor);
+        edge_correlation(self.raycaster.colour().filter(|_| is_cast)?, seen.frame.left)
     }
 
     /// Mean depth of what was cast last, m.

@@ -179,11 +179,10 @@ impl<'s> Mapper<'s> {
     fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             scene_flow,
-            camera,
-            self_calibration,
+            localization,
             tracker,
             objects,
-            background,
+            static_map,
             planning,
             size,
             frame,
@@ -193,9 +192,6 @@ impl<'s> Mapper<'s> {
             capacity,
             // Belong to one frame.
             stereo: _,
-            estimator: _,
-            depth_m: _,
-            raycaster: _,
             rectifier: _,
             rectified: _,
             aligned: _,
@@ -207,11 +203,10 @@ impl<'s> Mapper<'s> {
         visitor.count(&mut height, capacity.image_height);
         *size = (width * height > 0).then_some([width, height]);
         scene_flow.visit(visitor);
-        camera.visit(visitor);
-        self_calibration.visit(visitor);
+        localization.visit(visitor);
         tracker.visit(visitor);
         objects.visit(visitor);
-        background.visit(visitor);
+        static_map.visit(visitor);
         planning.visit(visitor);
     }
 
@@ -219,7 +214,7 @@ impl<'s> Mapper<'s> {
     fn rebuild(&mut self) -> bool {
         self.tracker.set_frame_interval_s(self.clock.interval_s());
         self.scene_flow.rebuild(&self.config.scene_flow, self.rectifier.invalid().as_ref());
-        self.objects.rebuild() && self.background.rebuild()
+        self.objects.rebuild() && self.static_map.volume.rebuild()
     }
 }
 

@@ -1,78 +1,131 @@
-//! Fusion of a frame into the static map.
+//! The static map: fusion of a frame into it, and its picture from a pose.
 
-use super::{Config, StereoFrame};
+use super::matched::MatchedFrame;
 use crate::{
-    Executor, Stage,
-    image::{View, ViewMut},
+    Capacity, Executor, Stage,
+    egomotion::icp::{self, IcpConfig, IcpReport, MapPicture, MeasuredDepth},
+    image::ViewMut,
+    memory::{Carver, region_bytes},
+    state::Visitor,
     tracking::{CameraMotion, Tracked},
+    view::Raycaster,
     volume::{
-        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth,
-        Viewpoint, Volume,
+        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth, Viewpoint,
+        Volume,
     },
 };
 use bytemuck::TransparentWrapper;
 
-/// The parts of a mapper that fuse a frame into the static map.
-pub(super) struct StaticMap<'m, 's> {
-    pub config: &'m Config,
-    pub disparity_q8: View<'m, u16>,
-    pub background: &'m mut Volume<'s>,
-    pub depth_m: &'m mut [f32],
+/// What does not move, and the images in which a frame meets it.
+#[derive(Debug)]
+pub(super) struct StaticMap<'s> {
+    pub volume: Volume<'s>,
+    /// Depth of the frame that is fused, m, without what moves or may move. Until then it is
+    /// scratch for ICP's pyramid.
+    depth_m: &'s mut [f32],
+    pub raycaster: Raycaster<'s>,
 }
 
-impl StaticMap<'_, '_> {
+impl<'s> StaticMap<'s> {
+    /// Bytes of the slab.
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        region_bytes::<f32>(capacity.pixels())
+            + Volume::bytes(capacity)
+            + Raycaster::bytes(capacity)
+    }
+
+    /// Allocates an empty map.
+    pub fn new_in(capacity: &Capacity, config: &super::Config, carver: &mut Carver<'s>) -> Self {
+        Self {
+            depth_m: carver.alloc("depth_m", capacity.pixels()),
+            volume: Volume::new_in(capacity, &config.volume, carver),
+            raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
+        }
+    }
+
+    /// Visits what lives from frame to frame.
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
+        // Both images belong to one frame.
+        let Self { volume, depth_m: _, raycaster: _ } = self;
+        volume.visit(visitor);
+    }
+
     /// Erases what moving objects left before they were known to move. Returns how many voxels.
     pub fn erase_trails(&mut self, camera: &CameraMotion, tracked: &mut Tracked<'_, '_>) -> u32 {
         let mut erased = 0;
         tracked.take_trails(&camera.t_world_camera, |trail| {
-            erased += trail
-                .boxes()
-                .map(|before| self.background.erase(&before, trail.frames()))
-                .sum::<u32>();
+            erased +=
+                trail.boxes().map(|before| self.volume.erase(&before, trail.frames())).sum::<u32>();
         });
         erased
     }
 
-    /// Turns the disparity into depth, removes what moves or may move, allocates blocks around the
-    /// rest and averages it in.
-    pub fn fuse<E: Executor, S: BlockStore>(
+    /// Turns the disparity into depth, and removes what moves or may move.
+    pub fn take_depth<E: Executor>(
         &mut self,
-        frame: &StereoFrame<'_>,
-        camera: &CameraMotion,
+        seen: &MatchedFrame<'_, '_>,
         tracked: &mut Tracked<'_, '_>,
         executor: &E,
-        store: &mut S,
-    ) -> AllocationReport {
-        let (width, height) = (frame.left.width(), frame.left.height());
-        let view = Viewpoint {
-            rig: self.config.scaled_rig(),
-            width,
-            height,
-            t_world_camera: camera.t_world_camera,
-        };
+    ) {
+        let (width, height) = (seen.frame.left.width(), seen.frame.left.height());
         let noted = NotedDepth::wrap_slice_mut(self.depth_m);
         let Some(mut depths) = ViewMut::new(noted, width, height) else {
             debug_assert!(false, "the depth image has the capacity's size");
-            return AllocationReport::default();
+            return;
         };
         let observed = ObservedDepth {
-            config: &self.config.volume,
-            rig: &view.rig,
-            disparity_q8: self.disparity_q8,
+            config: &seen.config.volume,
+            rig: &seen.config.scaled_rig(),
+            disparity_q8: seen.disparity_q8,
         };
         executor.stage(Stage::Fuse, || observed.write(&mut depths, executor));
         let mut depth_m = depths.peeled_mut();
         executor.stage(Stage::Instances, || tracked.mask_dynamic_depth(&mut depth_m));
+    }
+
+    /// Allocates blocks around the depth that was taken, and averages it in.
+    pub fn fuse<E: Executor, S: BlockStore>(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        camera: &CameraMotion,
+        executor: &E,
+        store: &mut S,
+    ) -> AllocationReport {
+        let view = seen.view(&camera.t_world_camera);
+        let noted = NotedDepth::wrap_slice_mut(self.depth_m);
+        let Some(depths) = ViewMut::new(noted, view.width, view.height) else {
+            return AllocationReport::default();
+        };
         let observation = Observation {
             depth: DepthImage::Noted(depths.as_view()),
-            grey: frame.left,
-            colour: frame.colour,
-            class: frame.class,
+            grey: seen.frame.left,
+            colour: seen.frame.colour,
+            class: seen.frame.class,
         };
         let allocation = executor.stage(Stage::Allocate, || {
-            self.background.allocate(&view, observation.depth.depth_m(), store, executor)
+            self.volume.allocate(&view, observation.depth.depth_m(), store, executor)
         });
-        executor.stage(Stage::Fuse, || self.background.fuse(&view, observation, executor));
+        executor.stage(Stage::Fuse, || self.volume.fuse(&view, observation, executor));
         allocation
+    }
+
+    /// Looks at the map from a pose; whether that could be done.
+    pub fn cast<E: Executor>(&mut self, view: &Viewpoint, executor: &E) -> bool {
+        self.raycaster.cast(&self.volume, view, executor).is_ok()
+    }
+
+    /// Registers a frame's depth with the map as it was cast last.
+    pub fn register(&mut self, seen: &MatchedFrame<'_, '_>, config: &IcpConfig) -> IcpReport {
+        let (Some(depth_m), Some(normal)) = (self.raycaster.depth_m(), self.raycaster.normal())
+        else {
+            return IcpReport::unpaired();
+        };
+        let volume = &seen.config.volume;
+        let measured = MeasuredDepth {
+            rig: &seen.config.scaled_rig(),
+            limits_m: [volume.near_m, volume.far_m],
+            disparity_q8: seen.disparity_q8,
+        };
+        icp::track(config, &measured, &MapPicture { depth_m, normal }, self.depth_m)
     }
 }

@@ -6,11 +6,18 @@ use super::{
     matches::Match,
 };
 
+/// Matches and how good each is.
+#[derive(Clone, Copy)]
+pub(super) struct Scored<'a> {
+    pub matches: &'a [Match],
+    /// Larger is better; 0 of a match beyond its end.
+    pub score: &'a [f32],
+}
+
 /// Writes the positions of the `per_cell` best matches of each cell, cell by cell, best first (of
 /// equals the earlier), to `selection` and returns how many those are.
 pub(super) fn select(
-    matches: &[Match],
-    score: &[f32],
+    Scored { matches, score }: Scored<'_>,
     shape: Shape,
     per_cell: usize,
     cells: &mut Cells<'_>,

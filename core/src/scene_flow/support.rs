@@ -27,13 +27,19 @@ const FLOW_TOLERANCE_PX: f32 = 5.0;
 /// What must agree: disparity and flow in u and v, px. The fourth keeps rows of four.
 pub(super) type Motion = [f32; 4];
 
-/// Writes 1 to `supported` for each supported match, else 0. `motion` has space for as many.
+/// Memory of matches sorted into cells.
+pub(super) struct SortedMotions<'a, 's> {
+    pub cells: &'a mut Cells<'s>,
+    /// Motions in the order of the cells; space for as many as there are matches.
+    pub motion: &'a mut [Motion],
+}
+
+/// Writes 1 to `supported` for each supported match, else 0.
 pub(super) fn support(
     matches: &[Match],
     shape: Shape,
     config: &SceneFlowConfig,
-    cells: &mut Cells<'_>,
-    motion: &mut [Motion],
+    SortedMotions { cells, motion }: SortedMotions<'_, '_>,
     supported: &mut [u8],
 ) {
     let (start, order) = cells.sort(matches, shape);
@@ -44,46 +50,55 @@ pub(super) fn support(
         *motion = [m.previous_disparity_px(), du, dv, 0.0];
     }
     let motion = clipped(motion, ..matches.len());
+    let neighbours = Neighbours { shape, config, start, motion };
     for (&index, own) in order.iter().zip(motion) {
         if let (Some(m), Some(supported)) =
             (matches.get(index as usize), supported.get_mut(index as usize))
         {
-            *supported = u8::from(is_supported(*own, shape.cell(m), shape, config, start, motion));
+            *supported = u8::from(neighbours.support(*own, shape.cell(m)));
         }
     }
 }
 
-fn is_supported(
-    own: Motion,
-    [column, row]: [usize; 2],
+/// Motions of all matches, cell by cell.
+struct Neighbours<'a> {
     shape: Shape,
-    config: &SceneFlowConfig,
-    start: &[u32],
-    motion: &[Motion],
-) -> bool {
-    let needed = usize::from(config.support_min);
-    if needed == 0 {
-        return true;
-    }
-    let (mut neighbours, mut agreeing) = (0, 0);
-    for ring in 1..=RINGS {
-        (neighbours, agreeing) = (0, 0);
-        let (left, right) = (column.saturating_sub(ring), (column + ring).min(shape.columns - 1));
-        for row in row.saturating_sub(ring)..=(row + ring).min(shape.rows - 1) {
-            let (first, last) = (row * shape.columns + left, row * shape.columns + right);
-            let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else {
-                continue;
-            };
-            let run = clipped(motion, from as usize..to as usize);
-            neighbours += run.len();
-            agreeing += run.iter().map(|other| usize::from(agree(own, *other))).sum::<usize>();
+    config: &'a SceneFlowConfig,
+    /// First motion of each cell, and the end of the last.
+    start: &'a [u32],
+    motion: &'a [Motion],
+}
+
+impl Neighbours<'_> {
+    /// Whether enough matches around a cell move like one in it.
+    fn support(&self, own: Motion, [column, row]: [usize; 2]) -> bool {
+        let &Self { shape, config, start, motion } = self;
+        let needed = usize::from(config.support_min);
+        if needed == 0 {
+            return true;
         }
-        if neighbours > NEIGHBOURS {
-            break;
+        let (mut neighbours, mut agreeing) = (0, 0);
+        for ring in 1..=RINGS {
+            (neighbours, agreeing) = (0, 0);
+            let (left, right) =
+                (column.saturating_sub(ring), (column + ring).min(shape.columns - 1));
+            for row in row.saturating_sub(ring)..=(row + ring).min(shape.rows - 1) {
+                let (first, last) = (row * shape.columns + left, row * shape.columns + right);
+                let (Some(&from), Some(&to)) = (start.get(first), start.get(last + 1)) else {
+                    continue;
+                };
+                let run = clipped(motion, from as usize..to as usize);
+                neighbours += run.len();
+                agreeing +=
+                    run.iter().map(|other| usize::from(agree(own, *other))).sum::<usize>();
+            }
+            if neighbours > NEIGHBOURS {
+                break;
+            }
         }
+        // The match itself is among its neighbours, and agrees.
+        agreeing > needed && 2 * (agreeing - 1) >= neighbours - 1
     }
-    // The match itself is among its neighbours, and agrees.
-    agreeing > needed && 2 * (agreeing - 1) >= neighbours - 1
 }
 
 fn agree(a: Motion, b: Motion) -> bool {

@@ -306,8 +306,7 @@ mod tests {
 
     /// The definition, pixel by pixel.
     fn peaks(
-        response: &[i16],
-        width: usize,
+        Field { response, width }: Field<'_>,
         class: u8,
         sign: i16,
         radius: usize,
@@ -354,7 +353,8 @@ mod tests {
                 for (class, field, sign) in
                     [(0, &blob, 1), (1, &blob, -1), (2, &corner, 1), (3, &corner, -1)]
                 {
-                    expected.extend(peaks(field, width, class, sign, radius, 5));
+                    let field = Field { response: field, width };
+                    expected.extend(peaks(field, class, sign, radius, 5));
                 }
                 let accepted = found.iter().filter(|c| !sparse || c.sparse == 1);
                 let mut accepted: Vec<_> = accepted.map(|c| (c.u, c.v, c.class)).collect();

@@ -9,7 +9,7 @@ use super::{
     motion_filter::{MotionFilter, Observation},
 };
 use crate::{
-    egomotion::Estimator,
+    egomotion::{Estimator, MotionHypotheses},
     geometry::{StereoRig, Transform, histogram::Histogram},
     random::Random,
     scene_flow::Match,
@@ -113,8 +113,7 @@ pub(super) fn estimate_motion<'m>(
                 &settings,
                 frame.rig,
                 matches,
-                &mut Random::new(frame.seed),
-                Some(&expected),
+                MotionHypotheses { random: &mut Random::new(frame.seed), initial: Some(&expected) },
             );
             expected = guess.t_current_previous.unwrap_or(expected);
         }
@@ -135,8 +134,7 @@ pub(super) fn estimate_motion<'m>(
         &settings,
         frame.rig,
         matches.clone(),
-        &mut Random::new(frame.seed),
-        Some(&expected),
+        MotionHypotheses { random: &mut Random::new(frame.seed), initial: Some(&expected) },
     );
     if estimate.t_current_previous.is_none() {
         return outcome;

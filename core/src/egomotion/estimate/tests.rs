@@ -150,7 +150,12 @@ fn an_estimate_says_what_it_was_made_of() {
         some.iter_mut().for_each(|m| m.current_right[1] += 0.5);
         some[5].current_left[0] += 50.0;
         let config = EgomotionConfig { side_knee: 10.0, ..EgomotionConfig::default() };
-        let estimate = estimator.estimate(&config, &RIG, &some, &mut Random::new(3), None);
+        let estimate = estimator.estimate(
+            &config,
+            &RIG,
+            &some,
+            MotionHypotheses::from_draws(&mut Random::new(3)),
+        );
         assert_eq!(
             (estimate.status, estimate.matches, estimate.inliers),
             (MotionStatus::Estimated, 40, 39)
@@ -171,7 +176,12 @@ fn an_estimate_says_what_it_was_made_of() {
         );
         assert_eq!(estimator.inliers().count(), 0, "counting chooses none");
         let restless = EgomotionConfig { refine_steps: 1, ..config };
-        let estimate = estimator.estimate(&restless, &RIG, &some, &mut Random::new(3), None);
+        let estimate = estimator.estimate(
+            &restless,
+            &RIG,
+            &some,
+            MotionHypotheses::from_draws(&mut Random::new(3)),
+        );
         assert_eq!(
             (estimate.status, estimate.t_current_previous, estimate.steps),
             (MotionStatus::NotConverged, None, 1)
@@ -201,7 +211,12 @@ fn as_many_inliers_as_asked_for_are_enough_and_one_fewer_is_not() {
                 matches_min: least,
                 ..EgomotionConfig::default()
             };
-            let estimate = estimator.estimate(&config, &RIG, &some, &mut Random::new(3), None);
+            let estimate = estimator.estimate(
+                &config,
+                &RIG,
+                &some,
+                MotionHypotheses::from_draws(&mut Random::new(3)),
+            );
             (estimate.status, estimate.inliers)
         };
         assert_eq!(status(0.5, 3), (MotionStatus::Estimated, 10));

@@ -143,16 +143,26 @@ pub struct MapPicture<'a> {
     pub normal: View<'a, [i8; 3]>,
 }
 
-/// Tracks one frame: `disparity_q8` measured now, `map` as seen from where the camera was. `memory`
-/// is overwritten; it needs a third of the image's pixels. The matches are not checked here.
+/// Depth that a rig measured.
+#[derive(Clone, Copy, Debug)]
+pub struct MeasuredDepth<'a> {
+    /// Rig of the disparity image.
+    pub rig: &'a StereoRig,
+    /// Smallest and largest depth used, m.
+    pub limits_m: [f32; 2],
+    /// Disparity, 1/256 px, 0 none.
+    pub disparity_q8: View<'a, u16>,
+}
+
+/// Tracks one frame: `measured` now, `map` as seen from where the camera was. `memory` is
+/// overwritten; it needs a third of the image's pixels. The matches are not checked here.
 pub fn track(
     config: &IcpConfig,
-    rig: &StereoRig,
-    limits_m: [f32; 2],
-    disparity_q8: View<'_, u16>,
+    measured: &MeasuredDepth<'_>,
     map: &MapPicture<'_>,
     memory: &mut [f32],
 ) -> IcpReport {
+    let &MeasuredDepth { rig, limits_m, disparity_q8 } = measured;
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
     let mut t_previous_current = Transform::IDENTITY;
     let mut report = IcpReport::unpaired();

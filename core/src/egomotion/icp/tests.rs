@@ -63,6 +63,11 @@ fn render(planes: &[Plane], t_world_camera: &Transform) -> Picture {
     picture
 }
 
+fn measured(disparity_q8: &[u16]) -> MeasuredDepth<'_> {
+    let disparity_q8 = View::new(disparity_q8, WIDTH, HEIGHT).unwrap();
+    MeasuredDepth { rig: &RIG, limits_m: LIMITS_M, disparity_q8 }
+}
+
 /// Tracks the way from the origin to `motion`, which is where the camera is then.
 fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpReport {
     let (before, now) = (render(planes, &Transform::IDENTITY), render(planes, motion));
@@ -71,14 +76,7 @@ fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpRepor
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
     };
     let mut memory = vec![7.0; WIDTH * HEIGHT];
-    track(
-        config,
-        &RIG,
-        LIMITS_M,
-        View::new(&now.disparity_q8, WIDTH, HEIGHT).unwrap(),
-        &map,
-        &mut memory,
-    )
+    track(config, &measured(&now.disparity_q8), &map, &mut memory)
 }
 
 fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
@@ -141,9 +139,7 @@ fn depth_off_the_map_is_no_estimate() {
     let mut memory = vec![0.0; WIDTH * HEIGHT / 3];
     let report = track(
         &IcpConfig { pairs_min: 0.5, ..IcpConfig::default() },
-        &RIG,
-        LIMITS_M,
-        View::new(&now.disparity_q8, WIDTH, HEIGHT).unwrap(),
+        &measured(&now.disparity_q8),
         &map,
         &mut memory,
     );

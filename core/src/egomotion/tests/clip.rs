@@ -3,6 +3,7 @@
 //!
 //! With `--nocapture` the figures and the mean time of a frame are printed.
 
+use super::at_10_hz;
 use crate::egomotion::{Egomotion, EgomotionConfig, Estimator, MotionStatus};
 use crate::{
     geometry::StereoRig,
@@ -143,7 +144,12 @@ fn run(name: &str) -> Vec<Matrix4<f64>> {
         let report = matcher.push(&SceneFlowConfig::default(), left_view, right_view, &Serial);
         let matched = cpu_ms();
         let estimate = (frame > 0).then(|| {
-            camera.step(&EgomotionConfig::default(), &rig, 0.1, matcher.bucketed(), &mut estimator)
+            camera.step(
+                &EgomotionConfig::default(),
+                &rig,
+                at_10_hz(matcher.bucketed()),
+                &mut estimator,
+            )
         });
         (matching_ms, moving_ms) = (matching_ms + matched - begin, moving_ms + cpu_ms() - matched);
         if let Some(estimate) = estimate {

@@ -7,9 +7,10 @@ const IMAGES: [(usize, usize); 6] =
 
 fn solve(
     bytes: usize,
-    (width, height): (usize, usize),
+    size: (usize, usize),
     options: &BudgetOptions,
 ) -> Result<Capacity, BudgetError> {
+    let (width, height) = size;
     Capacity::for_budget(bytes, width, height, options)
 }
 

@@ -40,10 +40,11 @@ fn named_by(
 fn a_bit_of_a_voxel_of_the_background() {
     let walk = Walk::new(FRAMES);
     with_mapper(&walk, FRAMES, |mapper, reports| {
-        let slot = mapper.background.visible().slots()[0];
+        let slot = mapper.static_map.volume.visible().slots()[0];
         for bit in 0..24 {
             for voxel in [0, 77, 511] {
-                let flip = |mapper: &mut Mapper<'_>| mapper.background.flip(slot, voxel, bit);
+                let flip =
+                    |mapper: &mut Mapper<'_>| mapper.static_map.volume.flip(slot, voxel, bit);
                 assert_eq!(
                     named_by(&walk, mapper, reports, flip),
                     Some(Digested::Background),
@@ -86,7 +87,7 @@ fn a_bit_of_a_match() {
 fn a_bit_of_a_component_of_the_pose() {
     for component in 0..7 {
         assert_eq!(
-            named(|mapper| mapper.camera.flip(component, 0)),
+            named(|mapper| mapper.localization.camera.flip(component, 0)),
             Some(Digested::Egomotion),
             "component {component}"
         );
@@ -127,12 +128,12 @@ fn what_changes_in_memory_between_two_frames_is_named_in_the_next_one() {
     let clean = next(&|_| {});
     let named = |change: &dyn Fn(&mut Mapper<'_>)| clean.first_difference(&next(change));
     assert_eq!(named(&|_| {}), None);
-    assert_eq!(named(&|mapper| mapper.camera.flip(6, 30)), Some(Digested::Egomotion));
+    assert_eq!(named(&|mapper| mapper.localization.camera.flip(6, 30)), Some(Digested::Egomotion));
     let raw = |mapper: &mut Mapper<'_>| {
         // One that the next frame fuses as well.
-        let visible = mapper.background.visible().slots();
+        let visible = mapper.static_map.volume.visible().slots();
         let slot = visible[visible.len() / 2];
-        mapper.background.flip_behind_its_back(slot, 200, 23);
+        mapper.static_map.volume.flip_behind_its_back(slot, 200, 23);
     };
     assert_eq!(named(&raw), Some(Digested::Background));
     assert_eq!(named(&|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracks));

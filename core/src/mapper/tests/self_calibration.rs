@@ -2,7 +2,7 @@
 
 use crate::{
     Capacity, Serial,
-    egomotion::{Egomotion, EgomotionConfig, Estimator},
+    egomotion::{Egomotion, EgomotionConfig, Estimator, TimedMatches},
     geometry::{StereoRig, Transform},
     image::View,
     memory::{Carver, SLAB_ALIGN},
@@ -20,8 +20,18 @@ const RIG: StereoRig = StereoRig {
     baseline_m: 379.8145 / 707.0912,
 };
 
-/// A grey picture, row by row, and its width and height.
-type Grey = (Vec<u8>, usize, usize);
+/// A grey picture, row by row.
+struct Grey {
+    pixels: Vec<u8>,
+    width: usize,
+    height: usize,
+}
+
+impl Grey {
+    fn view(&self) -> View<'_, u8> {
+        View::new(&self.pixels, self.width, self.height).unwrap()
+    }
+}
 
 fn grey(camera: &str, frame: usize) -> Grey {
     let sequence = Path::new(dynvox_needs::data_folder!()).join("kitti-odometry/sequences/06");
@@ -29,11 +39,13 @@ fn grey(camera: &str, frame: usize) -> Grey {
         .unwrap()
         .into_luma8();
     let (width, height) = picture.dimensions();
-    (picture.into_raw(), width as usize, height as usize)
+    Grey { pixels: picture.into_raw(), width: width as usize, height: height as usize }
 }
 
 /// The picture moved to the right by `by_px`, with cubic interpolation.
-fn shifted((pixels, width, height): Grey, by_px: f64) -> Grey {
+fn shifted(picture: &Grey, by_px: f64) -> Grey {
+    let Grey { pixels, width, height } = picture;
+    let (width, height) = (*width, *height);
     let whole = (-by_px).floor();
     let t = -by_px - whole;
     let weights = [
@@ -50,7 +62,7 @@ fn shifted((pixels, width, height): Grey, by_px: f64) -> Grey {
         let sum: f64 = (0..4).zip(weights).map(|(k, weight)| weight * pixel(k)).sum();
         sum.round() as u8
     };
-    ((0..width * height).map(moved).collect(), width, height)
+    Grey { pixels: (0..width * height).map(moved).collect(), width, height }
 }
 
 /// What is found with the right pictures moved by `by_px`, and how far the camera drove, m.
@@ -64,17 +76,15 @@ fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
     let (mut camera, mut calibration) =
         (Egomotion::default(), SelfCalibration::new(&RigConfig::default()));
     for frame in 0..FRAMES {
-        let (left, right) = (grey("image_0", frame), shifted(grey("image_1", frame), by_px));
-        let images = [&left, &right]
-            .map(|(pixels, width, height)| View::new(pixels, *width, *height).unwrap());
+        let (left, right) = (grey("image_0", frame), shifted(&grey("image_1", frame), by_px));
+        let images = [left.view(), right.view()];
         matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
         matcher.correct(calibration.pixel_correction(&RIG).unwrap_or_default());
         if frame > 0 {
             let estimate = camera.step(
                 &EgomotionConfig::default(),
                 &RIG,
-                0.1,
-                matcher.bucketed(),
+                TimedMatches { interval_s: 0.1, matches: matcher.bucketed() },
                 &mut estimator,
             );
             let observations = matcher.bucketed().map(|m| {

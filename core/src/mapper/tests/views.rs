@@ -12,7 +12,7 @@ fn depths(
     cast: impl FnOnce(&mut Mapper<'_>) -> Result<(), RaycastError>,
 ) -> Vec<f32> {
     cast(mapper).unwrap();
-    Vec::from(mapper.raycaster.depth_m().unwrap().pixels())
+    Vec::from(mapper.static_map.raycaster.depth_m().unwrap().pixels())
 }
 
 #[test]
@@ -29,7 +29,7 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
         });
         let composed =
             depths(mapper, |mapper| mapper.raycast_composed(&t_world_camera, &Serial).map(|_| ()));
-        let layers = Vec::from(mapper.raycaster.layer().unwrap().pixels());
+        let layers = Vec::from(mapper.static_map.raycaster.layer().unwrap().pixels());
         let shown = |depths: &[f32]| depths.iter().filter(|depth_m| **depth_m > 0.0).count();
         assert!(
             shown(&map) > 3_000 && shown(&object) > 500,

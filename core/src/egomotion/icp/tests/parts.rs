@@ -82,23 +82,29 @@ fn a_coarser_level_averages_the_finer_one_and_bridges_no_edge() {
     }
 }
 
-/// A map that shows one depth everywhere, with these normals.
-fn wall(depth_m: f32, normal: [i8; 3]) -> (Vec<f32>, Vec<[i8; 3]>) {
-    (vec![depth_m; WIDTH * HEIGHT], vec![normal; WIDTH * HEIGHT])
+/// Depth and normals of each pixel of a map.
+struct Shown {
+    depth_m: Vec<f32>,
+    normal: Vec<[i8; 3]>,
 }
 
-fn picture<'a>((depth_m, normal): &'a (Vec<f32>, Vec<[i8; 3]>)) -> MapPicture<'a> {
+/// A map that shows one depth everywhere, with these normals.
+fn wall(depth_m: f32, normal: [i8; 3]) -> Shown {
+    Shown { depth_m: vec![depth_m; WIDTH * HEIGHT], normal: vec![normal; WIDTH * HEIGHT] }
+}
+
+fn picture(shown: &Shown) -> MapPicture<'_> {
     MapPicture {
-        depth_m: View::new(depth_m, WIDTH, HEIGHT).unwrap(),
-        normal: View::new(normal, WIDTH, HEIGHT).unwrap(),
+        depth_m: View::new(&shown.depth_m, WIDTH, HEIGHT).unwrap(),
+        normal: View::new(&shown.normal, WIDTH, HEIGHT).unwrap(),
     }
 }
 
 #[test]
 fn a_point_is_paired_with_the_surface_at_the_nearest_pixel() {
     let mut map = wall(5.0, [127, 0, -127]);
-    (map.0[3 * WIDTH + 7], map.1[3 * WIDTH + 7]) = (8.0, [0, 127, 0]);
-    map.0[0] = 0.0;
+    (map.depth_m[3 * WIDTH + 7], map.normal[3 * WIDTH + 7]) = (8.0, [0, 127, 0]);
+    map.depth_m[0] = 0.0;
     let config = IcpConfig::default();
     let pairing = Pairing::new(&config, &RIG, 0);
     let at =

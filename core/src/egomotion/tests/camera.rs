@@ -1,0 +1,173 @@
+//! The camera over frames that say nothing, leap, or are lost.
+
+use super::*;
+
+#[test]
+fn a_dark_right_camera_repeats_the_last_motion() {
+    let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
+    let mut estimator = estimator(&mut slab);
+    let mut camera = Egomotion::default();
+    let step = Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.4));
+    let dark = vec![0; WIDTH * HEIGHT];
+    let mut t_world_camera = Transform::IDENTITY;
+    for frame in 0..4 {
+        let [left, right] = see(&t_world_camera);
+        let right = if frame < 2 { &right } else { &dark };
+        let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
+        matcher.push(&SceneFlowConfig::default(), view(&left), view(right), &Serial);
+        if frame > 0 {
+            let estimate = camera.step(
+                &EgomotionConfig::default(),
+                &RIG,
+                at_10_hz(matcher.bucketed()),
+                &mut estimator,
+            );
+            let expected =
+                if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
+            assert_eq!((estimate.status, camera.held_frames()), (expected, frame - 1));
+            let (distance, _) = between(camera.t_current_previous(), &step.inverse());
+            assert!(distance < 0.02);
+        }
+        t_world_camera = t_world_camera * step;
+    }
+    assert!(
+        (camera.t_world_camera().translation().z - 1.2).abs() < 0.05,
+        "three steps, two of them extrapolated"
+    );
+}
+
+#[test]
+fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen() {
+    let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
+    let mut matcher = FlowMatcher::new_in(
+        &CAPACITY,
+        &mut Carver::new(&mut flow_slab.0, FlowMatcher::bytes(&CAPACITY)).unwrap(),
+    );
+    let mut estimator = estimator(&mut slab);
+    let mut camera = Egomotion::default();
+    let dark = vec![0; WIDTH * HEIGHT];
+    let mut t_world_camera = Transform::IDENTITY;
+    for (frame, metres) in [0.0, 0.3, 0.3, 0.1, 0.1].into_iter().enumerate() {
+        t_world_camera = t_world_camera * Transform::from_translation([0.0, 0.0, metres]);
+        let seen = see(&t_world_camera);
+        let [left, right] =
+            if frame == 2 || frame == 3 { [&dark, &dark] } else { [&seen[0], &seen[1]] };
+        let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
+        matcher.push(&SceneFlowConfig::default(), view(left), view(right), &Serial);
+        if frame > 0 {
+            camera.step(
+                &EgomotionConfig::default(),
+                &RIG,
+                at_10_hz(matcher.bucketed()),
+                &mut estimator,
+            );
+        }
+        if camera.since_reference() > 0 {
+            matcher.keep_previous();
+        }
+        let (distance, _) = between(camera.t_world_camera(), &t_world_camera);
+        let guessed = camera.held_frames() > 0;
+        assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
+        assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
+    }
+    assert!(
+        (camera.t_current_previous().distance_m() - 0.5 / 3.0).abs() < 0.02,
+        "a frame's share of the motion since then"
+    );
+}
+
+#[test]
+fn the_time_of_frames_without_matches_counts_in_the_motion_over_them() {
+    let mut slab = Box::new(Slab([0; BYTES]));
+    let (mut estimator, mut camera, mut random) =
+        (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let config = EgomotionConfig::default();
+    camera.step(&config, &RIG, at_10_hz(&matches(60, 0, &motion(), &mut random)), &mut estimator);
+    camera.hold(0.1);
+    let over_two = matches(60, 30, &(motion() * motion()), &mut random);
+    let estimate = camera.step(&config, &RIG, at_10_hz(&over_two), &mut estimator);
+    assert_eq!(
+        (estimate.status, camera.held_frames()),
+        (MotionStatus::Estimated, 0),
+        "half of the matches agree with what was expected"
+    );
+    assert!(between(camera.t_current_previous(), &motion()).0 < 0.05);
+}
+
+/// A camera that moved by `motion()` a frame, and what it makes of one of another motion with
+/// `outliers` among 60 matches.
+fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomotion) {
+    let mut slab = Box::new(Slab([0; BYTES]));
+    let (mut estimator, mut camera, mut random) =
+        (estimator(&mut slab), Egomotion::default(), Random::new(5));
+    let config = EgomotionConfig::default();
+    let first = matches(60, 0, &motion(), &mut random);
+    assert_eq!(
+        camera.step(&config, &RIG, at_10_hz(&first), &mut estimator).status,
+        MotionStatus::Estimated
+    );
+    let second = matches(60, outliers, then, &mut random);
+    (camera.step(&config, &RIG, at_10_hz(&second), &mut estimator), camera)
+}
+
+#[test]
+fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
+    let leap = motion() * Transform::from_translation([0.0, 0.0, -1.0]);
+    let (estimate, camera) = after_one_frame(&leap, 30);
+    assert_eq!(
+        (estimate.status, estimate.t_current_previous, camera.held_frames()),
+        (MotionStatus::Implausible, None, 1)
+    );
+    assert!(between(camera.t_current_previous(), &motion()).0 < 1e-3, "it moves on as before");
+    assert_eq!(after_one_frame(&leap, 5).0.status, MotionStatus::Estimated);
+    assert_eq!(
+        after_one_frame(&motion(), 30).0.status,
+        MotionStatus::Estimated,
+        "half of the matches are enough for what was expected"
+    );
+    assert_eq!(after_one_frame(&motion(), 50).0.status, MotionStatus::TooFewInliers);
+}
+
+#[test]
+fn a_camera_stands_at_once_where_it_could_brake() {
+    let config = EgomotionConfig::default();
+    assert!(Egomotion::default().may_stand(&config, 0.1), "nothing is known of its motion");
+    let (_, camera) = after_one_frame(&motion(), 0);
+    let braked_m = config.acceleration_max_m_s2 * 0.1 * 0.1;
+    assert!(motion().distance_m() > braked_m + 0.1);
+    assert!(!camera.may_stand(&config, 0.1) && camera.may_stand(&config, 1.0));
+}
+
+#[test]
+fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_above_its_guess() {
+    let mut camera = Egomotion::default();
+    camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
+    for frame in 1..=REFERENCE_FRAMES_MAX {
+        assert_eq!((camera.is_lost(), camera.since_reference()), (false, frame - 1));
+        camera.hold(0.1);
+    }
+    for frame in 0..20 {
+        assert_eq!((camera.is_lost(), camera.segment(), camera.since_reference()), (true, 0, 0));
+        assert!(
+            (camera.t_world_camera().translation_m[2]
+                - 1.0
+                - f64::from(REFERENCE_FRAMES_MAX + frame))
+            .abs()
+                < 1e-9
+        );
+        camera.hold(0.1);
+    }
+    let guess = camera.t_world_camera().translation_m;
+    camera.begin_segment();
+    assert_eq!(
+        (camera.t_world_camera().translation_m, camera.segment()),
+        ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1)
+    );
+    let pose = Transform::from_translation([3.0, 0.0, 2.0]);
+    camera.relocalize(&pose);
+    assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, 1));
+}

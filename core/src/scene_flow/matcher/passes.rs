@@ -1,0 +1,130 @@
+//! The two passes of matching, sparse and dense, and the refinement of what they leave.
+
+use super::{FlowMatcher, images};
+use crate::{
+    parallel::{Bands, Executor, each, zip3},
+    slices::clipped,
+    scene_flow::{
+        SceneFlowConfig,
+        cells::{CELL_MIN_PX, Shape},
+        circle::{Corners, Reach},
+        refine::RefineSupported,
+        report::PassCount,
+        support::{SortedMotions, support},
+    },
+};
+
+/// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
+const SPARSE_CELL_PX: usize = 24;
+
+impl FlowMatcher<'_> {
+    /// Matches the sparse features and learns from the supported ones where to look.
+    pub(super) fn sparse_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        executor: &E,
+    ) -> PassCount {
+        let ((left_before, left), (right_before, right)) =
+            (self.left.frames(), self.right.frames());
+        let corners = Corners {
+            previous_left: &left_before.sparse,
+            previous_right: &right_before.sparse,
+            current_right: &right.sparse,
+            current_left: &left.sparse,
+        };
+        let widest = Reach::widest(config);
+        corners.trace(|_| widest, self.traced, executor);
+        let closed = corners.gather(self.traced, self.sparse);
+        self.sparse_len = closed.min(self.sparse.len());
+        let matches = clipped(self.sparse, ..self.sparse_len);
+        let shape = Shape::new(width, height, SPARSE_CELL_PX);
+        let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
+        support(matches, shape, config, memory, self.supported);
+        let supported = matches
+            .iter()
+            .zip(&*self.supported)
+            .filter(|&(_, &supported)| supported == 1)
+            .map(|(m, _)| *m);
+        self.prior.learn(supported.clone(), width, height, config);
+        PassCount {
+            closed: closed as u32,
+            dropped: (closed - self.sparse_len) as u32,
+            unsupported: (self.sparse_len - supported.count()) as u32,
+        }
+    }
+
+    /// Matches all features within what the sparse pass learned; leaves the matches in `refined`
+    /// and who is supported in `supported`. Returns its counts and how many there are.
+    pub(super) fn dense_pass<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        executor: &E,
+    ) -> (PassCount, usize) {
+        let ((left_before, left), (right_before, right)) =
+            (self.left.frames(), self.right.frames());
+        let corners = Corners {
+            previous_left: &left_before.dense,
+            previous_right: &right_before.dense,
+            current_right: &right.dense,
+            current_left: &left.dense,
+        };
+        let widest = Reach::widest(config);
+        let prior = &self.prior;
+        corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
+        let closed = corners.gather(self.traced, self.refined);
+        let stored = closed.min(self.refined.len());
+        let matches = clipped(self.refined, ..stored);
+        let shape = Shape::new(width, height, CELL_MIN_PX);
+        let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
+        support(matches, shape, config, memory, self.supported);
+        let supported =
+            self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
+        let count = PassCount {
+            closed: closed as u32,
+            dropped: (closed - stored) as u32,
+            unsupported: (stored - supported) as u32,
+        };
+        (count, stored)
+    }
+
+    /// Refines the supported among the first `closed` matches and closes the gaps the others leave.
+    pub(super) fn refine_supported<E: Executor>(
+        &mut self,
+        config: &SceneFlowConfig,
+        [width, height]: [usize; 2],
+        closed: usize,
+        executor: &E,
+    ) {
+        let images = images(&self.left, &self.right, [width, height]);
+        if config.refine {
+            let bands = Bands::of(closed);
+            let (matches, supported) =
+                (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
+            let jobs = zip3(matches, supported, bands.split_mut(self.score, 1));
+            each(executor, jobs, |(matches, supported, score)| {
+                executor.vectors().run(RefineSupported { images, matches, supported, score })
+            });
+        } else {
+            self.score.fill(0.0);
+        }
+        let mut len = 0;
+        for index in 0..closed {
+            if self.supported.get(index) == Some(&1) {
+                move_item(self.refined, index, len);
+                move_item(self.score, index, len);
+                len += 1;
+            }
+        }
+        self.refined_len = len;
+    }
+}
+
+/// Copies an item to an earlier position.
+fn move_item<T: Copy>(items: &mut [T], from: usize, to: usize) {
+    let item = items.get(from).copied();
+    if let (Some(item), Some(slot)) = (item, items.get_mut(to)) {
+        *slot = item;
+    }
+}
