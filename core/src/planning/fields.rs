@@ -2,7 +2,10 @@
 
 use super::{
     CellState, Column, Grid, MovingBox, Planning, PlanningConfig, PlanningReport, Sweep, Way,
-    cells::OBJECT, grid::Cell, query, slice,
+    cells::OBJECT,
+    grid::Cell,
+    query::{self, KnownSpace},
+    slice,
 };
 use crate::volume::Volume;
 
@@ -49,8 +52,12 @@ impl Planning<'_> {
         PlanningReport {
             occupied: count(CellState::Occupied),
             free: count(CellState::Free),
-            ground: self.ground.columns().iter().filter(|column| column.has(Column::GROUND)).count()
-                as u32,
+            ground: self
+                .height_map
+                .columns()
+                .iter()
+                .filter(|column| column.has(Column::GROUND))
+                .count() as u32,
             obstacles: self
                 .slice
                 .iter()
@@ -64,14 +71,15 @@ impl Planning<'_> {
     /// Makes the slice between other heights and its distance field; another slice is made by
     /// another call, and the last one stands.
     pub fn cut_slice(&mut self, limits: &Limits) {
-        let Self { config, cells, ground, slice, slice_obstacle, slice_distance, grid, .. } = self;
+        let Self { config, cells, height_map, slice, slice_obstacle, slice_distance, grid, .. } =
+            self;
         let config = PlanningConfig {
             low_m: limits.low_m,
             high_m: limits.high_m,
             level: limits.level,
             ..*config
         };
-        slice::reduce(&config, grid.cell_m() as f32, cells, ground, slice);
+        slice::reduce(&config, grid.cell_m() as f32, cells, height_map, slice);
         for (obstacle, state) in slice_obstacle.iter_mut().zip(&**slice) {
             *obstacle = u8::from(is_obstacle(&config, *state));
         }
@@ -127,7 +135,7 @@ impl Planning<'_> {
     /// The ground of a column; the cell's height does not matter. `None` outside the window.
     pub fn column(&self, [x, y, _]: Cell) -> Option<Column> {
         let [x, y, _] = self.cells.local([x, y, self.cells.origin[2]])?;
-        Some(self.ground.get(x, y))
+        Some(self.height_map.get(x, y))
     }
 
     /// The state of a column in the slice.
@@ -217,12 +225,16 @@ impl Planning<'_> {
         direction: [f64; 3],
         far_m: f64,
     ) -> Way {
-        query::ray(volume, &self.grid, &self.cells, origin_m, direction, far_m)
+        query::ray(&self.known_space(volume), origin_m, direction, far_m)
     }
 
     /// How far a robot may follow a polyline of world points on the ground.
     pub fn sweep(&self, volume: &Volume<'_>, path_m: &[[f64; 3]], robot: &Sweep) -> Way {
-        query::sweep(volume, &self.grid, &self.cells, self.config.min_weight, path_m, robot)
+        query::sweep(&self.known_space(volume), self.config.min_weight, path_m, robot)
+    }
+
+    fn known_space<'a, 'v>(&'a self, volume: &'a Volume<'v>) -> KnownSpace<'a, 'v, 'a> {
+        KnownSpace { volume, grid: &self.grid, cells: &self.cells }
     }
 }
 

@@ -27,7 +27,8 @@ mod distance;
 mod fields;
 mod free_space;
 mod grid;
-mod ground;
+mod height_map;
+mod plane_fit;
 mod pyramid;
 mod query;
 mod slice;
@@ -44,7 +45,7 @@ pub use fields::{Distance, Limits};
 pub(crate) use free_space::MARGIN_PX;
 pub use free_space::Sight;
 pub use grid::{Cell, Grid};
-pub use ground::Column;
+pub use height_map::Column;
 pub use query::{Sweep, Way, WayEnd};
 pub(crate) use surface::crossings;
 
@@ -57,7 +58,7 @@ use crate::{
     volume::Volume,
 };
 use cells::{Cells, OCCUPIED};
-use ground::{Ground, Level};
+use height_map::{Growth, HeightMap, Level};
 use pyramid::Pyramid;
 
 /// What an update made.
@@ -87,7 +88,7 @@ pub struct Planning<'s> {
     grid: Grid,
     cells: Cells<'s>,
     pyramid: Pyramid<'s>,
-    ground: Ground<'s>,
+    height_map: HeightMap<'s>,
     /// The state of each column, x fastest.
     slice: &'s mut [u8],
     /// Whether each column, and each cell, counts as an obstacle: 0 or 1.
@@ -115,7 +116,7 @@ impl<'s> Planning<'s> {
         let longest = if width > height { width } else { height };
         Cells::bytes(capacity)
             + Pyramid::bytes(capacity)
-            + Ground::bytes(columns)
+            + HeightMap::bytes(columns)
             + 2 * region_bytes::<u8>(columns)
             + region_bytes::<u8>(cells)
             + DistanceField::bytes(columns, longest)
@@ -157,7 +158,7 @@ impl<'s> Planning<'s> {
             grid: Grid::new(config, voxel_size_m),
             cells: Cells::new_in(capacity, carver),
             pyramid: Pyramid::new_in(capacity, carver),
-            ground: Ground::new_in(width, length, carver),
+            height_map: HeightMap::new_in(width, length, carver),
             slice: carver.alloc("planning.slice", columns),
             slice_obstacle: carver.alloc("planning.slice_obstacle", columns),
             cell_obstacle: carver.alloc("planning.cell_obstacle", cells),
@@ -269,7 +270,9 @@ impl<'s> Planning<'s> {
     /// will be `ahead_s` seconds after the last frame.
     pub(crate) fn finish(&mut self, ahead_s: f32) -> PlanningReport {
         let cell_m = self.grid.cell_m() as f32;
-        self.ground.find(&self.config, cell_m, self.level, self.camera, &self.cells);
+        let Self { config, cells, .. } = self;
+        let growth = Growth { config, cell_m, center: self.camera, cells };
+        self.height_map.find(self.level, &growth);
         self.predict(ahead_s)
     }
 
@@ -291,7 +294,7 @@ impl<'s> Planning<'s> {
             // Belongs to one frame.
             pyramid: _,
             // Made on request.
-            ground: _,
+            height_map: _,
             slice: _,
             slice_obstacle: _,
             cell_obstacle: _,
@@ -318,7 +321,7 @@ impl<'s> Planning<'s> {
         self.cells.origin.iter().for_each(|c| digest.u64(*c as u64));
         self.cells.observed_at.iter().for_each(|stamp| digest.u64(u64::from(*stamp)));
         digest.bytes(self.cells.bits);
-        for column in self.ground.columns() {
+        for column in self.height_map.columns() {
             let values = [
                 column.height_m,
                 column.reference_m,

@@ -47,6 +47,14 @@ pub struct Sweep {
     pub unknown_ends: bool,
 }
 
+/// What is known of space: the map, and the window around the camera.
+#[derive(Clone, Copy)]
+pub(super) struct KnownSpace<'a, 'v, 'c> {
+    pub volume: &'a Volume<'v>,
+    pub grid: &'a Grid,
+    pub cells: &'a Cells<'c>,
+}
+
 /// Follows a ray from a point of the world in a direction of any length, at most `far_m`, to the
 /// first surface or unknown place.
 ///
@@ -54,9 +62,7 @@ pub struct Sweep {
 /// every half voxel: the map keeps at least two voxels behind each surface, so none is stepped
 /// over. Time: linear in `far_m`.
 pub(super) fn ray(
-    volume: &Volume<'_>,
-    grid: &Grid,
-    cells: &Cells<'_>,
+    &KnownSpace { volume, grid, cells }: &KnownSpace<'_, '_, '_>,
     origin_m: [f64; 3],
     direction: [f64; 3],
     far_m: f64,
@@ -122,9 +128,7 @@ fn bits_at(grid: &Grid, cells: &Cells<'_>, point_m: [f64; 3]) -> Option<u8> {
 /// the path's middle, every half cell. Time: linear in the map's blocks, and in the surface near
 /// the path times its points.
 pub(super) fn sweep(
-    volume: &Volume<'_>,
-    grid: &Grid,
-    cells: &Cells<'_>,
+    &KnownSpace { volume, grid, cells }: &KnownSpace<'_, '_, '_>,
     min_weight: u8,
     path_m: &[[f64; 3]],
     robot: &Sweep,

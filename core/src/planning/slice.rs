@@ -3,7 +3,7 @@
 use super::{
     PlanningConfig,
     cells::{CellState, Cells},
-    ground::{Column, Ground},
+    height_map::{Column, HeightMap},
 };
 
 /// Reduces the window to one state per column, x fastest: `states` is as long as there are columns.
@@ -16,7 +16,7 @@ pub(super) fn reduce(
     config: &PlanningConfig,
     cell_m: f32,
     cells: &Cells<'_>,
-    ground: &Ground<'_>,
+    ground: &HeightMap<'_>,
     states: &mut [u8],
 ) {
     let [width, length, height] = cells.size;

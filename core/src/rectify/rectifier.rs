@@ -71,6 +71,12 @@ pub struct Pair<'a> {
     pub colour: Option<View<'a, [u8; 3]>>,
 }
 
+/// A raw image and the camera that took it.
+struct RawImage<'a, T> {
+    camera: &'a TurnedCamera,
+    image: View<'a, T>,
+}
+
 /// One camera's regions.
 #[derive(Debug, Default)]
 struct Camera<'s> {
@@ -80,18 +86,18 @@ struct Camera<'s> {
 }
 
 impl Camera<'_> {
-    /// Fills a rectified image, in bands of rows.
-    fn remap<T: Sample, E: Executor>(
+    /// Fills a rectified image of that size, in bands of rows, and looks at it.
+    fn remap<'a, T: Sample, E: Executor>(
         &self,
-        turned: &TurnedCamera,
+        raw: RawImage<'_, T>,
         [width, height]: [usize; 2],
-        raw: &View<'_, T>,
-        out: &mut [T],
+        out: &'a mut [T],
         executor: &E,
-    ) {
+    ) -> Option<View<'a, T>> {
         let bands = Bands::of(height);
         let jobs = zip2(bands.split(self.map, width), bands.split_mut(out, width));
-        each(executor, jobs, |(map, out)| map::remap(map, &turned.raw, raw, out));
+        each(executor, jobs, |(map, out)| map::remap(map, &raw.camera.raw, &raw.image, out));
+        View::new(out, width, height)
     }
 }
 
@@ -234,20 +240,17 @@ impl<'s> Rectifier<'s> {
     ) -> Option<Pair<'a>> {
         let Rectification { left, right, width, height } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
-        let RectifiedImages { left: left_out, right: right_out, colour: colour_out } = images;
-        executor.join(
-            || self.left.remap(left, [width, height], &raw.left, left_out, executor),
-            || self.right.remap(right, [width, height], &raw.right, right_out, executor),
+        let (size, out) = ([width, height], images);
+        let raw_left = RawImage { camera: left, image: raw.left };
+        let raw_right = RawImage { camera: right, image: raw.right };
+        let (left_image, right_image) = executor.join(
+            || self.left.remap(raw_left, size, out.left, executor),
+            || self.right.remap(raw_right, size, out.right, executor),
         );
-        let colour = raw.colour.filter(|_| !colour_out.is_empty()).and_then(|raw| {
-            self.left.remap(left, [width, height], &raw, colour_out, executor);
-            View::new(colour_out, width, height)
+        let colour = raw.colour.filter(|_| !out.colour.is_empty()).and_then(|image| {
+            self.left.remap(RawImage { camera: left, image }, size, out.colour, executor)
         });
-        Some(Pair {
-            left: View::new(left_out, width, height)?,
-            right: View::new(right_out, width, height)?,
-            colour,
-        })
+        Some(Pair { left: left_image?, right: right_image?, colour })
     }
 
     /// The grey images, left and right, that the last [`Rectifier::rectify`] left in `images`;

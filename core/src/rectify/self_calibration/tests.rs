@@ -7,8 +7,17 @@ use std::vec::Vec;
 
 const RIG: StereoRig =
     StereoRig { focal_px: 720.0, center_u_px: 610.0, center_v_px: 175.0, baseline_m: 0.54 };
+/// Motion of a frame: a rotation vector, rad, and a way, m.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    turn: [f64; 3],
+    way_m: [f64; 3],
+}
+
 /// Forward a little less than a metre, turning a little.
-const DRIVING: ([f64; 3], [f64; 3]) = ([0.001, 0.01, -0.002], [0.02, -0.01, -0.9]);
+const DRIVING: Motion = Motion { turn: [0.001, 0.01, -0.002], way_m: [0.02, -0.01, -0.9] };
+const STANDING: Motion = Motion { turn: [0.0; 3], way_m: [0.0; 3] };
+const TURNING: Motion = Motion { turn: [0.0, 0.05, 0.0], way_m: [0.0; 3] };
 const NOISE_PX: f64 = 0.2;
 const FAR_M: f64 = 40.0;
 
@@ -55,12 +64,12 @@ fn pixel(seen: &StereoObservation) -> [f32; 2] {
 fn driven(
     config: &RigConfig,
     error: &DisparityCorrection,
-    motion: ([f64; 3], [f64; 3]),
+    motion: Motion,
     far_m: f64,
     frames: usize,
 ) -> SelfCalibration {
     let (mut random, mut calibration) = (Random::new(11), SelfCalibration::new(config));
-    let motion = Transform::new(motion.0, motion.1);
+    let motion = Transform::new(motion.turn, motion.way_m);
     for _ in 0..frames {
         let correction = calibration.applied.for_rig(&RIG);
         let corrected = |seen: StereoObservation| {
@@ -121,9 +130,7 @@ fn a_sound_rig_is_left_alone() {
 
 #[test]
 fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
-    for (motion, far_m) in
-        [(([0.0; 3], [0.0; 3]), FAR_M), (([0.0, 0.05, 0.0], [0.0; 3]), FAR_M), (DRIVING, 4_000.0)]
-    {
+    for (motion, far_m) in [(STANDING, FAR_M), (TURNING, FAR_M), (DRIVING, 4_000.0)] {
         let calibration = driven(&RigConfig::default(), &offset(0.7), motion, far_m, 40);
         let report = calibration.report();
         assert!(!report.known && calibration.applied.is_zero(), "{motion:?}: {report:?}");
@@ -135,7 +142,7 @@ fn standing_turning_on_the_spot_and_a_far_scene_say_nothing() {
 fn the_correction_changes_gently() {
     let mut random = Random::new(11);
     let (mut calibration, motion) =
-        (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.0, DRIVING.1));
+        (SelfCalibration::new(&RigConfig::default()), Transform::new(DRIVING.turn, DRIVING.way_m));
     for _ in 0..20 {
         let before = calibration.applied;
         calibration.update(&RIG, street(&offset(1.0), &motion, FAR_M, &mut random), &motion);
@@ -171,7 +178,7 @@ fn a_run_begins_where_another_ended() {
 
 #[test]
 fn observations_that_make_no_sense_change_nothing() {
-    let motion = Transform::new(DRIVING.0, DRIVING.1);
+    let motion = Transform::new(DRIVING.turn, DRIVING.way_m);
     let mut calibration = SelfCalibration::new(&RigConfig::default());
     let bad = [f64::NAN, f64::INFINITY, -1e300, 1e300].map(|value| {
         let seen = StereoObservation { u_left_px: value, v_px: value, u_right_px: 3.0 };

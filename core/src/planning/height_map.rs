@@ -21,6 +21,7 @@
 use super::{
     PlanningConfig,
     cells::{CellState, Cells, is_ghost},
+    plane_fit::PlaneFit,
 };
 use crate::{
     geometry::scalar::{max_f32, min_f32},
@@ -31,8 +32,6 @@ use bytemuck::{Pod, Zeroable};
 /// A plane is fitted to every second column up to four away: twice as far as its neighbours, so
 /// half the error at the same cost.
 const FIT_OFFSETS: [i32; 5] = [-4, -2, 0, 2, 4];
-/// Fewest columns of a fit.
-const FIT_MIN: u32 = 6;
 /// How fast what is allowed grows where no ground is seen, rise over run.
 const DRIFT: f32 = 0.1;
 
@@ -88,15 +87,25 @@ pub(super) struct Level {
     pub slope: [f32; 2],
 }
 
+/// Cells that ground grows through.
+pub(super) struct Growth<'a, 's> {
+    pub config: &'a PlanningConfig,
+    /// Side of a cell, m.
+    pub cell_m: f32,
+    /// Column of the camera, where growth begins.
+    pub center: [usize; 2],
+    pub cells: &'a Cells<'s>,
+}
+
 /// All columns.
 #[derive(Debug)]
-pub(super) struct Ground<'s> {
+pub(super) struct HeightMap<'s> {
     columns: &'s mut [Column],
     width: usize,
     level: Level,
 }
 
-impl<'s> Ground<'s> {
+impl<'s> HeightMap<'s> {
     pub const fn bytes(columns: usize) -> usize {
         region_bytes::<Column>(columns)
     }
@@ -128,16 +137,10 @@ impl<'s> Ground<'s> {
         self.level.height_m
     }
 
-    /// Finds the ground anew, outwards from the column at `center`.
-    pub fn find(
-        &mut self,
-        config: &PlanningConfig,
-        cell_m: f32,
-        level: Level,
-        center: [usize; 2],
-        cells: &Cells<'_>,
-    ) {
+    /// Finds the ground anew, outwards from where growth begins, at the level expected there.
+    pub fn find(&mut self, level: Level, growth: &Growth<'_, '_>) {
         self.level = level;
+        let &Growth { center, cells, .. } = growth;
         let [width, length, _] = cells.size;
         let rings = [
             center[0],
@@ -157,7 +160,7 @@ impl<'s> Ground<'s> {
                 let first =
                     if is_edge || center[0] >= ring { columns.start } else { center[0] + ring };
                 for x in (first..columns.end).step_by(step) {
-                    let column = self.grow(config, cell_m, [x, y], center, cells);
+                    let column = self.grow([x, y], growth);
                     if let Some(entry) = self.columns.get_mut(y * self.width + x) {
                         *entry = column;
                     }
@@ -166,7 +169,7 @@ impl<'s> Ground<'s> {
         }
         for y in 0..length {
             for x in 0..width {
-                let described = self.describe(config, cell_m, [x, y], cells);
+                let described = self.describe([x, y], growth);
                 if let Some(entry) = self.columns.get_mut(y * self.width + x) {
                     *entry = described;
                 }
@@ -175,15 +178,9 @@ impl<'s> Ground<'s> {
     }
 
     /// The column at a position, from its neighbours in the ring before.
-    fn grow(
-        &self,
-        config: &PlanningConfig,
-        cell_m: f32,
-        at: [usize; 2],
-        center: [usize; 2],
-        cells: &Cells<'_>,
-    ) -> Column {
-        let (reference_m, gap) = self.reference(cell_m, at, center);
+    fn grow(&self, at: [usize; 2], growth: &Growth<'_, '_>) -> Column {
+        let &Growth { config, cell_m, cells, .. } = growth;
+        let (reference_m, gap) = self.reference(at, growth);
         let gap_m = f32::from(gap) * cell_m;
         let allowed_m = config.ground_step_m
             + config.slope_max * cell_m
@@ -212,7 +209,8 @@ impl<'s> Ground<'s> {
     }
 
     /// The height to expect at a column, and the columns since ground was found.
-    fn reference(&self, cell_m: f32, at: [usize; 2], center: [usize; 2]) -> (f32, u16) {
+    fn reference(&self, at: [usize; 2], growth: &Growth<'_, '_>) -> (f32, u16) {
+        let &Growth { cell_m, center, .. } = growth;
         let [dx, dy] = [0, 1].map(|axis| offset(at, center, axis));
         let ring = if dx.abs() > dy.abs() { dx.abs() } else { dy.abs() };
         let plane = |dx: i32, dy: i32| {
@@ -252,16 +250,11 @@ impl<'s> Ground<'s> {
     }
 
     /// A column with what its surroundings say about it.
-    fn describe(
-        &self,
-        config: &PlanningConfig,
-        cell_m: f32,
-        [x, y]: [usize; 2],
-        cells: &Cells<'_>,
-    ) -> Column {
+    fn describe(&self, [x, y]: [usize; 2], growth: &Growth<'_, '_>) -> Column {
+        let cell_m = growth.cell_m;
         let mut column = self.get(x, y);
         let Some(height_m) = column.ground_m() else { return column };
-        let mut fit = Fit::default();
+        let mut fit = PlaneFit::default();
         for dy in FIT_OFFSETS {
             for dx in FIT_OFFSETS {
                 if let Some(other_m) = self.ground_beside([x, y], [dx, dy]) {
@@ -275,7 +268,7 @@ impl<'s> Ground<'s> {
         }
         let steps = [[1, 0], [0, 1]].map(|along| self.step_along([x, y], along));
         column.step_m = max_f32(steps[0], steps[1]);
-        column.clearance_m = clearance(config, cell_m, [x, y], height_m, cells);
+        column.clearance_m = clearance([x, y], height_m, growth);
         column
     }
 
@@ -341,13 +334,8 @@ fn surfaces([x, y]: [usize; 2], cell_m: f32, cells: &Cells<'_>) -> impl Iterator
 
 /// Height above ground of the lowest cell that is occupied and hangs over it as a whole; 0 where
 /// none does.
-fn clearance(
-    config: &PlanningConfig,
-    cell_m: f32,
-    [x, y]: [usize; 2],
-    ground_m: f32,
-    cells: &Cells<'_>,
-) -> f32 {
+fn clearance([x, y]: [usize; 2], ground_m: f32, growth: &Growth<'_, '_>) -> f32 {
+    let &Growth { config, cell_m, cells, .. } = growth;
     let (column, floor_m) = (cells.column(x, y), cells.origin[2] as f32 * cell_m);
     let from = max_f32(config.low_m, cell_m);
     let above = (0..cells.size[2])
@@ -360,55 +348,4 @@ fn clearance(
             .is_some_and(|bits| CellState::of(*bits) == CellState::Occupied)
     };
     above.into_iter().find(|(z, _)| is_occupied(*z)).map_or(0.0, |(_, above_m)| above_m)
-}
-
-/// Sums of a least-squares plane.
-#[derive(Clone, Copy, Debug, Default)]
-struct Fit {
-    count: u32,
-    x: f32,
-    y: f32,
-    z: f32,
-    xx: f32,
-    xy: f32,
-    yy: f32,
-    xz: f32,
-    yz: f32,
-    zz: f32,
-}
-
-impl Fit {
-    fn add(&mut self, x: f32, y: f32, z: f32) {
-        self.count += 1;
-        (self.x, self.y, self.z) = (self.x + x, self.y + y, self.z + z);
-        (self.xx, self.xy, self.yy) = (self.xx + x * x, self.xy + x * y, self.yy + y * y);
-        (self.xz, self.yz, self.zz) = (self.xz + x * z, self.yz + y * z, self.zz + z * z);
-    }
-
-    /// The plane's gradient and the root mean square distance from it; `None` where the points lie
-    /// too close to a line.
-    fn solve(&self) -> Option<([f32; 2], f32)> {
-        if self.count < FIT_MIN {
-            return None;
-        }
-        let n = self.count as f32;
-        let central = |sum: f32, a: f32, b: f32| sum - a * b / n;
-        let (xx, xy, yy) = (
-            central(self.xx, self.x, self.x),
-            central(self.xy, self.x, self.y),
-            central(self.yy, self.y, self.y),
-        );
-        let (xz, yz, zz) = (
-            central(self.xz, self.x, self.z),
-            central(self.yz, self.y, self.z),
-            central(self.zz, self.z, self.z),
-        );
-        let determinant = xx * yy - xy * xy;
-        if determinant < n {
-            return None;
-        }
-        let slope = [(xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant];
-        let rest = zz - slope[0] * xz - slope[1] * yz;
-        Some((slope, libm::sqrtf(max_f32(rest, 0.0) / n)))
-    }
 }
