@@ -23,7 +23,7 @@ mod snapshots;
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "stack/painted.rs")]
 mod stack;
 
-use dynvox_clip::{Clip, FrameDigests, replay_with};
+use dynvox_clip::{Bounds, Clip, FrameDigests, replay_with};
 #[cfg(not(feature = "instructions"))]
 use dynvox_core::Serial;
 use dynvox_core::memory::Slab;
@@ -50,7 +50,8 @@ fn run() -> u8 {
     let executor = Serial;
     #[cfg(feature = "instructions")]
     let executor = instructions::Counting::new();
-    let done = replay_with(&clip, (&CAPACITY, &CONFIG), &mut slab.0, &executor, |frame| {
+    let mut bounds = Bounds { capacity: &CAPACITY, config: &CONFIG, slab: &mut slab.0 };
+    let done = replay_with(&clip, &mut bounds, &executor, |frame| {
         let bytes = paint.used_below();
         most = paint.used_in_all().max(most);
         // What the first frame shows is mostly the making of the mapper.
