@@ -49,7 +49,8 @@ pub(super) fn stem(dataset: &dyn FrameSource, index: usize) -> String {
 }
 
 /// The masks of this frame's moving objects that no source of masks gave.
-fn found_by_motion(mapper: &Mapper<'_>, (width, height): (usize, usize)) -> Vec<InstanceMask> {
+fn found_by_motion(mapper: &Mapper<'_>, size: (usize, usize)) -> Vec<InstanceMask> {
+    let (width, height) = size;
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
     let track_at = |u: i32, v: i32| {
         mapper.instance_at(u, v).filter(|at| at.class == Class::MovingObject).map(|at| at.track)

@@ -249,12 +249,8 @@ impl ObjectsObserver {
         if triangles.is_empty() {
             return Ok(());
         }
-        write_files(
-            &folder,
-            (summary.id, name),
-            (&triangles, run.plan.request.exports.axes),
-            &poses,
-        )?;
+        let object = MeshedObject { id: summary.id, name, triangles: &triangles };
+        write_files(&folder, &object, run.plan.request.exports.axes, &poses)?;
         self.unsynced.extend(files(name).map(|file| format!("{OBJECTS_FOLDER}/{file}")));
         self.retired.push(ReconstructedObject {
             id: summary.id,
@@ -296,25 +292,46 @@ fn files(name: &str) -> [String; 4] {
     ]
 }
 
-/// Writes an object's files.
+/// An object as its files show it.
+struct MeshedObject<'a> {
+    id: u32,
+    /// Name of its files.
+    name: &'a str,
+    /// Surface, in the object's own frame.
+    triangles: &'a [Triangle],
+}
+
+/// The frame of reference of a mesh.
+struct MeshFrame<'a> {
+    /// Name, for the file's head.
+    name: &'a str,
+    axes: Axes,
+    /// The object's own frame to this one.
+    t_frame_object: &'a Transform,
+}
+
+/// Writes an object's files; those in the world in the axes given.
 fn write_files(
     folder: &Path,
-    (id, name): (u32, &str),
-    (triangles, axes): (&[Triangle], Axes),
+    object: &MeshedObject<'_>,
+    axes: Axes,
     poses: &[PosedAt],
 ) -> Result<(), ObserveError> {
-    let [mesh, world_mesh, kitti, tum] = files(name).map(|file| folder.join(file));
+    let [mesh, world_mesh, kitti, tum] = files(object.name).map(|file| folder.join(file));
     let failed = |path: &Path| {
         let path = path.to_path_buf();
         move |source| ObserveError::Write { path, source }
     };
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     let last = poses.last().map(|pose| pose.t_world_object).unwrap_or_default();
-    let own_frame = "the object's own frame: the camera's when it was first seen";
-    write_mesh(&mesh, id, (own_frame, Axes::Camera), triangles, &Transform::IDENTITY)
-        .map_err(failed(&mesh))?;
-    write_mesh(&world_mesh, id, ("the first camera", axes), triangles, &last)
-        .map_err(failed(&world_mesh))?;
+    let own = MeshFrame {
+        name: "the object's own frame: the camera's when it was first seen",
+        axes: Axes::Camera,
+        t_frame_object: &Transform::IDENTITY,
+    };
+    let world = MeshFrame { name: "the first camera", axes, t_frame_object: &last };
+    write_mesh(&mesh, object, &own).map_err(failed(&mesh))?;
+    write_mesh(&world_mesh, object, &world).map_err(failed(&world_mesh))?;
     let mut by_frame = Vec::new();
     let numbered: Vec<_> = poses.iter().map(|pose| (pose.frame, pose.t_world_object)).collect();
     write_numbered(&mut by_frame, &numbered)
@@ -325,20 +342,18 @@ fn write_files(
     std::fs::write(&tum, by_time).map_err(failed(&tum))
 }
 
-/// Writes a mesh that a pose carries to the frame of reference of that name.
+/// Writes an object's mesh in a frame of reference.
 fn write_mesh(
     path: &Path,
-    id: u32,
-    (frame, axes): (&str, Axes),
-    triangles: &[Triangle],
-    pose: &Transform,
+    object: &MeshedObject<'_>,
+    frame: &MeshFrame<'_>,
 ) -> std::io::Result<Mesh> {
     let moved = |position_m: [f32; 3]| {
-        pose.transform_point(position_m.map(f64::from)).map(|metres| metres as f32)
+        frame.t_frame_object.transform_point(position_m.map(f64::from)).map(|metres| metres as f32)
     };
-    let mut ply = PlyWriter::begin_in(path, frame, axes)?;
-    ply.begin_object(id);
-    for Triangle { vertices } in triangles {
+    let mut ply = PlyWriter::begin_in(path, frame.name, frame.axes)?;
+    ply.begin_object(object.id);
+    for Triangle { vertices } in object.triangles {
         ply.triangle(
             vertices.map(|vertex| Vertex { position_m: moved(vertex.position_m), ..vertex }),
         );

@@ -4,8 +4,10 @@ mod sums;
 
 use super::tables::track_rows;
 use super::{Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
-use crate::evaluate::masks::{MovingErrors, MovingFigures, Overlaps};
-use crate::evaluate::objects::{ObjectErrors, ObjectFigures, TrackComparison, TrackErrors};
+use crate::evaluate::masks::{ComparedMasks, MovingErrors, MovingFigures, Overlaps};
+use crate::evaluate::objects::{
+    ObjectErrors, ObjectFigures, TrackComparison, TrackErrors, TrackedFrame,
+};
 use crate::formats::{Image, TRACKS_FILE};
 use dynvox_core::Mapper;
 use dynvox_core::masks::PixelBox;
@@ -162,22 +164,22 @@ impl Observer for TracksObserver {
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
             let size = run.plan.dataset.size();
-            let large_enough = |pixels: &PixelBox| {
-                run.plan.config.tracking.is_reconstructable(pixels.area(), size.0)
-            };
-            self.errors.add(&tracks, &frame.row.report.t_world_camera, truth, size, large_enough);
+            let large_enough =
+                |pixels: &PixelBox| run.plan.config.tracking.is_reconstructable(pixels.area(), size.0);
+            let t_world_camera = &frame.row.report.t_world_camera;
+            let compared = TrackedFrame { tracks: &tracks, t_world_camera, truth, size };
+            self.errors.add(&compared, large_enough);
             self.compared_frames.push(frame.row.frame);
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
                 let large_enough =
                     |pixels: u64| run.plan.config.tracking.is_trackable(pixels as i64, size.0);
-                self.masks.add(
-                    &overlaps,
-                    &truth.objects,
-                    &truth.t_world_camera,
-                    large_enough,
-                    |label| by_motion.contains(&label),
-                );
+                let compared = ComparedMasks {
+                    overlaps: &overlaps,
+                    objects: &truth.objects,
+                    t_world_camera: &truth.t_world_camera,
+                };
+                self.masks.add(&compared, large_enough, |label| by_motion.contains(&label));
             }
         }
         let rows: Vec<TrackRow> = tracks.iter().map(TrackRow::from).collect();

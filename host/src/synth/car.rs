@@ -2,7 +2,7 @@
 //! right, y down from the road, z forward; the origin is the middle of its footprint.
 
 use super::config::CarKind;
-use super::mesh::{Mesh, Point, Triangle, Vertex};
+use super::mesh::{BarEnd, Mesh, Point, Triangle, Vertex};
 use super::surface::{Kind, Surface, tone};
 
 /// Cross-section: position along the car, height of the roof or bonnet, of the belt line, half
@@ -111,89 +111,70 @@ fn sections(kind: CarKind) -> &'static [Section] {
     }
 }
 
+const HATCHBACK_SHAPE: Shape = Shape {
+    half_m: [1.98, 0.87],
+    axles_m: [1.27, -1.22],
+    wheel_m: 0.30,
+    side_glass_m: [0.80, -1.52, 0.12, -1.22],
+    side_height_m: [0.98, 1.36],
+    pillars_m: [-0.36, -1.05],
+    windscreen_m: [1.04, 1.38, 0.66, 0.52],
+    rear_glass_m: [1.08, 1.38, 0.60, 0.48],
+    lamps_m: [0.68, 0.90],
+};
+const SALOON_SHAPE: Shape = Shape {
+    half_m: [2.28, 0.91],
+    axles_m: [1.38, -1.36],
+    wheel_m: 0.32,
+    side_glass_m: [0.82, -1.46, 0.14, -0.98],
+    side_height_m: [0.95, 1.31],
+    pillars_m: [-0.34, -1.22],
+    windscreen_m: [1.00, 1.33, 0.68, 0.53],
+    rear_glass_m: [1.08, 1.34, 0.62, 0.50],
+    lamps_m: [0.66, 0.82],
+};
+const ESTATE_SHAPE: Shape = Shape {
+    half_m: [2.32, 0.91],
+    axles_m: [1.40, -1.36],
+    wheel_m: 0.32,
+    side_glass_m: [0.84, -1.98, 0.16, -1.74],
+    side_height_m: [0.97, 1.36],
+    pillars_m: [-0.34, -1.16],
+    windscreen_m: [1.02, 1.37, 0.68, 0.54],
+    rear_glass_m: [1.06, 1.34, 0.58, 0.50],
+    lamps_m: [0.67, 0.86],
+};
+const OFFROAD_SHAPE: Shape = Shape {
+    half_m: [2.20, 0.94],
+    axles_m: [1.36, -1.32],
+    wheel_m: 0.37,
+    side_glass_m: [0.88, -1.90, 0.26, -1.72],
+    side_height_m: [1.12, 1.56],
+    pillars_m: [-0.32, -1.16],
+    windscreen_m: [1.16, 1.57, 0.72, 0.60],
+    rear_glass_m: [1.18, 1.52, 0.62, 0.56],
+    lamps_m: [0.84, 0.98],
+};
+const VAN_SHAPE: Shape = Shape {
+    half_m: [2.55, 0.98],
+    axles_m: [1.72, -1.60],
+    wheel_m: 0.34,
+    side_glass_m: [1.62, 0.52, 1.12, 0.52],
+    side_height_m: [1.24, 1.78],
+    pillars_m: [9.0, 9.0],
+    windscreen_m: [1.30, 1.94, 0.76, 0.72],
+    rear_glass_m: [1.30, 1.80, 0.68, 0.66],
+    lamps_m: [0.90, 1.00],
+};
+
 /// The painter's figures of a body.
 pub fn shape(kind: CarKind) -> Shape {
-    let s = |side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m| {
-        (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m)
-    };
-    let (half_m, axles_m, wheel_m, lamps_m, glass) = match kind {
-        CarKind::Hatchback => (
-            [1.98, 0.87],
-            [1.27, -1.22],
-            0.30,
-            [0.68, 0.90],
-            s(
-                [0.80, -1.52, 0.12, -1.22],
-                [0.98, 1.36],
-                [-0.36, -1.05],
-                [1.04, 1.38, 0.66, 0.52],
-                [1.08, 1.38, 0.60, 0.48],
-            ),
-        ),
-        CarKind::Saloon => (
-            [2.28, 0.91],
-            [1.38, -1.36],
-            0.32,
-            [0.66, 0.82],
-            s(
-                [0.82, -1.46, 0.14, -0.98],
-                [0.95, 1.31],
-                [-0.34, -1.22],
-                [1.00, 1.33, 0.68, 0.53],
-                [1.08, 1.34, 0.62, 0.50],
-            ),
-        ),
-        CarKind::Estate => (
-            [2.32, 0.91],
-            [1.40, -1.36],
-            0.32,
-            [0.67, 0.86],
-            s(
-                [0.84, -1.98, 0.16, -1.74],
-                [0.97, 1.36],
-                [-0.34, -1.16],
-                [1.02, 1.37, 0.68, 0.54],
-                [1.06, 1.34, 0.58, 0.50],
-            ),
-        ),
-        CarKind::Offroad => (
-            [2.20, 0.94],
-            [1.36, -1.32],
-            0.37,
-            [0.84, 0.98],
-            s(
-                [0.88, -1.90, 0.26, -1.72],
-                [1.12, 1.56],
-                [-0.32, -1.16],
-                [1.16, 1.57, 0.72, 0.60],
-                [1.18, 1.52, 0.62, 0.56],
-            ),
-        ),
-        CarKind::Van => (
-            [2.55, 0.98],
-            [1.72, -1.60],
-            0.34,
-            [0.90, 1.00],
-            s(
-                [1.62, 0.52, 1.12, 0.52],
-                [1.24, 1.78],
-                [9.0, 9.0],
-                [1.30, 1.94, 0.76, 0.72],
-                [1.30, 1.80, 0.68, 0.66],
-            ),
-        ),
-    };
-    let (side_glass_m, side_height_m, pillars_m, windscreen_m, rear_glass_m) = glass;
-    Shape {
-        half_m,
-        axles_m,
-        wheel_m,
-        side_glass_m,
-        side_height_m,
-        pillars_m,
-        windscreen_m,
-        rear_glass_m,
-        lamps_m,
+    match kind {
+        CarKind::Hatchback => HATCHBACK_SHAPE,
+        CarKind::Saloon => SALOON_SHAPE,
+        CarKind::Estate => ESTATE_SHAPE,
+        CarKind::Offroad => OFFROAD_SHAPE,
+        CarKind::Van => VAN_SHAPE,
     }
 }
 
@@ -230,7 +211,7 @@ pub fn body(kind: CarKind) -> Mesh {
         for side in [-1.0, 1.0] {
             let outer = Point::new(side * (half_width + 0.012), -radius, f64::from(axle));
             let inner = Point::new(side * (half_width - 0.2), -radius, f64::from(axle));
-            mesh.bar(tyre, (inner, radius), (outer, radius), 18);
+            mesh.bar(tyre, BarEnd::new(inner, radius), BarEnd::new(outer, radius), 18);
             disc(&mut mesh, rim, outer, side, radius);
         }
     }

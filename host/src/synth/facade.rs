@@ -1,7 +1,14 @@
 //! Houses. In a house's frame x runs along the street front from its left corner, y down from the
 //! pavement, z towards the street.
 
-use super::mesh::{Mesh, Point};
+mod balcony;
+mod ground_floor;
+mod roof;
+
+use ground_floor::{home_floor, shop_floor};
+use roof::roof;
+
+use super::mesh::{BarEnd, Mesh, Parallelogram, Point};
 use super::random::Rng;
 use super::surface::{Kind, Surface, Tone, scaled, tone};
 
@@ -31,7 +38,8 @@ const ROOFS: [(u8, u8, u8); 4] = [(136, 72, 54), (112, 66, 56), (84, 84, 90), (1
 const BOARDS: [(u8, u8, u8); 6] =
     [(170, 40, 36), (36, 84, 60), (40, 56, 104), (224, 196, 90), (60, 56, 54), (212, 208, 200)];
 
-fn of((red, green, blue): (u8, u8, u8)) -> Tone {
+fn of(rgb: (u8, u8, u8)) -> Tone {
+    let (red, green, blue) = rgb;
     tone(red, green, blue)
 }
 
@@ -43,6 +51,24 @@ struct Opening {
     top: f64,
     bottom: f64,
     pane: u16,
+}
+
+/// Heights of a storey, top and bottom, in the house's frame, m.
+#[derive(Clone, Copy)]
+struct Storey {
+    top: f64,
+    bottom: f64,
+}
+
+/// Windows of the upper storeys.
+struct Windows {
+    /// Number in a storey.
+    columns: usize,
+    width: f64,
+    height: f64,
+    frame: Tone,
+    /// Bits that say which have a balcony.
+    balconies: u32,
 }
 
 /// What the parts of one house share.
@@ -60,6 +86,42 @@ struct House {
 /// Builds a house `width` m wide with its front in the plane z = 0.
 pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
     let seed = rng.seed();
+    let (house, shop) = materials(mesh, rng, width, seed);
+    let floors = [2, 3, 3, 4, 4, 5][rng.below(6)];
+    let ground_height = rng.between(3.3, 3.9);
+    let floor_height = rng.between(2.9, 3.3);
+    let frame_tone = of(rng.pick(&FRAMES));
+    if shop {
+        shop_floor(mesh, rng, &house, ground_height, frame_tone);
+    } else {
+        home_floor(mesh, rng, &house, ground_height, frame_tone);
+    }
+    let mut roofline = -ground_height;
+    let mut windows = Windows {
+        width: rng.between(0.95, 1.4),
+        height: rng.between(1.45, 1.9),
+        columns: libm::floor(width / rng.between(2.3, 3.1)).max(1.0) as usize,
+        frame: frame_tone,
+        balconies: 0,
+    };
+    let balcony_mask = if rng.chance(0.45) { rng.seed() } else { 0 };
+    let cornices = rng.chance(0.5);
+    for floor in 1..floors {
+        let bottom = roofline;
+        roofline -= floor_height;
+        windows.balconies = balcony_mask >> (floor % 2);
+        upper_floor(mesh, rng, &house, Storey { top: roofline, bottom }, &windows);
+        if cornices || floor == 1 {
+            ledge(mesh, &house, bottom, 0.07, 0.16);
+        }
+    }
+    side_and_back_walls(mesh, &house, roofline);
+    roof(mesh, rng, &house, roofline, frame_tone);
+    rain_pipe(mesh, rng, width, roofline, seed ^ 3);
+}
+
+/// Draws a house's measures and what covers it, and whether a shop is in it.
+fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, bool) {
     let style = rng.unit();
     let wall_tone = of(rng.pick(&WALLS));
     let brick_tone = of(rng.pick(&BRICKS));
@@ -90,38 +152,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
         shutters: shuttered
             .then(|| mesh.surface(Surface::new(Kind::Fence, shutter_tone, seed ^ 2))),
     };
-    let floors = [2, 3, 3, 4, 4, 5][rng.below(6)];
-    let ground_height = rng.between(3.3, 3.9);
-    let floor_height = rng.between(2.9, 3.3);
-    let frame_tone = of(rng.pick(&FRAMES));
-    if shop {
-        shop_floor(mesh, rng, &house, ground_height, frame_tone);
-    } else {
-        home_floor(mesh, rng, &house, ground_height, frame_tone);
-    }
-    let mut roofline = -ground_height;
-    let window = (rng.between(0.95, 1.4), rng.between(1.45, 1.9));
-    let columns = libm::floor(width / rng.between(2.3, 3.1)).max(1.0) as usize;
-    let balcony_mask = if rng.chance(0.45) { rng.seed() } else { 0 };
-    let cornices = rng.chance(0.5);
-    for floor in 1..floors {
-        let bottom = roofline;
-        roofline -= floor_height;
-        upper_floor(
-            mesh,
-            rng,
-            &house,
-            (roofline, bottom),
-            (columns, window, frame_tone),
-            balcony_mask >> (floor % 2),
-        );
-        if cornices || floor == 1 {
-            ledge(mesh, &house, bottom, 0.07, 0.16);
-        }
-    }
-    side_and_back_walls(mesh, &house, roofline);
-    roof(mesh, rng, &house, roofline, frame_tone);
-    rain_pipe(mesh, rng, width, roofline, seed ^ 3);
+    (house, shop)
 }
 
 fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
@@ -131,9 +162,11 @@ fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
         mesh.sheet(
             house.wall,
             outward,
-            Point::new(x, roofline, 0.0),
-            Point::new(0.0, 0.0, -house.depth),
-            down,
+            Parallelogram::new(
+                Point::new(x, roofline, 0.0),
+                Point::new(0.0, 0.0, -house.depth),
+                down,
+            ),
             [0.0, roofline, 0.0],
         );
     }
@@ -141,9 +174,11 @@ fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
     mesh.sheet(
         house.wall,
         -Point::z(),
-        back,
-        Point::new(house.width, 0.0, 0.0),
-        Point::new(0.0, -roofline, 0.0),
+        Parallelogram::new(
+            back,
+            Point::new(house.width, 0.0, 0.0),
+            Point::new(0.0, -roofline, 0.0),
+        ),
         [0.0, roofline, 0.0],
     );
 }
@@ -156,7 +191,12 @@ fn rain_pipe(mesh: &mut Mesh, rng: &mut Rng, width: f64, roofline: f64, seed: u3
     ));
     let x = if rng.chance(0.5) { 0.18 } else { width - 0.18 };
     mesh.slight = true;
-    mesh.bar(pipe, (Point::new(x, roofline, 0.09), 0.05), (Point::new(x, -0.05, 0.09), 0.05), 6);
+    mesh.bar(
+        pipe,
+        BarEnd::new(Point::new(x, roofline, 0.09), 0.05),
+        BarEnd::new(Point::new(x, -0.05, 0.09), 0.05),
+        6,
+    );
     mesh.slight = false;
 }
 
@@ -165,13 +205,18 @@ fn floor_front(
     mesh: &mut Mesh,
     house: &House,
     wall: u16,
-    (top, bottom): (f64, f64),
+    Storey { top, bottom }: Storey,
     openings: &[Opening],
 ) {
     let mut panel = |left: f64, right: f64, top: f64, bottom: f64| {
         if right - left > 1e-6 && bottom - top > 1e-6 {
             let (u, v) = (Point::new(right - left, 0.0, 0.0), Point::new(0.0, bottom - top, 0.0));
-            mesh.sheet(wall, Point::z(), Point::new(left, top, 0.0), u, v, [left, top, 0.0]);
+            mesh.sheet(
+                wall,
+                Point::z(),
+                Parallelogram::new(Point::new(left, top, 0.0), u, v),
+                [left, top, 0.0],
+            );
         }
     };
     let mut left = 0.0;
@@ -192,18 +237,36 @@ fn recess(mesh: &mut Mesh, house: &House, wall: u16, opening: &Opening) {
     let (width, height, inward) =
         (right - left, bottom - top, Point::new(0.0, 0.0, -house.reveal_m));
     let (across, down) = (Point::new(width, 0.0, 0.0), Point::new(0.0, height, 0.0));
-    mesh.sheet(wall, Point::x(), Point::new(left, top, 0.0), inward, down, [left, top, 0.0]);
-    mesh.sheet(wall, -Point::x(), Point::new(right, top, 0.0), inward, down, [right, top, 0.0]);
-    mesh.sheet(wall, Point::y(), Point::new(left, top, 0.0), across, inward, [left, top, 0.0]);
+    mesh.sheet(
+        wall,
+        Point::x(),
+        Parallelogram::new(Point::new(left, top, 0.0), inward, down),
+        [left, top, 0.0],
+    );
+    mesh.sheet(
+        wall,
+        -Point::x(),
+        Parallelogram::new(Point::new(right, top, 0.0), inward, down),
+        [right, top, 0.0],
+    );
+    mesh.sheet(
+        wall,
+        Point::y(),
+        Parallelogram::new(Point::new(left, top, 0.0), across, inward),
+        [left, top, 0.0],
+    );
     mesh.sheet(
         house.trim,
         -Point::y(),
-        Point::new(left, bottom, 0.0),
-        across,
-        inward,
+        Parallelogram::new(Point::new(left, bottom, 0.0), across, inward),
         [left, bottom, 0.0],
     );
-    mesh.sheet(pane, Point::z(), Point::new(left, top, -house.reveal_m), across, down, [0.0; 3]);
+    mesh.sheet(
+        pane,
+        Point::z(),
+        Parallelogram::new(Point::new(left, top, -house.reveal_m), across, down),
+        [0.0; 3],
+    );
 }
 
 fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
@@ -240,14 +303,9 @@ fn window(mesh: &mut Mesh, rng: &mut Rng, frame: Tone, width: f64, height: f64) 
     )
 }
 
-fn upper_floor(
-    mesh: &mut Mesh,
-    rng: &mut Rng,
-    house: &House,
-    (top, bottom): (f64, f64),
-    (columns, (width, height), frame): (usize, (f64, f64), Tone),
-    balconies: u32,
-) {
+fn upper_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, storey: Storey, windows: &Windows) {
+    let Storey { top, bottom } = storey;
+    let &Windows { columns, width, height, frame, balconies } = windows;
     let spacing = house.width / columns as f64;
     let width = width.min(spacing - 0.6);
     let mut openings = Vec::new();
@@ -266,77 +324,12 @@ fn upper_floor(
         };
         openings.push(opening);
         if balcony {
-            self::balcony(mesh, rng, house, middle, bottom);
+            balcony::balcony(mesh, rng, house, middle, bottom);
         } else {
             sill_and_surround(mesh, house, &opening);
         }
     }
-    floor_front(mesh, house, house.wall, (top, bottom), &openings);
-}
-
-fn balcony(mesh: &mut Mesh, rng: &mut Rng, house: &House, middle: f64, floor: f64) {
-    let (half, out) = (1.05, 1.0);
-    let slab = (
-        Point::new(middle - half, floor - 0.12, 0.0),
-        Point::new(middle + half, floor + 0.06, out),
-    );
-    mesh.cuboid(house.trim, slab.0, slab.1, &[4]);
-    let rail = mesh.surface(Surface::new(
-        Kind::Plain,
-        scaled(tone(70, 72, 76), rng.between(0.5, 1.5)),
-        rng.seed(),
-    ));
-    let top = floor - 1.1;
-    if rng.chance(0.35) {
-        let edges = [
-            (
-                Point::new(middle - half, top, out - 0.05),
-                Point::new(middle + half, floor - 0.12, out),
-            ),
-            (
-                Point::new(middle - half, top, 0.0),
-                Point::new(middle - half + 0.05, floor - 0.12, out - 0.05),
-            ),
-            (
-                Point::new(middle + half - 0.05, top, 0.0),
-                Point::new(middle + half, floor - 0.12, out - 0.05),
-            ),
-        ];
-        for (low, high) in edges {
-            mesh.cuboid(house.wall, low, high, &[]);
-        }
-        return;
-    }
-    mesh.slight = true;
-    let bars = 11;
-    for k in 0..=bars {
-        let x = middle - half + 0.03 + (2.0 * half - 0.06) * f64::from(k) / f64::from(bars);
-        mesh.cuboid(
-            rail,
-            Point::new(x - 0.012, top, out - 0.04),
-            Point::new(x + 0.012, floor - 0.12, out - 0.016),
-            &[2, 3, 4],
-        );
-    }
-    for x in [middle - half, middle + half - 0.04] {
-        for k in 0..5 {
-            let z = 0.1 + 0.2 * f64::from(k);
-            mesh.cuboid(
-                rail,
-                Point::new(x, top, z),
-                Point::new(x + 0.024, floor - 0.12, z + 0.024),
-                &[2, 3],
-            );
-        }
-        mesh.cuboid(rail, Point::new(x, top - 0.05, 0.0), Point::new(x + 0.05, top, out), &[]);
-    }
-    mesh.cuboid(
-        rail,
-        Point::new(middle - half, top - 0.05, out - 0.06),
-        Point::new(middle + half, top, out),
-        &[],
-    );
-    mesh.slight = false;
+    floor_front(mesh, house, house.wall, storey, &openings);
 }
 
 /// A band of trim over the whole front.
@@ -347,219 +340,4 @@ fn ledge(mesh: &mut Mesh, house: &House, y: f64, out: f64, height: f64) {
         Point::new(house.width, y + 0.5 * height, out),
         &[4],
     );
-}
-
-fn home_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, frame: Tone) {
-    let columns = libm::floor(house.width / rng.between(2.4, 3.0)).max(1.0) as usize;
-    let spacing = house.width / columns as f64;
-    let door_at = rng.below(columns);
-    let (width, window_height) =
-        ((spacing - 0.9).min(rng.between(1.0, 1.5)).max(0.7), rng.between(1.4, 1.7));
-    let mut openings = Vec::new();
-    for column in 0..columns {
-        let middle = (column as f64 + 0.5) * spacing;
-        if column == door_at {
-            let (half, head) = (0.55, -2.45);
-            let door = Surface::new(Kind::Door, of(rng.pick(&DOORS)), rng.seed())
-                .with(frame)
-                .sized(2.0 * half, 2.35);
-            let pane = mesh.surface(door);
-            openings.push(Opening {
-                left: middle - half,
-                right: middle + half,
-                top: head,
-                bottom: -0.1,
-                pane,
-            });
-            let step = mesh.surface(Surface::new(Kind::Plain, tone(140, 138, 132), rng.seed()));
-            mesh.cuboid(
-                step,
-                Point::new(middle - 0.8, -0.1, 0.0),
-                Point::new(middle + 0.8, 0.1, 0.35),
-                &[4],
-            );
-            if rng.chance(0.5) {
-                mesh.cuboid(
-                    house.trim,
-                    Point::new(middle - 0.85, -2.75, 0.0),
-                    Point::new(middle + 0.85, -2.62, 0.7),
-                    &[4],
-                );
-            }
-        } else {
-            let pane = window(mesh, rng, frame, width, window_height);
-            let (left, right) = (middle - 0.5 * width, middle + 0.5 * width);
-            let opening = Opening { left, right, top: -1.0 - window_height, bottom: -1.0, pane };
-            sill_and_surround(mesh, house, &opening);
-            openings.push(opening);
-        }
-    }
-    floor_front(mesh, house, house.wall, (-height, 0.1), &openings);
-    // The plinth stands out a little; it is cut at the door.
-    let door = openings[door_at];
-    for (left, right) in [(0.0, door.left - 0.12), (door.right + 0.12, house.width)] {
-        if right - left > 0.1 {
-            mesh.cuboid(
-                house.base,
-                Point::new(left, -0.6, 0.0),
-                Point::new(right, 0.1, 0.05),
-                &[4, 3],
-            );
-        }
-    }
-}
-
-fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, frame: Tone) {
-    let bays = libm::floor(house.width / 3.6).max(1.0) as usize;
-    let spacing = house.width / bays as f64;
-    let door_at = rng.below(bays);
-    let head = -(height - 0.95);
-    let mut openings = Vec::new();
-    for bay in 0..bays {
-        let (left, right) = (bay as f64 * spacing + 0.3, (bay + 1) as f64 * spacing - 0.3);
-        let shop = Surface::new(Kind::Shop, tone(44, 44, 44), rng.seed()).with(frame);
-        if bay == door_at {
-            let split = right - 1.1;
-            let pane = mesh.surface(shop.sized(split - left - 0.1, -0.5 - head));
-            openings.push(Opening { left, right: split - 0.1, top: head, bottom: -0.5, pane });
-            let pane = mesh
-                .surface(Surface { seed: rng.seed(), ..shop }.sized(right - split, -0.06 - head));
-            openings.push(Opening { left: split, right, top: head, bottom: -0.06, pane });
-        } else {
-            let pane = mesh.surface(shop.sized(right - left, -0.5 - head));
-            openings.push(Opening { left, right, top: head, bottom: -0.5, pane });
-        }
-    }
-    floor_front(mesh, house, house.base, (-height, 0.1), &openings);
-    let letters = if rng.chance(0.6) { tone(238, 234, 220) } else { tone(236, 200, 84) };
-    let sign = Surface::new(Kind::Board, of(rng.pick(&BOARDS)), rng.seed()).with(letters);
-    let board = mesh.surface(sign.sized(house.width - 0.6, 0.62));
-    let (low, high) =
-        (Point::new(0.3, -height + 0.14, 0.0), Point::new(house.width - 0.3, -height + 0.76, 0.12));
-    mesh.cuboid(house.trim, low, high, &[4, 5]);
-    let (across, down) = (Point::new(high.x - low.x, 0.0, 0.0), Point::new(0.0, 0.62, 0.0));
-    mesh.sheet(board, Point::z(), Point::new(low.x, low.y, 0.12), across, down, [0.0; 3]);
-    if rng.chance(0.5) {
-        awning(mesh, rng, house, head - 0.02);
-    }
-}
-
-fn awning(mesh: &mut Mesh, rng: &mut Rng, house: &House, y: f64) {
-    let mut cloth =
-        Surface::new(Kind::Fence, of(rng.pick(&BOARDS)), rng.seed()).with(tone(230, 226, 216));
-    cloth.two_sided = true;
-    let cloth = mesh.surface(cloth);
-    let (origin, across) = (Point::new(0.4, y, 0.02), Point::new(house.width - 0.8, 0.0, 0.0));
-    mesh.sheet(
-        cloth,
-        Point::new(0.0, -1.0, 1.0),
-        origin,
-        across,
-        Point::new(0.0, 0.5, 1.15),
-        [0.0; 3],
-    );
-    mesh.sheet(
-        cloth,
-        Point::z(),
-        origin + Point::new(0.0, 0.5, 1.15),
-        across,
-        Point::new(0.0, 0.2, 0.0),
-        [0.0; 3],
-    );
-}
-
-fn roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64, frame: Tone) {
-    ledge(mesh, house, top + 0.12, 0.18, 0.3);
-    let (width, depth) = (house.width, house.depth);
-    if rng.chance(0.3) {
-        let parapet = rng.between(0.4, 0.9);
-        mesh.cuboid(
-            house.wall,
-            Point::new(0.0, top - parapet, -0.25),
-            Point::new(width, top, 0.0),
-            &[3],
-        );
-        mesh.cuboid(
-            house.trim,
-            Point::new(0.0, top - parapet - 0.1, -0.3),
-            Point::new(width, top - parapet, 0.06),
-            &[],
-        );
-        let deck = mesh.surface(Surface::new(Kind::Plain, tone(90, 90, 90), rng.seed()));
-        mesh.sheet(
-            deck,
-            -Point::y(),
-            Point::new(0.0, top, 0.0),
-            Point::new(width, 0.0, 0.0),
-            Point::new(0.0, 0.0, -depth),
-            [0.0; 3],
-        );
-        return;
-    }
-    let tiles = mesh.surface(Surface::new(
-        Kind::Tiles,
-        scaled(of(rng.pick(&ROOFS)), rng.between(0.7, 1.2)),
-        rng.seed(),
-    ));
-    let rise = 0.5 * depth * rng.between(0.6, 0.95);
-    let over = 0.45;
-    let slope = rise / (0.5 * depth);
-    let eave = Point::new(0.0, top + over * slope, over);
-    let up = Point::new(0.0, -rise - over * slope, -0.5 * depth - over);
-    mesh.sheet(tiles, Point::new(0.0, -1.0, 0.5), eave, Point::new(width, 0.0, 0.0), up, [0.0; 3]);
-    let eave_back = Point::new(0.0, top, -depth);
-    let up_back = Point::new(0.0, -rise, 0.5 * depth);
-    mesh.sheet(
-        tiles,
-        Point::new(0.0, -1.0, -0.5),
-        eave_back,
-        Point::new(width, 0.0, 0.0),
-        up_back,
-        [0.0; 3],
-    );
-    let (low, high) = (eave + Point::new(0.0, 0.0, -0.08), eave + Point::new(width, 0.1, 0.04));
-    mesh.cuboid(house.trim, low, high, &[]);
-    for x in [0.0, width] {
-        let corner = |y: f64, z: f64| (Point::new(x, y, z), [z as f32, y as f32, 0.0]);
-        let gable = [corner(top, 0.0), corner(top, -depth), corner(top - rise, -0.5 * depth)];
-        mesh.polygon(house.wall, Point::new(x - 0.5 * width, 0.0, 0.0), &gable);
-    }
-    if rng.chance(0.7) {
-        let x = rng.between(0.5, width - 1.3);
-        let brick = mesh.surface(
-            Surface::new(Kind::Brick, tone(134, 84, 70), rng.seed()).with(tone(150, 146, 138)),
-        );
-        let (low, high) = (
-            Point::new(x, top - rise - 1.0, -0.5 * depth - 0.3),
-            Point::new(x + 0.8, top - rise + 0.8, -0.5 * depth + 0.3),
-        );
-        mesh.cuboid(brick, low, high, &[3]);
-    }
-    let dormers = if rng.chance(0.5) { libm::floor(width / 4.5) as usize } else { 0 };
-    for k in 0..dormers {
-        let middle = (k as f64 + 0.5) * width / dormers as f64;
-        let (front, base) = (-0.5, top - 0.5 * slope);
-        let head = base - 1.5;
-        let pane = window(mesh, rng, frame, 0.9, 1.1);
-        let (low, high) = (
-            Point::new(middle - 0.65, head, front - 2.2),
-            Point::new(middle + 0.65, base + 0.1, front),
-        );
-        mesh.cuboid(house.wall, low, high, &[3, 4]);
-        let (across, down) = (Point::new(0.9, 0.0, 0.0), Point::new(0.0, 1.1, 0.0));
-        mesh.sheet(
-            pane,
-            Point::z(),
-            Point::new(middle - 0.45, head + 0.2, front + 0.02),
-            across,
-            down,
-            [0.0; 3],
-        );
-        mesh.cuboid(
-            tiles,
-            low + Point::new(-0.12, -0.15, 0.0),
-            Point::new(middle + 0.77, head, front + 0.2),
-            &[],
-        );
-    }
 }

@@ -1,7 +1,7 @@
 //! Trees, hedges, lamps, signs and what else stands on pavements. Each is built around its foot at
 //! the origin, y down.
 
-use super::mesh::{Mesh, Point};
+use super::mesh::{BarEnd, Mesh, Parallelogram, Point};
 use super::random::Rng;
 use super::surface::{Kind, Surface, scaled, tone};
 
@@ -29,7 +29,7 @@ pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
     let lean = Point::new(rng.between(-0.2, 0.2), 0.0, rng.between(-0.2, 0.2));
     let fork = lean - Point::y() * (0.42 * height);
     let radius = rng.between(0.09, 0.17);
-    mesh.bar(bark, (Point::zeros(), 1.25 * radius), (fork, radius), 9);
+    mesh.bar(bark, BarEnd::new(Point::zeros(), 1.25 * radius), BarEnd::new(fork, radius), 9);
     let (red, green, blue) = rng.pick(&GREENS);
     let green = scaled(tone(red, green, blue), rng.between(0.75, 1.15));
     let leaves: Vec<u16> = (0..4)
@@ -44,10 +44,18 @@ pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
         let toward = direction(rng);
         let blob = middle
             + Point::new(toward.x * 0.55 * crown, toward.y * 0.5 * crown, toward.z * 0.55 * crown);
-        mesh.bar(bark, (fork, 0.5 * radius), (blob, 0.15 * radius), 5);
+        mesh.bar(bark, BarEnd::new(fork, 0.5 * radius), BarEnd::new(blob, 0.15 * radius), 5);
         let radius = crown * rng.between(0.45, 0.65);
-        crown_part(mesh, rng, &leaves, (blob, middle), radius);
+        crown_part(mesh, rng, &leaves, &Bough { center: blob, crown: middle, radius_m: radius });
     }
+}
+
+/// A ragged ball of leaves, m.
+struct Bough {
+    center: Point,
+    /// Middle of the whole crown.
+    crown: Point,
+    radius_m: f64,
 }
 
 /// One bough: leaf sheets on a ragged ball. Their normals lean outwards, so that the crown is lit
@@ -56,8 +64,7 @@ fn crown_part(
     mesh: &mut Mesh,
     rng: &mut Rng,
     leaves: &[u16],
-    (blob, middle): (Point, Point),
-    radius: f64,
+    &Bough { center: blob, crown: middle, radius_m: radius }: &Bough,
 ) {
     for _ in 0..44 {
         let out = direction(rng);
@@ -133,9 +140,7 @@ pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
         mesh.sheet(
             leaves,
             Point::new(0.0, 0.0, out),
-            Point::new(-0.35, -height, z),
-            u,
-            v,
+            Parallelogram::new(Point::new(-0.35, -height, z), u, v),
             [0.0; 3],
         );
     }
@@ -150,12 +155,17 @@ pub fn lamp(mesh: &mut Mesh, rng: &mut Rng) {
     ));
     let glass = mesh.surface(Surface::new(Kind::Plain, tone(220, 216, 200), rng.seed()));
     let top = Point::new(0.0, -6.4, 0.0);
-    mesh.bar(metal, (Point::zeros(), 0.11), (Point::new(0.0, -1.1, 0.0), 0.10), 10);
-    mesh.bar(metal, (Point::new(0.0, -1.1, 0.0), 0.075), (top, 0.05), 10);
+    mesh.bar(
+        metal,
+        BarEnd::new(Point::zeros(), 0.11),
+        BarEnd::new(Point::new(0.0, -1.1, 0.0), 0.10),
+        10,
+    );
+    mesh.bar(metal, BarEnd::new(Point::new(0.0, -1.1, 0.0), 0.075), BarEnd::new(top, 0.05), 10);
     let bend = Point::new(-0.5, -6.9, 0.0);
     let end = Point::new(-1.5, -7.0, 0.0);
-    mesh.bar(metal, (top, 0.05), (bend, 0.045), 8);
-    mesh.bar(metal, (bend, 0.045), (end, 0.04), 8);
+    mesh.bar(metal, BarEnd::new(top, 0.05), BarEnd::new(bend, 0.045), 8);
+    mesh.bar(metal, BarEnd::new(bend, 0.045), BarEnd::new(end, 0.04), 8);
     mesh.cuboid(
         metal,
         end + Point::new(-0.55, -0.09, -0.13),
@@ -171,7 +181,12 @@ pub fn sign(mesh: &mut Mesh, rng: &mut Rng) {
     let variant = rng.below(SIGNS as usize) as u32;
     let back = mesh.surface(Surface::new(Kind::Plain, tone(128, 130, 132), rng.seed()));
     let height = rng.between(2.2, 2.6);
-    mesh.bar(metal, (Point::zeros(), 0.034), (Point::new(0.0, -height - 0.3, 0.0), 0.034), 8);
+    mesh.bar(
+        metal,
+        BarEnd::new(Point::zeros(), 0.034),
+        BarEnd::new(Point::new(0.0, -height - 0.3, 0.0), 0.034),
+        8,
+    );
     let radius = 0.36;
     let face = mesh.surface(Surface::new(Kind::Sign, tone(255, 255, 255), variant));
     // Round, triangular, square: the face's corners follow what is painted on it.
@@ -199,9 +214,24 @@ pub fn sign(mesh: &mut Mesh, rng: &mut Rng) {
 pub fn bollard(mesh: &mut Mesh, rng: &mut Rng) {
     let dark = mesh.surface(Surface::new(Kind::Plain, tone(62, 64, 66), rng.seed()));
     let white = mesh.surface(Surface::new(Kind::Plain, tone(224, 224, 220), rng.seed()));
-    mesh.bar(dark, (Point::zeros(), 0.07), (Point::new(0.0, -0.62, 0.0), 0.06), 10);
-    mesh.bar(white, (Point::new(0.0, -0.62, 0.0), 0.062), (Point::new(0.0, -0.76, 0.0), 0.062), 10);
-    mesh.bar(dark, (Point::new(0.0, -0.76, 0.0), 0.06), (Point::new(0.0, -0.88, 0.0), 0.045), 10);
+    mesh.bar(
+        dark,
+        BarEnd::new(Point::zeros(), 0.07),
+        BarEnd::new(Point::new(0.0, -0.62, 0.0), 0.06),
+        10,
+    );
+    mesh.bar(
+        white,
+        BarEnd::new(Point::new(0.0, -0.62, 0.0), 0.062),
+        BarEnd::new(Point::new(0.0, -0.76, 0.0), 0.062),
+        10,
+    );
+    mesh.bar(
+        dark,
+        BarEnd::new(Point::new(0.0, -0.76, 0.0), 0.06),
+        BarEnd::new(Point::new(0.0, -0.88, 0.0), 0.045),
+        10,
+    );
 }
 
 /// A litter bin on a post.
@@ -210,9 +240,24 @@ pub fn bin(mesh: &mut Mesh, rng: &mut Rng) {
     let shell =
         mesh.surface(Surface::new(Kind::Fence, tone(shell.0, shell.1, shell.2), rng.seed()));
     let dark = mesh.surface(Surface::new(Kind::Plain, tone(40, 40, 42), rng.seed()));
-    mesh.bar(dark, (Point::zeros(), 0.05), (Point::new(0.0, -0.4, 0.0), 0.05), 8);
-    mesh.bar(shell, (Point::new(0.0, -0.3, 0.0), 0.19), (Point::new(0.0, -0.95, 0.0), 0.22), 12);
-    mesh.bar(dark, (Point::new(0.0, -0.95, 0.0), 0.23), (Point::new(0.0, -1.0, 0.0), 0.10), 12);
+    mesh.bar(
+        dark,
+        BarEnd::new(Point::zeros(), 0.05),
+        BarEnd::new(Point::new(0.0, -0.4, 0.0), 0.05),
+        8,
+    );
+    mesh.bar(
+        shell,
+        BarEnd::new(Point::new(0.0, -0.3, 0.0), 0.19),
+        BarEnd::new(Point::new(0.0, -0.95, 0.0), 0.22),
+        12,
+    );
+    mesh.bar(
+        dark,
+        BarEnd::new(Point::new(0.0, -0.95, 0.0), 0.23),
+        BarEnd::new(Point::new(0.0, -1.0, 0.0), 0.10),
+        12,
+    );
 }
 
 /// A cabinet of the telephone company.

@@ -64,7 +64,7 @@ impl Street {
                     points.push(self.echo(
                         scene,
                         &faces[face as usize],
-                        (beam, direction),
+                        Shot { beam, direction },
                         1.0 / nearness,
                     ));
                 }
@@ -106,14 +106,8 @@ impl Street {
         mesh.triangles.iter().enumerate().filter_map(face).collect()
     }
 
-    fn echo(
-        &self,
-        scene: &Scene,
-        face: &Face,
-        (beam, direction): (usize, usize),
-        range_m: f64,
-    ) -> [f32; 4] {
-        let ray = ray(beam, direction);
+    fn echo(&self, scene: &Scene, face: &Face, shot: Shot, range_m: f64) -> [f32; 4] {
+        let ray = ray(shot.beam, shot.direction);
         let object = &scene.objects[face.object as usize];
         let mesh = object.mesh(self.bodies());
         let triangle = &mesh.triangles[face.triangle as usize];
@@ -142,6 +136,13 @@ impl Street {
             (0.4 * red + 0.4 * green + 0.2 * blue).clamp(0.0, 1.0),
         ]
     }
+}
+
+/// One shot of the scanner: beam and direction.
+#[derive(Clone, Copy)]
+struct Shot {
+    beam: usize,
+    direction: usize,
 }
 
 fn elevation(beam: usize) -> f64 {

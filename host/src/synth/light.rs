@@ -20,18 +20,24 @@ pub struct Light {
     pub to_sun: Direction,
 }
 
+/// How a point of a surface lies to eye, sun and sky.
+pub struct Exposure {
+    /// Outward normal.
+    pub normal: Direction,
+    /// Direction to the eye.
+    pub to_eye: Direction,
+    /// Share of the sun that reaches it.
+    pub sunlit: f32,
+    /// Share of the sky that reaches it.
+    pub open: f32,
+    /// Light shines through, as through a leaf.
+    pub thin: bool,
+}
+
 impl Light {
-    /// Light that leaves a surface towards the eye. `sunlit` and `open` are the shares of sun and
-    /// sky that reach it.
-    pub fn shade(
-        &self,
-        painted: &Painted,
-        normal: Direction,
-        to_eye: Direction,
-        sunlit: f32,
-        open: f32,
-        thin: bool,
-    ) -> Tone {
+    /// Light that leaves a surface towards the eye.
+    pub fn shade(&self, painted: &Painted, exposure: &Exposure) -> Tone {
+        let &Exposure { normal, to_eye, sunlit, open, thin } = exposure;
         let facing = normal.dot(&self.to_sun);
         // Leaves let light through.
         let direct = if thin { 0.30 + 0.45 * facing.max(-0.4 * facing) } else { facing.max(0.0) };

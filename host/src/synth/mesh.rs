@@ -51,6 +51,35 @@ pub struct Mesh {
     pub slight: bool,
 }
 
+/// A parallelogram in space, m.
+#[derive(Clone, Copy)]
+pub struct Parallelogram {
+    origin: Point,
+    u: Point,
+    v: Point,
+}
+
+impl Parallelogram {
+    /// Spans a parallelogram from `origin` along `u` and `v`.
+    pub fn new(origin: Point, u: Point, v: Point) -> Self {
+        Self { origin, u, v }
+    }
+}
+
+/// End of a round bar: the middle of its circle and the radius, m.
+#[derive(Clone, Copy)]
+pub struct BarEnd {
+    middle: Point,
+    radius_m: f64,
+}
+
+impl BarEnd {
+    /// Ends a bar at a point, with a radius there.
+    pub fn new(middle: Point, radius_m: f64) -> Self {
+        Self { middle, radius_m }
+    }
+}
+
 impl Mesh {
     /// Adds a material and returns its number.
     pub fn surface(&mut self, surface: Surface) -> u16 {
@@ -83,17 +112,9 @@ impl Mesh {
         }
     }
 
-    /// Adds a parallelogram from `origin` along `u` and `v`; texture coordinates are metres from
-    /// `texture`.
-    pub fn sheet(
-        &mut self,
-        surface: u16,
-        outward: Point,
-        origin: Point,
-        u: Point,
-        v: Point,
-        texture: [f64; 3],
-    ) {
+    /// Adds a parallelogram that faces `outward`; texture coordinates are metres from `texture`.
+    pub fn sheet(&mut self, surface: u16, outward: Point, area: Parallelogram, texture: [f64; 3]) {
+        let Parallelogram { origin, u, v } = area;
         let (lu, lv) = (u.norm(), v.norm());
         let at = |a: f64, b: f64| {
             [(texture[0] + a * lu) as f32, (texture[1] + b * lv) as f32, texture[2] as f32]
@@ -125,13 +146,18 @@ impl Mesh {
             let (mut along, mut across) = (Point::zeros(), Point::zeros());
             along[u] = size[u];
             across[v] = size[v];
-            self.sheet(surface, outward, origin, along, across, [origin[u], origin[v], 0.0]);
+            self.sheet(
+                surface,
+                outward,
+                Parallelogram::new(origin, along, across),
+                [origin[u], origin[v], 0.0],
+            );
         }
     }
 
     /// Adds a round bar from `from` to `to` with smooth normals, open at its ends.
-    pub fn bar(&mut self, surface: u16, from: (Point, f64), to: (Point, f64), sides: u32) {
-        let axis = to.0 - from.0;
+    pub fn bar(&mut self, surface: u16, from: BarEnd, to: BarEnd, sides: u32) {
+        let axis = to.middle - from.middle;
         let length = axis.norm();
         let helper = if axis.y.abs() > 0.9 * length { Point::x() } else { Point::y() };
         let u = axis.cross(&helper).normalize();
@@ -140,10 +166,11 @@ impl Mesh {
         for k in 0..=sides {
             let angle = 2.0 * core::f64::consts::PI * f64::from(k % sides) / f64::from(sides);
             let out = u * libm::cos(angle) + v * libm::sin(angle);
-            let round = 2.0 * core::f64::consts::PI * from.1 * f64::from(k) / f64::from(sides);
+            let round =
+                2.0 * core::f64::consts::PI * from.radius_m * f64::from(k) / f64::from(sides);
             for (end, down) in [(from, 0.0), (to, length)] {
                 self.vertices.push(Vertex {
-                    position_m: end.0 + out * end.1,
+                    position_m: end.middle + out * end.radius_m,
                     surface_m: [round as f32, down as f32, 0.0],
                     normal: [out.x as f32, out.y as f32, out.z as f32],
                 });

@@ -102,8 +102,8 @@ impl Painter {
             Kind::Kerb => self.kerb(surface, surface_point),
             Kind::Yard => self.yard(surface, surface_point),
             Kind::Plaster => self.plaster(surface, surface_point),
-            Kind::Brick => self.masonry(surface, surface_point, (0.25, 0.085, 0.012), 0.20),
-            Kind::Stone => self.masonry(surface, surface_point, (0.72, 0.36, 0.018), 0.10),
+            Kind::Brick => self.masonry(surface, surface_point, &BRICKS),
+            Kind::Stone => self.masonry(surface, surface_point, &STONES),
             Kind::Window => window_paint::window(self, surface, surface_point),
             Kind::Shop => window_paint::shop(self, surface, surface_point),
             Kind::Board => window_paint::board(self, surface, surface_point),
@@ -155,12 +155,13 @@ impl Painter {
             shade -= 0.10 + 0.05 * broad;
             shade -= 0.25 * (1.0 - within(-10.0, 3.6, d, 0.3 + fd));
         }
-        self.repairs(surface.seed, (s, d), (fs, fd), broad, &mut shade);
-        if let Some(lid) = manhole(surface.seed, (s, d), (fs, fd)) {
+        let point = RoadPoint { s, d, fs, fd };
+        self.repairs(surface.seed, point, broad, &mut shade);
+        if let Some(lid) = manhole(surface.seed, point) {
             tint = blend(tint, [0.07, 0.065, 0.06], lid);
         }
         let worn = (0.86 + 0.16 * broad + 0.10 * fine).clamp(0.25, 1.0);
-        let marking = markings(surface.size_m[0] > 0.5, (s, d), (fs, fd)) * worn;
+        let marking = markings(surface.size_m[0] > 0.5, point) * worn;
         let painted =
             blend(times(tint, shade), times([0.72, 0.72, 0.68], 1.0 + 0.06 * fine), marking);
         Painted { tone: painted, gloss: 0.02, open: 1.0 }
@@ -171,8 +172,7 @@ impl Painter {
     fn repairs(
         &self,
         seed: u32,
-        (s, d): (f32, f32),
-        (fs, fd): (f32, f32),
+        RoadPoint { s, d, fs, fd }: RoadPoint,
         broad: f32,
         shade: &mut f32,
     ) {
@@ -257,14 +257,9 @@ impl Painter {
         Painted::dull(times(surface.tone, shade))
     }
 
-    /// Running bond: (length, height, joint) of a stone in m, spread of the stones' tones.
-    fn masonry(
-        &self,
-        surface: &Surface,
-        surface_point: &SurfacePoint,
-        (length, height, joint): (f32, f32, f32),
-        spread: f32,
-    ) -> Painted {
+    /// Stones in running bond.
+    fn masonry(&self, surface: &Surface, surface_point: &SurfacePoint, bond: &Bond) -> Painted {
+        let &Bond { length, height, joint, spread } = bond;
         let [u, v, _] = surface_point.surface_m;
         let [fu, fv, _] = surface_point.footprint_m;
         let row = floor(v / height);
@@ -348,8 +343,29 @@ fn shifted(seed: u32, surface_point: &SurfacePoint, tile_m: f32) -> (f32, f32) {
     )
 }
 
+/// Running bond of stones, m.
+struct Bond {
+    length: f32,
+    height: f32,
+    joint: f32,
+    /// Spread of the stones' tones.
+    spread: f32,
+}
+
+const BRICKS: Bond = Bond { length: 0.25, height: 0.085, joint: 0.012, spread: 0.20 };
+const STONES: Bond = Bond { length: 0.72, height: 0.36, joint: 0.018, spread: 0.10 };
+
+/// A point of the road and the size of the pixel that looks at it, m: along the street and across.
+#[derive(Clone, Copy)]
+struct RoadPoint {
+    s: f32,
+    d: f32,
+    fs: f32,
+    fd: f32,
+}
+
 /// Share of a manhole's lid in the footprint, if one is near.
-fn manhole(seed: u32, (s, d): (f32, f32), (fs, fd): (f32, f32)) -> Option<f32> {
+fn manhole(seed: u32, RoadPoint { s, d, fs, fd }: RoadPoint) -> Option<f32> {
     let (cs, cd) = (floor(s * (1.0 / 6.0)), floor((d + 9.6) * (1.0 / 3.2)));
     let h = cell(seed ^ 0x77, cs, cd);
     if !h.is_multiple_of(5) {
@@ -366,7 +382,7 @@ fn manhole(seed: u32, (s, d): (f32, f32), (fs, fd): (f32, f32)) -> Option<f32> {
 }
 
 /// Share of white paint in the footprint.
-fn markings(crossing: bool, (s, d): (f32, f32), (fs, fd): (f32, f32)) -> f32 {
+fn markings(crossing: bool, RoadPoint { s, d, fs, fd }: RoadPoint) -> f32 {
     let half = 0.06;
     let line = |at: f32| within(at - half, at + half, d, fd);
     let lane = layout::LANE_M as f32;

@@ -7,8 +7,8 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::light::{Light, develop};
-use super::mesh::{Mesh, Point};
+use super::light::{Exposure, Light, develop};
+use super::mesh::{Mesh, Point, Vertex};
 use super::paint::{Painter, SurfacePoint};
 use super::raster::{Band, OFFSETS_PX, Pinhole, SAMPLES, SKY, Setup};
 use super::scene::{Scene, SceneObject};
@@ -223,37 +223,8 @@ impl Shading<'_> {
         let mesh = object.mesh(self.renderer.bodies);
         let triangle = &mesh.triangles[setup.triangle as usize];
         let surface = &mesh.surfaces[triangle.surface as usize];
-        let [first, second, third] = triangle.corners;
-        let corners = [
-            &mesh.vertices[first as usize],
-            &mesh.vertices[second as usize],
-            &mesh.vertices[third as usize],
-        ];
-        let inverse = setup.inverse_depth();
-        let depth = 1.0 / (inverse[0] * u + inverse[1] * v + inverse[2]);
-        // Barycentric coordinates of the second and third corner, and how they change per column
-        // and row.
-        let share = |k: usize| {
-            let plane = &setup.weights[k];
-            let value = (plane[0] * u + plane[1] * v + plane[2]) * depth;
-            (
-                value as f32,
-                ((plane[0] - value * inverse[0]) * depth) as f32,
-                ((plane[1] - value * inverse[1]) * depth) as f32,
-            )
-        };
-        let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
-        let mut surface_point =
-            SurfacePoint { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
-        for k in 0..3 {
-            let [p, q, r] =
-                [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
-            surface_point.surface_m[k] = p + b * (q - p) + c * (r - p);
-            let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
-            surface_point.footprint_m[k] = (du * du + dv * dv).sqrt();
-            let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
-            surface_point.own_normal[k] = p + b * (q - p) + c * (r - p);
-        }
+        let corners = triangle.corners.map(|corner| &mesh.vertices[corner as usize]);
+        let (surface_point, depth) = surface_point(setup, corners, u, v);
         let position = rotation * (ray * depth + Point::new(self.offset_m, 0.0, 0.0))
             + self.scene.anchor_camera.shift;
         let position = position.map(|value| value as f32);
@@ -272,14 +243,9 @@ impl Shading<'_> {
         } else {
             0.0
         };
-        let light = self.renderer.light.shade(
-            &painted,
-            normal,
-            to_eye,
-            sunlit,
-            open,
-            surface.kind == Kind::Leaves,
-        );
+        let thin = surface.kind == Kind::Leaves;
+        let exposure = Exposure { normal, to_eye, sunlit, open, thin };
+        let light = self.renderer.light.shade(&painted, &exposure);
         (self.renderer.light.through_air(light, depth as f32), depth as f32)
     }
 
@@ -293,4 +259,33 @@ impl Shading<'_> {
             _ => 0.62 + 0.38 * (height * 0.4).clamp(0.0, 1.0),
         }
     }
+}
+
+/// The surface's own coordinates where a ray meets a triangle, and the depth there.
+fn surface_point(setup: &Setup, corners: [&Vertex; 3], u: f64, v: f64) -> (SurfacePoint, f64) {
+    let inverse = setup.inverse_depth();
+    let depth = 1.0 / (inverse[0] * u + inverse[1] * v + inverse[2]);
+    // Barycentric coordinates of the second and third corner, and how they change per column
+    // and row.
+    let share = |k: usize| {
+        let plane = &setup.weights[k];
+        let value = (plane[0] * u + plane[1] * v + plane[2]) * depth;
+        (
+            value as f32,
+            ((plane[0] - value * inverse[0]) * depth) as f32,
+            ((plane[1] - value * inverse[1]) * depth) as f32,
+        )
+    };
+    let ((b, b_u, b_v), (c, c_u, c_v)) = (share(1), share(2));
+    let mut surface_point =
+        SurfacePoint { surface_m: [0.0; 3], footprint_m: [0.0; 3], own_normal: [0.0; 3] };
+    for k in 0..3 {
+        let [p, q, r] = [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
+        surface_point.surface_m[k] = p + b * (q - p) + c * (r - p);
+        let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
+        surface_point.footprint_m[k] = (du * du + dv * dv).sqrt();
+        let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
+        surface_point.own_normal[k] = p + b * (q - p) + c * (r - p);
+    }
+    (surface_point, depth)
 }

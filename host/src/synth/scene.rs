@@ -83,15 +83,23 @@ pub struct Scene {
     pub ground: GroundLight,
 }
 
+/// What a scene is seen from, and where its light comes from.
+pub struct StreetView<'a> {
+    /// Pose of the camera in the street.
+    pub t_street_camera: &'a Transform,
+    /// A point of the street near the camera.
+    pub anchor: Point,
+    /// Axes of the sunlight.
+    pub sun: SunAxes,
+}
+
 impl Scene {
-    /// Poses what `segments` and `cars` hold and draws the shadows. `anchor` is a point of the
-    /// street near the camera.
+    /// Poses what `segments` and `cars` hold and draws the shadows.
     pub fn new(
         bodies: &[Mesh; 5],
         segments: &[Arc<Segment>],
         cars: &[(CarKind, Tone, Transform)],
-        t_street_camera: &Transform,
-        (anchor, sun): (Point, SunAxes),
+        StreetView { t_street_camera, anchor, sun }: StreetView<'_>,
     ) -> Self {
         let t_camera_street = t_street_camera.inverse();
         let object = |source, t_street_mesh: &Transform, coat, instance| {
@@ -135,7 +143,7 @@ impl Scene {
             let mesh = &bodies[*kind as usize];
             shadow.lay(&ShadowTile::new(&sun, core::iter::once((mesh, pose))));
             let (low, high) = mesh.bounds_m();
-            let half = (0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z));
+            let half = [0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z)];
             ground.cover(
                 pose.shift - anchor,
                 pose.rotation * Vector3::x(),

@@ -112,6 +112,21 @@ impl Side {
     }
 }
 
+/// A stretch of one side of the street, from a position along the segment to another, m.
+#[derive(Clone, Copy)]
+struct Plot {
+    side: Side,
+    from: f64,
+    to: f64,
+}
+
+/// A position in the segment, and a heading there.
+struct Site {
+    along_m: f64,
+    lateral_m: f64,
+    yaw_rad: f64,
+}
+
 struct Builder<'a> {
     config: &'a StreetConfig,
     number: i64,
@@ -205,7 +220,7 @@ impl<'a> Builder<'a> {
         for pair in cuts.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             if rng.chance(0.14) {
-                self.garden(side, (from, to), &mut rng, meshes);
+                self.garden(Plot { side, from, to }, &mut rng, meshes);
                 continue;
             }
             let setback = if rng.chance(0.2) { rng.between(1.0, 2.5) } else { 0.0 };
@@ -227,28 +242,42 @@ impl<'a> Builder<'a> {
             mesh.move_by(0, &pose);
             meshes.push(mesh.finish());
             if setback > 0.0 {
-                self.edge(side, (from + 0.1, to - 2.5), &mut rng, meshes);
+                self.edge(Plot { side, from: from + 0.1, to: to - 2.5 }, &mut rng, meshes);
             }
         }
     }
 
     /// An empty plot: fence or hedge at the pavement, trees and a shed behind.
-    fn garden(&self, side: Side, (from, to): (f64, f64), rng: &mut Rng, meshes: &mut Vec<Mesh>) {
-        self.edge(side, (from + 0.1, to - 0.1), rng, meshes);
+    fn garden(&self, plot: Plot, rng: &mut Rng, meshes: &mut Vec<Mesh>) {
+        let Plot { side, from, to } = plot;
+        self.edge(Plot { side, from: from + 0.1, to: to - 0.1 }, rng, meshes);
         for _ in 0..3 {
             let mut mesh = Mesh::default();
             furniture::tree(&mut mesh, rng);
             let (along, out) = (rng.between(from + 2.0, to - 2.0), rng.between(3.0, 9.0));
-            self.stand(mesh, along, side.front_m() + side.sign() * out, 0.0, meshes);
+            self.stand(
+                mesh,
+                Site {
+                    along_m: along,
+                    lateral_m: side.front_m() + side.sign() * out,
+                    yaw_rad: 0.0,
+                },
+                meshes,
+            );
         }
         let mut mesh = Mesh::default();
         facade::house(&mut mesh, rng, to - from + 4.0);
         let yaw = side.sign() * -0.25 * core::f64::consts::PI * 2.0;
         let along = if side == Side::Right { from - 2.0 } else { to + 2.0 };
-        self.stand(mesh, along, side.front_m() + side.sign() * 13.0, yaw, meshes);
+        self.stand(
+            mesh,
+            Site { along_m: along, lateral_m: side.front_m() + side.sign() * 13.0, yaw_rad: yaw },
+            meshes,
+        );
     }
 
-    fn edge(&self, side: Side, (from, to): (f64, f64), rng: &mut Rng, meshes: &mut Vec<Mesh>) {
+    fn edge(&self, plot: Plot, rng: &mut Rng, meshes: &mut Vec<Mesh>) {
+        let Plot { side, from, to } = plot;
         let mut mesh = Mesh::default();
         if rng.chance(0.5) {
             furniture::hedge(&mut mesh, rng, to - from);
@@ -269,15 +298,8 @@ impl<'a> Builder<'a> {
     }
 
     /// Puts a mesh on the pavement.
-    fn stand(
-        &self,
-        mut mesh: Mesh,
-        along_m: f64,
-        lateral_m: f64,
-        yaw_rad: f64,
-        meshes: &mut Vec<Mesh>,
-    ) {
-        let mut pose = self.local(along_m, lateral_m, yaw_rad);
+    fn stand(&self, mut mesh: Mesh, site: Site, meshes: &mut Vec<Mesh>) {
+        let mut pose = self.local(site.along_m, site.lateral_m, site.yaw_rad);
         pose.translation_m[1] -= layout::KERB_HEIGHT_M;
         mesh.move_by(0, &pose);
         meshes.push(mesh.finish());
@@ -293,16 +315,22 @@ impl<'a> Builder<'a> {
             furniture::tree(&mut mesh, &mut rng);
             self.stand(
                 mesh,
-                6.0 + 11.0 * k as f64 + rng.between(-1.5, 1.5),
-                lateral,
-                rng.between(0.0, 3.0),
+                Site {
+                    along_m: 6.0 + 11.0 * k as f64 + rng.between(-1.5, 1.5),
+                    lateral_m: lateral,
+                    yaw_rad: rng.between(0.0, 3.0),
+                },
                 meshes,
             );
         }
         if (self.number + i64::from(side == Side::Left)) % 2 == 0 {
             let mut mesh = Mesh::default();
             furniture::lamp(&mut mesh, &mut rng);
-            self.stand(mesh, 1.2, lateral, facing_rad, meshes);
+            self.stand(
+                mesh,
+                Site { along_m: 1.2, lateral_m: lateral, yaw_rad: facing_rad },
+                meshes,
+            );
         }
         for _ in 0..2 {
             let mut mesh = Mesh::default();
@@ -315,7 +343,15 @@ impl<'a> Builder<'a> {
                 _ => furniture::bollard(&mut mesh, &mut rng),
             }
             // Signs on the left face those who come from ahead.
-            self.stand(mesh, along, lateral, facing_rad + rng.between(-0.08, 0.08), meshes);
+            self.stand(
+                mesh,
+                Site {
+                    along_m: along,
+                    lateral_m: lateral,
+                    yaw_rad: facing_rad + rng.between(-0.08, 0.08),
+                },
+                meshes,
+            );
         }
         if rng.chance(0.3) {
             for k in 0..6 {
@@ -323,9 +359,11 @@ impl<'a> Builder<'a> {
                 furniture::bollard(&mut mesh, &mut rng);
                 self.stand(
                     mesh,
-                    13.4 + 1.5 * f64::from(k),
-                    side.kerb_m() + side.sign() * 0.4,
-                    0.0,
+                    Site {
+                        along_m: 13.4 + 1.5 * f64::from(k),
+                        lateral_m: side.kerb_m() + side.sign() * 0.4,
+                        yaw_rad: 0.0,
+                    },
                     meshes,
                 );
             }

@@ -213,8 +213,8 @@ impl GroundLight {
 
     /// Darkens the ground under and beside a box: `middle` relative to the anchor, `right` and
     /// `ahead` its axes, half sizes in m.
-    pub fn cover(&mut self, middle: Point, right: Point, ahead: Point, half_m: (f64, f64)) {
-        let reach = half_m.0 + half_m.1 + 1.0;
+    pub fn cover(&mut self, middle: Point, right: Point, ahead: Point, half_m: [f64; 2]) {
+        let reach = half_m[0] + half_m[1] + 1.0;
         let (u, v) = (
             middle.x / GROUND_TEXEL_M + self.offset[0],
             middle.z / GROUND_TEXEL_M + self.offset[1],
@@ -228,8 +228,8 @@ impl GroundLight {
             for column in u0..=u1 {
                 let (x, z) =
                     ((column as f64 - u) * GROUND_TEXEL_M, (row as f64 - v) * GROUND_TEXEL_M);
-                let across = ((x * right.x + z * right.z).abs() - half_m.0).max(-0.6);
-                let along = ((x * ahead.x + z * ahead.z).abs() - half_m.1).max(-0.6);
+                let across = ((x * right.x + z * right.z).abs() - half_m[0]).max(-0.6);
+                let along = ((x * ahead.x + z * ahead.z).abs() - half_m[1]).max(-0.6);
                 let outside =
                     libm::sqrt(across.max(0.0) * across.max(0.0) + along.max(0.0) * along.max(0.0));
                 let distance = if outside > 0.0 { outside } else { across.max(along) };

@@ -15,17 +15,17 @@ use super::layout;
 use super::light::Light;
 use super::mesh::Mesh;
 use super::paint::Painter;
-use super::path::{Centerline, RoadSpan, SEGMENT_M};
+use super::path::{Centerline, SEGMENT_M};
 use super::random::Rng;
 use super::raster::Pinhole;
 use super::raw::{self, CameraView};
 use super::render::{Picture, Renderer};
-use super::scene::Scene;
+use super::scene::{Scene, StreetView};
 use super::segment::{Segment, segment};
 use super::sensor::{Sensor, luma};
 use super::shadow::SunAxes;
 use super::surface::Tone;
-use super::traffic;
+use super::traffic::{self, Road};
 use crate::formats::calibration::StereoCalibration;
 
 /// How far behind and ahead of the camera the street exists, m.
@@ -258,42 +258,15 @@ impl Street {
         let t_street_camera = camera::t_street_camera(&self.config, &span, time_s);
         let segments: Vec<Arc<Segment>> =
             (first..=last).map(|number| self.segment(number)).collect();
-        let cars = self.present(&segments, &span, time_s, reach);
+        let (from_m, to_m) = reach;
+        let road = Road { config: &self.config, span: &span, time_s, from_m, to_m };
+        let cars = present(&segments, &road);
         let anchor = span.point(libm::floor(along / SEGMENT_M) * SEGMENT_M);
         let posed_cars: Vec<_> =
             cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
-        let scene =
-            Scene::new(&self.bodies, &segments, &posed_cars, &t_street_camera, (anchor, self.sun));
+        let view = StreetView { t_street_camera: &t_street_camera, anchor, sun: self.sun };
+        let scene = Scene::new(&self.bodies, &segments, &posed_cars, view);
         Surroundings { scene, t_street_camera, cars }
-    }
-
-    fn present(
-        &self,
-        segments: &[Arc<Segment>],
-        span: &RoadSpan<'_>,
-        time_s: f64,
-        reach: (f64, f64),
-    ) -> Vec<Present> {
-        let mut cars: Vec<Present> = Vec::new();
-        for driver in traffic::drivers(&self.config, span, time_s, reach) {
-            let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
-            cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
-        }
-        for car in segments.iter().flat_map(|segment| &segment.parked) {
-            cars.push(Present {
-                id: car.id,
-                kind: car.kind,
-                paint: car.paint,
-                t_street_car: car.t_street_car,
-                speed_m_s: 0.0,
-            });
-        }
-        cars.sort_by_key(|car| car.id);
-        // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts
-        // could reach it.
-        cars.truncate(usize::from(u8::MAX));
-        debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
-        cars
     }
 
     /// A segment, from the few that are cached or made anew: either way the same.
@@ -326,4 +299,28 @@ impl Street {
     pub(super) fn painter(&self) -> &Painter {
         &self.painter
     }
+}
+
+/// Cars of the traffic and parked ones, by id.
+fn present(segments: &[Arc<Segment>], road: &Road<'_>) -> Vec<Present> {
+    let mut cars: Vec<Present> = Vec::new();
+    for driver in traffic::drivers(road) {
+        let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
+        cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
+    }
+    for car in segments.iter().flat_map(|segment| &segment.parked) {
+        cars.push(Present {
+            id: car.id,
+            kind: car.kind,
+            paint: car.paint,
+            t_street_car: car.t_street_car,
+            speed_m_s: 0.0,
+        });
+    }
+    cars.sort_by_key(|car| car.id);
+    // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts
+    // could reach it.
+    cars.truncate(usize::from(u8::MAX));
+    debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
+    cars
 }

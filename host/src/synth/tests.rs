@@ -36,7 +36,8 @@ fn projected(street: &Street, point: &Point3<f64>) -> (f64, f64) {
 }
 
 /// Bilinear grey level, if the four pixels around are in the picture.
-fn grey_at(picture: &[u8], (width, height): (usize, usize), (u, v): (f64, f64)) -> Option<f64> {
+fn grey_at(picture: &[u8], size: (usize, usize), at: (f64, f64)) -> Option<f64> {
+    let ((width, height), (u, v)) = (size, at);
     if !(u >= 0.0 && v >= 0.0 && u < width as f64 - 1.0 && v < height as f64 - 1.0) {
         return None;
     }

@@ -84,13 +84,23 @@ fn lateral(car: &ScriptedCar, way_m: f64, rate_hz: f64) -> (f64, f64) {
     (from + (to - from) * smooth, (to - from) * slope)
 }
 
-/// All cars of the traffic between two positions along the street.
-pub fn drivers(
-    config: &StreetConfig,
-    span: &RoadSpan<'_>,
-    time_s: f64,
-    (from_m, to_m): (f64, f64),
-) -> Vec<Driver> {
+/// A stretch of the street at a moment.
+pub struct Road<'a> {
+    /// The street.
+    pub config: &'a StreetConfig,
+    /// Its line, at least as far as the stretch.
+    pub span: &'a RoadSpan<'a>,
+    /// Time since the first frame, s.
+    pub time_s: f64,
+    /// Begin of the stretch along the street, m.
+    pub from_m: f64,
+    /// End of the stretch along the street, m.
+    pub to_m: f64,
+}
+
+/// All cars of the traffic on a stretch.
+pub fn drivers(road: &Road<'_>) -> Vec<Driver> {
+    let &Road { config, span, time_s, from_m, to_m } = road;
     let Traffic::Moving(moving) = &config.traffic else { return Vec::new() };
     let mut drivers = Vec::new();
     for (number, car) in moving.cars.iter().enumerate() {
@@ -113,8 +123,8 @@ pub fn drivers(
             speed_m_s,
         });
     }
-    flow(config, moving, span, time_s, (from_m, to_m), Lane::Oncoming, &mut drivers);
-    flow(config, moving, span, time_s, (from_m, to_m), Lane::Overtaking, &mut drivers);
+    flow(road, moving, Lane::Oncoming, &mut drivers);
+    flow(road, moving, Lane::Overtaking, &mut drivers);
     drivers
 }
 
@@ -124,15 +134,8 @@ const ONCOMING_SPEED_M_S: f64 = 8.0;
 const OVERTAKING_SPEED_M_S: f64 = 13.0;
 
 /// The endless flow in one lane: car j stands in slot j of a belt that moves with the lane's speed.
-fn flow(
-    config: &StreetConfig,
-    moving: &MovingTraffic,
-    span: &RoadSpan<'_>,
-    time_s: f64,
-    (from_m, to_m): (f64, f64),
-    lane: Lane,
-    drivers: &mut Vec<Driver>,
-) {
+fn flow(road: &Road<'_>, moving: &MovingTraffic, lane: Lane, drivers: &mut Vec<Driver>) {
+    let &Road { config, span, time_s, from_m, to_m } = road;
     let (gap, speed, sign, first_id) = match lane {
         Lane::Oncoming => (moving.oncoming_gap_m, ONCOMING_SPEED_M_S, -1.0, layout::ONCOMING_IDS),
         _ => (moving.overtaking_gap_m, OVERTAKING_SPEED_M_S, 1.0, layout::OVERTAKING_IDS),

@@ -9,7 +9,7 @@ mod files;
 mod moving;
 
 pub use files::{AreaFigures, FileFigures, FoundMask, compare};
-pub use moving::{MovingErrors, MovingFigures, RangeFigures};
+pub use moving::{ComparedMasks, MovingErrors, MovingFigures, RangeFigures};
 
 use crate::formats::Image;
 use std::collections::BTreeMap;

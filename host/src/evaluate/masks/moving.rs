@@ -61,15 +61,22 @@ pub struct RangeFigures {
     pub mean_iou: Option<f64>,
 }
 
+/// Masks of a frame beside the exact ones.
+pub struct ComparedMasks<'a> {
+    /// Overlaps of the masks with the exact ones.
+    pub overlaps: &'a Overlaps,
+    /// True objects, with the value of each in the exact masks.
+    pub objects: &'a [TrueObject],
+    /// True pose of the camera.
+    pub t_world_camera: &'a Transform,
+}
+
 impl MovingErrors {
-    /// Takes in a frame: the objects, with the value of each in the exact masks, and the masks'
-    /// overlaps with these. `large_enough` tells of how many visible pixels on an object counts;
+    /// Takes in a frame. `large_enough` tells of how many visible pixels on an object counts;
     /// `by_motion` which masks were found by motion.
     pub fn add(
         &mut self,
-        overlaps: &Overlaps,
-        objects: &[TrueObject],
-        t_world_camera: &Transform,
+        &ComparedMasks { overlaps, objects, t_world_camera }: &ComparedMasks<'_>,
         large_enough: impl Fn(u64) -> bool,
         by_motion: impl Fn(u16) -> bool,
     ) {
@@ -154,16 +161,16 @@ mod tests {
         // Mask 10 is on the first, three of four pixels; mask 11 on the parked one; the second is
         // not found.
         let pairs =
-            || [(10, 1), (10, 1), (10, 1), (0, 1), (0, 2), (11, 3), (11, 3), (11, 0)].into_iter();
+            [(10, 1), (10, 1), (10, 1), (0, 1), (0, 2), (11, 3), (11, 3), (11, 0)].into_iter();
+        let overlaps = Overlaps::of(pairs);
+        let compared = |objects| ComparedMasks {
+            overlaps: &overlaps,
+            objects,
+            t_world_camera: &Transform::IDENTITY,
+        };
         let mut errors = MovingErrors::default();
         for _ in 0..5 {
-            errors.add(
-                &Overlaps::of(pairs()),
-                &objects,
-                &Transform::IDENTITY,
-                |_| true,
-                |label| label == 11,
-            );
+            errors.add(&compared(&objects), |_| true, |label| label == 11);
         }
         let figures = errors.figures().unwrap();
         let [near, middle, far] = &figures.ranges[..] else { panic!("three ranges") };
@@ -172,14 +179,8 @@ mod tests {
         assert_eq!((far.objects, far.recall), (2, Some(0.0)));
         assert_eq!((figures.false_masks, figures.mean_iou), (5, Some(0.75)));
         // What was out of sight begins anew.
-        errors.add(
-            &Overlaps::of(pairs()),
-            &objects[1..],
-            &Transform::IDENTITY,
-            |_| true,
-            |_| false,
-        );
-        errors.add(&Overlaps::of(pairs()), &objects, &Transform::IDENTITY, |_| true, |_| false);
+        errors.add(&compared(&objects[1..]), |_| true, |_| false);
+        errors.add(&compared(&objects), |_| true, |_| false);
         assert_eq!(errors.figures().unwrap().ranges[0].objects, 2);
     }
 }

@@ -126,16 +126,24 @@ pub struct ObjectErrors {
     association: Association,
 }
 
+/// Tracks of a frame beside the true objects.
+pub struct TrackedFrame<'a> {
+    /// Tracks seen in it.
+    pub tracks: &'a [TrackReport],
+    /// Estimated pose of the camera.
+    pub t_world_camera: &'a Transform,
+    /// True objects and pose.
+    pub truth: &'a ObjectsTruth,
+    /// Width and height of the images, px.
+    pub size: (usize, usize),
+}
+
 impl ObjectErrors {
-    /// Compares the tracks seen in a frame, whose images have `size`; call it for every frame.
-    /// `large_enough` tells which boxes are large enough for a detection: others do not count as
-    /// missed.
+    /// Compares the tracks seen in a frame; call it for every frame. `large_enough` tells which
+    /// boxes are large enough for a detection: others do not count as missed.
     pub fn add(
         &mut self,
-        tracks: &[TrackReport],
-        t_world_camera: &Transform,
-        truth: &ObjectsTruth,
-        size: (usize, usize),
+        &TrackedFrame { tracks, t_world_camera, truth, size }: &TrackedFrame<'_>,
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
         let boxes: Vec<(u32, PixelBox)> = tracks

@@ -72,13 +72,13 @@ fn errors_of(
         let before = truth(frame.saturating_sub(1), moving).objects[0].t_world_object;
         let motion =
             before * (before.inverse() * now.objects[0].t_world_object * error) * before.inverse();
-        errors.add(
-            &[track(state, drift * motion * drift.inverse())],
-            &(drift * now.t_world_camera),
-            &now,
-            SIZE,
-            |_| true,
-        );
+        let frame = TrackedFrame {
+            tracks: &[track(state, drift * motion * drift.inverse())],
+            t_world_camera: &(drift * now.t_world_camera),
+            truth: &now,
+            size: SIZE,
+        };
+        errors.add(&frame, |_| true);
     }
     errors
 }
@@ -122,7 +122,13 @@ fn what_overlaps_nothing_true_is_not_compared() {
     };
     let unseen =
         TrackReport { detected: false, ..track(MotionState::Dynamic, Transform::IDENTITY) };
-    errors.add(&[elsewhere, unseen], &Transform::IDENTITY, &truth(0, true), SIZE, |_| true);
+    let frame = TrackedFrame {
+        tracks: &[elsewhere, unseen],
+        t_world_camera: &Transform::IDENTITY,
+        truth: &truth(0, true),
+        size: SIZE,
+    };
+    errors.add(&frame, |_| true);
     assert!(errors.tracks().is_empty() && errors.figures().is_none());
 }
 

@@ -65,14 +65,10 @@ pub fn image(stamp: Stamp, jpeg: &[u8]) -> Value {
     json!({ "timestamp": stamp.json(), "frame_id": LEFT, "format": "jpeg", "data": STANDARD.encode(jpeg) })
 }
 
-/// How a picture of the left camera projects, which may be smaller than the images that were
-/// matched.
-pub fn calibration(
-    stamp: Stamp,
-    rig: &StereoRig,
-    (full_width, _): (usize, usize),
-    (width, height): (u32, u32),
-) -> Value {
+/// Projection of a picture of the left camera, which may be smaller than the images that were
+/// matched and `full_width` px wide.
+pub fn calibration(stamp: Stamp, rig: &StereoRig, full_width: usize, size: (u32, u32)) -> Value {
+    let (width, height) = size;
     let share = f64::from(width) / full_width as f64;
     let [f, u, v] = [rig.focal_px, rig.center_u_px, rig.center_v_px].map(|px| px * share);
     json!({
@@ -195,6 +191,7 @@ pub fn planning(stamp: Stamp, layers: &PlanningLayers) -> Value {
 }
 
 /// What lies where in a point or a cell.
-fn field((name, offset, kind): (&str, usize, u32)) -> Value {
+fn field(field: (&str, usize, u32)) -> Value {
+    let (name, offset, kind) = field;
     json!({ "name": name, "offset": offset, "type": kind })
 }

@@ -113,7 +113,7 @@ impl Recording {
                 &messages::calibration(
                     stamp,
                     &run.plan.config.rig,
-                    run.plan.dataset.size(),
+                    run.plan.dataset.size().0,
                     left.dimensions(),
                 ),
             )?;

@@ -49,9 +49,10 @@ fn columns(
     frame: &EvaluatedFrame,
     region: Region,
     counts: &Counts,
-    (at, rule): (usize, &Rule),
+    rule: (usize, &Rule),
 ) -> ReferenceColumns {
     let ([input, map], scan) = (&counts.sources, &frame.count);
+    let (at, rule) = rule;
     ReferenceColumns {
         frame: frame.frame,
         region: region.name(),

@@ -80,7 +80,7 @@ pub fn tiles(
         .iter()
         .map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten())))
         .fold(1e-3, f32::max);
-    chunks.iter().map(|chunk| tile(&surface, chunk, (object, longest_m / STEPS))).collect()
+    chunks.iter().map(|chunk| tile(&surface, chunk, object, longest_m / STEPS)).collect()
 }
 
 /// The box around some vertices, m.
@@ -93,7 +93,8 @@ fn box_of<'c>(mesh: &IndexedMesh, corners: impl Iterator<Item = &'c u32>) -> [[f
 fn tile(
     surface: &Surface<'_>,
     triangles: &[[u32; 3]],
-    (object, step_m): (Option<usize>, f32),
+    object: Option<usize>,
+    step_m: f32,
 ) -> io::Result<Tile> {
     let Surface { mesh, normals, values } = surface;
     let (mut numbers, mut vertices, mut corners) =

@@ -20,6 +20,16 @@ pub struct Binary {
     pub accessors: Vec<Value>,
 }
 
+/// What the bytes of a view are.
+pub struct Values<'a> {
+    /// Type of a component, as glTF numbers them.
+    pub component: u32,
+    /// Kind of a value: `SCALAR`, `VEC3`.
+    pub kind: &'a str,
+    /// Number of values.
+    pub count: usize,
+}
+
 impl Binary {
     /// Appends bytes as a view of their own: of vertices `stride` bytes apart, of indices, or of
     /// neither. Returns its number.
@@ -38,15 +48,9 @@ impl Binary {
         self.views.len() - 1
     }
 
-    /// Describes a view: so many values of a kind (`SCALAR`, `VEC3`). Returns its number.
-    pub fn accessor(
-        &mut self,
-        view: usize,
-        component: u32,
-        kind: &str,
-        count: usize,
-        more: &Value,
-    ) -> usize {
+    /// Describes a view. Returns its number.
+    pub fn accessor(&mut self, view: usize, values: Values<'_>, more: &Value) -> usize {
+        let Values { component, kind, count } = values;
         let mut accessor =
             json!({ "bufferView": view, "componentType": component, "type": kind, "count": count });
         for (key, value) in more.as_object().into_iter().flatten() {
@@ -61,7 +65,8 @@ impl Binary {
         let bytes: Vec<u8> =
             values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes, None, None);
-        self.accessor(view, F32, kind, values.len(), &Value::Null)
+        let values = Values { component: F32, kind, count: values.len() };
+        self.accessor(view, values, &Value::Null)
     }
 
     /// Times of an animation, ascending.
@@ -70,9 +75,7 @@ impl Binary {
         let view = self.view(&bytes, None, None);
         self.accessor(
             view,
-            F32,
-            "SCALAR",
-            times_s.len(),
+            Values { component: F32, kind: "SCALAR", count: times_s.len() },
             &json!({ "min": [times_s.first()], "max": [times_s.last()] }),
         )
     }

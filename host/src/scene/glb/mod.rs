@@ -9,7 +9,7 @@ mod binary;
 mod quantise;
 
 use super::{Scene, SceneObject};
-use binary::{Binary, F32, VERTICES};
+use binary::{Binary, F32, VERTICES, Values};
 use dynvox_core::geometry::Transform;
 use quantise::primitive;
 use serde_json::{Value, json};
@@ -83,7 +83,11 @@ impl Document {
             points.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.binary.view(&bytes, Some(VERTICES), None);
         let range = json!({ "min": bound(f32::min), "max": bound(f32::max) });
-        let position = self.binary.accessor(view, F32, "VEC3", points.len(), &range);
+        let position = self.binary.accessor(
+            view,
+            Values { component: F32, kind: "VEC3", count: points.len() },
+            &range,
+        );
         self.meshes.push(json!({ "name": name, "primitives": [{ "attributes": { "POSITION": position }, "mode": 3, "material": 1 }] }));
         Some(self.node(json!({ "name": name, "mesh": self.meshes.len() - 1 })))
     }

@@ -1,6 +1,6 @@
 //! A mesh in few bytes: positions of 16 bits, normals of 8, linear colours of 16.
 
-use super::binary::{Binary, I8, INDICES, U16, U32, VERTICES};
+use super::binary::{Binary, I8, INDICES, U16, U32, VERTICES, Values};
 use crate::scene::IndexedMesh;
 use serde_json::{Value, json};
 
@@ -42,10 +42,11 @@ pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32
         .ok()?;
     let normalized = json!({ "normalized": true });
     let range = json!({ "normalized": true, "min": step(&low_m), "max": step(&high_m) });
+    let of = |component| Values { component, kind: "VEC3", count };
     let attributes = json!({
-        "POSITION": binary.accessor(position, U16, "VEC3", count, &range),
-        "NORMAL": binary.accessor(normal, I8, "VEC3", count, &normalized),
-        "COLOR_0": binary.accessor(colour, U16, "VEC3", count, &normalized),
+        "POSITION": binary.accessor(position, of(U16), &range),
+        "NORMAL": binary.accessor(normal, of(I8), &normalized),
+        "COLOR_0": binary.accessor(colour, of(U16), &normalized),
     });
     Some((
         json!({ "attributes": attributes, "indices": indices(binary, mesh), "material": 0 }),
@@ -64,7 +65,8 @@ fn indices(binary: &mut Binary, mesh: &IndexedMesh) -> usize {
         corners.iter().flat_map(|corner| corner.to_le_bytes()).collect()
     };
     let view = binary.view(&bytes, Some(INDICES), None);
-    binary.accessor(view, if short { U16 } else { U32 }, "SCALAR", corners.len(), &Value::Null)
+    let component = if short { U16 } else { U32 };
+    binary.accessor(view, Values { component, kind: "SCALAR", count: corners.len() }, &Value::Null)
 }
 
 /// The direction, upward for a length of 0, which glTF does not allow.
