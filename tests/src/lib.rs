@@ -13,7 +13,6 @@ pub mod rust_page {}
 pub mod pin_your_rig_page {}
 
 pub mod fuzz;
-pub mod parameters;
 pub mod source;
 
 use dynvox::input::InstanceMask;

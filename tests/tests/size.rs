@@ -1,9 +1,10 @@
 //! No function is longer than a screen and no file longer than can be read in one go.
 
-use dynvox_tests::{
-    parameters::parameter_lists,
-    source::{files, parts, text},
-};
+#[path = "size/parameters.rs"]
+mod parameters;
+
+use dynvox_tests::source::{files, parts, text};
+use parameters::parameter_lists;
 use std::{collections::BTreeMap, path::Path};
 
 /// Most lines of a function, from its `fn` to its closing brace.
@@ -14,10 +15,10 @@ const FILE_LINES: usize = 565;
 /// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
 const WIDE: usize = 6;
 /// Most wide functions of the repository, tests included. The figure only ever falls.
-const WIDE_MAX: usize = 94;
+const WIDE_MAX: usize = 52;
 /// Most functions that are not wide and take a tuple apart in their parameter list, which hides
 /// parameters. The figure only ever falls.
-const TAKING_APART_MAX: usize = 43;
+const TAKING_APART_MAX: usize = 29;
 
 /// Name, first line and number of lines of each function with a body.
 fn functions(rust: &str) -> Vec<(String, usize, usize)> {

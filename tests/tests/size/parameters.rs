@@ -1,6 +1,6 @@
 //! Parameters of functions, counted in Rust source: also those that a tuple hides.
 
-use crate::source::parts;
+use dynvox_tests::source::parts;
 
 /// Parameter list of one function.
 #[derive(Debug, PartialEq, Eq)]
