@@ -120,6 +120,16 @@ fn few_functions_take_six_parameters_or_more() {
 
 #[test]
 fn the_count_sees_bodies_and_nothing_else() {
-    let rust = "trait A {\n    fn declared(&self) -> [u8; 3];\n}\n// fn comment() {\nfn short() -> [u8; 2] {\n    let f = |x: u8| {\n        x\n    };\n    [f(1); 2]\n}\n";
+    let rust = "trait A {
+    fn declared(&self) -> [u8; 3];
+}
+// fn comment() {
+fn short() -> [u8; 2] {
+    let f = |x: u8| {
+        x
+    };
+    [f(1); 2]
+}
+";
     assert_eq!(functions(rust), [("short".to_owned(), 5, 6)]);
 }

@@ -20,7 +20,7 @@ const REFINE_STEP_MIN: f64 = 1e-6;
 /// Rounds of choosing inliers anew and refining on them.
 const ROUNDS: usize = 3;
 
-/// How an estimate went.
+/// Outcome of an estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -50,7 +50,7 @@ pub enum MotionStatus {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct MotionEstimate {
-    /// How it went.
+    /// Outcome.
     pub status: MotionStatus,
     /// Maps previous camera coordinates to current camera coordinates; `None` unless `status` is
     /// `Estimated`. Of the camera: from the last frame whose pose is not a guess.
@@ -61,7 +61,7 @@ pub struct MotionEstimate {
     pub inliers: u32,
     /// Root mean square error of one coordinate over the inliers, px.
     pub residual_rms_px: f64,
-    /// MotionHypotheses drawn.
+    /// Hypotheses drawn.
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
@@ -295,7 +295,7 @@ impl<'s> Estimator<'s> {
     }
 }
 
-/// MotionHypotheses to draw so that one is free of outliers with the configured probability, given the
+/// Hypotheses to draw so that one is free of outliers with the configured probability, given the
 /// most inliers so far.
 fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     let share = f64::from(inliers) / points as f64;

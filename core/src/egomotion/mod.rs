@@ -9,12 +9,13 @@
 //! Reconstruction*, 1987), because an inlier may be two pixels off. Matches far from the middle
 //! column weigh less: what rectification leaves of the lenses' errors grows steeply there.
 //!
-//! [`Estimator`] owns the scratch memory and estimates any set of matches; [`Egomotion`] tracks the camera and repeats its last motion
-//! where the estimate fails. [`icp`] estimates motion from depth alone.
+//! [`Estimator`] owns the scratch memory and estimates any set of matches; [`Egomotion`] tracks the
+//! camera and repeats its last motion where the estimate fails. [`icp`] estimates motion from depth
+//! only.
 //!
 //! **Memory.** 36 bytes per match.
 //!
-//! **Time.** MotionHypotheses times matches, in single precision and without branches; the rest is small
+//! **Time.** Hypotheses times matches, in single precision and without branches; the rest is small
 //! compared with it.
 //!
 //! **What can go wrong.** [`MotionStatus`] names it. A motion without enough inliers, or whose
@@ -22,7 +23,11 @@
 //! other orders give other last bits.
 //!
 //! ```
-//! use dynvox_core::{Capacity, egomotion::{EgomotionConfig, Estimator, MotionHypotheses, MotionStatus}, geometry::StereoRig, memory::Carver, random::Random};
+//! use dynvox_core::{
+//!     Capacity,
+//!     egomotion::{EgomotionConfig, Estimator, MotionHypotheses, MotionStatus},
+//!     geometry::StereoRig, memory::Carver, random::Random,
+//! };
 //!
 //! let capacity = Capacity { matches: 50, ..Capacity::TINY };
 //! let mut slab = vec![0; Estimator::bytes(&capacity) + 64];

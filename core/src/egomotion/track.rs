@@ -37,7 +37,7 @@ pub struct TimedMatches<M> {
     pub matches: M,
 }
 
-/// Where the camera is and how it last moved.
+/// Pose of the camera and its last motion.
 #[derive(Clone, Debug)]
 pub struct Egomotion {
     t_world_camera: Transform,
@@ -53,7 +53,7 @@ pub struct Egomotion {
     /// Matches that motion explained.
     inliers: u32,
     held: u32,
-    /// How many segments of the map were begun after the first.
+    /// Number of segments of the map were begun after the first.
     segment: u32,
     random: Random,
 }
@@ -133,7 +133,7 @@ impl Egomotion {
         self.hold_from_reference();
     }
 
-    /// As [`Egomotion::hold`], where the time since the reference is counted already.
+    /// Holds the camera where the time since the reference is counted already.
     fn hold_from_reference(&mut self) {
         self.held = self.held.saturating_add(1);
         self.since_reference += 1;
@@ -143,7 +143,7 @@ impl Egomotion {
         }
     }
 
-    /// Whether the camera has not been located for so long that its pose says nothing any more.
+    /// Tells that the camera has not been located for so long that its pose says nothing any more.
     pub fn is_lost(&self) -> bool {
         self.held >= REFERENCE_FRAMES_MAX
     }

@@ -27,7 +27,7 @@ pub(super) struct Located {
     pub found: Found,
 }
 
-/// Where a pose comes from, and what the stage that found it says.
+/// Origin of a pose, and the report of the stage that found it.
 pub(super) struct Found {
     pub origin: PoseOrigin,
     pub egomotion: Option<MotionEstimate>,
@@ -46,7 +46,7 @@ impl Found {
 /// about the rig.
 const ROW_DIFFERENCE_MAX_PX: f32 = 2.0;
 
-/// What both cameras saw of a match, before and now; `None` where the rows are too far apart.
+/// Observations of a match by both cameras, before and now; `None` where the rows are too far apart.
 fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     let pairs = [(m.previous_left, m.previous_right), (m.current_left, m.current_right)];
     let aligned =

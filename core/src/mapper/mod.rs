@@ -247,7 +247,7 @@ impl<'s> Mapper<'s> {
         self.static_map.volume.finish()
     }
 
-    /// Where the left camera was in the last frame: camera to world; the identity before the first.
+    /// Pose of the left camera in the last frame: camera to world; the identity before the first.
     pub fn t_world_camera(&self) -> &Transform {
         self.localization.camera.t_world_camera()
     }
@@ -257,7 +257,7 @@ impl<'s> Mapper<'s> {
         &self.config
     }
 
-    /// What is tracked, as it stands after the last frame, by age.
+    /// Tracks, as they stand after the last frame, by age.
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
         self.objects.tracks(&self.tracker)
     }

@@ -20,18 +20,18 @@ use crate::{
 
 /// Distance over which brightness is compared, px: wider than what fusion blurs.
 const EDGE_PX: usize = 4;
-/// Least correlation of edges. Right poses have .16 to .74 on 06 and r1405, those half a metre
-/// aside up to .29.
+/// Least correlation of edges. Right poses have 0.16 to 0.74 on 06 and r1405, those half a metre
+/// aside up to 0.29.
 const CORRELATION_MIN: f64 = 0.25;
-/// How far ahead and behind the map must look less like the image, m.
+/// Distance ahead and behind at which the map must look less like the image, m.
 const ASIDE_M: f64 = 0.5;
-/// How far around what the map shows, to the left and to the right, it must, rad.
+/// Angle around what the map shows, to the left and to the right, at which it must, rad.
 const ASIDE_RAD: f64 = 0.04;
-/// How much less: factor on signal to noise. Small images change little over half a metre.
+/// Factor on signal to noise by which it must look less like it. Small images change little over half a metre.
 const SIGNAL_FACTOR: f64 = 1.07;
 /// Least share of the image that the map must show.
 const SHOWN_MIN: f64 = 0.1;
-/// How often the pose is refined.
+/// Number of times that the pose is refined.
 const REGISTRATIONS: usize = 2;
 /// Registration with the map: a guess is off by more than a frame's motion, and much of the view
 /// may be new.
@@ -101,7 +101,7 @@ impl StaticMap<'_> {
         (correlation >= CORRELATION_MIN && aside.iter().all(is_less_like)).then_some(t_world_camera)
     }
 
-    /// How much the map from a pose looks like the image; `None` where it shows too little of it.
+    /// Correlation of the map from a pose with the image; `None` where it shows too little of it.
     fn correlation_at<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
@@ -126,7 +126,7 @@ impl StaticMap<'_> {
     }
 }
 
-/// Whether one correlation says that signal to noise is larger by the factor than the other says.
+/// Tells that one correlation says that signal to noise is larger by the factor than the other says.
 /// Two images of one scene with noise of their own correlate by S / (S + N): near 1 a small step of
 /// correlation is a large one of signal to noise.
 fn is_clearer(correlation: f64, other: f64) -> bool {

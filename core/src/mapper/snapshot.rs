@@ -29,12 +29,12 @@ use crate::{
 };
 use core::fmt::{self, Write};
 
-/// What a snapshot begins with.
+/// First bytes of a snapshot.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
 pub const VERSION: u32 = 5;
 
-/// Why a mapper cannot be restored. There is no mapper then; the slab may be used again.
+/// Reason that a mapper cannot be restored. There is no mapper then; the slab may be used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

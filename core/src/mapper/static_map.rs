@@ -16,7 +16,7 @@ use crate::{
 };
 use bytemuck::TransparentWrapper;
 
-/// What does not move, and the images in which a frame meets it.
+/// Map of all that does not move, and the images in which a frame meets it.
 #[derive(Debug)]
 pub(super) struct StaticMap<'s> {
     pub volume: Volume<'s>,

@@ -21,7 +21,7 @@ use crate::{
     volume::{AllocationReport, BlockStore, NoStore, PruneReport},
 };
 
-/// What a frame's stages return, for its report.
+/// Results of a frame's stages, for its report.
 struct Outcome {
     stereo: StereoReport,
     scene_flow: FlowReport,
@@ -226,7 +226,7 @@ impl Mapper<'_> {
         report
     }
 
-    /// How much of what must hold after a frame does not.
+    /// Number of conditions that must hold after a frame and do not.
     fn check_invariants(&self) -> u32 {
         let mut invariants = Invariants::default();
         invariants.require(

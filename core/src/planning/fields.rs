@@ -25,7 +25,7 @@ pub struct Limits {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Distance {
-    /// Its square, in cells: exact.
+    /// Square of the distance, in cells: exact.
     pub squared_cells: u32,
     /// In metres: below 0 inside an obstacle.
     pub distance_m: f32,
@@ -104,7 +104,7 @@ impl Planning<'_> {
         cell_distance.transform(cell_obstacle, [width, length, height]);
     }
 
-    /// How cells lie in the world.
+    /// Position of the cells in the world.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -216,7 +216,7 @@ impl Planning<'_> {
         self.boxes.get(..self.box_count).unwrap_or_default()
     }
 
-    /// How far a ray is free: from a point of the world, in a direction of any length, at most
+    /// Length by which a ray is free: from a point of the world, in a direction of any length, at most
     /// `far_m`. See [`Way`].
     pub fn ray(
         &self,
@@ -228,7 +228,7 @@ impl Planning<'_> {
         query::ray(&self.known_space(volume), origin_m, direction, far_m)
     }
 
-    /// How far a robot may follow a polyline of world points on the ground.
+    /// Length by which a robot may follow a polyline of world points on the ground.
     pub fn sweep(&self, volume: &Volume<'_>, path_m: &[[f64; 3]], robot: &Sweep) -> Way {
         query::sweep(&self.known_space(volume), self.config.min_weight, path_m, robot)
     }

@@ -32,7 +32,7 @@ use bytemuck::{Pod, Zeroable};
 /// A plane is fitted to every second column up to four away: twice as far as its neighbours, so
 /// half the error at the same cost.
 const FIT_OFFSETS: [i32; 5] = [-4, -2, 0, 2, 4];
-/// How fast what is allowed grows where no ground is seen, rise over run.
+/// Growth of what is allowed where no ground is seen, rise over run.
 const DRIFT: f32 = 0.1;
 
 /// A column of the height map. Heights are along up, from the world's origin.
@@ -41,7 +41,7 @@ const DRIFT: f32 = 0.1;
 pub struct Column {
     /// Height of the ground, m; meaningless where [`Column::ground_m`] is `None`.
     pub height_m: f32,
-    /// Where ground would be expected, m: its height where it was found.
+    /// Height at which ground would be expected, m: its height where it was found.
     pub reference_m: f32,
     /// Rise over run to the right and ahead; 0 where too little is known around.
     pub slope: [f32; 2],
@@ -51,7 +51,7 @@ pub struct Column {
     pub step_m: f32,
     /// Height of what hangs over the ground, m above it; 0 where nothing is.
     pub clearance_m: f32,
-    /// What is known: [`Column::GROUND`], [`Column::FITTED`].
+    /// Known parts: [`Column::GROUND`], [`Column::FITTED`].
     flags: u16,
     /// Columns since ground was last found on the way from the camera.
     gap: u16,

@@ -61,7 +61,7 @@ use cells::{Cells, OCCUPIED};
 use height_map::{Growth, HeightMap, Level};
 use pyramid::Pyramid;
 
-/// What an update made.
+/// Result of an update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -171,7 +171,7 @@ impl<'s> Planning<'s> {
         }
     }
 
-    /// Whether there is a window at all.
+    /// Tells that there is no window.
     pub fn is_empty(&self) -> bool {
         self.cells.observed_at.is_empty()
     }

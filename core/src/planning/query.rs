@@ -11,7 +11,7 @@ use super::{
 };
 use crate::volume::{BLOCK_SIDE, Volume};
 
-/// How a ray or a path ends.
+/// End of a ray or a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum WayEnd {
@@ -19,15 +19,15 @@ pub enum WayEnd {
     Free,
     /// At a surface of the map.
     Surface,
-    /// Where nothing was ever seen.
+    /// At a place that was never seen.
     Unknown,
 }
 
-/// How far a way is free.
+/// Length by which a way is free.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Way {
-    /// What it ends at.
+    /// End of the free part.
     pub end: WayEnd,
     /// The length of its free part, m.
     pub free_m: f64,
@@ -37,17 +37,17 @@ pub struct Way {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sweep {
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
     /// From this height over the path, m, on surfaces are in its way,
     pub low_m: f64,
     /// up to this one.
     pub high_m: f64,
-    /// Whether what was never seen is in its way as well.
+    /// Places never seen are in its way as well.
     pub unknown_ends: bool,
 }
 
-/// What is known of space: the map, and the window around the camera.
+/// Known space: the map, and the window around the camera.
 #[derive(Clone, Copy)]
 pub(super) struct KnownSpace<'a, 'v, 'c> {
     pub volume: &'a Volume<'v>,
@@ -120,7 +120,7 @@ fn bits_at(grid: &Grid, cells: &Cells<'_>, point_m: [f64; 3]) -> Option<u8> {
     cells.bits.get(cells.position(cells.local(cell)?)?).copied()
 }
 
-/// How far a robot may follow a polyline, its points in world coordinates on the ground.
+/// Length by which a robot may follow a polyline, its points in world coordinates on the ground.
 ///
 /// Every surface point within `radius_m` of the path and between the heights is found by the edges
 /// of the map that it crosses, so the answer is as fine as the map, not as the window's cells; the
@@ -193,7 +193,7 @@ struct Leg {
     from: [f64; 3],
     /// A unit vector across the ground.
     along: [f64; 2],
-    /// Its length across the ground.
+    /// Length across the ground.
     length_m: f64,
     rise: f64,
 }
@@ -212,13 +212,13 @@ impl Leg {
         [self.along[0] * dx + self.along[1] * dy, self.along[0] * dy - self.along[1] * dx]
     }
 
-    /// Whether something `reach_m` around a point may touch the robot.
+    /// Tells that something `reach_m` around a point may touch the robot.
     fn is_within(&self, point: [f64; 3], robot: &Sweep, reach_m: f64) -> bool {
         let (reach_m, [along, beside]) = (reach_m + robot.radius_m, self.local(point));
         along > -reach_m && along < self.length_m + reach_m && libm::fabs(beside) < reach_m
     }
 
-    /// How far along the leg the robot touches a point first.
+    /// Distance along the leg at which the robot touches a point first, m.
     fn touches(&self, point: [f64; 3], robot: &Sweep) -> Option<f64> {
         let [along, beside] = self.local(point);
         let square = robot.radius_m * robot.radius_m - beside * beside;

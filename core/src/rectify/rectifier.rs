@@ -15,7 +15,7 @@ use crate::{
     slices::clipped_mut,
 };
 
-/// Why a rectification does not fit a capacity.
+/// Reason that a rectification does not fit a capacity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -214,7 +214,7 @@ impl<'s> Rectifier<'s> {
         Ok(())
     }
 
-    /// What is rectified, where anything is.
+    /// Rectification in use, where there is one.
     pub(crate) fn rectification(&self) -> Option<&Rectification> {
         self.rectification.as_ref()
     }
@@ -261,7 +261,7 @@ impl<'s> Rectifier<'s> {
         Some([View::new(&*images.left, width, height)?, View::new(&*images.right, width, height)?])
     }
 
-    /// What is reported of each frame; `None` where nothing is rectified.
+    /// Report of a frame; `None` where nothing is rectified.
     pub(crate) fn report(&self, rectified: &Pair<'_>) -> Option<RectifyReport> {
         self.rectification.as_ref()?;
         let mut digest = Digest::default();

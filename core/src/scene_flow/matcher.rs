@@ -33,7 +33,7 @@ pub struct FlowMatcher<'s> {
     right: Camera<'s>,
     /// Width and height of the last frame, if there is one.
     last: Option<[usize; 2]>,
-    /// Whether the frame before it was matched with it.
+    /// The frame before it was matched with it.
     matched: bool,
     capacity: [usize; 2],
     traced: &'s mut [[u32; 3]],
@@ -48,7 +48,7 @@ pub struct FlowMatcher<'s> {
     score: &'s mut [f32],
     selection: &'s mut [u32],
     selection_len: usize,
-    /// What has been taken out of the last frame's matches.
+    /// Disparity error taken out of the last frame's matches.
     correction: PixelCorrection,
 }
 
@@ -288,7 +288,7 @@ impl<'s> FlowMatcher<'s> {
         self.push_within(config, &MaskedPair { left, right, invalid: None }, executor)
     }
 
-    /// As [`FlowMatcher::push`], for a frame with invalid pixels: no feature is found there.
+    /// Takes in and matches, as [`FlowMatcher::push`] does, a frame with invalid pixels: no feature is found there.
     pub(crate) fn push_within<E: Executor>(
         &mut self,
         config: &SceneFlowConfig,

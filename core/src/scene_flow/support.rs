@@ -24,7 +24,7 @@ const DISPARITY_TOLERANCE_PX: f32 = 5.0;
 /// Largest difference of their flow in each direction, px, as in DynSLAM.
 const FLOW_TOLERANCE_PX: f32 = 5.0;
 
-/// What must agree: disparity and flow in u and v, px. The fourth keeps rows of four.
+/// Values that must agree: disparity and flow in u and v, px. The fourth keeps rows of four.
 pub(super) type Motion = [f32; 4];
 
 /// Memory of matches sorted into cells.
@@ -70,7 +70,7 @@ struct Neighbours<'a> {
 }
 
 impl Neighbours<'_> {
-    /// Whether enough matches around a cell move like one in it.
+    /// Tells that enough matches around a cell move like one in it.
     fn support(&self, own: Motion, [column, row]: [usize; 2]) -> bool {
         let &Self { shape, config, start, motion } = self;
         let needed = usize::from(config.support_min);

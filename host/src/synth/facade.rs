@@ -71,7 +71,7 @@ struct Windows {
     balconies: u32,
 }
 
-/// What the parts of one house share.
+/// Measures and surfaces that the parts of one house share.
 struct House {
     width: f64,
     depth: f64,

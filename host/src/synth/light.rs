@@ -20,7 +20,7 @@ pub struct Light {
     pub to_sun: Direction,
 }
 
-/// How a point of a surface lies to eye, sun and sky.
+/// Exposure of a point of a surface to eye, sun and sky.
 pub struct Exposure {
     /// Outward normal.
     pub normal: Direction,

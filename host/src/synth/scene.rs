@@ -83,7 +83,7 @@ pub struct Scene {
     pub ground: GroundLight,
 }
 
-/// What a scene is seen from, and where its light comes from.
+/// Viewpoint of a scene, and its light.
 pub struct StreetView<'a> {
     /// Pose of the camera in the street.
     pub t_street_camera: &'a Transform,

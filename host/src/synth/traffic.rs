@@ -16,15 +16,15 @@ const CHANGE_M: f64 = 13.0;
 
 /// A car of the traffic at one time.
 pub struct Driver {
-    /// Its number for ever.
+    /// Number for ever.
     pub id: u32,
-    /// Its body.
+    /// Body.
     pub kind: CarKind,
-    /// Its paint.
+    /// Paint.
     pub paint: Tone,
-    /// Where it is.
+    /// Pose in the street.
     pub t_street_car: Transform,
-    /// Its speed, m/s.
+    /// Speed, m/s.
     pub speed_m_s: f64,
 }
 
@@ -88,7 +88,7 @@ fn lateral(car: &ScriptedCar, way_m: f64, rate_hz: f64) -> (f64, f64) {
 pub struct Road<'a> {
     /// The street.
     pub config: &'a StreetConfig,
-    /// Its line, at least as far as the stretch.
+    /// Line of the street, at least as far as the stretch.
     pub span: &'a RoadSpan<'a>,
     /// Time since the first frame, s.
     pub time_s: f64,

@@ -54,7 +54,7 @@ const NOISE_M: f64 = 0.02;
 /// Units of a normal's components.
 const NORMAL_ONE: f64 = 127.0;
 
-/// How tracking went.
+/// Outcome of tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -64,7 +64,7 @@ pub enum IcpStatus {
     Tracked,
     /// The map shows too little, or the frame has too little depth.
     TooFewPairs,
-    /// What is paired leaves a direction free.
+    /// Pairs leave a direction free.
     NotHeld,
     /// Most points in view of the map lie off it.
     OffTheMap,
@@ -88,13 +88,13 @@ impl IcpStatus {
     }
 }
 
-/// What the tracker made of a frame.
+/// Result of tracking a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct IcpReport {
-    /// How it went.
+    /// Outcome.
     pub status: IcpStatus,
     /// Maps previous camera coordinates to current ones; what was found, even where the status says
     /// that it is no motion to follow.
@@ -114,7 +114,7 @@ pub struct IcpReport {
 }
 
 impl IcpReport {
-    /// Where no point was paired.
+    /// Report of a frame without a pair.
     pub(crate) fn unpaired() -> Self {
         Self { status: IcpStatus::TooFewPairs, ..Self::default() }
     }
@@ -134,7 +134,7 @@ impl IcpReport {
     }
 }
 
-/// What the map shows from where the camera was.
+/// Picture of the map from where the camera was.
 #[derive(Clone, Copy, Debug)]
 pub struct MapPicture<'a> {
     /// Depth, m, 0 none.
@@ -208,7 +208,7 @@ fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     }
 }
 
-/// How points of one level are paired.
+/// Pairing of the points of one level.
 struct Pairing<'c> {
     rig: &'c StereoRig,
     /// Px of the image between two points.

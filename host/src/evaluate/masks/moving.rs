@@ -61,7 +61,7 @@ pub struct RangeFigures {
     pub mean_iou: Option<f64>,
 }
 
-/// Masks of a frame beside the exact ones.
+/// Masks of a frame to compare with the exact ones.
 pub struct ComparedMasks<'a> {
     /// Overlaps of the masks with the exact ones.
     pub overlaps: &'a Overlaps,

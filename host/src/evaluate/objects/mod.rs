@@ -126,7 +126,7 @@ pub struct ObjectErrors {
     association: Association,
 }
 
-/// Tracks of a frame beside the true objects.
+/// Tracks of a frame to compare with the true objects.
 pub struct TrackedFrame<'a> {
     /// Tracks seen in it.
     pub tracks: &'a [TrackReport],

@@ -20,7 +20,7 @@ pub struct Binary {
     pub accessors: Vec<Value>,
 }
 
-/// What the bytes of a view are.
+/// Layout of the bytes of a view.
 pub struct Values<'a> {
     /// Type of a component, as glTF numbers them.
     pub component: u32,

@@ -5,9 +5,9 @@ use crate::synth::mesh::{Mesh, Point};
 use crate::synth::random::Rng;
 use crate::synth::surface::{Kind, Surface, scaled, tone};
 
-/// Half its width, m.
+/// Half of the width, m.
 const HALF_M: f64 = 1.05;
-/// How far it stands out, m.
+/// Depth over the street, m.
 const OUT_M: f64 = 1.0;
 
 /// A slab over the street with a parapet or a railing, around the middle of an opening.
