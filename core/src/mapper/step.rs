@@ -12,6 +12,7 @@ use crate::{
     digest::Digest,
     egomotion::MotionEstimate,
     image::MaskedPair,
+    invariants::Invariants,
     objects::{InstancesReport, NoSink, ObjectSink},
     rectify::Pair,
     scene_flow::{FlowReport, Match},

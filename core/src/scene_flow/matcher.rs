@@ -17,6 +17,7 @@ use crate::{
     digest::Digest,
     geometry::PixelCorrection,
     image::{InvalidPair, MaskedPair, View},
+    invariants::Invariants,
     memory::{Capacity, Carver, region_bytes},
     parallel::{Executor, Vectors},
     slices::clipped,

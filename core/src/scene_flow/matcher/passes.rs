@@ -3,7 +3,6 @@
 use super::{FlowMatcher, images};
 use crate::{
     parallel::{Bands, Executor, each, zip3},
-    slices::clipped,
     scene_flow::{
         SceneFlowConfig,
         cells::{CELL_MIN_PX, Shape},
@@ -12,6 +11,7 @@ use crate::{
         report::PassCount,
         support::{SortedMotions, support},
     },
+    slices::clipped,
 };
 
 /// Cells in which sparse matches look for support, px; those of the dense pass are [`CELL_MIN_PX`].
