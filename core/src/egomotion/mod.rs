@@ -34,7 +34,8 @@
 //! let lead = slab.as_ptr().align_offset(64);
 //! let mut carver = Carver::new(&mut slab[lead..], Estimator::bytes(&capacity)).unwrap();
 //! let mut estimator = Estimator::new_in(&capacity, &mut carver);
-//! let rig = StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.54 };
+//! let rig =
+//!     StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.54 };
 //! let mut random = Random::new(1);
 //! let hypotheses = MotionHypotheses::from_draws(&mut random);
 //! let estimate = estimator.estimate(&EgomotionConfig::default(), &rig, [], hypotheses);

@@ -90,7 +90,8 @@ impl Config {
     /// ```
     /// use dynvox_core::{Config, geometry::StereoRig};
     ///
-    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let mut config = Config::for_rig(rig);
     /// (config.mapper.fuse_every, config.mesh.min_weight) = (0, 0);
     /// let keys: Vec<_> = config.validate().iter().map(|problem| problem.key).collect();

@@ -51,7 +51,10 @@ impl core::error::Error for NewError {}
 /// Why a frame cannot be taken. The mapper is as it was before.
 ///
 /// ```
-/// use dynvox_core::{Capacity, Config, Mapper, Serial, StepError, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
+/// use dynvox_core::{
+///     Capacity, Config, Mapper, Serial, StepError, StereoFrame, geometry::StereoRig, image::View,
+///     memory::SLAB_ALIGN,
+/// };
 ///
 /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
 /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];

@@ -53,7 +53,10 @@ use crate::{
 /// A stereo mapper in a slab.
 ///
 /// ```
-/// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
+/// use dynvox_core::{
+///     Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View,
+///     memory::SLAB_ALIGN,
+/// };
 ///
 /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
 /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
@@ -136,8 +139,8 @@ const _: () = assert!(Capacity::DESKTOP.bytes() < 2048 * MIB);
 
 impl<'s> Mapper<'s> {
     /// Makes a mapper in `slab`, which must hold at least `capacity.bytes()` from its first byte at
-    /// a multiple of
-    /// [`SLAB_ALIGN`](crate::memory::SLAB_ALIGN) on: `capacity.bytes() + SLAB_ALIGN` bytes are enough anywhere.
+    /// a multiple of [`SLAB_ALIGN`](crate::memory::SLAB_ALIGN) on: `capacity.bytes() + SLAB_ALIGN`
+    /// bytes are enough anywhere.
     ///
     /// # Errors
     /// The slab is too small, or the configuration is not usable.

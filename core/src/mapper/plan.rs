@@ -28,9 +28,13 @@ impl<'s> Mapper<'s> {
     /// frame. Nothing where the capacity has no window.
     ///
     /// ```
-    /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View, memory::SLAB_ALIGN};
+    /// use dynvox_core::{
+    ///     Capacity, Config, Mapper, Serial, StereoFrame, geometry::StereoRig, image::View,
+    ///     memory::SLAB_ALIGN,
+    /// };
     ///
-    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let capacity = Capacity { planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY };
     /// let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     /// let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;

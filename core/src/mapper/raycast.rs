@@ -15,10 +15,14 @@ impl<'s> Mapper<'s> {
     /// ([`RaycastView`]). Before the first frame there is no size to look at.
     ///
     /// ```
-    /// use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform}, image::View, memory::SLAB_ALIGN};
+    /// use dynvox_core::{
+    ///     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    ///     image::View, memory::SLAB_ALIGN,
+    /// };
     /// use dynvox_core::view::RaycastView;
     ///
-    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
     /// let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
     /// assert!(mapper.raycast(&Transform::IDENTITY, &Serial).is_err(), "no frame, no image size");

@@ -46,7 +46,8 @@ impl Config {
     /// ```
     /// use dynvox_core::{Config, SetError, geometry::StereoRig};
     ///
-    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let mut config = Config::for_rig(rig);
     /// config.set("volume.voxel_size_m", "0.1")?;
     /// config.set("mapper.egomotion", "icp")?;

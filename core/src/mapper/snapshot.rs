@@ -99,7 +99,8 @@ impl<'s> Mapper<'s> {
     /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
     /// use std::io::{Error, Read};
     ///
-    /// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let (capacity, config) = (Capacity::TINY, Config::for_rig(rig));
     /// let [mut first, mut second] = [0, 1].map(|_| vec![0; capacity.bytes() + SLAB_ALIGN]);
     /// let mut bytes = Vec::new();

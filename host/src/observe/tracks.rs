@@ -164,8 +164,9 @@ impl Observer for TracksObserver {
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
             let size = run.plan.dataset.size();
-            let large_enough =
-                |pixels: &PixelBox| run.plan.config.tracking.is_reconstructable(pixels.area(), size.0);
+            let large_enough = |pixels: &PixelBox| {
+                run.plan.config.tracking.is_reconstructable(pixels.area(), size.0)
+            };
             let t_world_camera = &frame.row.report.t_world_camera;
             let compared = TrackedFrame { tracks: &tracks, t_world_camera, truth, size };
             self.errors.add(&compared, large_enough);
