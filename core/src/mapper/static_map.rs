@@ -10,8 +10,8 @@ use crate::{
     tracking::{CameraMotion, Tracked},
     view::Raycaster,
     volume::{
-        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth, Viewpoint,
-        Volume,
+        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth,
+        Viewpoint, Volume,
     },
 };
 use bytemuck::TransparentWrapper;
