@@ -6,7 +6,7 @@ use super::{
     SceneFlowConfig,
     bucket::{Scored, select},
     camera::{Camera, Names},
-    cells::{CELL_MIN_PX, Cells, Shape},
+    cells::{Cells, Shape},
     matches::Match,
     prior::Prior,
     refine::{Images, Pixels, find_back},

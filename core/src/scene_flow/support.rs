@@ -89,8 +89,7 @@ impl Neighbours<'_> {
                 };
                 let run = clipped(motion, from as usize..to as usize);
                 neighbours += run.len();
-                agreeing +=
-                    run.iter().map(|other| usize::from(agree(own, *other))).sum::<usize>();
+                agreeing += run.iter().map(|other| usize::from(agree(own, *other))).sum::<usize>();
             }
             if neighbours > NEIGHBOURS {
                 break;
