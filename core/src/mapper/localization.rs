@@ -3,7 +3,10 @@
 use super::{Config, MotionSource, PoseOrigin, matched::MatchedFrame, static_map::StaticMap};
 use crate::{
     Capacity,
-    egomotion::{Egomotion, Estimator, MotionEstimate, TimedMatches, icp::IcpReport},
+    egomotion::{
+        Egomotion, Estimator, MotionEstimate, TimedMatches,
+        icp::{self, IcpReport},
+    },
     geometry::{StereoObservation, StereoRig, Transform},
     memory::Carver,
     parallel::Executor,
