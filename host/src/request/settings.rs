@@ -4,6 +4,7 @@
 use crate::formats::calibration::RectifiedSize;
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
+use dynvox_core::MapperConfig;
 use dynvox_core::egomotion::EgomotionConfig;
 use dynvox_core::egomotion::icp::IcpConfig;
 use dynvox_core::geometry::StereoRig;
@@ -17,7 +18,6 @@ use dynvox_core::tracking::TrackingConfig;
 use dynvox_core::view::{MeshConfig, RaycastConfig};
 use dynvox_core::volume::VolumeConfig;
 use dynvox_core::{Capacity, Config};
-use dynvox_core::{MapperConfig, MotionSource};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::{Table, Value};
@@ -151,46 +151,6 @@ impl Settings {
             self.volume.prune_lag = u32::try_from(capacity.history_frames)
                 .map_or(default, |frames| frames.min(default));
         }
-    }
-
-    /// Side of a voxel of the static map, m.
-    pub fn voxel_size_m(&self) -> f32 {
-        self.volume.voxel_size_m
-    }
-
-    /// Sets the time between two frames, which comes with the data set.
-    pub fn set_frame_interval_s(&mut self, interval_s: f64) {
-        self.tracking.frame_interval_s = interval_s as f32;
-    }
-
-    /// Sets the source of the camera's motion.
-    pub fn set_motion_source(&mut self, source: MotionSource) {
-        self.mapper.egomotion = source;
-    }
-
-    /// Fuses every so many frames.
-    pub fn set_fuse_every(&mut self, frames: u32) {
-        self.mapper.fuse_every = frames;
-    }
-
-    /// Sets whether objects are separate from the static map.
-    pub fn set_dynamic(&mut self, dynamic: bool) {
-        self.tracking.dynamic = dynamic;
-    }
-
-    /// Sets whether moving objects are searched for by their motion.
-    pub fn set_motion_segmentation(&mut self, enabled: bool) {
-        self.tracking.segmentation.enabled = enabled;
-    }
-
-    /// How large raw pairs are rectified.
-    pub fn rectified_size(&self) -> RectifiedSize {
-        self.rectify
-    }
-
-    /// Sets how large raw pairs are rectified.
-    pub fn set_rectified_size(&mut self, size: RectifiedSize) {
-        self.rectify = size;
     }
 
     /// The street's configuration.
