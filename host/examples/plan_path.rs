@@ -175,12 +175,7 @@ fn street(seed: u64) -> anyhow::Result<Street> {
         car(Lane::Overtaking, 8.0, 18.0, 4.0, 7.0),
         car(Lane::Oncoming, 30.0, 50.0, 3.0, 6.0),
     ];
-    let traffic = MovingTraffic {
-        oncoming_gap_m: 0.0,
-        overtaking_gap_m: 0.0,
-        cars,
-        ..MovingTraffic::default()
-    };
+    let traffic = MovingTraffic { oncoming_gap_m: 0.0, overtaking_gap_m: 0.0, cars };
     Ok(Street::new(StreetConfig {
         seed,
         width: 828,
