@@ -16,7 +16,7 @@
 //!
 //! Memory: 128 KiB, half of it a direct-mapped cache of the blocks met, which spares the index most
 //! look-ups, half for requests. Time: linear in pixels times blocks per ray, at most
-//! [`MAX_BLOCKS_PER_RAY`].
+//! [`MAX_BLOCKS_PER_RAY`](super::MAX_BLOCKS_PER_RAY).
 
 use super::{
     BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
@@ -27,10 +27,6 @@ use crate::{
     parallel::{Executor, each},
 };
 use nalgebra::Vector3;
-
-/// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three
-/// axes, and one at either end.
-pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
 
 /// What one frame's allocation did. Requests refused repeat when several rays ask for the same
 /// block.

@@ -30,7 +30,7 @@ mod viewpoint;
 mod visible;
 mod visit;
 
-pub use allocate::{AllocationReport, MAX_BLOCKS_PER_RAY};
+pub use allocate::AllocationReport;
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
 pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;
@@ -41,6 +41,7 @@ pub use noted_depth::{DepthImage, NotedDepth};
 pub(crate) use observed::ObservedDepth;
 pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
+pub use request::MAX_BLOCKS_PER_RAY;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
 pub(crate) use surroundings::{BLOCK, EDGE_Q8, Surroundings};

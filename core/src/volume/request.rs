@@ -4,7 +4,7 @@
 //! Each band of rows has a cache of the blocks it met last and a list of those to ask the map for.
 //! A list that is full is emptied before its band goes on, so that no size of it loses a block.
 
-use super::{BLOCK_SIDE, MAX_BLOCKS_PER_RAY, Viewpoint, VolumeConfig};
+use super::{BLOCK_SIDE, Viewpoint, VolumeConfig};
 use crate::{
     geometry::scalar::{floor_i32, max_f32, min_f32},
     image::View,
@@ -12,6 +12,10 @@ use crate::{
     parallel::{BANDS, Bands},
 };
 use nalgebra::Vector3;
+
+/// Most blocks one ray visits: 2 x 64 voxels of truncation are 16 blocks, diagonally across three
+/// axes, and one at either end.
+pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
 
 /// Rows and columns from one pixel whose ray is walked to the next, where a block is narrower than
 /// [`WIDE_PX`]: at KITTI's focal length it is 14 px wide at 20 m. Twice as many from that width on,

@@ -269,17 +269,7 @@ impl Group {
             return None;
         }
         let last = 2 * cost.radius;
-        // Columns of the row are below 2^13. Four bytes wide, they are found side by side, and no
-        // end of a range can wrap.
-        let mut starts = [0; LANES];
-        for (start, (u, &first)) in starts.iter_mut().zip((self.u as u32..).zip(&firsts)) {
-            *start =
-                if LEFT { u.wrapping_sub(first as u32 + last as u32) } else { u + first as u32 };
-        }
-        let mut rows = [&[Descriptor::UNTEXTURED; PLANE_WIDTH]; LANES];
-        for (row, start) in rows.iter_mut().zip(starts.map(|start| start as usize)) {
-            *row = other.get(start..start + PLANE_WIDTH)?.first_chunk()?;
-        }
+        let rows = self.rows_from::<LEFT>(other, &firsts, last)?;
         // What a candidate's distance is added to; about a steep plane, which is not preferred, all
         // cost the same.
         let lowered = |mut best: Eight<u32>, sums: Eight<u32>, step: usize, about: u32| {
@@ -319,6 +309,29 @@ impl Group {
             last,
             *cost.about_plane.get(last)?,
         ))
+    }
+
+    /// The descriptors of the other row that candidates from the first ones to `last` more stand
+    /// for, in the order of columns; `None` where they do not lie in it.
+    #[inline(always)]
+    fn rows_from<'a, const LEFT: bool>(
+        &self,
+        other: &'a [Descriptor],
+        firsts: &Eight<i32>,
+        last: usize,
+    ) -> Option<Eight<&'a [Descriptor; PLANE_WIDTH]>> {
+        // Columns of the row are below 2^13. Four bytes wide, they are found side by side, and no
+        // end of a range can wrap.
+        let mut starts = [0; LANES];
+        for (start, (u, &first)) in starts.iter_mut().zip((self.u as u32..).zip(firsts)) {
+            *start =
+                if LEFT { u.wrapping_sub(first as u32 + last as u32) } else { u + first as u32 };
+        }
+        let mut rows = [&[Descriptor::UNTEXTURED; PLANE_WIDTH]; LANES];
+        for (row, start) in rows.iter_mut().zip(starts.map(|start| start as usize)) {
+            *row = other.get(start..start + PLANE_WIDTH)?.first_chunk()?;
+        }
+        Some(rows)
     }
 
     /// The same of planes wherever they are.

@@ -2,6 +2,24 @@
 //! integer operations.
 
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS};
+use bytemuck::{Pod, Zeroable};
+
+/// One of the cells in view: its block's entry and its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct CellId(pub u32);
+
+impl CellId {
+    /// No cell.
+    pub const NONE: Self = Self(u32::MAX);
+    /// Most blocks in view that ids tell apart.
+    pub const MAX_BLOCKS: usize = u32::MAX as usize / BLOCK_VOXELS;
+
+    #[inline(always)]
+    pub fn new(entry: usize, cell: CellIndex) -> Self {
+        Self((entry * BLOCK_VOXELS + cell.voxel()) as u32)
+    }
+}
 
 /// The last coordinate in a block.
 const LAST: u32 = BLOCK_SIDE as u32 - 1;

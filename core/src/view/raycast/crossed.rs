@@ -2,30 +2,12 @@
 
 use super::{
     cell::{Corners, Faces},
-    cell_index::{CellIndex, Point},
+    cell_index::{CellId, CellIndex, Point},
     colour::{self, Colours},
     ray_camera::AXES,
     surface::Surface,
 };
 use crate::volume::{BLOCK_SIDE, BLOCK_VOXELS, Blocks, Slot};
-use bytemuck::{Pod, Zeroable};
-
-/// One of the cells in view: its block's entry and its number there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(transparent)]
-pub(super) struct CellId(pub u32);
-
-impl CellId {
-    /// No cell.
-    pub const NONE: Self = Self(u32::MAX);
-    /// Most blocks in view that ids tell apart.
-    pub const MAX_BLOCKS: usize = u32::MAX as usize / BLOCK_VOXELS;
-
-    #[inline(always)]
-    pub fn new(entry: usize, cell: CellIndex) -> Self {
-        Self((entry * BLOCK_VOXELS + cell.voxel()) as u32)
-    }
-}
 
 /// Reads the cells in view.
 #[derive(Clone, Copy)]

@@ -3,7 +3,8 @@
 
 use super::{
     NORMAL_ONE,
-    crossed::{CellId, CrossedCells},
+    cell_index::CellId,
+    crossed::CrossedCells,
     hits::{Hit, Hits, RowToHit},
     ray_camera::RayCamera,
     visibility::{Projection, Strip},

@@ -2,8 +2,9 @@
 
 use super::{
     cell::{Faces, Field, along, depths_m, mean, position},
+    cell_index::CellId,
     colour::{self, Colours},
-    crossed::{CellId, CrossedCell, CrossedCells},
+    crossed::{CrossedCell, CrossedCells},
     ray_camera::{AXES, RowOfRays},
 };
 use crate::{
@@ -267,13 +268,33 @@ impl Work for Meet<'_> {
                 break;
             }
         }
+        self.seen(&Passages { fields, from, to, depths, share })
+    }
+}
+
+/// Rays through their cells: the field there, where and at which depths they enter and leave, and
+/// the share of that way at which the surface lies.
+struct Passages {
+    fields: [Eight<f32>; 8],
+    from: [Eight<f32>; 3],
+    to: [Eight<f32>; 3],
+    depths: [Eight<f32>; 2],
+    share: Eight<f32>,
+}
+
+impl Meet<'_> {
+    /// What is seen where the rays meet the surface.
+    #[inline(always)]
+    #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
+    fn seen(&self, passages: &Passages) -> Met {
+        let Passages { fields, from, to, depths, share } = passages;
         let mut met = Met::default();
         for lane in 0..LANES {
             let share = max_f32(0.0, min_f32(share[lane], 1.0));
-            let point = along(ends(lane), share);
-            let gradient = Field(at_lane(&fields, lane)).gradient(point);
+            let point = along([at_lane(from, lane), at_lane(to, lane)], share);
+            let gradient = Field(at_lane(fields, lane)).gradient(point);
             met.depth_m[lane] = depths[0][lane] + (depths[1][lane] - depths[0][lane]) * share;
-            let colour = colour::mean(&at_lane(&crossings.colours, lane), point);
+            let colour = colour::mean(&at_lane(&self.crossings.colours, lane), point);
             for axis in AXES {
                 let row = self.rotation[axis];
                 met.colour[axis][lane] = colour[axis];

@@ -4,7 +4,7 @@
 //! joined into crossed cells.
 
 use super::{
-    crossed::CellId,
+    cell_index::CellId,
     ray_camera::RayCamera,
     signs::{self, Cells},
 };

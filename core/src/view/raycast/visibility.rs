@@ -8,8 +8,8 @@
 
 use super::{
     cell::{Faces, depths_m, mean, position},
-    cell_index::CellIndex,
-    crossed::{CellId, CrossedCell, CrossedCells},
+    cell_index::{CellId, CellIndex},
+    crossed::{CrossedCell, CrossedCells},
     ray_camera::{Ray, RayCamera, RowOfRays},
     surface::BlockInView,
 };

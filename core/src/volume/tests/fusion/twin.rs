@@ -28,6 +28,30 @@ fn gain(config: &VolumeConfig, class: Option<u8>, depth_m: f32, distance_m: f32)
     crate::geometry::scalar::clamp_f32(at_1_m / depth_m, 1.0, 10.0) as i32 * by_class
 }
 
+/// An average of integers with the share of a new observation in 15 bits.
+fn averaged(old: i32, new: i32, gain: i32, sum: i32) -> i32 {
+    let share = (gain * (((1 << 23) + sum / 2) / sum) + 128) >> 8;
+    old + (((new - old) * share + (1 << 14)) >> 15)
+}
+
+/// Averages a colour in, unless there is one and that of the pixel may be another surface's.
+fn fuse_colour_slowly(
+    colour: &mut Colour,
+    voxel: usize,
+    weight: u8,
+    is_unreliable: bool,
+    target: [u8; 3],
+) {
+    let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
+    if !is_blank && is_unreliable {
+        return;
+    }
+    let sum = if is_blank { 1 } else { i32::from(weight).clamp(2, 6) };
+    for (plane, target) in colour.iter_mut().zip(target) {
+        plane[voxel] = averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
+    }
+}
+
 /// Fusion as its module states it, one voxel after the other, and as plainly.
 fn fuse_slowly(
     config: &VolumeConfig,
@@ -44,10 +68,6 @@ fn fuse_slowly(
         .cast::<f32>();
     let step = [Vector3::x(), Vector3::y(), Vector3::z()]
         .map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
-    let averaged = |old: i32, new: i32, gain: i32, sum: i32| {
-        let share = (gain * (((1 << 23) + sum / 2) / sum) + 128) >> 8;
-        old + (((new - old) * share + (1 << 14)) >> 15)
-    };
     for voxel in 0..BLOCK_VOXELS {
         let (x, y, z) = (voxel & 7, voxel >> 3 & 7, voxel >> 6);
         let first = corner + step[1] * y as f32 + step[2] * z as f32;
@@ -92,14 +112,15 @@ fn fuse_slowly(
         sdf[voxel] =
             averaged(i32::from(sdf[voxel]), observed, gain, past(config, w, depth) + gain) as i16;
         weight[voxel] = (w + gain).min(i32::from(config.max_weight)) as u8;
-        let is_blank = colour.iter().all(|plane| plane[voxel] == 0);
-        if distance.abs() > COLOUR_BAND * config.truncation_m || !is_blank && notes & 16 != 0 {
-            continue;
-        }
-        let sum = if is_blank { 1 } else { i32::from(weight[voxel]).clamp(2, 6) };
-        for (plane, target) in colour.iter_mut().zip(target_colour(seen, u, v)) {
-            plane[voxel] =
-                averaged(i32::from(plane[voxel]), i32::from(target.max(1)), 1, sum) as u8;
+        if distance.abs() <= COLOUR_BAND * config.truncation_m {
+            let is_unreliable = notes & 16 != 0;
+            fuse_colour_slowly(
+                colour,
+                voxel,
+                weight[voxel],
+                is_unreliable,
+                target_colour(seen, u, v),
+            );
         }
     }
 }
