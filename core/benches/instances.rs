@@ -195,7 +195,7 @@ impl Executor for Timed {
 /// the two stages and of the step, summed over the frames measured.
 fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) -> [Duration; 3] {
     let mut config = Config::for_rig(RIG);
-    config.tracking.segmentation.enabled = by_motion;
+    config.segmentation.enabled = by_motion;
     let mut mapper = Mapper::new(&Capacity::ONBOARD, &config, slab).unwrap();
     let mut spent = [Duration::ZERO; 3];
     for (at, frame) in frames.iter().enumerate() {

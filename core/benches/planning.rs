@@ -12,7 +12,7 @@ use cpu_time::ThreadTime;
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     Capacity, Serial,
-    geometry::{StereoRig, Transform},
+    geometry::{GroundPlane, StereoRig, Transform},
     image::View,
     memory::{Carver, SLAB_ALIGN},
     planning::{DistanceField, Planning, PlanningConfig, Sight},
@@ -120,11 +120,9 @@ fn windows(criterion: &mut Criterion) {
             .collect();
         let pose =
             |n: u32| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.8 * f64::from(n)));
-        let sight = |t_world_camera| Sight {
-            rig: &RIG,
-            t_world_camera,
-            disparity_q8: View::new(&disparity_q8, WIDTH, HEIGHT).unwrap(),
-        };
+        let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
+        let ground = GroundPlane::find(&RIG, disparity_q8);
+        let sight = |t_world_camera| Sight { rig: &RIG, t_world_camera, disparity_q8, ground };
         let poses: Vec<Transform> = (0..12).map(pose).collect();
         for pose in &poses {
             let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: *pose };

@@ -35,6 +35,7 @@ pub mod random;
 pub mod rectify;
 mod sad;
 pub mod scene_flow;
+pub mod segmentation;
 pub mod settings;
 mod slices;
 mod state;

@@ -60,7 +60,7 @@ fn main() -> anyhow::Result<()> {
     };
     let mut config = Config::for_rig(street.rig());
     (config.planning.below_m, config.planning.far_m) = (4.5, FAR_M as f32);
-    config.tracking.segmentation.enabled = false;
+    config.segmentation.enabled = false;
     for setting in
         arguments.iter().filter(|argument| argument.contains('.') && argument.contains('='))
     {

@@ -232,7 +232,7 @@ fn map(
     capacity: &Capacity,
 ) -> anyhow::Result<(Fields, Truth, [f64; 2], [f64; 2])> {
     let mut config = Config::for_rig(street.rig());
-    config.tracking.segmentation.enabled = true;
+    config.segmentation.enabled = true;
     config.planning.unknown_is_obstacle = true;
     for setting in std::env::args().filter(|argument| argument.starts_with("planning.")) {
         let (key, value) = setting.split_once('=').unwrap_or_default();

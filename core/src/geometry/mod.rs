@@ -3,6 +3,7 @@
 
 mod correction;
 mod depth;
+mod ground_plane;
 pub(crate) mod histogram;
 mod oriented_box;
 mod rig;
@@ -15,6 +16,7 @@ pub use correction::DisparityCorrection;
 pub(crate) use correction::{PixelCorrection, ROW_SQUARE_MEAN};
 pub(crate) use depth::DepthRange;
 pub use depth::depth_from_disparity;
+pub use ground_plane::GroundPlane;
 pub(crate) use oriented_box::OrientedBox;
 pub(crate) use rig::StereoObservation;
 pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoRig};

@@ -9,6 +9,7 @@ use crate::{
     rectify::Rectification,
     rectify::self_calibration::RigConfig,
     scene_flow::SceneFlowConfig,
+    segmentation::SegmentationConfig,
     settings::{Problems, require},
     stereo::StereoConfig,
     tracking::TrackingConfig,
@@ -47,6 +48,8 @@ pub struct Config {
     pub mapper: MapperConfig,
     /// Instances and tracks.
     pub tracking: TrackingConfig,
+    /// Moving objects that no detector found.
+    pub segmentation: SegmentationConfig,
     /// The objects' maps.
     pub objects: ObjectsConfig,
     /// The map.
@@ -72,6 +75,7 @@ impl Config {
             icp: IcpConfig::default(),
             mapper: MapperConfig::default(),
             tracking: TrackingConfig::default(),
+            segmentation: SegmentationConfig::default(),
             objects: ObjectsConfig::default(),
             volume: VolumeConfig::default(),
             raycast: RaycastConfig::default(),
@@ -125,6 +129,7 @@ impl Config {
         self.icp.validate(&mut problems);
         self.mapper.validate(&mut problems);
         self.tracking.validate(&mut problems);
+        self.segmentation.validate(&mut problems);
         self.objects.validate(&mut problems);
         self.volume.validate(&mut problems);
         self.raycast.validate(&mut problems);

@@ -13,6 +13,7 @@ mod plan;
 mod raycast;
 mod relocalization;
 mod report;
+mod segmentation;
 mod set;
 mod settings;
 pub mod snapshot;
@@ -44,6 +45,7 @@ use crate::{
     planning::Planning,
     rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier},
     scene_flow::FlowMatcher,
+    segmentation::MotionSegmenter,
     stereo::StereoMatcher,
     tracking::{InstanceAt, TrackReport, Tracker},
     view::Triangle,
@@ -78,6 +80,7 @@ pub struct Mapper<'s> {
     scene_flow: FlowMatcher<'s>,
     localization: Localization<'s>,
     tracker: Tracker<'s>,
+    segmenter: MotionSegmenter<'s>,
     objects: Objects<'s>,
     static_map: StaticMap<'s>,
     planning: Planning<'s>,
@@ -103,6 +106,7 @@ impl Capacity {
             + FlowMatcher::bytes(self)
             + Localization::bytes(self)
             + Tracker::bytes(self)
+            + MotionSegmenter::bytes(self)
             + Objects::bytes(self)
             + StaticMap::bytes(self)
             + Planning::bytes(self)
@@ -173,6 +177,8 @@ impl<'s> Mapper<'s> {
             scene_flow: FlowMatcher::new_in(capacity, carver),
             localization: Localization::new_in(capacity, config, carver),
             tracker: Tracker::new_in(capacity, &config.tracking, carver),
+            segmenter: carver
+                .group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),
             objects: Objects::new_in(capacity, &config.objects, carver),
             static_map: StaticMap::new_in(capacity, config, carver),
             planning: Planning::new_in(

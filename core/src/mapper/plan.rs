@@ -9,7 +9,7 @@
 
 use super::Mapper;
 use crate::{
-    geometry::{StereoRig, Transform},
+    geometry::{GroundPlane, StereoRig, Transform},
     objects::PosedObject,
     planning::{BoxFit, Grid, MARGIN_PX, MovingBox, Planning, PlanningReport, Sight, crossings},
     tracking::{MotionState, Track},
@@ -67,12 +67,17 @@ impl<'s> Mapper<'s> {
     }
 
     /// Marks what the frame sees through in the planner's window, where the capacity has one.
-    pub(super) fn observe_free_space(&mut self, t_world_camera: &Transform) {
+    pub(super) fn observe_free_space(
+        &mut self,
+        t_world_camera: &Transform,
+        ground: Option<GroundPlane>,
+    ) {
         let rig = self.config.scaled_rig();
         self.planning.observe(&Sight {
             rig: &rig,
             t_world_camera,
             disparity_q8: self.stereo.disparity_q8(),
+            ground,
         });
     }
 

@@ -7,6 +7,7 @@ use crate::{
     planning::PlanningConfig,
     rectify::self_calibration::RigConfig,
     scene_flow::SceneFlowConfig,
+    segmentation::SegmentationConfig,
     settings::{About, Setting, Value, find},
     stereo::StereoConfig,
     tracking::TrackingConfig,
@@ -74,6 +75,7 @@ impl Config {
             "icp" => find(IcpConfig::CHECKS, &mut self.icp, key),
             "mapper" => find(MapperConfig::CHECKS, &mut self.mapper, key),
             "tracking" => find(TrackingConfig::CHECKS, &mut self.tracking, key),
+            "segmentation" => find(SegmentationConfig::CHECKS, &mut self.segmentation, key),
             "objects" => find(ObjectsConfig::CHECKS, &mut self.objects, key),
             "volume" => find(VolumeConfig::CHECKS, &mut self.volume, key),
             "raycast" => find(RaycastConfig::CHECKS, &mut self.raycast, key),
@@ -99,6 +101,7 @@ impl Config {
             .chain(IcpConfig::SETTINGS.iter().map(Setting::about))
             .chain(MapperConfig::SETTINGS.iter().map(Setting::about))
             .chain(TrackingConfig::SETTINGS.iter().map(Setting::about))
+            .chain(SegmentationConfig::SETTINGS.iter().map(Setting::about))
             .chain(ObjectsConfig::SETTINGS.iter().map(Setting::about))
             .chain(VolumeConfig::SETTINGS.iter().map(Setting::about))
             .chain(RaycastConfig::SETTINGS.iter().map(Setting::about))

@@ -182,6 +182,7 @@ impl<'s> Mapper<'s> {
             scene_flow,
             localization,
             tracker,
+            segmenter,
             objects,
             static_map,
             planning,
@@ -189,7 +190,7 @@ impl<'s> Mapper<'s> {
             frame,
             clock,
             // Told by the caller; a fingerprint stands for them.
-            config: _,
+            config,
             capacity,
             // Belong to one frame.
             stereo: _,
@@ -206,6 +207,10 @@ impl<'s> Mapper<'s> {
         scene_flow.visit(visitor);
         localization.visit(visitor);
         tracker.visit(visitor);
+        // Without it the state is what it was before there was any.
+        if config.segmentation.enabled {
+            segmenter.visit(visitor);
+        }
         objects.visit(visitor);
         static_map.visit(visitor);
         planning.visit(visitor);

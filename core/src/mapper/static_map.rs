@@ -6,6 +6,7 @@ use crate::{
     egomotion::icp::{self, IcpConfig, IcpReport, MapPicture, MeasuredDepth},
     image::ViewMut,
     memory::{Carver, region_bytes},
+    segmentation::MotionSegmenter,
     state::Visitor,
     tracking::{CameraMotion, Tracked},
     view::Raycaster,
@@ -51,9 +52,13 @@ impl<'s> StaticMap<'s> {
     }
 
     /// Erases what moving objects left before they were known to move. Returns how many voxels.
-    pub fn erase_trails(&mut self, camera: &CameraMotion, tracked: &mut Tracked<'_, '_>) -> u32 {
+    pub fn erase_trails(
+        &mut self,
+        camera: &CameraMotion,
+        segmenter: &mut MotionSegmenter<'_>,
+    ) -> u32 {
         let mut erased = 0;
-        tracked.take_trails(&camera.t_world_camera, |trail| {
+        segmenter.take_trails(&camera.t_world_camera, |trail| {
             erased +=
                 trail.boxes().map(|before| self.volume.erase(&before, trail.frames())).sum::<u32>();
         });

@@ -6,16 +6,19 @@ use super::{
     StereoFrame,
     localization::{Localization, Located},
     matched::MatchedFrame,
+    segmentation::Segmentation,
 };
 use crate::{
     Executor, Stage,
     digest::Digest,
     egomotion::MotionEstimate,
+    geometry::GroundPlane,
     image::MaskedPair,
     invariants::Invariants,
     objects::{InstancesReport, NoSink, ObjectSink},
     rectify::Pair,
     scene_flow::{FlowReport, Match},
+    segmentation::SegmentationReport,
     state::Hasher,
     stereo::{RectifiedPair, StereoReport},
     tracking::TrackingReport,
@@ -27,6 +30,8 @@ struct Outcome {
     stereo: StereoReport,
     scene_flow: FlowReport,
     located: Located,
+    ground: Option<GroundPlane>,
+    segmentation: SegmentationReport,
     tracking: TrackingReport,
     fused: bool,
     allocation: AllocationReport,
@@ -97,11 +102,11 @@ impl Mapper<'_> {
             flow_status: scene_flow.status,
             with_last: self.localization.camera.since_reference() == 0,
         };
-        let Self { tracker, localization, static_map, objects, .. } = self;
+        let Self { tracker, segmenter, localization, static_map, objects, planning, .. } = self;
         // (B) Detections, associated with tracks, and the matches assigned to them.
         tracker.set_frame_interval_s(seen.interval_s);
         let (detections, matches) = (frame.detections, seen.matches());
-        let assigned = executor.stage(Stage::Instances, || {
+        let mut assigned = executor.stage(Stage::Instances, || {
             tracker.detect(seen.number, detections, seen.size(), matches).assign_matches()
         });
         // (C.2) The camera's own motion, from what does not move. The first frame's camera is the
@@ -111,17 +116,18 @@ impl Mapper<'_> {
         let located = executor.stage(Stage::Egomotion, locate);
         // (B) Moving objects that no detector found, and (D) the objects' motions.
         let (rig, camera) = (seen.config.scaled_rig(), located.camera);
-        let segment_motion =
-            || assigned.segment_motion(&rig, &camera, seen.disparity_q8, seen.search());
-        let assigned = executor.stage(Stage::Segmentation, segment_motion);
+        let fused = located.found.origin != PoseOrigin::Held && seen.is_due();
+        let plans = fused && planning.seeks_ground();
+        let segmentation = Segmentation { segmenter, plans };
+        let (ground, segmentation) =
+            executor.stage(Stage::Segmentation, || segmentation.run(&seen, &camera, &mut assigned));
         let estimator = &mut localization.estimator;
         let estimate_motions =
             || assigned.estimate_motions(&rig, &camera, seen.search(), estimator);
         let mut tracked = executor.stage(Stage::Instances, estimate_motions);
         // (E) The static map, without what moves or may move, and the objects' maps; unless the
         // pose is extrapolated.
-        let fused = located.found.origin != PoseOrigin::Held && seen.is_due();
-        let erase_trails = || static_map.erase_trails(&camera, &mut tracked);
+        let erase_trails = || static_map.erase_trails(&camera, segmenter);
         let voxels_erased = executor.stage(Stage::Prune, erase_trails);
         let mut allocation = AllocationReport::default();
         if fused {
@@ -139,7 +145,17 @@ impl Mapper<'_> {
             prune = executor.stage(Stage::Prune, || static_map.volume.prune());
         }
         prune.voxels_erased = voxels_erased;
-        let outcome = Outcome { stereo, scene_flow, located, tracking, fused, allocation, prune };
+        let outcome = Outcome {
+            stereo,
+            scene_flow,
+            located,
+            ground,
+            segmentation,
+            tracking,
+            fused,
+            allocation,
+            prune,
+        };
         self.finish_frame(outcome)
     }
 
@@ -187,6 +203,8 @@ impl Mapper<'_> {
             stereo,
             scene_flow,
             located: Located { camera, found },
+            ground,
+            segmentation,
             tracking,
             fused,
             allocation,
@@ -196,7 +214,7 @@ impl Mapper<'_> {
             self.scene_flow.keep_previous();
         }
         if fused {
-            self.observe_free_space(&camera.t_world_camera);
+            self.observe_free_space(&camera.t_world_camera, ground);
         }
         let digests = self.digests(found.egomotion.as_ref());
         let report = Report {
@@ -212,6 +230,7 @@ impl Mapper<'_> {
             self_calibration: self.localization.self_calibration.report(),
             instances: InstancesReport::of(
                 &tracking,
+                segmentation,
                 self.objects.report(),
                 found.matches_excluded,
             ),
@@ -279,6 +298,9 @@ impl Mapper<'_> {
     fn tracks_digest(&mut self) -> u64 {
         Hasher::digest(|hasher| {
             self.tracker.visit(hasher);
+            if self.config.segmentation.enabled {
+                self.segmenter.visit(hasher);
+            }
             self.objects.visit_crops(hasher);
         })
     }

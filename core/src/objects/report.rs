@@ -1,8 +1,9 @@
 //! Reports of a frame's instances, as plain values.
 
 use super::{Object, ObjectSummary, Objects};
-use crate::tracking::{
-    DetectionCount, SegmentationReport, TrackCount, TrackReport, Tracker, TrackingReport,
+use crate::{
+    segmentation::SegmentationReport,
+    tracking::{DetectionCount, TrackCount, TrackReport, Tracker, TrackingReport},
 };
 
 /// How volumes were used in a frame.
@@ -60,11 +61,11 @@ impl InstancesReport {
     /// The report of a frame, from those of its stages. `matches_excluded` is the camera's.
     pub(crate) fn of(
         tracking: &TrackingReport,
+        segmentation: SegmentationReport,
         objects: ObjectsReport,
         matches_excluded: u32,
     ) -> Self {
-        let &TrackingReport { detections, tracks, segmentation, pixels_masked, mask_words } =
-            tracking;
+        let &TrackingReport { detections, tracks, pixels_masked, mask_words } = tracking;
         Self {
             detections,
             segmentation,

@@ -21,7 +21,7 @@ use super::{
     pyramid::Pyramid,
 };
 use crate::{
-    geometry::{StereoRig, Transform, scalar::floor_i32},
+    geometry::{GroundPlane, StereoRig, Transform, scalar::floor_i32},
     image::View,
 };
 
@@ -43,6 +43,9 @@ pub struct Sight<'a> {
     /// Disparity, 1/256 px, 0 none; of everything, moving objects too: they hide what is behind
     /// them and show what is before them.
     pub disparity_q8: View<'a, u16>,
+    /// The ground plane of the disparity image; `None` where it shows too little ground, or
+    /// [`Planning::seeks_ground`](super::Planning::seeks_ground) says that it is not needed.
+    pub ground: Option<GroundPlane>,
 }
 
 /// A frame's geometry, per cell.

@@ -54,7 +54,6 @@ use crate::{
     geometry::Transform,
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
-    tracking::Ground as GroundPlane,
     volume::Volume,
 };
 use cells::{Cells, OCCUPIED};
@@ -176,6 +175,12 @@ impl<'s> Planning<'s> {
         self.cells.observed_at.is_empty()
     }
 
+    /// Whether the planner needs the ground plane of each frame it observes: there is a window, and
+    /// no height of the camera is configured.
+    pub fn seeks_ground(&self) -> bool {
+        !self.is_empty() && f64::from(self.config.camera_height_m) <= 0.0
+    }
+
     /// Moves the window to the camera and marks what a frame sees through. Nothing without a
     /// window, or where the pose lies beyond 2^24 cells.
     pub fn observe(&mut self, sight: &Sight<'_>) {
@@ -199,8 +204,7 @@ impl<'s> Planning<'s> {
     /// height where that is configured. A frame that shows no ground leaves the plane where it was.
     fn level_ground(&mut self, sight: &Sight<'_>) {
         let height_m = f64::from(self.config.camera_height_m);
-        let shown =
-            if height_m > 0.0 { None } else { GroundPlane::of(sight.rig, sight.disparity_q8) };
+        let shown = sight.ground.filter(|_| self.seeks_ground());
         let cell_m = self.grid.cell_m();
         // The grid coordinates of a point of the camera's frame, m.
         let in_grid = |point: [f64; 3]| {

@@ -343,7 +343,7 @@ fn affinity(
 }
 
 /// Moves the items behind `at` up by one; the last stays where it is.
-pub(super) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
+pub(crate) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
     let Some(behind) = items.get_mut(at..) else { return };
     let Some(mut carried) = behind.last().copied() else { return };
     behind.iter_mut().rev().for_each(|slot| core::mem::swap(slot, &mut carried));

@@ -1,7 +1,6 @@
 //! Settings of tracking. Speeds are in metres per second of real time: other frame rates need no
 //! other thresholds.
 
-use super::motion_segmentation::SegmentationConfig;
 use crate::{
     egomotion::EgomotionConfig,
     settings::{Problems, require},
@@ -70,8 +69,6 @@ pub struct TrackingConfig {
     pub motion: MotionConfig,
     /// What is classified as moving.
     pub state: StateConfig,
-    /// How moving objects are found without a detector.
-    pub segmentation: SegmentationConfig,
 }
 
 impl Default for TrackingConfig {
@@ -91,7 +88,6 @@ impl Default for TrackingConfig {
             large_share: 0.05,
             motion: MotionConfig::default(),
             state: StateConfig::default(),
-            segmentation: SegmentationConfig::default(),
         }
     }
 }
@@ -163,7 +159,6 @@ impl TrackingConfig {
         require(problems, share(self.large_share), "tracking.large_share", "must be from 0 to 1");
         self.motion.validate(problems);
         self.state.validate(problems);
-        self.segmentation.validate(problems);
     }
 }
 

@@ -114,7 +114,7 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
 }
 
 /// Where a pixel of the current left image is in all four.
-pub(super) fn expected(
+pub(crate) fn expected(
     rig: &StereoRig,
     [u, v]: [i32; 2],
     disparity_px: f64,

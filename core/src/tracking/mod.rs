@@ -62,7 +62,6 @@ mod instance_at;
 mod match_assignment;
 mod motion_estimate;
 mod motion_filter;
-mod motion_segmentation;
 mod motion_state;
 mod motions;
 mod occlusion;
@@ -75,19 +74,19 @@ mod track;
 mod visit;
 
 pub use association::TrackCount;
+pub(crate) use association::remove_at;
 pub use class::{Class, Treatment};
 pub use config::{MotionConfig, Overlap, StateConfig, TrackingConfig};
 pub use detection::{Detection, DetectionCount, MAX_DETECTIONS};
 pub(crate) use egomotion_mask::{CameraMotion, EgomotionMask};
-pub(crate) use guided_matching::GuidedMatching;
+pub(crate) use guided_matching::{GuidedMatching, expected};
 pub use instance_at::InstanceAt;
-pub(crate) use match_assignment::FrameMatches;
-pub use motion_segmentation::{Ground, SegmentationConfig, SegmentationReport};
+pub(crate) use match_assignment::{FrameMatches, MatchOwner, OwnerCode};
 #[cfg(test)]
 pub(crate) use motion_state::MotionEvidence;
 pub use motion_state::MotionState;
 pub use report::{TrackReport, TrackingReport};
-pub(crate) use stages::Tracked;
+pub(crate) use stages::{Added, Assigned, Tracked};
 
 pub(crate) use instance::Instance;
 pub(crate) use track::Track;
@@ -101,9 +100,6 @@ use association::TrackTable;
 use guided_matching::GUIDED_MATCHES_MAX;
 use image_velocity::measure_image_velocities;
 use instance::Instances;
-use match_assignment::OwnerCode;
-use motion_segmentation::MotionSegmenter;
-pub(crate) use motion_segmentation::Trail;
 use motions::MotionInput;
 
 /// Instances and tracks.
@@ -118,7 +114,6 @@ pub(crate) struct Tracker<'s> {
     sparse_owner: &'s mut [OwnerCode],
     /// Matches found by guided matching on one object.
     guided_matches: &'s mut [Match],
-    segmenter: MotionSegmenter<'s>,
     frame: u32,
     /// Width and height of the frame's images, px.
     size: [usize; 2],
@@ -133,7 +128,6 @@ impl<'s> Tracker<'s> {
             + TrackTable::bytes(capacity)
             + 2 * region_bytes::<OwnerCode>(capacity.matches)
             + region_bytes::<Match>(GUIDED_MATCHES_MAX)
-            + MotionSegmenter::bytes(capacity)
     }
 
     /// Allocates its regions.
@@ -153,8 +147,6 @@ impl<'s> Tracker<'s> {
             refined_owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
             guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
-            segmenter: carver
-                .group("tracking.segmentation", |carver| MotionSegmenter::new_in(capacity, carver)),
             frame: 0,
             size: [0; 2],
             report: TrackingReport::default(),

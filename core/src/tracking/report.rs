@@ -1,9 +1,6 @@
 //! Reports of detections and tracks, as plain values.
 
-use super::{
-    Class, DetectionCount, MotionState, SegmentationReport, TrackCount, Tracker,
-    motions::motion_world,
-};
+use super::{Class, DetectionCount, MotionState, TrackCount, Tracker, motions::motion_world};
 use crate::{geometry::Transform, masks::PixelBox};
 
 /// A track as it stands after a frame.
@@ -58,8 +55,6 @@ pub struct TrackingReport {
     pub detections: DetectionCount,
     /// How they were associated with tracks.
     pub tracks: TrackCount,
-    /// What was found by its motion.
-    pub segmentation: SegmentationReport,
     /// Pixels whose depth was kept out of the static map.
     pub pixels_masked: u32,
     /// Most words of masks in use: what `capacity.mask_words` bounds.

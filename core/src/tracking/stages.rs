@@ -1,14 +1,10 @@
 //! The stages of tracking in a frame, each a value that the next one takes.
 
 use super::{
-    CameraMotion, Detection, EgomotionMask, FrameMatches, GuidedMatching, MotionInput, Tracker,
-    TrackingReport, Trail,
+    CameraMotion, Class, Detection, EgomotionMask, FrameMatches, GuidedMatching, Instance,
+    MotionInput, OwnerCode, Tracker, TrackingReport,
 };
-use crate::{
-    egomotion::Estimator,
-    geometry::{StereoRig, Transform},
-    image::{View, ViewMut},
-};
+use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut, masks::PixelBox};
 
 impl<'s> Tracker<'s> {
     /// Begins frame `frame` of images of that size: validates its detections and associates them
@@ -50,24 +46,68 @@ pub(crate) struct Assigned<'t, 'm, 's> {
     matches: FrameMatches<'m>,
 }
 
-impl<'t, 's> Assigned<'t, '_, 's> {
-    /// Which matches the camera's own motion may be estimated from.
+impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
+    /// The matches that the camera's own motion may be estimated from.
     pub(crate) fn egomotion_mask(&self) -> EgomotionMask<'_, 's> {
         self.tracker.egomotion_mask(self.matches.refined)
     }
 
-    /// Adds instances of what moves and no detector found, if that is asked for
-    /// ([`super::SegmentationConfig`]). `search` is where more matches are searched for on objects
-    /// that have few.
-    pub(crate) fn segment_motion(
-        self,
-        rig: &StereoRig,
-        camera: &CameraMotion,
-        disparity_q8: View<'_, u16>,
-        search: Option<GuidedMatching<'_, '_>>,
-    ) -> Self {
-        self.tracker.segment_motion(rig, camera, &self.matches, disparity_q8, search);
-        self
+    /// The frame's matches.
+    pub(crate) fn matches(&self) -> FrameMatches<'m> {
+        self.matches
+    }
+
+    /// What the refined and the sparse matches are assigned to.
+    pub(crate) fn match_owners(&self) -> [&[OwnerCode]; 2] {
+        [self.tracker.refined_owner, self.tracker.sparse_owner]
+    }
+
+    /// The instances of the frame.
+    pub(crate) fn instances(&self) -> &[Instance] {
+        self.tracker.instances.all()
+    }
+
+    /// Adds an instance of class [`Class::MovingObject`] with the pixels of a box that are its own,
+    /// without those of other instances.
+    pub(crate) fn add_moving_object(
+        &mut self,
+        pixels: PixelBox,
+        score: f32,
+        is_own: impl Fn(i32, i32) -> bool,
+    ) -> Added {
+        let Tracker { masks, instances, config, size, .. } = &mut *self.tracker;
+        let masks = masks.current_mut();
+        let Some(mask) = masks.alloc(pixels) else { return Added::Full };
+        masks.fill(&mask, is_own);
+        let whole = masks.area(&mask);
+        instances.all().iter().for_each(|instance| masks.subtract(&mask, &instance.mask));
+        if 3 * masks.area(&mask) <= 2 * whole {
+            masks.free_last(mask);
+            return Added::Covered;
+        }
+        if instances.add(config, mask, Class::MovingObject, score, size[0]) {
+            Added::Yes
+        } else {
+            masks.free_last(mask);
+            Added::Full
+        }
+    }
+
+    /// Associates the instances from position `first` on with tracks, and assigns to them the
+    /// matches that no instance has.
+    pub(crate) fn associate_from(&mut self, first: usize) {
+        let tracker = &mut *self.tracker;
+        if tracker.instances.all().len() > first {
+            tracker.tracks.associate_from(
+                first,
+                &tracker.config,
+                tracker.frame,
+                tracker.instances.all_mut(),
+                &tracker.masks,
+                &mut tracker.report.tracks,
+            );
+            tracker.assign_from(first, &self.matches);
+        }
     }
 
     /// Estimates each track's motion, state and pose. `search` is where more matches are searched
@@ -85,6 +125,17 @@ impl<'t, 's> Assigned<'t, '_, 's> {
     }
 }
 
+/// The fate of an instance that was not detected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Added {
+    /// It is an instance of the frame.
+    Yes,
+    /// Other instances have a third of its pixels or more.
+    Covered,
+    /// There was no space for it.
+    Full,
+}
+
 /// Its tracks have their motions, states and poses.
 #[derive(Debug)]
 #[must_use]
@@ -96,11 +147,6 @@ impl<'s> Tracked<'_, 's> {
     /// Sets the depth of what moves or may move to 0, so that the static map does not get it.
     pub(crate) fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
         self.tracker.report.pixels_masked = self.tracker.mask_dynamic_depth(depth_m);
-    }
-
-    /// Visits where objects were before they were known to move.
-    pub(crate) fn take_trails(&mut self, t_world_camera: &Transform, visit: impl FnMut(&Trail)) {
-        self.tracker.segmenter.take_trails(t_world_camera, visit);
     }
 
     /// The tracks with their instances and masks.

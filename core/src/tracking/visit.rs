@@ -15,8 +15,8 @@ impl Tracker<'_> {
         let Self {
             masks,
             tracks,
-            segmenter,
-            config,
+            // Told by the caller.
+            config: _,
             // Belong to one frame.
             instances: _,
             refined_owner: _,
@@ -28,9 +28,5 @@ impl Tracker<'_> {
         } = self;
         masks.current_mut().visit(visitor);
         tracks.visit(visitor);
-        // Without it the state is what it was before there was any.
-        if config.segmentation.enabled {
-            segmenter.visit(visitor);
-        }
     }
 }

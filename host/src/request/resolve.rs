@@ -66,7 +66,7 @@ impl Request {
         let mut settings = self.settings.clone();
         settings.fit(bounds);
         if let Some(finds_motion) = self.masks.source.finds_motion() {
-            settings.tracking.segmentation.enabled = finds_motion;
+            settings.segmentation.enabled = finds_motion;
         }
         if let Some(interval_s) = interval_s {
             settings.tracking.frame_interval_s = interval_s as f32;

@@ -12,6 +12,7 @@ use dynvox_core::objects::ObjectsConfig;
 use dynvox_core::planning::PlanningConfig;
 use dynvox_core::rectify::{Rectification, self_calibration::RigConfig};
 use dynvox_core::scene_flow::SceneFlowConfig;
+use dynvox_core::segmentation::SegmentationConfig;
 use dynvox_core::settings::constant;
 use dynvox_core::stereo::StereoConfig;
 use dynvox_core::tracking::TrackingConfig;
@@ -43,6 +44,8 @@ pub struct Settings {
     pub mapper: MapperConfig,
     /// Tracking of objects.
     pub tracking: TrackingConfig,
+    /// Moving objects that no detector found.
+    pub segmentation: SegmentationConfig,
     /// Reconstruction of objects.
     pub objects: ObjectsConfig,
     /// Static map.
@@ -118,6 +121,7 @@ impl Settings {
             icp,
             mapper,
             tracking,
+            segmentation,
             objects,
             volume,
             raycast,
@@ -135,6 +139,7 @@ impl Settings {
             icp: *icp,
             mapper: *mapper,
             tracking: *tracking,
+            segmentation: *segmentation,
             objects: *objects,
             volume: *volume,
             raycast: *raycast,
@@ -299,7 +304,7 @@ mod tests {
             "volume.voxel_size_m=0.1",
             "volume.observation_weight=depth",
             "tracking.motion.samples=77",
-            "tracking.segmentation.enabled=true",
+            "segmentation.enabled=true",
             "rig.self_calibration=report",
             "rig.disparity_correction.offset_px=0.125",
             "egomotion.confidence=0.99",

@@ -26,7 +26,7 @@ const STREET: [&str; 18] = [
     "--set",
     "volume.prune_lag=6",
     "--set",
-    "tracking.segmentation.enabled=true",
+    "segmentation.enabled=true",
     "--instances",
     "exact",
     "--out",

@@ -22,6 +22,7 @@ use crate::{
     memory::SLAB_ALIGN,
     random::Random,
     scene_flow::Match,
+    segmentation::SegmentationReport,
     tracking::{
         CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt,
         MotionConfig, MotionEvidence, MotionState, Overlap, StateConfig, TrackCount, TrackReport,
@@ -106,7 +107,12 @@ impl<'s> Instances<'s> {
     ) -> InstancesReport {
         let tracked = self.tracker.test_tracked();
         self.objects.reconstruct(&tracked, frame, &Serial, sink);
-        InstancesReport::of(&tracked.commit(), self.objects.report(), 0)
+        InstancesReport::of(
+            &tracked.commit(),
+            SegmentationReport::default(),
+            self.objects.report(),
+            0,
+        )
     }
 
     pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
@@ -114,7 +120,12 @@ impl<'s> Instances<'s> {
     }
 
     pub fn report(&self) -> InstancesReport {
-        InstancesReport::of(&self.tracker.test_report(), self.objects.report(), 0)
+        InstancesReport::of(
+            &self.tracker.test_report(),
+            SegmentationReport::default(),
+            self.objects.report(),
+            0,
+        )
     }
 
     pub fn tracks(&self) -> impl Iterator<Item = TrackReport> {

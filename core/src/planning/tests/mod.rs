@@ -8,7 +8,7 @@ mod windows;
 
 use super::{cells::Cells, *};
 use crate::{
-    geometry::{StereoRig, Transform},
+    geometry::{GroundPlane, StereoRig, Transform},
     image::View,
     memory::SLAB_ALIGN,
     parallel::Serial,
@@ -109,7 +109,13 @@ impl Scene {
         self.volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         self.volume.fuse(&view, seen, &Serial);
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
-        self.planning.observe(&Sight { rig: &RIG, t_world_camera: &t_world_camera, disparity_q8 });
+        let ground = GroundPlane::find(&RIG, disparity_q8);
+        self.planning.observe(&Sight {
+            rig: &RIG,
+            t_world_camera: &t_world_camera,
+            disparity_q8,
+            ground,
+        });
     }
 
     /// The cell that holds a point of the world.

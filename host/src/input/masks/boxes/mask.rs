@@ -4,10 +4,10 @@ use super::DetectedBox;
 use super::marks::Marks;
 use crate::formats::Image;
 use crate::input::source::InstanceMask;
-use dynvox_core::geometry::StereoRig;
+use dynvox_core::geometry::{GroundPlane, StereoRig};
 use dynvox_core::image::{DISPARITY_ONE_PX, View};
 use dynvox_core::masks::PixelBox;
-use dynvox_core::tracking::{Class, Ground};
+use dynvox_core::tracking::Class;
 use std::collections::BTreeMap;
 
 /// Boxes of fewer pixels are shrunk only.
@@ -53,7 +53,7 @@ fn length_m(class: Class) -> f64 {
 pub(super) struct Scene<'a> {
     rig: &'a StereoRig,
     disparity_q8: View<'a, u16>,
-    ground: Option<Ground>,
+    ground: Option<GroundPlane>,
     /// A semantic map of the image, by [`Class::code`].
     regions: Option<&'a Image<u8>>,
 }
@@ -64,7 +64,7 @@ impl<'a> Scene<'a> {
         disparity_q8: View<'a, u16>,
         regions: Option<&'a Image<u8>>,
     ) -> Self {
-        Self { rig, disparity_q8, ground: Ground::of(rig, disparity_q8), regions }
+        Self { rig, disparity_q8, ground: GroundPlane::find(rig, disparity_q8), regions }
     }
 
     fn size(&self) -> (usize, usize) {

@@ -48,7 +48,7 @@ class Mapper {
     DynvoxConfig config;
     check(dynvox_config_default(&rig, &config), "the rig cannot be used");
     // No detector is needed: what moves is found by its motion, unless a setting says otherwise.
-    check(dynvox_config_set(&config, "tracking.segmentation.enabled", "true"), "motion segmentation");
+    check(dynvox_config_set(&config, "segmentation.enabled", "true"), "motion segmentation");
     for (const auto &[key, value] : settings) check(dynvox_config_set(&config, key.c_str(), value.c_str()), key + "=" + value);
     std::array<char, 200> problem{};
     check(dynvox_config_problem(&config, problem.data(), problem.size()), "the settings");

@@ -1,5 +1,6 @@
 //! Patches of the images where matches are few.
 
+use super::super::patches::PatchMemory;
 use super::*;
 use crate::{
     parallel::Serial,
@@ -85,16 +86,16 @@ fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_el
             let t_current_previous = world.camera(1).t_current_previous.unwrap();
             let config = SegmentationConfig::default();
             let model = StaticModel::new(&config, &RIG, &t_current_previous, [0.25, 0.0]);
-            let shape = Shape { lattice: Lattice::new(&RIG, disparity_q8), ground: None };
+            let lattice = Lattice::new(&RIG, disparity_q8, None);
             let mut search = PatchSearch::new(
                 GuidedMatching { matcher, disparity_q8 },
                 &t_current_previous,
-                &shape,
+                &lattice,
             );
             let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
             let (mut members, mut values) =
                 (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
-            let extent = groups::Extent {
+            let extent = extent::Extent {
                 low: [1.8, 0.4, extent_z_m - 0.1],
                 high: [3.2, 1.4, extent_z_m + 0.1],
             };

@@ -1,11 +1,7 @@
 //! Candidates that lie together and move alike.
 
-use super::{
-    SegmentationConfig,
-    residual::{Residual, StaticModel},
-};
+use super::{SegmentationConfig, candidate::Candidate, extent::Extent, residual::StaticModel};
 use crate::{geometry::scalar::max_f64, scene_flow::Match};
-use bytemuck::{Pod, Zeroable};
 use heapless::Vec;
 use nalgebra::Vector3;
 
@@ -17,12 +13,6 @@ pub(super) const GROUPS_MAX: usize = 16;
 /// Distance in the image at which two candidates may be neighbours, m, and at least, px.
 const NEIGHBOUR_M: f64 = 0.9;
 const NEIGHBOUR_MIN_PX: f64 = 12.0;
-/// The same of disparities, px and as a share.
-const DISPARITY_MIN_PX: f64 = 1.0;
-const DISPARITY_SHARE: f64 = 0.06;
-/// How far motions on one object may differ, m, and by metre of depth.
-const MOTION_M: f64 = 0.15;
-const MOTION_PER_DEPTH: f64 = 0.02;
 /// A group's motion beyond the least one, m for each m^2 of squared depth.
 const MOTION_PER_SQUARED_DEPTH: f64 = 0.0008;
 /// Up to this depth groups are small as well, m: what passes the camera is blurred, cut by the
@@ -35,120 +25,6 @@ const EXTENT_MAX_M: [f64; 3] = [8.0, 5.0, 12.0];
 /// Motions of groups on one object differ by at most this, m, and lie at most that far apart, m.
 const MERGE_MOTION_M: f64 = 0.2;
 const MERGE_DISTANCE_M: f64 = 4.0;
-
-/// A match that contradicts the static prediction. The position in the image is of the current left
-/// frame.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(in crate::tracking) struct Candidate {
-    u: f32,
-    v: f32,
-    disparity_px: f32,
-    /// In the current camera, m.
-    point_m: [f32; 3],
-    motion_m: [f32; 3],
-    depth_sigma_m: f32,
-    /// Another member of the same group; the first member names itself.
-    parent: u32,
-}
-
-impl Candidate {
-    pub fn new(m: &Match, residual: &Residual, index: usize) -> Self {
-        let numbers = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
-        Self {
-            u: m.current_left[0],
-            v: m.current_left[1],
-            disparity_px: m.current_disparity_px(),
-            point_m: numbers(&residual.point_m),
-            motion_m: numbers(&residual.motion_m),
-            depth_sigma_m: residual.depth_sigma_m as f32,
-            parent: index as u32,
-        }
-    }
-
-    /// Its pixel and disparity.
-    pub fn position(&self) -> [f32; 3] {
-        [self.u, self.v, self.disparity_px]
-    }
-
-    /// Whether it is the first member of its group, at that position.
-    pub fn is_first(&self, index: usize) -> bool {
-        self.parent as usize == index
-    }
-
-    /// Whether it belongs to the group whose first member is at `first`.
-    pub fn is_of(&self, first: u32) -> bool {
-        self.parent == first
-    }
-
-    /// The same at another position.
-    pub fn at(self, index: usize) -> Self {
-        Self { parent: index as u32, ..self }
-    }
-
-    /// Whether the other one lies next to it and moves alike.
-    fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
-        let depth_m = f64::from(self.point_m[2]);
-        let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
-        let disparity_px =
-            max_f64(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
-        if apart(self.u, other.u) > reach_px
-            || apart(self.v, other.v) > reach_px
-            || apart(self.disparity_px, other.disparity_px) > disparity_px
-        {
-            return false;
-        }
-        let side_m = motion_tolerance_m(depth_m);
-        let along_m = side_m + f64::from(self.depth_sigma_m) + f64::from(other.depth_sigma_m);
-        let [[x, y, z], [x2, y2, z2]] = [self.motion_m, other.motion_m];
-        apart(x, x2) < side_m && apart(y, y2) < side_m && apart(z, z2) < along_m
-    }
-}
-
-/// How far motions on one object may differ, along the image's axes, m.
-pub(super) fn motion_tolerance_m(depth_m: f64) -> f64 {
-    MOTION_M + MOTION_PER_DEPTH * depth_m
-}
-
-/// A box in the camera's axes, m.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Extent {
-    pub low: [f64; 3],
-    pub high: [f64; 3],
-}
-
-impl Extent {
-    pub fn contains(&self, point: &Vector3<f64>) -> bool {
-        let axes = self.low.iter().zip(&self.high).zip(point.iter());
-        axes.into_iter().all(|((low, high), at)| low <= at && at <= high)
-    }
-
-    pub fn center(&self) -> Vector3<f64> {
-        (Vector3::from(self.low) + Vector3::from(self.high)) * 0.5
-    }
-
-    fn union(&self, other: &Self) -> Self {
-        let mut joined = *self;
-        for (low, theirs) in joined.low.iter_mut().zip(other.low) {
-            *low = if theirs < *low { theirs } else { *low };
-        }
-        for (high, theirs) in joined.high.iter_mut().zip(other.high) {
-            *high = max_f64(theirs, *high);
-        }
-        joined
-    }
-
-    /// How far the other one is away, m; 0 where they overlap.
-    pub fn gap(&self, other: &Self) -> f64 {
-        let mut squared = 0.0;
-        for axis in 0..3 {
-            let at = |values: &[f64; 3]| values.get(axis).copied().unwrap_or(0.0);
-            let gap = max_f64(at(&other.low) - at(&self.high), at(&self.low) - at(&other.high));
-            squared += if gap > 0.0 { gap * gap } else { 0.0 };
-        }
-        libm::sqrt(squared)
-    }
-}
 
 /// Candidates that lie together and move alike, after the gates.
 #[derive(Clone, Copy, Debug)]
@@ -238,17 +114,17 @@ fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
     }
 }
 
-/// Sets `groups` to those that pass the gates; those on one object are merged. `refused` counts
-/// groups beyond [`GROUPS_MAX`].
+/// Sets `groups` to those that pass the gates; those on one object are merged. Returns
+/// how many groups lay beyond [`GROUPS_MAX`].
 pub(super) fn select<'m>(
     model: &StaticModel<'_>,
     candidates: &[Candidate],
     matches: impl Iterator<Item = (&'m Match, bool)> + Clone,
     values: &mut [f32],
     groups: &mut Vec<Group, GROUPS_MAX>,
-    refused: &mut u32,
-) {
+) -> u32 {
     groups.clear();
+    let mut refused = 0;
     for (first, candidate) in (0u32..).zip(candidates) {
         if candidate.parent != first {
             continue;
@@ -258,7 +134,7 @@ pub(super) fn select<'m>(
         else {
             continue;
         };
-        *refused += u32::from(groups.push(group).is_err());
+        refused += u32::from(groups.push(group).is_err());
     }
     let mut counts = [[0u32; 2]; GROUPS_MAX];
     for (m, is_candidate) in matches {
@@ -278,6 +154,7 @@ pub(super) fn select<'m>(
         f64::from(own) >= share * f64::from(all)
     });
     merge(groups);
+    refused
 }
 
 /// The candidates of one group, and memory for one number of each.

@@ -4,11 +4,13 @@ mod patches;
 
 use super::*;
 use crate::{
+    egomotion::Estimator,
     geometry::Transform,
+    masks::PixelBox,
     memory::SLAB_ALIGN,
     random::Random,
-    scene_flow::FlowMatcher,
-    tracking::{Detection, FrameMatches, TrackReport, TrackingConfig},
+    scene_flow::{FlowMatcher, Match},
+    tracking::{Class, Detection, FrameMatches, OwnerCode, TrackReport, Tracker, TrackingConfig},
 };
 use std::{vec, vec::Vec};
 
@@ -155,17 +157,17 @@ impl World {
         frames: u32,
         mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
     ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
-        let config = TrackingConfig {
-            segmentation: SegmentationConfig { enabled: true, ..SegmentationConfig::default() },
-            area_min_px: 0,
-            track_area_min_px: 0,
-            ..TrackingConfig::default()
-        };
-        let bytes = Tracker::bytes(&CAPACITY) + crate::egomotion::Estimator::bytes(&CAPACITY);
+        let config =
+            TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() };
+        let segmentation = SegmentationConfig { enabled: true, ..SegmentationConfig::default() };
+        let bytes = Tracker::bytes(&CAPACITY)
+            + MotionSegmenter::bytes(&CAPACITY)
+            + Estimator::bytes(&CAPACITY);
         let mut slab = vec![0u8; bytes + SLAB_ALIGN];
         let mut carver = Carver::new(&mut slab, bytes).unwrap();
         let mut tracker = Tracker::new_in(&CAPACITY, &config, &mut carver);
-        let mut estimator = crate::egomotion::Estimator::new_in(&CAPACITY, &mut carver);
+        let mut segmenter = MotionSegmenter::new_in(&CAPACITY, &mut carver);
+        let mut estimator = Estimator::new_in(&CAPACITY, &mut carver);
         (0..frames)
             .map(|frame| {
                 let (mut matches, disparity) = (
@@ -192,17 +194,23 @@ impl World {
                     .collect();
                 let camera = self.camera(frame);
                 let matches = FrameMatches { refined: &matches, sparse: &[] };
-                let assigned =
+                let mut assigned =
                     tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
                 let search = input
                     .images
                     .as_deref()
                     .filter(|_| frame > 0)
                     .map(|matcher| GuidedMatching { matcher, disparity_q8 });
-                let tracked = assigned
-                    .segment_motion(&RIG, &camera, disparity_q8, search)
-                    .estimate_motions(&RIG, &camera, None, &mut estimator);
-                let report = tracked.commit().segmentation;
+                let seen = SegmentationInput {
+                    rig: &RIG,
+                    camera: &camera,
+                    disparity_q8,
+                    ground: GroundPlane::find(&RIG, disparity_q8),
+                    search,
+                    bias_px: [config.motion.bias_px, config.motion.lens_px].map(f64::from),
+                };
+                let report = segmenter.segment(&segmentation, &seen, &mut assigned);
+                assigned.estimate_motions(&RIG, &camera, None, &mut estimator).commit();
                 (tracker.tracks().collect(), report)
             })
             .collect()
@@ -309,12 +317,12 @@ fn a_mask_does_not_grow_over_matches_that_do_not_move() {
     };
     let (disparity, [middle, beside]) =
         (world.disparity(0), [2.5, 5.3].map(|x| project([x, 1.0, 14.0])[0]));
-    let lattice = Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap());
+    let lattice = Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap(), None);
     let (mut cells, mut blocked, mut queue) = (vec![0; 3000], vec![0; 3000], vec![0; 3000]);
-    let extent = groups::Extent { low: [1.7, 0.3, 13.9], high: [5.4, 1.5, 14.1] };
+    let extent = extent::Extent { low: [1.7, 0.3, 13.9], high: [5.4, 1.5, 14.1] };
     let mut is_marked = |blocked: &[u8]| {
-        lattice.grow(&extent, None, blocked, &mut cells, &mut queue).unwrap();
-        [middle, beside].map(|[u, v]| lattice.is_own(None, &cells, u as i32, v as i32))
+        lattice.grow(&extent, blocked, &mut cells, &mut queue).unwrap();
+        [middle, beside].map(|[u, v]| lattice.is_own(&cells, u as i32, v as i32))
     };
     assert_eq!(is_marked(&blocked), [true, true]);
     for at in (40..HEIGHT)
@@ -347,10 +355,10 @@ fn a_mask_reaches_the_left_border_where_only_the_left_camera_sees() {
             _ => 1_024,
         };
         let disparity_q8: Vec<u16> = (0..WIDTH * HEIGHT).map(disparity).collect();
-        let lattice = Lattice::new(&RIG, View::new(&disparity_q8, WIDTH, HEIGHT).unwrap());
-        let extent = groups::Extent { low: [-5.2, -0.5, 7.9], high: [-2.7, 1.0, 8.1] };
+        let lattice = Lattice::new(&RIG, View::new(&disparity_q8, WIDTH, HEIGHT).unwrap(), None);
+        let extent = extent::Extent { low: [-5.2, -0.5, 7.9], high: [-2.7, 1.0, 8.1] };
         let mut working = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
-        let pixels = lattice.grow(&extent, None, &[], &mut working.0, &mut working.1).unwrap();
+        let pixels = lattice.grow(&extent, &[], &mut working.0, &mut working.1).unwrap();
         assert_eq!((pixels.left, pixels.left + pixels.width), (left, 100), "{pixels:?}");
     }
 }
@@ -398,18 +406,15 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
         let (camera, matches) = (shown.camera(frame), shown.matches(frame));
         let codes = vec![OwnerCode::default(); matches.len()];
         let disparity = shown.disparity(frame);
-        let shape = Shape {
-            lattice: Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap()),
-            ground: None,
+        let lattice = Lattice::new(&RIG, View::new(&disparity, WIDTH, HEIGHT).unwrap(), None);
+        let contradictions = Contradictions {
+            model: &model(&camera),
+            t_world_camera: &camera.t_world_camera,
+            refined: Owned { matches: &matches, codes: &codes, variance: 1.0 },
+            sparse: Owned { matches: &[], codes: &[], variance: SPARSE_VARIANCE },
+            lattice: &lattice,
         };
-        segmenter.observe(
-            &model(&camera),
-            &camera,
-            &FrameMatches { refined: &matches, sparse: &[] },
-            [&codes, &[]],
-            &shape,
-            None,
-        );
+        segmenter.observe(&contradictions, None);
         confirmed.push(
             segmenter
                 .hypotheses

@@ -1,7 +1,7 @@
 //! What a moving object leaves in the static map in the frames before it is known to move, and in
 //! those in which it is not found.
 
-use super::groups::Extent;
+use super::extent::Extent;
 use crate::geometry::{OrientedBox, Transform};
 use nalgebra::Vector3;
 

@@ -10,72 +10,29 @@
 //! Time: at most [`SEARCHES_MAX`] patches a frame, each searched for once or twice.
 
 use super::{
-    SegmentationConfig, Shape,
-    groups::{Candidate, Extent, Group, measure, motion_tolerance_m},
+    SegmentationConfig,
+    candidate::{Candidate, motion_tolerance_m},
+    groups::{Group, measure},
     joint::FROM_M,
+    lattice::Lattice,
     residual::{Residual, StaticModel},
+    seed::Seed,
 };
 use crate::{
     geometry::Transform,
-    tracking::guided_matching::{GuidedMatching, expected},
+    tracking::{GuidedMatching, expected},
 };
-use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
-/// Most supposed objects of a frame.
-pub(super) const SEEDS_MAX: usize = 32;
 /// Most patches of one of them.
 pub(super) const PATCHES_MAX: usize = 48;
 /// Most patches of a frame.
 const SEARCHES_MAX: usize = 384;
-/// How far an object reaches beyond a few members, m.
-const REACH_M: f64 = 0.3;
-/// The same along the depth, m for each m^2 of squared depth.
-const REACH_PER_SQUARED_DEPTH: f64 = 0.001;
 
 /// Least share of moving patches on an object that was found before.
 const KNOWN_SHARE_MIN: f64 = 0.7;
 /// What a motion to the side errs by, one sigma, by metre of depth.
 const SIDE_PER_DEPTH: f64 = 0.002;
-
-/// An object that is supposed to be there: its extent in the current camera, and its motion against
-/// the static prediction.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(in crate::tracking) struct Seed {
-    low_m: [f64; 3],
-    high_m: [f64; 3],
-    motion_m: [f64; 3],
-    /// Whether it was an object before: 0 or 1.
-    known: u64,
-}
-
-impl Seed {
-    pub fn new(extent: &Extent, motion_m: Vector3<f64>) -> Self {
-        Self { low_m: extent.low, high_m: extent.high, motion_m: motion_m.into(), known: 0 }
-    }
-
-    /// The same of an object that was found before.
-    pub fn known(self, known: bool) -> Self {
-        Self { known: u64::from(known), ..self }
-    }
-
-    /// Its extent and a little more.
-    fn extent(&self) -> Extent {
-        let mut extent = Extent { low: self.low_m, high: self.high_m };
-        let depth_m = extent.center().z;
-        let reaches = [REACH_M, REACH_M, REACH_M + REACH_PER_SQUARED_DEPTH * depth_m * depth_m];
-        for ((low, high), reach_m) in extent.low.iter_mut().zip(&mut extent.high).zip(reaches) {
-            (*low, *high) = (*low - reach_m, *high + reach_m);
-        }
-        extent
-    }
-
-    /// Whether a group lies where it is.
-    pub fn is_at(&self, group: &Group) -> bool {
-        Extent { low: self.low_m, high: self.high_m }.gap(&group.extent) < REACH_M
-    }
-}
 
 /// The square of a motion, by what it errs by along the depth and to the side.
 fn scaled(motion_m: &Vector3<f64>, residual: &Residual) -> f64 {
@@ -94,7 +51,7 @@ enum Patch {
 pub(super) struct PatchSearch<'a, 's> {
     images: GuidedMatching<'a, 's>,
     t_previous_current: Transform,
-    shape: &'a Shape<'a>,
+    lattice: &'a Lattice<'a>,
     /// Patches left for this frame.
     left: usize,
 }
@@ -111,12 +68,12 @@ impl<'a, 's> PatchSearch<'a, 's> {
     pub fn new(
         images: GuidedMatching<'a, 's>,
         t_current_previous: &Transform,
-        shape: &'a Shape<'a>,
+        lattice: &'a Lattice<'a>,
     ) -> Self {
         Self {
             images,
             t_previous_current: t_current_previous.inverse(),
-            shape,
+            lattice,
             left: SEARCHES_MAX,
         }
     }
@@ -129,17 +86,10 @@ impl<'a, 's> PatchSearch<'a, 's> {
         memory: &mut PatchMemory<'_>,
     ) -> Option<Group> {
         let PatchMemory { cells, queue, members, values } = memory;
-        let pixels = self.shape.lattice.grow(
-            &seed.extent(),
-            self.shape.ground.as_ref(),
-            &[],
-            cells,
-            queue,
-        )?;
-        let every = self.shape.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
+        let pixels = self.lattice.grow(&seed.extent(), &[], cells, queue)?;
+        let every = self.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
         let (mut moving, mut still) = (0usize, 0usize);
         let marked = self
-            .shape
             .lattice
             .marked(cells, &pixels)
             .enumerate()
@@ -155,7 +105,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 None => {}
             }
         }
-        let share = if seed.known > 0 {
+        let share = if seed.is_known() {
             KNOWN_SHARE_MIN
         } else {
             f64::from(model.config.candidate_share_min)
@@ -167,15 +117,13 @@ impl<'a, 's> PatchSearch<'a, 's> {
 
     /// Frees the cells around the patches of an object.
     pub fn unblock(&self, members: &[Candidate], blocked: &mut [u8]) {
-        members
-            .iter()
-            .for_each(|member| self.shape.lattice.block(member.position(), true, blocked));
+        members.iter().for_each(|member| self.lattice.block(member.position(), true, blocked));
     }
 
     /// Searches for the patch at a pixel.
     fn search_patch(&self, model: &StaticModel<'_>, at: [usize; 2], seed: &Seed) -> Option<Patch> {
         let config: &SegmentationConfig = model.config;
-        let disparity_px = self.shape.lattice.disparity_px(at)?;
+        let disparity_px = self.lattice.disparity_px(at)?;
         let pixel = at.map(|at| at as i32);
         let found = |t_previous_current: &Transform| {
             let m = self.images.matcher.find(&expected(
@@ -187,7 +135,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
             Some((m, model.residual(&m)?))
         };
         let is_static = |chi_square: f64| chi_square <= f64::from(config.candidate_chi_square);
-        let motion_m = Vector3::from(seed.motion_m);
+        let motion_m = seed.motion_m();
         let back = Transform::from_translation((-motion_m).into());
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
             let side_m = motion_tolerance_m(residual.point_m.z);
@@ -196,7 +144,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 && libm::fabs(off.y) < side_m
                 && libm::fabs(off.z) < side_m + 2.0 * residual.depth_sigma_m;
             // Of what is known to move, the nearer of both motions decides.
-            let is_static = if seed.known > 0 {
+            let is_static = if seed.is_known() {
                 scaled(&residual.motion_m, &residual) < scaled(&off, &residual)
             } else {
                 is_static(residual.chi_square)
@@ -205,7 +153,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 return Some(Patch::Static);
             }
             // In a row of posts the next one is found as well as the post itself.
-            let is_unsure = seed.known == 0
+            let is_unsure = !seed.is_known()
                 && residual.point_m.z < FROM_M
                 && self.is_static_at(model, pixel, disparity_px);
             if is_as_supposed && !is_unsure {

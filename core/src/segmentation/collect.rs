@@ -1,32 +1,42 @@
 //! The candidates among a frame's matches, and what lies still between them.
 
 use super::{
-    MotionSegmenter, SegmentationReport, ground::Ground, groups::Candidate, joint::FarMatches,
-    lattice::Lattice, residual::StaticModel,
+    MotionSegmenter, SegmentationReport, candidate::Candidate, joint::FarMatches, lattice::Lattice,
+    residual::StaticModel,
 };
 use crate::{
+    geometry::GroundPlane,
     scene_flow::Match,
-    tracking::match_assignment::{MatchOwner, OwnerCode},
+    tracking::{MatchOwner, OwnerCode},
 };
 
+/// Variance of a sparse match, at whole pixels, against that of a refined one.
+pub(super) const SPARSE_VARIANCE: f64 = 4.0;
+
+/// Matches of one kind, each with what it is assigned to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Owned<'a> {
+    pub matches: &'a [Match],
+    pub codes: &'a [OwnerCode],
+    /// Variance of a match against that of a refined one.
+    pub variance: f64,
+}
+
 impl MotionSegmenter<'_> {
-    /// Collects the candidates among matches whose variance is `variance` times that of refined
-    /// ones; how many they are.
+    /// Collects the candidates among matches; how many they are.
     pub(super) fn collect(
         &mut self,
         model: &StaticModel<'_>,
-        matches: &[Match],
-        match_owner: &[OwnerCode],
-        variance: f64,
+        given: &Owned<'_>,
         report: &mut SegmentationReport,
     ) -> usize {
         let (mut len, mut stride, mut count) = (0, 1, 0usize);
         let (least, far_m) = (
-            variance * f64::from(model.config.candidate_chi_square),
+            given.variance * f64::from(model.config.candidate_chi_square),
             f64::from(model.config.far_m),
         );
         for ((m, match_owner), mark) in
-            matches.iter().zip(match_owner).zip(self.is_candidate.iter_mut())
+            given.matches.iter().zip(given.codes).zip(self.is_candidate.iter_mut())
         {
             *mark = 0;
             let residual = if is_free(*match_owner) { model.residual(m) } else { None };
@@ -59,14 +69,9 @@ impl MotionSegmenter<'_> {
     }
 
     /// Blocks the cells of matches that do not move.
-    pub(super) fn block_static(
-        &mut self,
-        lattice: &Lattice<'_>,
-        matches: &[Match],
-        match_owner: &[OwnerCode],
-    ) {
+    pub(super) fn block_static(&mut self, lattice: &Lattice<'_>, given: &Owned<'_>) {
         self.blocked.fill(0);
-        let marked = free_matches(matches, match_owner, self.is_candidate);
+        let marked = free_matches(given, self.is_candidate);
         for moves in [false, true] {
             let at = |m: &Match| [m.current_left[0], m.current_left[1], m.current_disparity_px()];
             marked
@@ -81,15 +86,15 @@ impl MotionSegmenter<'_> {
     pub(super) fn collect_joint(
         &mut self,
         model: &StaticModel<'_>,
-        matches: &[Match],
-        match_owner: &[OwnerCode],
-        ground: Option<&Ground>,
+        given: &Owned<'_>,
+        ground: Option<&GroundPlane>,
         mut len: usize,
     ) -> usize {
-        let mut far = FarMatches::new(self.far);
-        for (index, ((m, _), mark)) in matches
+        let mut far = FarMatches::new(self.far, ground);
+        for (index, ((m, _), mark)) in given
+            .matches
             .iter()
-            .zip(match_owner)
+            .zip(given.codes)
             .zip(&*self.is_candidate)
             .enumerate()
             .filter(|(_, ((_, match_owner), _))| is_free(**match_owner))
@@ -97,14 +102,13 @@ impl MotionSegmenter<'_> {
             let residual = model
                 .residual(m)
                 .filter(|residual| residual.point_m.z < f64::from(model.config.far_m));
-            residual
-                .into_iter()
-                .for_each(|residual| far.add(m, index, &residual, *mark > 0, ground));
+            residual.into_iter().for_each(|residual| far.add(m, index, &residual, *mark > 0));
         }
         for at in 0..far.len() {
             let Some(slot) = self.candidates.get_mut(len) else { break };
-            let Some((index, residual)) = far.candidate(model, matches, at) else { continue };
-            let Some((m, mark)) = matches.get(index).zip(self.is_candidate.get_mut(index)) else {
+            let Some((index, residual)) = far.candidate(model, given.matches, at) else { continue };
+            let Some((m, mark)) = given.matches.get(index).zip(self.is_candidate.get_mut(index))
+            else {
                 continue;
             };
             (*slot, *mark) = (Candidate::new(m, &residual, len), 1);
@@ -121,13 +125,13 @@ fn is_free(match_owner: OwnerCode) -> bool {
 
 /// The matches that belong to no instance, each with whether it is a candidate.
 pub(super) fn free_matches<'m>(
-    matches: &'m [Match],
-    match_owner: &'m [OwnerCode],
+    given: &Owned<'m>,
     is_candidate: &'m [u8],
-) -> impl Iterator<Item = (&'m Match, bool)> + Clone {
-    let free = matches
+) -> impl Iterator<Item = (&'m Match, bool)> + Clone + use<'m> {
+    let free = given
+        .matches
         .iter()
-        .zip(match_owner)
+        .zip(given.codes)
         .zip(is_candidate)
         .filter(|((_, match_owner), _)| is_free(**match_owner));
     free.map(|((m, _), mark)| (m, *mark > 0))

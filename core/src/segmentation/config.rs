@@ -1,6 +1,6 @@
 //! Settings of motion segmentation.
 
-use crate::settings::{Problems, require};
+use crate::settings::{Problems, check};
 
 /// How moving objects are found by their motion. Off by default: it adds to detections, or stands
 /// in for them.
@@ -70,63 +70,8 @@ impl Default for SegmentationConfig {
 }
 
 impl SegmentationConfig {
-    /// Adds what is wrong with the settings.
-    pub(in crate::tracking) fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        let not_negative = |value: f32| value.is_finite() && value >= 0.0;
-        let mut check = |holds: bool, key: &'static str, rule: &'static str| {
-            require(problems, holds, key, rule)
-        };
-        check(positive(self.noise_px), "tracking.segmentation.noise_px", "must be above 0");
-        check(
-            positive(self.disparity_noise_px),
-            "tracking.segmentation.disparity_noise_px",
-            "must be above 0",
-        );
-        check(not_negative(self.camera_m), "tracking.segmentation.camera_m", "must be at least 0");
-        check(
-            not_negative(self.camera_rad),
-            "tracking.segmentation.camera_rad",
-            "must be at least 0",
-        );
-        check(
-            positive(self.candidate_chi_square),
-            "tracking.segmentation.candidate_chi_square",
-            "must be above 0",
-        );
-        check(positive(self.far_m), "tracking.segmentation.far_m", "must be above 0");
-        check(
-            (3..=1000).contains(&self.members_min),
-            "tracking.segmentation.members_min",
-            "must be in 3..=1000",
-        );
-        check(
-            (3..=1000).contains(&self.far_members_min),
-            "tracking.segmentation.far_members_min",
-            "must be in 3..=1000",
-        );
-        check(
-            not_negative(self.sparse_from_m),
-            "tracking.segmentation.sparse_from_m",
-            "must be at least 0",
-        );
-        let share = (0.0..=1.0).contains(&self.candidate_share_min);
-        check(share, "tracking.segmentation.candidate_share_min", "must be from 0 to 1");
-        check(
-            not_negative(self.motion_min_m),
-            "tracking.segmentation.motion_min_m",
-            "must be at least 0",
-        );
-        check(
-            (1..=3).contains(&self.confirm_frames),
-            "tracking.segmentation.confirm_frames",
-            "must be in 1..=3",
-        );
-        check(
-            self.predict_frames <= 10,
-            "tracking.segmentation.predict_frames",
-            "must be at most 10",
-        );
-        check(self.erase_frames <= 30, "tracking.segmentation.erase_frames", "must be at most 30");
+    /// Notes everything wrong with the settings.
+    pub fn validate(&self, problems: &mut Problems) {
+        check(Self::CHECKS, self, problems);
     }
 }

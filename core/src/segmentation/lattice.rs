@@ -1,9 +1,8 @@
 //! The disparity image on a lattice: where a group's mask grows.
 
-use super::{ground::Ground, groups::Extent};
+use super::extent::Extent;
 use crate::{
-    geometry::StereoRig,
-    geometry::scalar::max_f64,
+    geometry::{GroundPlane, StereoRig, scalar::max_f64},
     image::{DISPARITY_ONE_PX, View},
     masks::PixelBox,
 };
@@ -46,15 +45,30 @@ const CLEARANCE_M: f64 = 0.12;
 pub(super) struct Lattice<'a> {
     rig: &'a StereoRig,
     disparity_q8: View<'a, u16>,
+    ground: Option<GroundPlane>,
     columns: usize,
     rows: usize,
 }
 
 impl<'a> Lattice<'a> {
-    pub fn new(rig: &'a StereoRig, disparity_q8: View<'a, u16>) -> Self {
+    pub fn new(
+        rig: &'a StereoRig,
+        disparity_q8: View<'a, u16>,
+        ground: Option<GroundPlane>,
+    ) -> Self {
         let (columns, rows) =
             (disparity_q8.width().div_ceil(CELL_PX), disparity_q8.height().div_ceil(CELL_PX));
-        Self { rig, disparity_q8, columns, rows }
+        Self { rig, disparity_q8, ground, columns, rows }
+    }
+
+    /// The ground under the image, if it shows any.
+    pub fn ground(&self) -> Option<&GroundPlane> {
+        self.ground.as_ref()
+    }
+
+    /// Whether a point of the camera's frame is clear of the ground.
+    fn is_above_ground(&self, point: [f64; 3]) -> bool {
+        self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
     }
 
     /// The pixel of a cell: its middle, within the image.
@@ -101,16 +115,6 @@ impl<'a> Lattice<'a> {
         Some([x * per_px, y * per_px, self.rig.focal_px * per_px])
     }
 
-    /// The points of every second cell of every second row below the horizon.
-    pub fn points_below_horizon(&self) -> impl Iterator<Item = [f64; 3]> {
-        let rows = (0..self.rows)
-            .step_by(2)
-            .filter(|&row| self.pixel(0, row)[1] as f64 > self.rig.center_v_px);
-        rows.flat_map(move |row| {
-            (0..self.columns).step_by(2).filter_map(move |column| self.point(column, row))
-        })
-    }
-
     /// Marks the cells of an object, from those within its extent on, connected through cells that
     /// can be its own, and fills gaps between them. The marks are `cells`, row by row of the
     /// lattice; those that `blocked` marks belong to something else. Returns the pixels they lie
@@ -118,7 +122,6 @@ impl<'a> Lattice<'a> {
     pub fn grow(
         &self,
         extent: &Extent,
-        ground: Option<&Ground>,
         blocked: &[u8],
         cells: &mut [u8],
         queue: &mut [u32],
@@ -130,9 +133,7 @@ impl<'a> Lattice<'a> {
                 return false;
             }
             let point = self.point(column, row).filter(|point| within.contains(&(*point).into()));
-            point.is_some_and(|point| {
-                ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
-            })
+            point.is_some_and(|point| self.is_above_ground(point))
         };
         let cells = cells.get_mut(..self.columns * self.rows)?;
         cells.fill(0);
@@ -281,7 +282,7 @@ impl<'a> Lattice<'a> {
     /// Whether a pixel belongs to the marked cells: it lies in one, has the disparity of that or of
     /// one beside it, and is above the ground. One without a disparity belongs to the cell it lies
     /// in.
-    pub fn is_own(&self, ground: Option<&Ground>, cells: &[u8], u: i32, v: i32) -> bool {
+    pub fn is_own(&self, cells: &[u8], u: i32, v: i32) -> bool {
         let Some(at) = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| [u, v])
         else {
             return false;
@@ -313,10 +314,8 @@ impl<'a> Lattice<'a> {
             (column, row.wrapping_sub(1)),
             (column, row + 1),
         ];
-        let is_above =
-            |point: [f64; 3]| ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M);
         near.into_iter().any(|(column, row)| is_like(column, row))
-            && self.point_at(at).is_some_and(is_above)
+            && self.point_at(at).is_some_and(|point| self.is_above_ground(point))
     }
 }
 

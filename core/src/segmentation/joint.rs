@@ -8,11 +8,8 @@
 //!
 //! Time: a comparison for each pair of at most [`JOINT_MAX`] matches.
 
-use super::{
-    ground::Ground,
-    residual::{Residual, StaticModel},
-};
-use crate::scene_flow::Match;
+use super::residual::{Residual, StaticModel};
+use crate::{geometry::GroundPlane, scene_flow::Match};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Vector3};
 
@@ -41,7 +38,7 @@ const ABOVE_MAX_M: f64 = 3.5;
 /// A far match. The position in the image is of the current left frame.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(in crate::tracking) struct FarMatch {
+pub(crate) struct FarMatch {
     at: [f32; 3],
     residual_px: [f32; 3],
     motion_m: [f32; 3],
@@ -56,6 +53,7 @@ pub(in crate::tracking) struct FarMatch {
 pub(super) struct FarMatches<'m> {
     slots: &'m mut [FarMatch],
     len: usize,
+    ground: Option<&'m GroundPlane>,
 }
 
 /// Sums over a match's neighbours.
@@ -68,21 +66,14 @@ struct Sums {
 }
 
 impl<'m> FarMatches<'m> {
-    pub fn new(slots: &'m mut [FarMatch]) -> Self {
-        Self { slots, len: 0 }
+    pub fn new(slots: &'m mut [FarMatch], ground: Option<&'m GroundPlane>) -> Self {
+        Self { slots, len: 0, ground }
     }
 
     /// Adds a match that is far, and not the ground's; beyond the bound none is added.
-    pub fn add(
-        &mut self,
-        m: &Match,
-        index: usize,
-        residual: &Residual,
-        candidate: bool,
-        ground: Option<&Ground>,
-    ) {
+    pub fn add(&mut self, m: &Match, index: usize, residual: &Residual, candidate: bool) {
         let depth_m = residual.point_m.z;
-        let above_m = ground.map(|ground| ground.above_m(residual.point_m.into()));
+        let above_m = self.ground.map(|ground| ground.above_m(residual.point_m.into()));
         let is_tested = depth_m > FROM_M
             && above_m.is_none_or(|above_m| above_m > ABOVE_MIN_M && above_m < ABOVE_MAX_M);
         if let Some(slot) = self.slots.get_mut(self.len).filter(|_| is_tested) {

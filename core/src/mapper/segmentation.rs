@@ -1,0 +1,46 @@
+//! The ground of a frame, and the moving objects in it that no detector found.
+
+use super::matched::MatchedFrame;
+use crate::{
+    geometry::GroundPlane,
+    segmentation::{MotionSegmenter, SegmentationInput, SegmentationReport},
+    tracking::{Assigned, CameraMotion},
+};
+
+/// The parts of a mapper that segment a frame by motion.
+pub(super) struct Segmentation<'m, 's> {
+    pub segmenter: &'m mut MotionSegmenter<'s>,
+    /// Whether the planner needs the ground of this frame.
+    pub plans: bool,
+}
+
+impl Segmentation<'_, '_> {
+    /// Finds the ground plane, if a stage needs it, and adds instances of what moves to `assigned`,
+    /// if the configuration asks for that.
+    pub fn run(
+        self,
+        seen: &MatchedFrame<'_, '_>,
+        camera: &CameraMotion,
+        assigned: &mut Assigned<'_, '_, '_>,
+    ) -> (Option<GroundPlane>, SegmentationReport) {
+        let Self { segmenter, plans } = self;
+        let (config, disparity_q8) = (seen.config, seen.disparity_q8);
+        let (rig, motion) = (config.scaled_rig(), &config.tracking.motion);
+        let segments = config.tracking.dynamic
+            && config.segmentation.enabled
+            && camera.t_current_previous.is_some();
+        let ground = (segments || plans).then(|| GroundPlane::find(&rig, disparity_q8)).flatten();
+        if !segments {
+            return (ground, SegmentationReport::default());
+        }
+        let input = SegmentationInput {
+            rig: &rig,
+            camera,
+            disparity_q8,
+            ground,
+            search: seen.search(),
+            bias_px: [motion.bias_px, motion.lens_px].map(f64::from),
+        };
+        (ground, segmenter.segment(&config.segmentation, &input, assigned))
+    }
+}
