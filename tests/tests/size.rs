@@ -8,9 +8,9 @@ use parameters::parameter_lists;
 use std::{collections::BTreeMap, path::Path};
 
 /// Most lines of a function, from its `fn` to its closing brace.
-const FUNCTION_LINES: usize = 112;
+const FUNCTION_LINES: usize = 101;
 /// Most lines of a file.
-const FILE_LINES: usize = 565;
+const FILE_LINES: usize = 523;
 
 /// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
 const WIDE: usize = 6;

@@ -91,7 +91,6 @@ impl Mapper<'_> {
     ) -> Report {
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last.
         let (stereo, scene_flow) = self.match_images(frame, executor);
-        self.correct_matches(executor);
         let seen = MatchedFrame {
             config: &self.config,
             number: self.frame,
@@ -109,8 +108,7 @@ impl Mapper<'_> {
         let mut assigned = executor.stage(Stage::Instances, || {
             tracker.detect(seen.number, detections, seen.size(), matches).assign_matches()
         });
-        // (C.2) The camera's own motion, from what does not move. The first frame's camera is the
-        // world.
+        // (C.2) The camera's own motion, from what does not move; the first camera is the world.
         let mask = assigned.egomotion_mask();
         let locate = || localization.locate(&seen, &mask, static_map, executor);
         let located = executor.stage(Stage::Egomotion, locate);
@@ -125,8 +123,7 @@ impl Mapper<'_> {
         let estimate_motions =
             || assigned.estimate_motions(&rig, &camera, seen.search(), estimator);
         let mut tracked = executor.stage(Stage::Instances, estimate_motions);
-        // (E) The static map, without what moves or may move, and the objects' maps; unless the
-        // pose is extrapolated.
+        // (E) The static map without what may move, and objects' maps; not at a pose extrapolated.
         let erase_trails = || static_map.erase_trails(&camera, segmenter);
         let voxels_erased = executor.stage(Stage::Prune, erase_trails);
         let mut allocation = AllocationReport::default();
@@ -140,11 +137,9 @@ impl Mapper<'_> {
             tracked.commit()
         });
         // (F) Noise last observed a fixed lag ago is removed.
-        let mut prune = PruneReport::default();
-        if fused {
-            prune = executor.stage(Stage::Prune, || static_map.volume.prune());
-        }
-        prune.voxels_erased = voxels_erased;
+        let prune = || executor.stage(Stage::Prune, || static_map.volume.prune());
+        let prune = fused.then(prune).unwrap_or_default();
+        let prune = PruneReport { voxels_erased, ..prune };
         let outcome = Outcome {
             stereo,
             scene_flow,
@@ -160,7 +155,7 @@ impl Mapper<'_> {
     }
 
     /// Depth from the pair, unless it is given, and matches over this pair and the last: neither
-    /// needs the other.
+    /// needs the other. Both are corrected by the disparity error found so far.
     fn match_images<E: Executor>(
         &mut self,
         frame: &StereoFrame<'_>,
@@ -178,10 +173,12 @@ impl Mapper<'_> {
         };
         let pair = MaskedPair { left, right, invalid };
         let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
-        executor.join(
+        let reports = executor.join(
             || executor.stage(Stage::Stereo, compute_disparity),
             || executor.stage(Stage::SceneFlow, match_features),
-        )
+        );
+        self.correct_matches(executor);
+        reports
     }
 
     /// Learns from the matches which rows agree, and takes the disparity error found so far out of
