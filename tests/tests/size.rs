@@ -15,7 +15,7 @@ const FILE_LINES: usize = 523;
 /// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
 const WIDE: usize = 6;
 /// Most wide functions of the repository, tests included. The figure only ever falls.
-const WIDE_MAX: usize = 37;
+const WIDE_MAX: usize = 29;
 /// Most functions that are not wide and take a tuple apart in their parameter list, which hides
 /// parameters. The figure only ever falls.
 const TAKING_APART_MAX: usize = 30;
