@@ -299,7 +299,6 @@ fn a_folder_that_the_table_does_not_know_and_a_cycle_in_the_table_are_faults() {
 /// Circles of files that are still to be broken, by their files. A circle that is broken leaves the
 /// list; none joins it.
 const CIRCLES_LEFT: &[(&str, &[&str])] = &[
-    ("core/src", &["tracking/occlusion.rs", "tracking/track.rs"]),
     ("core/src", &["view/raycast/crossed.rs", "view/raycast/surface.rs"]),
     ("core/src", &["volume/allocate.rs", "volume/request.rs"]),
     ("host/src", &["cli/fleet/jobs.rs", "cli/sweep.rs"]),

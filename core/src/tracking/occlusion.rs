@@ -5,11 +5,13 @@
 //! last seen whole, its *extent*, and moves that with its velocity in the image. A detection of
 //! agreeing class within it, with the same top or bottom, is the object again.
 
-use super::{TrackingConfig, instance::Instance, track::Track};
+use super::{
+    TrackingConfig,
+    instance::Instance,
+    track::{Track, is_cut},
+};
 use crate::masks::PixelBox;
 
-/// A box with less than this share of the area that was expected is cut, 1/10.
-const CUT_TENTHS: i64 = 7;
 /// Share of a detection's box that must lie within the extent, 1/10.
 const WITHIN_TENTHS: i64 = 8;
 /// Most by which the tops, or the bottoms, may differ, as a part of the extent's height.
@@ -55,11 +57,6 @@ pub(super) fn next_extent(
         Some(seen) => seen,
         None => expected,
     }
-}
-
-/// Whether a box shows less of the object than was expected.
-pub(super) fn is_cut(seen: &PixelBox, expected: &PixelBox) -> bool {
-    10 * seen.area() < CUT_TENTHS * expected.area()
 }
 
 fn is_within(seen: &PixelBox, extent: &PixelBox) -> bool {

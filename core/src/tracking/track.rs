@@ -6,7 +6,6 @@ use super::{
     instance::Instance,
     motion_filter::MotionFilter,
     motion_state::MotionHysteresis,
-    occlusion::is_cut,
 };
 use crate::{
     geometry::Transform,
@@ -14,6 +13,9 @@ use crate::{
     state::Visitor,
 };
 use bytemuck::{Pod, Zeroable};
+
+/// A box with less than this share of the area that was expected is cut, 1/10.
+const CUT_TENTHS: i64 = 7;
 
 /// An object over time.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -200,4 +202,9 @@ impl Track {
             velocity_measured.bits_mut(),
         ]);
     }
+}
+
+/// Whether a box shows less of the object than was expected.
+pub(super) fn is_cut(seen: &PixelBox, expected: &PixelBox) -> bool {
+    10 * seen.area() < CUT_TENTHS * expected.area()
 }
