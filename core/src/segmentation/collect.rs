@@ -1,5 +1,6 @@
 //! The candidates among a frame's matches, and what lies still between them.
 
+use super::residual::CANDIDATE_CHI_SQUARE;
 use super::{
     MotionSegmenter, SegmentationReport, candidate::Candidate, joint::FarMatches, lattice::Lattice,
     residual::StaticModel,
@@ -31,10 +32,8 @@ impl MotionSegmenter<'_> {
         report: &mut SegmentationReport,
     ) -> usize {
         let (mut len, mut stride, mut count) = (0, 1, 0usize);
-        let (least, far_m) = (
-            given.variance * f64::from(model.config.candidate_chi_square),
-            f64::from(model.config.far_m),
-        );
+        let (least, far_m) =
+            (given.variance * f64::from(CANDIDATE_CHI_SQUARE), f64::from(model.config.far_m));
         for ((m, match_owner), mark) in
             given.matches.iter().zip(given.codes).zip(self.is_candidate.iter_mut())
         {

@@ -1,10 +1,21 @@
 //! Candidates that lie together and move alike.
 
-use super::{SegmentationConfig, candidate::Candidate, extent::Extent, residual::StaticModel};
+use super::{candidate::Candidate, extent::Extent, residual::StaticModel};
 use crate::{geometry::scalar::max_f64, scene_flow::Match};
 use heapless::Vec;
 use nalgebra::Vector3;
 
+/// Fewest members of a group.
+pub(super) const MEMBERS_MIN: u16 = 8;
+/// Fewest members of a group beyond [`SPARSE_FROM_M`].
+const FAR_MEMBERS_MIN: u16 = 5;
+/// Depth from which on groups are smaller, m.
+const SPARSE_FROM_M: f32 = 25.0;
+/// Least share of candidates among all matches within a group's box.
+pub(super) const CANDIDATE_SHARE_MIN: f32 = 0.85;
+/// Least motion of a group in a frame, m; 0.0008 m for each square metre of squared depth comes on
+/// top.
+const MOTION_MIN_M: f32 = 0.1;
 /// Most candidates of a frame.
 pub(super) const CANDIDATES_MAX: usize = 1024;
 /// Most groups of a frame.
@@ -44,14 +55,13 @@ pub(super) struct Group {
 
 impl Group {
     /// Whether it moves, and is not too large for an object.
-    pub fn is_plausible(&self, config: &SegmentationConfig) -> bool {
+    pub fn is_plausible(&self) -> bool {
         let Extent { low, high } = &self.extent;
         let is_small =
             low.iter().zip(high).zip(EXTENT_MAX_M).all(|((low, high), most)| high - low <= most);
         is_small
             && self.motion_m.norm()
-                > f64::from(config.motion_min_m)
-                    + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
+                > f64::from(MOTION_MIN_M) + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
     }
 
     /// Whether another group is on the same object: of one motion and close by.
@@ -61,13 +71,13 @@ impl Group {
     }
 
     /// Whether it has members enough as well.
-    pub fn passes(&self, config: &SegmentationConfig) -> bool {
+    pub fn passes(&self) -> bool {
         let Extent { low: [left, _, near], high: [right, _, far] } = self.extent;
         let is_wide = max_f64(right - left, far - near) > WIDTH_MIN_M;
-        let is_sparse = self.depth_m > f64::from(config.sparse_from_m)
-            || self.depth_m < SPARSE_UP_TO_M && is_wide;
-        let least = if is_sparse { config.far_members_min } else { config.members_min };
-        self.members >= u32::from(least) && self.is_plausible(config)
+        let is_sparse =
+            self.depth_m > f64::from(SPARSE_FROM_M) || self.depth_m < SPARSE_UP_TO_M && is_wide;
+        let least = if is_sparse { FAR_MEMBERS_MIN } else { MEMBERS_MIN };
+        self.members >= u32::from(least) && self.is_plausible()
     }
 }
 
@@ -129,9 +139,7 @@ pub(super) fn select<'m>(
         if candidate.parent != first {
             continue;
         }
-        let Some(group) =
-            measure(candidates, first, values).filter(|group| group.passes(model.config))
-        else {
+        let Some(group) = measure(candidates, first, values).filter(|group| group.passes()) else {
             continue;
         };
         refused += u32::from(groups.push(group).is_err());
@@ -146,7 +154,7 @@ pub(super) fn select<'m>(
             }
         }
     }
-    let share = f64::from(model.config.candidate_share_min);
+    let share = f64::from(CANDIDATE_SHARE_MIN);
     let mut index = 0;
     groups.retain(|_| {
         let [all, own] = counts.get(index).copied().unwrap_or_default();
@@ -282,13 +290,8 @@ mod tests {
 
     #[test]
     fn a_near_group_may_be_small_where_it_is_wide_enough_for_more_than_a_bollard() {
-        let config = SegmentationConfig::default();
-        assert!(
-            group(0.0, 0.6, 5.0, 5).passes(&config) && !group(0.0, 0.4, 5.0, 5).passes(&config)
-        );
-        assert!(
-            group(0.0, 0.4, 5.0, 8).passes(&config) && !group(0.0, 0.6, 15.0, 5).passes(&config)
-        );
+        assert!(group(0.0, 0.6, 5.0, 5).passes() && !group(0.0, 0.4, 5.0, 5).passes());
+        assert!(group(0.0, 0.4, 5.0, 8).passes() && !group(0.0, 0.6, 15.0, 5).passes());
     }
 
     #[test]

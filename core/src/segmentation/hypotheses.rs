@@ -1,6 +1,7 @@
 //! Groups over frames: a group becomes an object when it is found again with the same motion, and
 //! is predicted where it is not.
 
+use super::hypothesis::PREDICT_FRAMES;
 use super::{
     SegmentationConfig,
     groups::{GROUPS_MAX, Group},
@@ -93,13 +94,13 @@ impl<'s> Hypotheses<'s> {
             }
             match best {
                 Some((_, index, found)) => {
-                    hypothesis.update(config, &found, t_world_camera);
+                    hypothesis.update(&found, t_world_camera);
                     used.get_mut(index).into_iter().for_each(|used| *used = true);
                 }
                 None => hypothesis.miss(),
             }
         }
-        self.drop_missed(config);
+        self.drop_missed();
         let mut refused = 0;
         for (group, _) in groups.iter().zip(used).filter(|(_, used)| !used) {
             let Some(slot) = self.table.get_mut(self.len) else {
@@ -107,7 +108,7 @@ impl<'s> Hypotheses<'s> {
                 continue;
             };
             *slot = Hypothesis::new(config);
-            slot.update(config, &observed(group), t_world_camera);
+            slot.update(&observed(group), t_world_camera);
             self.len += 1;
         }
         refused
@@ -115,9 +116,9 @@ impl<'s> Hypotheses<'s> {
 
     /// Drops the hypotheses missed for too long: an unconfirmed one once no recent frame agrees, a
     /// confirmed one after a frame in which it is given up.
-    fn drop_missed(&mut self, config: &SegmentationConfig) {
+    fn drop_missed(&mut self) {
         let mut kept = 0;
-        let frames_most = u32::from(config.predict_frames) + HIDDEN_FRAMES;
+        let frames_most = u32::from(PREDICT_FRAMES) + HIDDEN_FRAMES;
         for index in 0..self.len {
             let Some(mut hypothesis) = self.table.get(index).copied() else { break };
             let is_given_up = hypothesis.is_confirmed() && hypothesis.missed == frames_most + 1;
@@ -226,16 +227,12 @@ mod tests {
         for _ in 0..20 {
             hypotheses.update(&config, &[], &Transform::IDENTITY);
             counts[0] += hypotheses.all().len() as u32;
-            counts[1] +=
-                u32::from(hypotheses.all().iter().any(|hypothesis| hypothesis.is_shown(&config)));
+            counts[1] += u32::from(hypotheses.all().iter().any(|hypothesis| hypothesis.is_shown()));
         }
         // One frame more, in which it is given up.
         assert_eq!(
             counts,
-            [
-                u32::from(config.predict_frames) + HIDDEN_FRAMES + 1,
-                u32::from(config.predict_frames)
-            ]
+            [u32::from(PREDICT_FRAMES) + HIDDEN_FRAMES + 1, u32::from(PREDICT_FRAMES)]
         );
     }
 

@@ -11,6 +11,10 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
+/// Of the last three frames, in how many a group's motion must agree before it is an object.
+const CONFIRM_FRAMES: u8 = 2;
+/// Frames without a group over which an object's mask is predicted.
+pub(super) const PREDICT_FRAMES: u8 = 3;
 /// Share of an extent that is kept where a frame's members do not reach.
 const KEPT_SHARE: f64 = 0.9;
 /// Largest extent that is kept, m: width, height, length.
@@ -96,8 +100,8 @@ impl Hypothesis {
     }
 
     /// Whether its mask is in this frame.
-    pub fn is_shown(&self, config: &SegmentationConfig) -> bool {
-        self.is_confirmed() && self.missed <= u32::from(config.predict_frames)
+    pub fn is_shown(&self) -> bool {
+        self.is_confirmed() && self.missed <= u32::from(PREDICT_FRAMES)
     }
 
     /// Whether a group of this frame is its own.
@@ -112,18 +116,13 @@ impl Hypothesis {
     }
 
     /// Updates it by the group of this frame.
-    pub(super) fn update(
-        &mut self,
-        config: &SegmentationConfig,
-        found: &Observed,
-        t_world_camera: &Transform,
-    ) {
+    pub(super) fn update(&mut self, found: &Observed, t_world_camera: &Transform) {
         let is_known = self.history != 0;
         let expected = self.center() + Vector3::from(self.motion_m);
         let offset_m = t_world_camera.inverse().rotate(expected - found.center);
         self.history = self.history << 1 | 1;
         self.missed = 0;
-        if (self.history & RECENT).count_ones() >= u32::from(config.confirm_frames) {
+        if (self.history & RECENT).count_ones() >= u32::from(CONFIRM_FRAMES) {
             self.confirmed = 1;
         }
         // The members are now on one part of it, now on another: its extent is theirs, and for a

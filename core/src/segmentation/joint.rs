@@ -8,6 +8,7 @@
 //!
 //! Time: a comparison for each pair of at most [`JOINT_MAX`] matches.
 
+use super::residual::CANDIDATE_CHI_SQUARE;
 use super::residual::{Residual, StaticModel};
 use crate::{geometry::GroundPlane, scene_flow::Match};
 use bytemuck::{Pod, Zeroable};
@@ -134,8 +135,7 @@ impl<'m> FarMatches<'m> {
             depth_sigma_m,
             ..residual
         };
-        (chi_square > f64::from(model.config.candidate_chi_square))
-            .then_some((own.index as usize, joint))
+        (chi_square > f64::from(CANDIDATE_CHI_SQUARE)).then_some((own.index as usize, joint))
     }
 }
 

@@ -219,7 +219,7 @@ impl<'s> MotionSegmenter<'s> {
         let first = assigned.instances().len();
         let mut index = 0;
         while index < self.hypotheses.all().len() {
-            let grown = self.grow(config, index, &lattice, &camera.t_world_camera);
+            let grown = self.grow(index, &lattice, &camera.t_world_camera);
             let is_own = |u: i32, v: i32| lattice.is_own(self.cells, u, v);
             let added = grown.map(|pixels| assigned.add_moving_object(pixels, SCORE, is_own));
             match added {

@@ -1,7 +1,8 @@
 //! The groups of a frame that contradict a static world, and the hypotheses they continue.
 
+use super::groups::MEMBERS_MIN;
 use super::{
-    MotionSegmenter, SegmentationConfig, SegmentationReport,
+    MotionSegmenter, SegmentationReport,
     collect::{Owned, free_matches},
     groups::{self, GROUPS_MAX, Group},
     joint,
@@ -51,9 +52,9 @@ impl MotionSegmenter<'_> {
             found.groups.retain(|group| !search.is_repeated(model, candidates, group));
             self.seed_count = 0;
             self.seed_predicted(input.t_world_camera);
-            self.seed_small_groups(model.config, len);
+            self.seed_small_groups(len);
             let len = self.add_sparse(model, &input.sparse, &mut search, &mut found);
-            self.seed_small_groups(model.config, len);
+            self.seed_small_groups(len);
             self.verify(model, search, &mut found);
         }
         found.report.groups = found.groups.len() as u32;
@@ -81,7 +82,7 @@ impl MotionSegmenter<'_> {
         let mut groups = heapless::Vec::<Group, GROUPS_MAX>::new();
         found.report.refused += groups::select(model, candidates, marked, self.values, &mut groups);
         groups.retain(|group| !search.is_repeated(model, candidates, group));
-        found.report.refused += groups::add(&mut found.groups, &groups, model.config.members_min);
+        found.report.refused += groups::add(&mut found.groups, &groups, MEMBERS_MIN);
         len
     }
 
@@ -103,14 +104,14 @@ impl MotionSegmenter<'_> {
     }
 
     /// Supposes an object at each group of three candidates or more that moves.
-    fn seed_small_groups(&mut self, config: &SegmentationConfig, len: usize) {
+    fn seed_small_groups(&mut self, len: usize) {
         for first in 0..len {
             let Some(candidates) = self.candidates.get(..len) else { return };
             if candidates.get(first).is_none_or(|candidate| !candidate.is_first(first)) {
                 continue;
             }
             let group = groups::measure(candidates, first as u32, self.values)
-                .filter(|group| group.is_plausible(config));
+                .filter(|group| group.is_plausible());
             if let Some(group) = group {
                 self.seed(Seed::new(&group.extent, group.motion_m));
             }
@@ -143,13 +144,12 @@ impl MotionSegmenter<'_> {
     /// Grows the mask of the confirmed hypothesis at that position; the pixels it lies in.
     pub(super) fn grow(
         &mut self,
-        config: &SegmentationConfig,
         index: usize,
         lattice: &Lattice<'_>,
         t_world_camera: &Transform,
     ) -> Option<PixelBox> {
         let hypothesis =
-            self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_shown(config))?;
+            self.hypotheses.all().get(index).filter(|hypothesis| hypothesis.is_shown())?;
         let extent = hypothesis.extent(t_world_camera);
         // Of what was not found again, far matches say nothing.
         let is_decided = hypothesis.is_observed() || extent.center().z < joint::FROM_M;

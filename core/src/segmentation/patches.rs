@@ -9,8 +9,9 @@
 //!
 //! Time: at most [`SEARCHES_MAX`] patches a frame, each searched for once or twice.
 
+use super::groups::CANDIDATE_SHARE_MIN;
+use super::residual::CANDIDATE_CHI_SQUARE;
 use super::{
-    SegmentationConfig,
     candidate::{Candidate, motion_tolerance_m},
     groups::{Group, measure},
     joint::FROM_M,
@@ -105,14 +106,10 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 None => {}
             }
         }
-        let share = if seed.is_known() {
-            KNOWN_SHARE_MIN
-        } else {
-            f64::from(model.config.candidate_share_min)
-        };
+        let share = if seed.is_known() { KNOWN_SHARE_MIN } else { f64::from(CANDIDATE_SHARE_MIN) };
         let is_moving = moving as f64 >= share * (moving + still) as f64;
         let group = measure(members.get(..moving)?, 0, values).filter(|_| is_moving)?;
-        group.passes(model.config).then_some(group)
+        group.passes().then_some(group)
     }
 
     /// Frees the cells around the patches of an object.
@@ -122,7 +119,6 @@ impl<'a, 's> PatchSearch<'a, 's> {
 
     /// Searches for the patch at a pixel.
     fn search_patch(&self, model: &StaticModel<'_>, at: [usize; 2], seed: &Seed) -> Option<Patch> {
-        let config: &SegmentationConfig = model.config;
         let disparity_px = self.lattice.disparity_px(at)?;
         let pixel = at.map(|at| at as i32);
         let found = |t_previous_current: &Transform| {
@@ -134,7 +130,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
             )?)?;
             Some((m, model.residual(&m)?))
         };
-        let is_static = |chi_square: f64| chi_square <= f64::from(config.candidate_chi_square);
+        let is_static = |chi_square: f64| chi_square <= f64::from(CANDIDATE_CHI_SQUARE);
         let motion_m = seed.motion_m();
         let back = Transform::from_translation((-motion_m).into());
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
@@ -169,9 +165,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
         let found = expected
             .and_then(|expected| self.images.matcher.find(&expected))
             .and_then(|m| model.residual(&m));
-        found.is_some_and(|residual| {
-            residual.chi_square <= f64::from(model.config.candidate_chi_square)
-        })
+        found.is_some_and(|residual| residual.chi_square <= f64::from(CANDIDATE_CHI_SQUARE))
     }
 
     /// Whether a near group is one of a row of posts or the like, each taken for the next: more

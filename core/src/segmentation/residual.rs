@@ -17,6 +17,17 @@ use crate::{
 };
 use nalgebra::{Cholesky, Matrix3, Vector3};
 
+/// Error of a match coordinate, one sigma, px.
+const NOISE_PX: f32 = 0.35;
+/// Error of a disparity, one sigma, px.
+const DISPARITY_NOISE_PX: f32 = 0.45;
+/// Error of the camera's translation in a frame, one sigma, m.
+const CAMERA_M: f32 = 0.02;
+/// Error of the camera's rotation in a frame, one sigma, rad.
+const CAMERA_RAD: f32 = 0.0005;
+/// Squared Mahalanobis distance from the static prediction beyond which a match is a candidate:
+/// chi-square, 3 degrees of freedom, 0.1 %.
+pub(super) const CANDIDATE_CHI_SQUARE: f32 = 16.27;
 /// Smallest disparity a point is triangulated from, px.
 const DISPARITY_MIN_PX: f64 = 1.0;
 /// Nearest depth a point is predicted at, m.
@@ -65,11 +76,7 @@ impl<'a> StaticModel<'a> {
             bias_px,
             rotation: t_current_previous.quaternion().to_rotation_matrix().into_inner(),
             translation: t_current_previous.translation(),
-            noise: Vector3::new(
-                square(config.noise_px),
-                square(config.noise_px),
-                square(config.disparity_noise_px),
-            ),
+            noise: Vector3::new(square(NOISE_PX), square(NOISE_PX), square(DISPARITY_NOISE_PX)),
         }
     }
 
@@ -108,7 +115,7 @@ impl<'a> StaticModel<'a> {
         let point_m = self.point(&now);
         // The other terms only add to the covariance: what lies within these bounds needs no more.
         let bound = r.component_div(&self.noise).dot(&r);
-        let (chi_square, depth_variance) = if bound > f64::from(self.config.candidate_chi_square) {
+        let (chi_square, depth_variance) = if bound > f64::from(CANDIDATE_CHI_SQUARE) {
             let [own, shared] = self.covariance(&before, &previous, &predicted);
             let covariance = own + shared;
             let solved = Cholesky::new(covariance).map(|factor| factor.solve(&r))?;
@@ -178,8 +185,7 @@ impl<'a> StaticModel<'a> {
         let square = |sigma: f32| f64::from(sigma) * f64::from(sigma);
         let rotated =
             Matrix3::identity() * predicted.norm_squared() - predicted * predicted.transpose();
-        let camera = Matrix3::identity() * square(self.config.camera_m)
-            + rotated * square(self.config.camera_rad);
+        let camera = Matrix3::identity() * square(CAMERA_M) + rotated * square(CAMERA_RAD);
         let side = before.x / self.rig.center_u_px;
         let [offset_px, lens_px] = self.bias_px;
         let bias =

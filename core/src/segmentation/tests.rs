@@ -416,12 +416,7 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
         };
         segmenter.observe(&contradictions, None);
         confirmed.push(
-            segmenter
-                .hypotheses
-                .all()
-                .iter()
-                .filter(|hypothesis| hypothesis.is_shown(&config))
-                .count(),
+            segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_shown()).count(),
         );
     }
     assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);

@@ -3,9 +3,16 @@
 
 use crate::{
     egomotion::EgomotionConfig,
-    settings::{Problems, require},
+    settings::{Problems, check},
 };
 
+/// Scale of the mask under which nothing enters the static map, 1/1000.
+const DELETE_PERMILLE: u32 = 1200;
+/// Boxes below this many times the least area, 1/1000, are scaled twice.
+const SMALL_PERMILLE: u64 = 1375;
+/// Largest reprojection error of an inlier over its four coordinates together, px; three quarters
+/// of it at the last refinement.
+const INLIER_PX: f32 = 2.0;
 /// Image width to which areas in px refer.
 const REFERENCE_WIDTH: u64 = 1242;
 
@@ -48,10 +55,6 @@ pub struct TrackingConfig {
     /// to move; 900: the 18 matches a first motion takes, 7 px apart. The original: as
     /// `area_min_px`.
     pub track_area_min_px: u32,
-    /// Scale of the mask under which nothing enters the static map, 1/1000; 1000 to 4000; 1200.
-    pub delete_permille: u16,
-    /// Boxes below this many times the least area, 1/1000, are scaled twice; 1375.
-    pub small_permille: u16,
     /// What is compared in associating a detection with a track. The original: boxes.
     pub overlap: Overlap,
     /// Overlap times the geometric mean of both scores times the discount for frames missed must be
@@ -79,8 +82,6 @@ impl Default for TrackingConfig {
             score_min: 0.0,
             area_min_px: 2025,
             track_area_min_px: 900,
-            delete_permille: 1200,
-            small_permille: 1375,
             overlap: Overlap::Mask,
             association_min: 0.1,
             extent_frames: 10,
@@ -107,58 +108,15 @@ impl TrackingConfig {
     /// How much the delete mask of a box is scaled, 1/1000.
     pub(crate) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
         let least = least(self.area_min_px, width);
-        let is_small = area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000
-            < least * u64::from(self.small_permille);
-        let once = u32::from(self.delete_permille);
+        let is_small =
+            area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH * 1000 < least * SMALL_PERMILLE;
+        let once = DELETE_PERMILLE;
         if is_small { once * once / 1000 } else { once }
     }
 
     /// Notes what is wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        let share = |value: f32| (0.0..=1.0).contains(&value);
-        require(
-            problems,
-            positive(self.frame_interval_s),
-            "tracking.frame_interval_s",
-            "must be above 0",
-        );
-        require(problems, share(self.score_min), "tracking.score_min", "must be from 0 to 1");
-        require(
-            problems,
-            self.area_min_px <= 1 << 20,
-            "tracking.area_min_px",
-            "must be at most 1048576",
-        );
-        let tracked = self.track_area_min_px <= 1 << 20;
-        require(problems, tracked, "tracking.track_area_min_px", "must be at most 1048576");
-        require(
-            problems,
-            (1000..=4000).contains(&self.delete_permille),
-            "tracking.delete_permille",
-            "must be in 1000..=4000",
-        );
-        require(
-            problems,
-            share(self.association_min),
-            "tracking.association_min",
-            "must be from 0 to 1",
-        );
-        require(
-            problems,
-            self.extent_frames <= 1000,
-            "tracking.extent_frames",
-            "must be at most 1000",
-        );
-        require(
-            problems,
-            (1..=10_000).contains(&self.forget_frames),
-            "tracking.forget_frames",
-            "must be in 1..=10000",
-        );
-        require(problems, share(self.large_share), "tracking.large_share", "must be from 0 to 1");
-        self.motion.validate(problems);
-        self.state.validate(problems);
+        check(Self::CHECKS, self, problems);
     }
 }
 
@@ -179,35 +137,10 @@ pub struct MotionConfig {
     pub matches_min: u16,
     /// Fewest matches once a motion is known; 6 to 1000; 9 (the original: 18 always).
     pub matches_again: u16,
-    /// Refined matches from which on sparse ones are not used; at most 10000; 60 (the original:
-    /// sparse ones only).
-    pub matches_enough: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
-    /// Largest reprojection error of an inlier over its four coordinates together, px; above 0; 2.
-    /// At the last refinement three quarters of it.
-    pub inlier_px: f32,
-    /// Least error of a match coordinate, px; above 0.
-    pub noise_px: f32,
-    /// How far from the median depth a match may lie and still be on the object, m; its error comes
-    /// on top; above 0.
-    pub extent_m: f32,
-    /// Errors of one object's matches are correlated: no more than this many count as independent;
-    /// 3 to 1000.
-    pub independent_matches: u16,
-    /// How fast an object may rotate about the vertical when it is first detected, one sigma,
-    /// rad/s; above 0.
-    pub yaw_rad_s: f32,
-    /// The same about any other axis, which the road limits; above 0.
-    pub tilt_rad_s: f32,
     /// How fast it may be when first detected, one sigma, m/s; above 0.
     pub speed_m_s: f32,
-    /// Change of speed within a second, one sigma, m/s; above 0.
-    pub acceleration_m_s2: f32,
-    /// Change of rotation about the vertical within a second, one sigma, rad/s; above 0.
-    pub yaw_acceleration_rad_s2: f32,
-    /// The same about any other axis; above 0.
-    pub tilt_acceleration_rad_s2: f32,
     /// By how much all disparities may be too small, px; at least 0. To a moving camera a static
     /// object then seems to move, by twice this share of its disparity of the speed it passes by.
     pub bias_px: f32,
@@ -225,18 +158,8 @@ impl Default for MotionConfig {
         Self {
             matches_min: 12,
             matches_again: 9,
-            matches_enough: 60,
             samples: 200,
-            inlier_px: 2.0,
-            noise_px: 0.3,
-            extent_m: 5.0,
-            independent_matches: 30,
-            yaw_rad_s: 0.2,
-            tilt_rad_s: 0.03,
             speed_m_s: 20.0,
-            acceleration_m_s2: 3.0,
-            yaw_acceleration_rad_s2: 0.4,
-            tilt_acceleration_rad_s2: 0.03,
             bias_px: 0.25,
             lens_px: 3.0,
             camera_rad: 0.0004,
@@ -249,91 +172,14 @@ impl MotionConfig {
     pub(super) fn estimator(&self) -> EgomotionConfig {
         EgomotionConfig {
             samples: self.samples,
-            inlier_px: self.inlier_px,
-            refined_inlier_px: 0.75 * self.inlier_px,
+            inlier_px: INLIER_PX,
+            refined_inlier_px: 0.75 * INLIER_PX,
             matches_min: 6,
             inlier_share_min: 0.0,
             side_knee: 10.0,
             robust_px: 100.0,
             ..EgomotionConfig::default()
         }
-    }
-
-    fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(
-            problems,
-            (6..=1000).contains(&self.matches_min),
-            "tracking.motion.matches_min",
-            "must be in 6..=1000",
-        );
-        require(
-            problems,
-            (6..=1000).contains(&self.matches_again),
-            "tracking.motion.matches_again",
-            "must be in 6..=1000",
-        );
-        require(
-            problems,
-            self.matches_enough <= 10_000,
-            "tracking.motion.matches_enough",
-            "must be at most 10000",
-        );
-        require(
-            problems,
-            (1..=10_000).contains(&self.samples),
-            "tracking.motion.samples",
-            "must be in 1..=10000",
-        );
-        require(problems, positive(self.inlier_px), "tracking.motion.inlier_px", "must be above 0");
-        require(problems, positive(self.noise_px), "tracking.motion.noise_px", "must be above 0");
-        require(problems, positive(self.extent_m), "tracking.motion.extent_m", "must be above 0");
-        require(
-            problems,
-            (3..=1000).contains(&self.independent_matches),
-            "tracking.motion.independent_matches",
-            "must be in 3..=1000",
-        );
-        require(problems, positive(self.yaw_rad_s), "tracking.motion.yaw_rad_s", "must be above 0");
-        require(
-            problems,
-            positive(self.tilt_rad_s),
-            "tracking.motion.tilt_rad_s",
-            "must be above 0",
-        );
-        let tilt = positive(self.tilt_acceleration_rad_s2);
-        require(problems, tilt, "tracking.motion.tilt_acceleration_rad_s2", "must be above 0");
-        require(problems, positive(self.speed_m_s), "tracking.motion.speed_m_s", "must be above 0");
-        require(
-            problems,
-            positive(self.acceleration_m_s2),
-            "tracking.motion.acceleration_m_s2",
-            "must be above 0",
-        );
-        require(
-            problems,
-            positive(self.yaw_acceleration_rad_s2),
-            "tracking.motion.yaw_acceleration_rad_s2",
-            "must be above 0",
-        );
-        require(
-            problems,
-            self.bias_px.is_finite() && self.bias_px >= 0.0,
-            "tracking.motion.bias_px",
-            "must be at least 0",
-        );
-        require(
-            problems,
-            self.lens_px.is_finite() && self.lens_px >= 0.0,
-            "tracking.motion.lens_px",
-            "must be at least 0",
-        );
-        require(
-            problems,
-            self.camera_rad.is_finite() && self.camera_rad >= 0.0,
-            "tracking.motion.camera_rad",
-            "must be at least 0",
-        );
     }
 }
 
@@ -389,57 +235,5 @@ impl Default for StateConfig {
             static_frames: 5,
             dynamic_frames: 3,
         }
-    }
-}
-
-impl StateConfig {
-    fn validate(&self, problems: &mut Problems) {
-        let positive = |value: f32| value.is_finite() && value > 0.0;
-        require(
-            problems,
-            positive(self.static_m_s),
-            "tracking.state.static_m_s",
-            "must be above 0",
-        );
-        let above = positive(self.dynamic_m_s) && self.dynamic_m_s >= self.static_m_s;
-        require(
-            problems,
-            above,
-            "tracking.state.dynamic_m_s",
-            "must be at least tracking.state.static_m_s",
-        );
-        let slow = positive(self.slow_m_s) && self.slow_m_s >= self.static_m_s;
-        require(
-            problems,
-            slow,
-            "tracking.state.slow_m_s",
-            "must be at least tracking.state.static_m_s",
-        );
-        require(
-            problems,
-            self.sigmas.is_finite() && self.sigmas >= 0.0,
-            "tracking.state.sigmas",
-            "must be at least 0",
-        );
-        let likely = self.static_sigmas.is_finite() && self.static_sigmas >= 0.0;
-        require(problems, likely, "tracking.state.static_sigmas", "must be at least 0");
-        require(
-            problems,
-            (1..=100).contains(&self.confirm_frames),
-            "tracking.state.confirm_frames",
-            "must be in 1..=100",
-        );
-        require(
-            problems,
-            (1..=100).contains(&self.confirm_static_frames),
-            "tracking.state.confirm_static_frames",
-            "must be in 1..=100",
-        );
-        require(
-            problems,
-            (1..=100).contains(&self.change_frames),
-            "tracking.state.change_frames",
-            "must be in 1..=100",
-        );
     }
 }

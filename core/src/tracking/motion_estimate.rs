@@ -17,6 +17,11 @@ use crate::{
 };
 use nalgebra::Point3;
 
+/// Least error of a match coordinate, px: the single-precision number nearest to 0.3.
+const NOISE_PX: f64 = 0.3_f32 as f64;
+/// Largest distance of a match from the median depth to be on the object, m; its error comes on top.
+const EXTENT_M: f64 = 5.0;
+
 /// What a frame's motions are measured by.
 pub(super) struct MotionFrame<'a> {
     pub rig: &'a StereoRig,
@@ -52,25 +57,21 @@ struct DisparityRange {
 }
 
 impl DisparityRange {
-    /// Those no more than `config.extent_m` and three sigmas nearer or farther than the median.
-    fn of<'m>(
-        config: &MotionConfig,
-        rig: &StereoRig,
-        matches: impl Iterator<Item = &'m Match> + Clone,
-    ) -> Self {
+    /// Those no more than [`EXTENT_M`] and three sigmas nearer or farther than the median.
+    fn of<'m>(rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
         let mut disparities = Histogram::new();
         for m in matches {
             // What is not a number counts as 0.
             disparities.add((2.0 * disparity(m)) as usize);
         }
         let median_px = (disparities.median().unwrap_or(0) as f64 + 0.5) * 0.5;
-        let slack_px = 3.0 * core::f64::consts::SQRT_2 * f64::from(config.noise_px) + 0.5;
+        let slack_px = 3.0 * core::f64::consts::SQRT_2 * NOISE_PX + 0.5;
         let depth_m = rig.focal_baseline_px_m() / median_px;
-        let nearest_m = depth_m - f64::from(config.extent_m);
+        let nearest_m = depth_m - EXTENT_M;
         let most_px =
             if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
         Self {
-            least_px: rig.focal_baseline_px_m() / (depth_m + f64::from(config.extent_m)) - slack_px,
+            least_px: rig.focal_baseline_px_m() / (depth_m + EXTENT_M) - slack_px,
             most_px: most_px + slack_px,
         }
     }
@@ -107,7 +108,7 @@ pub(super) fn estimate_motion<'m>(
     let mut found: &'m [Match] = &[];
     if let Some(GuidedSearch { find, found: buffer }) = search {
         if !filter.is_known() {
-            let range = DisparityRange::of(config, frame.rig, matches.clone());
+            let range = DisparityRange::of(frame.rig, matches.clone());
             let matches = matches.clone().filter(|m| range.contains(m));
             let guess = estimator.estimate(
                 &settings,
@@ -122,7 +123,7 @@ pub(super) fn estimate_motion<'m>(
         found = clipped(buffer, ..count);
     }
     let matches = matches.chain(found);
-    let range = DisparityRange::of(config, frame.rig, matches.clone());
+    let range = DisparityRange::of(frame.rig, matches.clone());
     let matches = matches.filter(move |m| range.contains(m));
     let points = matches.clone().count() as u32;
     let mut outcome = ObjectMotion { matches: points, inliers: 0, measured: false };
@@ -141,11 +142,8 @@ pub(super) fn estimate_motion<'m>(
     }
     outcome.inliers = estimate.inliers;
     let inliers = Inliers { indexed: (0u32..).zip(matches), inliers: estimator.inliers() };
-    let noise_px = if estimate.residual_rms_px > f64::from(config.noise_px) {
-        estimate.residual_rms_px
-    } else {
-        f64::from(config.noise_px)
-    };
+    let noise_px =
+        if estimate.residual_rms_px > NOISE_PX { estimate.residual_rms_px } else { NOISE_PX };
     let observations = inliers.filter_map(|m| observation(m, frame));
     outcome.measured = filter.update(
         config,

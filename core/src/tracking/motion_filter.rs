@@ -19,6 +19,18 @@ use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Rotation3, Vector3, Vector6};
 
+/// Most of an object's matches that count as independent: their errors are correlated.
+const INDEPENDENT_MATCHES: f64 = 30.0;
+/// Rotation of an object about the vertical when it is first detected, one sigma, rad/s.
+const YAW_RAD_S: f32 = 0.2;
+/// Rotation about any other axis, which the road limits, one sigma, rad/s.
+const TILT_RAD_S: f32 = 0.03;
+/// Change of speed within a second, one sigma, m/s.
+const ACCELERATION_M_S2: f32 = 3.0;
+/// Change of rotation about the vertical within a second, one sigma, rad/s.
+const YAW_ACCELERATION_RAD_S2: f32 = 0.4;
+/// Change of rotation about any other axis within a second, one sigma, rad/s.
+const TILT_ACCELERATION_RAD_S2: f32 = 0.03;
 /// Gauss-Newton steps per frame; what is left after them is far below the noise.
 const STEPS: usize = 4;
 /// Squared Mahalanobis distance from the prediction beyond which a frame contradicts it:
@@ -108,8 +120,7 @@ impl MotionFilter {
     pub fn predict(&mut self, config: &MotionConfig, interval_s: f64) {
         let square = |x: f32| f64::from(x) * f64::from(x);
         if self.frames == 0 {
-            let [tilt, yaw, speed] =
-                [config.tilt_rad_s, config.yaw_rad_s, config.speed_m_s].map(square);
+            let [tilt, yaw, speed] = [TILT_RAD_S, YAW_RAD_S, config.speed_m_s].map(square);
             self.rate = [0.0; 6];
             self.covariance =
                 Matrix6::from_diagonal(&Vector6::new(tilt, yaw, tilt, speed, speed, speed)).into();
@@ -119,12 +130,9 @@ impl MotionFilter {
             .rotate(self.velocity());
         let [.., x, y, z] = &mut self.rate;
         (*x, *y, *z) = (turned.x, turned.y, turned.z);
-        let [tilt, yaw, speed] = [
-            config.tilt_acceleration_rad_s2,
-            config.yaw_acceleration_rad_s2,
-            config.acceleration_m_s2,
-        ]
-        .map(|change| square(change) * interval_s * interval_s);
+        let [tilt, yaw, speed] =
+            [TILT_ACCELERATION_RAD_S2, YAW_ACCELERATION_RAD_S2, ACCELERATION_M_S2]
+                .map(|change| square(change) * interval_s * interval_s);
         for (i, (row, growth)) in
             self.covariance.iter_mut().zip([tilt, yaw, tilt, speed, speed, speed]).enumerate()
         {
@@ -154,21 +162,15 @@ impl MotionFilter {
         observations: impl Iterator<Item = Observation> + Clone,
     ) -> bool {
         if self.contradictions == 0 || self.frames == 0 {
-            return self.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
+            return self.correct(rig, t_world_camera, interval_s, noise_px, observations);
         }
         let mut corrected = Self { contradictions: 0, ..*self };
         let mut restarted = Self { contradictions: 0, frames: 0, ..*self };
         restarted.predict(config, interval_s);
-        let fits = corrected.correct(
-            config,
-            rig,
-            t_world_camera,
-            interval_s,
-            noise_px,
-            observations.clone(),
-        );
-        let updated = fits
-            || restarted.correct(config, rig, t_world_camera, interval_s, noise_px, observations);
+        let fits =
+            corrected.correct(rig, t_world_camera, interval_s, noise_px, observations.clone());
+        let updated =
+            fits || restarted.correct(rig, t_world_camera, interval_s, noise_px, observations);
         if updated {
             *self = if fits { corrected } else { restarted };
         }
@@ -178,7 +180,6 @@ impl MotionFilter {
     /// As [`MotionFilter::update`], without a contradiction in the frame before.
     fn correct(
         &mut self,
-        config: &MotionConfig,
         rig: &StereoRig,
         t_world_camera: &Transform,
         interval_s: f64,
@@ -200,7 +201,7 @@ impl MotionFilter {
         if !(count >= 3.0 && center.iter().all(|x| x.is_finite())) {
             return false;
         }
-        let independent = f64::from(config.independent_matches);
+        let independent = INDEPENDENT_MATCHES;
         let weight =
             (if count > independent { independent / count } else { 1.0 }) / (noise_px * noise_px);
         let world_camera = t_world_camera.quaternion().to_rotation_matrix();

@@ -14,6 +14,8 @@ use crate::{
     scene_flow::Match,
 };
 
+/// Refined matches from which on sparse ones are not used; the original: sparse ones only.
+const MATCHES_ENOUGH: usize = 60;
 /// Seed of the objects' random samples.
 const SEED: u64 = 0x006F_626A_6563_7473;
 
@@ -81,7 +83,7 @@ impl Tracker<'_> {
         let is_own = |&(m, code): &(&Match, &OwnerCode)| code.is_instance(at) && was_under_mask(m);
         let own =
             input.matches.refined.iter().zip(&*self.refined_owner).filter(is_own).map(|(m, _)| m);
-        let enough = own.clone().count() >= usize::from(self.config.motion.matches_enough);
+        let enough = own.clone().count() >= MATCHES_ENOUGH;
         // Sparse matches of the same features say nothing new.
         for (m, code) in input
             .matches

@@ -44,11 +44,6 @@ impl TrackingConfig {
                  static map once it is known to move. The default is what 18 matches take, 7 px \
                  apart.",
             ),
-        Row::expert("tracking.delete_permille", "1/1000", |c| U16(&mut c.delete_permille))
-            .range(Range::Within(1000.0, 4000.0))
-            .text("Scale of the mask under which nothing enters the static map."),
-        Row::expert("tracking.small_permille", "1/1000", |c| U16(&mut c.small_permille))
-            .text("Boxes below this many times the least area are scaled twice."),
         Row::expert("tracking.overlap", "", |c| Choice(&mut c.overlap)).published("box").text(
             "Intersection over union by which a detection is associated with a track: that of \
              masks or of boxes.",
@@ -84,58 +79,13 @@ impl TrackingConfig {
             .range(MATCHES)
             .published("18")
             .text("Fewest matches once a motion is known."),
-        Row::expert("tracking.motion.matches_enough", "", |c| U16(&mut c.motion.matches_enough))
-            .range(Range::Within(0.0, 10_000.0))
-            .published("sparse ones only")
-            .text("Refined matches from which on sparse ones are not used."),
         Row::expert("tracking.motion.samples", "", |c| U16(&mut c.motion.samples))
             .range(Range::Within(1.0, 10_000.0))
             .published("500")
             .text("Most hypotheses."),
-        Row::expert("tracking.motion.inlier_px", "px", |c| F32(&mut c.motion.inlier_px))
-            .range(Range::POSITIVE)
-            .text(
-                "Largest reprojection error of an inlier over its four coordinates together; three \
-                 quarters of it at the last refinement.",
-            ),
-        Row::expert("tracking.motion.noise_px", "px", |c| F32(&mut c.motion.noise_px))
-            .range(Range::POSITIVE)
-            .text("Least error of a match coordinate."),
-        Row::expert("tracking.motion.extent_m", "m", |c| F32(&mut c.motion.extent_m))
-            .range(Range::POSITIVE)
-            .text(
-                "Largest distance of a match from the median depth to be on the object; its error \
-                 comes on top.",
-            ),
-        Row::expert("tracking.motion.independent_matches", "", |c| {
-            U16(&mut c.motion.independent_matches)
-        })
-        .range(Range::Within(3.0, 1000.0))
-        .text("Most of an object's matches that count as independent: their errors correlate."),
-        Row::expert("tracking.motion.yaw_rad_s", "rad/s", |c| F32(&mut c.motion.yaw_rad_s))
-            .range(Range::POSITIVE)
-            .text("Rotation of an object about the vertical when first detected, one sigma."),
-        Row::expert("tracking.motion.tilt_rad_s", "rad/s", |c| F32(&mut c.motion.tilt_rad_s))
-            .range(Range::POSITIVE)
-            .text("Rotation of an object about any other axis when first detected, one sigma."),
         Row::user("tracking.motion.speed_m_s", "m/s", |c| F32(&mut c.motion.speed_m_s))
             .range(Range::POSITIVE)
             .text("Speed of an object when first detected, one sigma."),
-        Row::expert("tracking.motion.acceleration_m_s2", "m/s²", |c| {
-            F32(&mut c.motion.acceleration_m_s2)
-        })
-        .range(Range::POSITIVE)
-        .text("Change of an object's speed within a second, one sigma."),
-        Row::expert("tracking.motion.yaw_acceleration_rad_s2", "rad/s²", |c| {
-            F32(&mut c.motion.yaw_acceleration_rad_s2)
-        })
-        .range(Range::POSITIVE)
-        .text("Change of an object's rotation about the vertical within a second, one sigma."),
-        Row::expert("tracking.motion.tilt_acceleration_rad_s2", "rad/s²", |c| {
-            F32(&mut c.motion.tilt_acceleration_rad_s2)
-        })
-        .range(Range::POSITIVE)
-        .text("Change of an object's rotation about any other axis within a second, one sigma."),
         Row::user("tracking.motion.bias_px", "px", |c| F32(&mut c.motion.bias_px))
             .range(Range::NOT_NEGATIVE)
             .text(
