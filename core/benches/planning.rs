@@ -15,7 +15,7 @@ use dynvox_core::{
     geometry::{GroundPlane, StereoRig, Transform},
     image::View,
     memory::{Carver, SLAB_ALIGN},
-    planning::{DistanceField, Planning, PlanningConfig, Sight},
+    planning::{DepthView, DistanceField, Planning, PlanningConfig},
     random::Random,
     volume::{DepthImage, NoStore, Observation, Viewpoint, Volume, VolumeConfig},
 };
@@ -122,7 +122,7 @@ fn windows(criterion: &mut Criterion) {
             |n: u32| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.8 * f64::from(n)));
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
         let ground = GroundPlane::find(&RIG, disparity_q8);
-        let sight = |t_world_camera| Sight { rig: &RIG, t_world_camera, disparity_q8, ground };
+        let sight = |t_world_camera| DepthView { rig: &RIG, t_world_camera, disparity_q8, ground };
         let poses: Vec<Transform> = (0..12).map(pose).collect();
         for pose in &poses {
             let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: *pose };
@@ -145,7 +145,7 @@ fn measure(
     criterion: &mut Criterion,
     capacity: &Capacity,
     (planning, volume): (&mut Planning<'_>, &Volume<'_>),
-    sight: &Sight<'_>,
+    sight: &DepthView<'_>,
 ) {
     let [width, length, height] = planning.size();
     let name = format!(

@@ -98,7 +98,7 @@ fn main() -> anyhow::Result<()> {
         truth.add(&mapper, &street, &frame);
     }
     let begin = std::time::Instant::now();
-    let report = mapper.plan(0.0);
+    let report = mapper.update_planning_maps(0.0);
     println!(
         "{report:?}, {:.1} ms, digest {:016x}",
         begin.elapsed().as_secs_f64() * 1e3,

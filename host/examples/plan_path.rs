@@ -251,7 +251,7 @@ fn map(
         add_walls(&mut walls, street, &frame);
         cars = cars_of(&frame);
     }
-    let report = mapper.plan(0.0);
+    let report = mapper.update_planning_maps(0.0);
     if let Some(folder) = std::env::args()
         .find_map(|argument| Some(std::path::PathBuf::from(argument.strip_prefix("out=")?)))
     {

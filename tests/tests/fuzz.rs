@@ -9,7 +9,7 @@ use dynvox_tests::fuzz::{Mutator, TARGETS, Target};
 const MUTATIONS: u32 = 1_000;
 /// Longest time one input may take. It is far above what any takes: it tells a hang from a slow
 /// machine.
-const INPUT_MAX: Duration = Duration::from_secs(20);
+const MAX_INPUT: Duration = Duration::from_secs(20);
 
 /// Runs a target on mutations, and prints how many there were and how many it took.
 fn fuzz(target: &Target) {
@@ -34,7 +34,7 @@ fn fuzz(target: &Target) {
                 &bytes[..bytes.len().min(4_000)]
             ),
         }
-        assert!(at.elapsed() < INPUT_MAX, "{} takes {:?} at run {runs}", target.name, at.elapsed());
+        assert!(at.elapsed() < MAX_INPUT, "{} takes {:?} at run {runs}", target.name, at.elapsed());
         runs += 1;
     }
     println!("{}: {runs} runs, {taken} taken, {:.0} s", target.name, begin.elapsed().as_secs_f64());

@@ -8,7 +8,7 @@ use dynvox_capi::{
     DynvoxSeverity, DynvoxStatus, dynvox_alignment, dynvox_bytes, dynvox_config_default,
     dynvox_config_set, dynvox_create, dynvox_step,
 };
-use dynvox_core::egomotion::{REFERENCE_FRAMES_MAX, SEGMENT_GAP_M};
+use dynvox_core::egomotion::{MAX_REFERENCE_FRAMES, SEGMENT_GAP_M};
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
 use dynvox_core::{Capacity, Config, Mapper, PoseOrigin, Report, Serial, Severity, StereoFrame};
@@ -18,7 +18,7 @@ const SIZE: [usize; 2] = [320, 96];
 const CAPACITY: Capacity = Capacity { colour: true, blocks: 8_000, ..Capacity::TINY };
 /// Frames before the camera is covered, and the first that it sees again.
 const COVERED: u32 = 12;
-const UNCOVERED: u32 = COVERED + REFERENCE_FRAMES_MAX + 4;
+const UNCOVERED: u32 = COVERED + MAX_REFERENCE_FRAMES + 4;
 const FRAMES: u32 = UNCOVERED + 6;
 
 fn street(seed: u64) -> Street {

@@ -25,7 +25,7 @@ const FRAMES: usize = 8;
 const GUARD: usize = 4 * SLAB_ALIGN;
 const GUARDED: u8 = 0xA5;
 /// Larger mappers are left out.
-const SLAB_MAX: usize = 16 << 20;
+const MAX_SLAB: usize = 16 << 20;
 /// Values that settings have at their ends.
 const VALUES: [&str; 22] = [
     "0",
@@ -314,7 +314,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
     let mut random = Random::new(seed);
     let (capacity, config) = (capacity(&mut random), config(street, keys, &mut random));
     counts.runs += 1;
-    if capacity.validate().is_err() || capacity.bytes() > SLAB_MAX {
+    if capacity.validate().is_err() || capacity.bytes() > MAX_SLAB {
         counts.refused += 1;
         return;
     }
@@ -347,7 +347,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
                     [store.kept - before[0], store.lost - before[1], store.returned - before[2]];
                 let of = report.allocation.eviction;
                 assert_eq!(
-                    [of.kept, of.lost, of.returned],
+                    [of.stored, of.lost, of.loaded],
                     stored,
                     "run {seed}, frame {}",
                     report.frame

@@ -15,10 +15,10 @@ const FILE_LINES: usize = 523;
 /// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
 const WIDE: usize = 6;
 /// Most wide functions of the repository, tests included. The figure only ever falls.
-const WIDE_MAX: usize = 29;
+const MAX_WIDE: usize = 29;
 /// Most functions that are not wide and take a tuple apart in their parameter list, which hides
 /// parameters. The figure only ever falls.
-const TAKING_APART_MAX: usize = 30;
+const MAX_TAKING_APART: usize = 30;
 
 /// Name, first line and number of lines of each function with a body.
 fn functions(rust: &str) -> Vec<(String, usize, usize)> {
@@ -114,8 +114,8 @@ fn few_functions_take_six_parameters_or_more() {
             }
         }
     }
-    assert_at_most(WIDE_MAX, "take six parameters or more", &wide);
-    assert_at_most(TAKING_APART_MAX, "take fewer, and hide some in a tuple", &taking_apart);
+    assert_at_most(MAX_WIDE, "take six parameters or more", &wide);
+    assert_at_most(MAX_TAKING_APART, "take fewer, and hide some in a tuple", &taking_apart);
 }
 
 #[test]

@@ -70,7 +70,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut store);
-    let evicted = sum(&reports, |report| report.allocation.eviction.kept);
+    let evicted = sum(&reports, |report| report.allocation.eviction.stored);
     assert!(evicted > 1_000, "{evicted} blocks left: the pool is outgrown");
     assert_eq!(
         sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused),
@@ -121,7 +121,7 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut store);
     assert!(store.failure().is_some() && store.bytes() <= 300_000);
-    let kept = sum(&reports, |report| report.allocation.eviction.kept);
+    let kept = sum(&reports, |report| report.allocation.eviction.stored);
     assert!(kept > 0 && sum(&reports, |report| report.allocation.eviction.lost) > 0);
     assert_eq!(u64::from(kept), store.records());
     for report in &reports {
@@ -149,7 +149,7 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let last = reports.last().expect("frames were taken");
         let made = sum(&reports, |report| report.allocation.made);
         let left = sum(&reports, |report| {
-            report.allocation.eviction.kept
+            report.allocation.eviction.stored
                 + report.allocation.eviction.empty
                 + report.prune.blocks_freed
         });
@@ -174,6 +174,6 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         assert_eq!(mapper.triangles(&mut |_| triangles += 1), triangles);
         assert!(mapper.raycast(&last.t_world_camera, &Serial).is_ok());
         let out = mapper.stream_out(&mut store);
-        assert_eq!((out.kept + out.empty, out.lost), (now, 0));
+        assert_eq!((out.stored + out.empty, out.lost), (now, 0));
     }
 }

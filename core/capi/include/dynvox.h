@@ -41,7 +41,8 @@ typedef enum {
   DYNVOX_STATUS_OK = 0,
   // A pointer that must not be null is.
   DYNVOX_STATUS_NULL,
-  // The buffer does not begin at a multiple of dynvox_alignment(), or another pointer not at one of its type's.
+  // The buffer does not begin at a multiple of dynvox_alignment(), or another pointer not at one
+  // of its type's.
   DYNVOX_STATUS_MISALIGNED,
   // The buffer or an output is too small.
   DYNVOX_STATUS_TOO_SMALL,
@@ -53,11 +54,13 @@ typedef enum {
   DYNVOX_STATUS_OVERLAP,
   // An unknown profile, class, track or setting.
   DYNVOX_STATUS_UNKNOWN,
-  // The configuration cannot be used: dynvox_config_problem says why. A calibration that is not finite is one reason.
+  // The configuration cannot be used: dynvox_config_problem says why. A calibration that is not
+  // finite is one reason.
   DYNVOX_STATUS_CONFIG,
   // A pose is not finite, its rotation is not of length 1, or it lies beyond the map.
   DYNVOX_STATUS_POSE,
-  // An image is larger than the profile allows, too small to match, or its stride is below its width.
+  // An image is larger than the profile allows, too small to match, or its stride is below its
+  // width.
   DYNVOX_STATUS_SIZE,
   // A frame's size differs from that of the frames before.
   DYNVOX_STATUS_SIZE_CHANGED,
@@ -100,12 +103,12 @@ typedef enum {
 // How a ray or a path ends.
 typedef enum {
   // It is free as far as was asked.
-  DYNVOX_WAY_END_FREE = 0,
+  DYNVOX_PATH_END_FREE = 0,
   // At a surface of the map.
-  DYNVOX_WAY_END_SURFACE,
+  DYNVOX_PATH_END_SURFACE,
   // Where nothing was ever seen.
-  DYNVOX_WAY_END_UNKNOWN,
-} DynvoxWayEnd;
+  DYNVOX_PATH_END_UNKNOWN,
+} DynvoxPathEnd;
 
 // A mapper; only ever behind a pointer.
 typedef struct DynvoxMapper DynvoxMapper;
@@ -159,7 +162,8 @@ typedef struct {
   double focal_px;
 } DynvoxRawRig;
 
-// Everything a mapper can be told, beside its bounds: the defaults for a rig, and what dynvox_config_set changed of them.
+// Everything a mapper can be told, beside its bounds: the defaults for a rig, and what
+// dynvox_config_set changed of them.
 typedef struct {
   // The cameras; where pairs are raw, the rectified ones.
   DynvoxRig rig;
@@ -174,7 +178,8 @@ typedef struct {
 // A capacity by name. Numbers as in dynvox's own table of profiles.
 typedef uint32_t DynvoxProfile;
 
-// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and dynvox_capacity_for_budget fill it.
+// Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and
+// dynvox_capacity_for_budget fill it.
 typedef struct {
   // Widest image, px.
   size_t image_width;
@@ -206,7 +211,8 @@ typedef struct {
   size_t object_blocks;
   // Pixels of crops that wait for their object's motion.
   size_t crop_pixels;
-  // Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no byte.
+  // Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no
+  // byte.
   size_t planning_width;
   // Length of the planner's window, cells.
   size_t planning_length;
@@ -218,8 +224,9 @@ typedef struct {
   uint8_t colour;
 } DynvoxCapacity;
 
-// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to the rules: colour where 20,000 blocks with
-// colour fit, objects in a fifth of what the image leaves.
+// A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to
+// the rules: colour where 20,000 blocks with colour fit, objects in a fifth of what the image
+// leaves.
 typedef struct {
   // Bytes of the buffer.
   size_t bytes;
@@ -241,7 +248,8 @@ typedef struct {
 
 // An image of one byte a pixel, three for a colour image: red, green, blue.
 typedef struct {
-  // The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from here on. Null: there is no such image.
+  // The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from
+  // here on. Null: there is no such image.
   const uint8_t *pixels;
   // Pixels from one row to the next.
   size_t stride;
@@ -249,7 +257,8 @@ typedef struct {
 
 // Something a detector saw in the left image.
 typedef struct {
-  // 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle, 10 animal, 11 moving object.
+  // 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle,
+  // 10 animal, 11 moving object.
   uint8_t class_code;
   // How sure the detector is, 0 to 1.
   float score;
@@ -261,11 +270,13 @@ typedef struct {
   uint32_t width;
   // Rows of the box, px.
   uint32_t height;
-  // `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is 0.
+  // `width` times `height` bytes, row by row; a pixel belongs to the object unless its byte is
+  // 0.
   const uint8_t *mask;
 } DynvoxDetection;
 
-// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world. Camera axes: x right, y down, z forward.
+// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
+// Camera axes: x right, y down, z forward.
 typedef struct {
   // w, x, y, z.
   double rotation[4];
@@ -273,7 +284,8 @@ typedef struct {
   double translation_m[3];
 } DynvoxPose;
 
-// A stereo pair and what is known of it, rectified, or raw where the configuration is dynvox_config_raw's. Everything is read during the call alone.
+// A stereo pair and what is known of it, rectified, or raw where the configuration is
+// dynvox_config_raw's. Everything is read during the call alone.
 typedef struct {
   // Of every image, px.
   size_t width;
@@ -291,11 +303,12 @@ typedef struct {
   size_t detection_count;
   // Where the camera is, for those who know; null lets the mapper find out.
   const DynvoxPose *t_world_camera;
-  // When the pair was taken, ns since any moment that stays the same, rising from frame to frame; null where nothing tells: then
-  // "tracking.frame_interval_s" has passed since the frame before.
+  // When the pair was taken, ns since any moment that stays the same, rising from frame to
+  // frame; null where nothing tells: then "tracking.frame_interval_s" has passed since the frame
+  // before.
   const uint64_t *time_ns;
-  // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height` values without padding; null lets the mapper
-  // match the pair.
+  // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
+  // values without padding; null lets the mapper match the pair.
   const uint16_t *disparity_q8;
 } DynvoxFrame;
 
@@ -311,7 +324,8 @@ typedef struct {
   const uint8_t *colour;
 } DynvoxBlock;
 
-// A block that becomes visible again, all zero, to be filled from the store. Valid during the call.
+// A block that becomes visible again, all zero, to be filled from the store. Valid during the
+// call.
 typedef struct {
   // Coordinates, blocks.
   int16_t coord[3];
@@ -323,13 +337,13 @@ typedef struct {
   uint8_t *colour;
 } DynvoxLoadedBlock;
 
-// The caller's store of blocks. Called on the thread of the step, which waits for it; must not call the same mapper, which answers
-// DYNVOX_STATUS_BUSY then.
+// The caller's store of blocks. Called on the thread of the step, which waits for it; must not
+// call the same mapper, which answers DYNVOX_STATUS_BUSY then.
 typedef struct {
   // Handed to both functions.
   void *context;
-  // Stores an evicted block; the last one stored at its coordinates counts. False when it cannot: the block is lost, and counted. Null: all
-  // are lost.
+  // Stores an evicted block; the last one stored at its coordinates counts. False when it
+  // cannot: the block is lost, and counted. Null: all are lost.
   bool (*store)(void *context, const DynvoxBlock *block);
   // Fills a block; false when none is stored at its coordinates. Null: none is.
   bool (*load)(void *context, const DynvoxLoadedBlock *block);
@@ -345,7 +359,8 @@ typedef struct {
   DynvoxPose t_world_camera;
   // Whether the frame went into the map.
   bool fused;
-  // Number of the map's segment, from 0: another one begins, 100 m above, where the camera was lost and not found again.
+  // Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
+  // lost and not found again.
   uint32_t segment;
   // Pixels with a disparity.
   uint32_t disparities;
@@ -359,15 +374,16 @@ typedef struct {
   uint32_t blocks_capacity;
   // Blocks refused in this step: pool full, or beyond the map.
   uint32_t blocks_refused;
-  // Blocks that left in this step and were kept by the store.
-  uint32_t blocks_kept;
-  // Blocks that left in this step and are lost.
+  // Blocks evicted and stored in this step.
+  uint32_t blocks_stored;
+  // Blocks evicted and lost in this step.
   uint32_t blocks_lost;
   // Voxels that pruning reset.
   uint32_t voxels_pruned;
   // Digest of what went in: the same pictures give the same number everywhere.
   uint64_t input_digest;
-  // Digest of all that came of the step: the same frames and configuration give the same number everywhere.
+  // Digest of all that came of the step: the same frames and configuration give the same number
+  // everywhere.
   uint64_t digest;
 } DynvoxReport;
 
@@ -395,7 +411,8 @@ typedef struct {
   const void *volume;
 } DynvoxRetired;
 
-// The caller's sink for objects that leave. Called on the thread of the step, which waits for it; must not call the same mapper.
+// The caller's sink for objects that leave. Called on the thread of the step, which waits for it;
+// must not call the same mapper.
 typedef struct {
   // Handed to the function.
   void *context;
@@ -403,14 +420,14 @@ typedef struct {
   void (*retire)(void *context, const DynvoxRetired *object);
 } DynvoxObjectSink;
 
-// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the frames; its rows follow each other
-// without padding.
+// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the
+// frames; its rows follow each other without padding.
 typedef struct {
   // Pixels that each buffer holds, unless it is null.
   size_t capacity;
   // Depth, m; 0 where there is no surface.
   float *depth_m;
-  // Three bytes a pixel: the surface's normal in the world, 1/127.
+  // Three bytes a pixel: the surface's normal in camera axes, towards the camera, 1/127.
   int8_t *normal;
   // Three bytes a pixel: red, green, blue.
   uint8_t *colour;
@@ -483,8 +500,9 @@ typedef struct {
   uint32_t blocks;
 } DynvoxTrack;
 
-// The planner's window from above: buffers of the caller, any may be null. Columns are in rows from the nearest ahead to the farthest, in
-// each row from left to right; cells of a column follow each other upwards.
+// The planner's window from above: buffers of the caller, any may be null. Columns are in rows
+// from the nearest ahead to the farthest, in each row from left to right; cells of a column follow
+// each other upwards.
 typedef struct {
   // Columns that each buffer of columns holds, unless it is null.
   size_t columns_capacity;
@@ -492,7 +510,8 @@ typedef struct {
   size_t cells_capacity;
   // Of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
   uint8_t *state;
-  // Distance to the nearest obstacle, m, below 0 inside one; the largest float without an obstacle.
+  // Distance to the nearest obstacle, m, below 0 inside one; the largest float without an
+  // obstacle.
   float *distance_m;
   // Height of the ground, m; the largest float where none was found.
   float *height_m;
@@ -506,7 +525,8 @@ typedef struct {
   size_t size[3];
   // Written: a cell's side, m.
   double cell_m;
-  // Written: where the first cell begins, m to the right, ahead and upwards of the world's origin.
+  // Written: where the first cell begins, m to the right, ahead and upwards of the world's
+  // origin.
   double origin_m[3];
   // Written: the world's coordinates of a metre to the right, ahead and upwards, in this order.
   double axes_world[3][3];
@@ -532,13 +552,13 @@ typedef struct {
   float sigma_m_s;
 } DynvoxMovingBox;
 
-// How far a way is free.
+// A ray or a path, as far as it is free.
 typedef struct {
-  // What it ends at.
-  DynvoxWayEnd end;
-  // The length of its free part, m.
+  // End of the free part.
+  DynvoxPathEnd end;
+  // Length of the free part, m.
   double free_m;
-} DynvoxWay;
+} DynvoxFreePath;
 
 // A robot that moves along a path: an upright cylinder.
 typedef struct {
@@ -550,7 +570,7 @@ typedef struct {
   double high_m;
   // Whether what was never seen is in its way as well: 0 or 1.
   uint8_t unknown_ends;
-} DynvoxRobot;
+} DynvoxRobotCylinder;
 
 // Takes the next bytes of a snapshot; false when it cannot. Must not call the same mapper.
 typedef bool (*DynvoxWrite)(void *context, const uint8_t *bytes, size_t len);
@@ -595,24 +615,22 @@ const char *dynvox_status_text(uint32_t status);
 // `rig` is null or points to a rig, `config` is null or points to a configuration.
 DynvoxStatus dynvox_config_default(const DynvoxRig *rig, DynvoxConfig *config);
 
-// Sets one setting by its dotted key: dynvox_config_set(&config, "volume.voxel_size_m", "0.05"). Keys and values are those of a run's
-// config.toml; choices stand without quotes. The time between two frames is "tracking.frame_interval_s". Whether a value is in its range,
+// Sets one setting by its dotted key: dynvox_config_set(&config, "volume.voxel_size_m", "0.05").
+// Keys and values are those of a run's config.toml; choices stand without quotes. The time between
+// two frames is "tracking.frame_interval_s". Whether a value is in its range,
 // dynvox_config_problem says.
 //
 // # Safety
-// `config` is null or points to a configuration from dynvox_config_default, `key` and `value` are null or text that ends in a zero byte.
-DynvoxStatus dynvox_config_set(DynvoxConfig *config,
-                               const char *key,
-                               const char *value);
+// `config` is null or points to a configuration from dynvox_config_default, `key` and `value` are
+// null or text that ends in a zero byte.
+DynvoxStatus dynvox_config_set(DynvoxConfig *config, const char *key, const char *value);
 
-// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len` bytes; the empty text without a
-// problem.
+// Writes the first problem of a configuration as text that ends in a zero byte, truncated to `len`
+// bytes; the empty text without a problem.
 //
 // # Safety
 // `config` is null or points to a configuration, `text` is null or to `len` bytes.
-DynvoxStatus dynvox_config_problem(const DynvoxConfig *config,
-                                   char *text,
-                                   size_t len);
+DynvoxStatus dynvox_config_problem(const DynvoxConfig *config, char *text, size_t len);
 
 // Writes the bounds of a profile.
 //
@@ -620,11 +638,13 @@ DynvoxStatus dynvox_config_problem(const DynvoxConfig *config,
 // `capacity` is null or points to a capacity.
 DynvoxStatus dynvox_capacity_of_profile(DynvoxProfile profile, DynvoxCapacity *capacity);
 
-// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at most `budget->bytes`. Of too few bytes
-// DYNVOX_STATUS_TOO_SMALL, and the least that works is written to `least`, which may be null.
+// Divides a buffer between the stages: writes the largest capacity for which dynvox_bytes is at
+// most `budget->bytes`. Of too few bytes DYNVOX_STATUS_TOO_SMALL, and the least that works is
+// written to `least`, which may be null.
 //
 // # Safety
-// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is null or points to a number.
+// `budget` is null or points to a budget, `capacity` is null or points to a capacity, `least` is
+// null or points to a number.
 DynvoxStatus dynvox_capacity_for_budget(const DynvoxBudget *budget,
                                         DynvoxCapacity *capacity,
                                         size_t *least);
@@ -638,12 +658,14 @@ size_t dynvox_alignment(void);
 // `capacity` is null or points to a capacity, `bytes` is null or points to a number.
 DynvoxStatus dynvox_bytes(const DynvoxCapacity *capacity, size_t *bytes);
 
-// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until dynvox_destroy: nothing else may read,
-// write, move or free it. What it holds before does not matter. Takes less than 32 KiB of stack, as a step does.
+// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until
+// dynvox_destroy: nothing else may read, write, move or free it. What it holds before does not
+// matter. Takes less than 32 KiB of stack, as a step does.
 //
 // # Safety
-// `capacity` is null or points to a capacity, `config` is null or points to a configuration, `buffer` is null or points to `len` bytes used by
-// nothing else, `mapper` is null or points to a pointer.
+// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+// `buffer` is null or points to `len` bytes used by nothing else, `mapper` is null or points to a
+// pointer.
 DynvoxStatus dynvox_create(const DynvoxCapacity *capacity,
                            const DynvoxConfig *config,
                            uint8_t *buffer,
@@ -656,19 +678,21 @@ DynvoxStatus dynvox_create(const DynvoxCapacity *capacity,
 // `mapper` is null or a handle from dynvox_create whose buffer is still there.
 DynvoxStatus dynvox_destroy(DynvoxMapper *mapper);
 
-// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or are lost and counted where it is null.
-// What was refused is counted in `report`, which may be null.
+// Processes one frame, on the calling thread: depth, motion, map. Evicted blocks go to `store`, or
+// are lost and counted where it is null. What was refused is counted in `report`, which may be
+// null.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `frame` is null or points to a
-// frame whose images, detections and masks are as large as it says; `store` is null or points to a store; `report` is null or points to
-// a report.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `frame` is null or points to a frame whose images, detections and masks are as large as
+// it says; `store` is null or points to a store; `report` is null or points to a report.
 DynvoxStatus dynvox_step(DynvoxMapper *mapper,
                          const DynvoxFrame *frame,
                          const DynvoxStore *store,
                          DynvoxReport *report);
 
-// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be null.
+// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be
+// null.
 //
 // # Safety
 // As dynvox_step; `objects` is null or points to a sink.
@@ -681,54 +705,57 @@ DynvoxStatus dynvox_step_with(DynvoxMapper *mapper,
 // Writes the left camera's pose in the last frame; the identity before the first.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to
-// a pose.
-DynvoxStatus dynvox_pose(DynvoxMapper *mapper,
-                         DynvoxPose *pose);
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `pose` is null or points to a pose.
+DynvoxStatus dynvox_pose(DynvoxMapper *mapper, DynvoxPose *pose);
 
 // Renders the static map from a pose.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `pose` is null or points to a
-// pose; `picture` is null or points to a picture whose buffers are as large as it says and overlap nothing.
-DynvoxStatus dynvox_raycast(DynvoxMapper *mapper,
-                            const DynvoxPose *pose,
-                            DynvoxPicture *picture);
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `pose` is null or points to a pose; `picture` is null or points to a picture whose
+// buffers are as large as it says and overlap nothing.
+DynvoxStatus dynvox_raycast(DynvoxMapper *mapper, const DynvoxPose *pose, DynvoxPicture *picture);
 
-// Hands every triangle of the static map to `sink`, and writes how many there were to `count`, which may be null.
+// Hands every triangle of the static map to `sink`, and writes how many there were to `count`,
+// which may be null.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
-// a number.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `count` is null or points to a number.
 DynvoxStatus dynvox_triangles(DynvoxMapper *mapper,
                               DynvoxTriangleSink sink,
                               void *context,
                               uint64_t *count);
 
-// Evicts every block of the static map into `store`, which holds the entire map then. Writes the number of stored blocks to `stored` and
-// of those the store refused to `lost`; either may be null.
+// Evicts every block of the static map into `store`, which holds the entire map then. Writes the
+// number of stored blocks to `stored` and of those the store refused to `lost`; either may be
+// null.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `store` is null or points to a
-// store; `stored` and `lost` are null or point to a number.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `store` is null or points to a store; `stored` and `lost` are null or point to a
+// number.
 DynvoxStatus dynvox_stream_out(DynvoxMapper *mapper,
                                const DynvoxStore *store,
                                uint32_t *stored,
                                uint32_t *lost);
 
-// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with. The map can be rendered and read out as before.
+// Ends a sequence: prunes what is still in the window. Objects are lost; see dynvox_finish_with.
+// The map can be rendered and read out as before.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it.
 DynvoxStatus dynvox_finish(DynvoxMapper *mapper);
 
-// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be null.
+// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be
+// null.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `objects` is null or points to a
-// sink.
-DynvoxStatus dynvox_finish_with(DynvoxMapper *mapper,
-                                const DynvoxObjectSink *objects);
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `objects` is null or points to a sink.
+DynvoxStatus dynvox_finish_with(DynvoxMapper *mapper, const DynvoxObjectSink *objects);
 
 // Writes a pose as the upper three rows of its matrix, row by row: twelve numbers.
 //
@@ -736,101 +763,107 @@ DynvoxStatus dynvox_finish_with(DynvoxMapper *mapper,
 // `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 DynvoxStatus dynvox_pose_matrix(const DynvoxPose *pose, double *matrix);
 
-// Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there are.
+// Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there
+// are.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `tracks` is null or points to
-// `capacity` tracks; `count` is null or points to a number.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `tracks` is null or points to `capacity` tracks; `count` is null or points to a number.
 DynvoxStatus dynvox_tracks(DynvoxMapper *mapper,
                            DynvoxTrack *tracks,
                            size_t capacity,
                            size_t *count);
 
-// Hands every triangle of a reconstructed object to `sink`, in the object's own frame (`t_world_object` of its track brings it to the world), and
-// writes how many there were to `count`, which may be null. DYNVOX_STATUS_UNKNOWN where the track is not reconstructed now.
+// Hands every triangle of a reconstructed object to `sink`, in the object's own frame
+// (`t_world_object` of its track brings it to the world), and writes how many there were to
+// `count`, which may be null. DYNVOX_STATUS_UNKNOWN where the track is not reconstructed now.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `count` is null or points to
-// a number.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `count` is null or points to a number.
 DynvoxStatus dynvox_object_triangles(DynvoxMapper *mapper,
                                      uint32_t track_id,
                                      DynvoxTriangleSink sink,
                                      void *context,
                                      uint64_t *count);
 
-// Reads the map into the planner's window, with moving objects where they will be `ahead_s` seconds after the last frame, and copies it
-// to `window`. Of a capacity without a window its size is 0.
+// Reads the map into the planner's window, with moving objects where they will be `ahead_s`
+// seconds after the last frame, and copies it to `window`. Of a capacity without a window its size
+// is 0.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `window` is null or points to a
-// window whose buffers are as large as it says and overlap nothing.
-DynvoxStatus dynvox_plan(DynvoxMapper *mapper,
-                         float ahead_s,
-                         DynvoxWindow *window);
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `window` is null or points to a window whose buffers are as large as it says and
+// overlap nothing.
+DynvoxStatus dynvox_update_planning_maps(DynvoxMapper *mapper, float ahead_s, DynvoxWindow *window);
 
-// Writes the moving objects of the last dynvox_plan, where they were in the last frame, at most `capacity` of them, and to `count` how many
-// there are.
+// Writes the moving objects of the last dynvox_update_planning_maps, where they were in the last
+// frame, at most `capacity` of them, and to `count` how many there are.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `boxes` is null or points to
-// `capacity` boxes, `count` is null or points to a number.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `boxes` is null or points to `capacity` boxes, `count` is null or points to a number.
 DynvoxStatus dynvox_moving_boxes(DynvoxMapper *mapper,
                                  DynvoxMovingBox *boxes,
                                  size_t capacity,
                                  size_t *count);
 
-// Follows a ray of the world from `origin_m` in `direction` (three numbers each, the direction of any length), at most `far_m`, to the
-// first surface or unknown place.
+// Follows a ray of the world from `origin_m` in `direction` (three numbers each, the direction of
+// any length), at most `far_m`, to the first surface or unknown place.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `origin_m` and `direction` are null
-// or point to three numbers, `way` is null or points to a way.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `origin_m` and `direction` are null or point to three numbers, `free_path` is null or
+// points to a free path.
 DynvoxStatus dynvox_ray(DynvoxMapper *mapper,
                         const double *origin_m,
                         const double *direction,
                         double far_m,
-                        DynvoxWay *way);
+                        DynvoxFreePath *free_path);
 
-// How far a robot may follow a polyline of `count` world points on the ground, three numbers each, before it touches a surface.
+// How far a robot may follow a polyline of `count` world points on the ground, three numbers each,
+// before it touches a surface.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it; `points_m` is null or points to
-// three times `count` numbers, `robot` is null or points to a robot, `way` is null or points to a way.
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `points_m` is null or points to three times `count` numbers, `robot` is null or points
+// to a robot, `free_path` is null or points to a free path.
 DynvoxStatus dynvox_sweep(DynvoxMapper *mapper,
                           const double *points_m,
                           size_t count,
-                          const DynvoxRobot *robot,
-                          DynvoxWay *way);
+                          const DynvoxRobotCylinder *robot,
+                          DynvoxFreePath *free_path);
 
-// Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size of the raw images, and the capacity's
-// `raw_width` and `raw_height` bound it. The rectified rig is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
+// Writes all defaults for raw cameras, whose pairs the mapper rectifies: frames then have the size
+// of the raw images, and the capacity's `raw_width` and `raw_height` bound it. The rectified rig
+// is in the configuration. DYNVOX_STATUS_CONFIG where the calibration cannot be used.
 //
 // # Safety
 // `rig` is null or points to a rig, `config` is null or points to a configuration.
-DynvoxStatus dynvox_config_raw(const DynvoxRawRig *rig,
-                               DynvoxConfig *config);
+DynvoxStatus dynvox_config_raw(const DynvoxRawRig *rig, DynvoxConfig *config);
 
-// Hands every triangle of an object that leaves to `sink`, in the object's own frame, and writes how many there were to `count`, which may be
-// null. Only within the call that reports the object.
+// Hands every triangle of an object that leaves to `sink`, in the object's own frame, and writes
+// how many there were to `count`, which may be null. Only within the call that reports the object.
 //
 // # Safety
-// `object` is null or what the caller's DynvoxObjectSink was handed, within that call; `count` is null or points to a number.
+// `object` is null or what the caller's DynvoxObjectSink was handed, within that call; `count` is
+// null or points to a number.
 DynvoxStatus dynvox_retired_triangles(const DynvoxRetired *object,
                                       DynvoxTriangleSink sink,
                                       void *context,
                                       uint64_t *count);
 
-// Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as before. DYNVOX_STATUS_CALLBACK when
-// `write` refused.
+// Writes the whole state of a mapper, but for blocks that a store holds. The mapper continues as
+// before. DYNVOX_STATUS_CALLBACK when `write` refused.
 //
 // # Safety
-// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread uses it.
-DynvoxStatus dynvox_save(DynvoxMapper *mapper,
-                         DynvoxWrite write,
-                         void *context);
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it.
+DynvoxStatus dynvox_save(DynvoxMapper *mapper, DynvoxWrite write, void *context);
 
-// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and configuration must be those of the saved one. No
-// mapper is made from a damaged snapshot (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
+// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and
+// configuration must be those of the saved one. No mapper is made from a damaged snapshot
+// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
 //
 // # Safety
 // As dynvox_create.

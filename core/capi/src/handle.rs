@@ -1,8 +1,8 @@
 //! A mapper in a caller's buffer.
 //!
-//! The buffer begins with a [`Head`], behind which, at the next multiple of the alignment, lies the
-//! slab. A handle points to the head. The two never overlap, so the mapper's exclusive hold on the
-//! slab and a handle's access to the head do not meet.
+//! The buffer begins with a [`HandleHeader`], behind which, at the next multiple of the alignment,
+//! lies the slab. A handle points to the header. The two never overlap, so the mapper's exclusive
+//! hold on the slab and a handle's access to the header do not meet.
 
 use crate::{
     DynvoxCapacity, DynvoxConfig, DynvoxStatus,
@@ -21,7 +21,7 @@ pub struct DynvoxMapper {
 const ALIVE: u64 = 0x6479_6e76_6f78_2e31;
 
 #[repr(C)]
-struct Head {
+struct HandleHeader {
     alive: u64,
     busy: bool,
     /// Bytes of head and slab.
@@ -30,7 +30,7 @@ struct Head {
 }
 
 /// Bytes of a buffer before its slab.
-pub const HEAD_BYTES: usize = size_of::<Head>().next_multiple_of(SLAB_ALIGN);
+pub const HEAD_BYTES: usize = size_of::<HandleHeader>().next_multiple_of(SLAB_ALIGN);
 
 const fn bytes(capacity: &Capacity) -> usize {
     HEAD_BYTES + capacity.bytes()
@@ -121,10 +121,10 @@ pub unsafe fn make(
         Ok(made) => made,
         Err(status) => return status,
     };
-    let head = buffer.cast::<Head>();
+    let head = buffer.cast::<HandleHeader>();
     // SAFETY: the buffer is aligned better than a head, and long enough; the handle was checked.
     unsafe {
-        head.write(Head {
+        head.write(HandleHeader {
             alive: ALIVE,
             busy: false,
             bytes: bytes(&capacity),
@@ -158,8 +158,8 @@ pub unsafe extern "C" fn dynvox_destroy(mapper: *mut DynvoxMapper) -> DynvoxStat
 ///
 /// # Safety
 /// `mapper` is null, misaligned or points to a head's memory.
-unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut Head, DynvoxStatus> {
-    let head = mapper.cast::<Head>();
+unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut HandleHeader, DynvoxStatus> {
+    let head = mapper.cast::<HandleHeader>();
     // SAFETY: only looked at.
     unsafe { output(head)? };
     // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to either

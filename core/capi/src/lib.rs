@@ -45,8 +45,8 @@ pub use map::{
     dynvox_stream_out, dynvox_triangles,
 };
 pub use plan::{
-    DynvoxMovingBox, DynvoxRobot, DynvoxWay, DynvoxWayEnd, DynvoxWindow, dynvox_moving_boxes,
-    dynvox_plan, dynvox_ray, dynvox_sweep,
+    DynvoxFreePath, DynvoxMovingBox, DynvoxPathEnd, DynvoxRobotCylinder, DynvoxWindow,
+    dynvox_moving_boxes, dynvox_ray, dynvox_sweep, dynvox_update_planning_maps,
 };
 pub use raw::{
     DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED,

@@ -19,7 +19,7 @@ pub struct DynvoxPicture {
     pub capacity: usize,
     /// Depth, m; 0 where there is no surface.
     pub depth_m: *mut f32,
-    /// Three bytes a pixel: the surface's normal in the world, 1/127.
+    /// Three bytes a pixel: the surface's normal in camera axes, towards the camera, 1/127.
     pub normal: *mut i8,
     /// Three bytes a pixel: red, green, blue.
     pub colour: *mut u8,
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn dynvox_stream_out(
             let lost = if lost.is_null() { None } else { Some(output(lost)?) };
             let report = mapper.stream_out(&mut store);
             if let Some(stored) = stored {
-                stored.write(report.kept);
+                stored.write(report.stored);
             }
             if let Some(lost) = lost {
                 lost.write(report.lost);

@@ -6,7 +6,7 @@ use crate::{
     handle::with,
 };
 use core::ops::Range;
-use dynvox_core::planning::{CellState, MovingBox, Planning, Sweep, Way, WayEnd};
+use dynvox_core::planning::{CellState, FreePath, MovingBox, PathEnd, Planning, RobotCylinder};
 
 /// The planner's window from above: buffers of the caller, any may be null. Columns are in rows
 /// from the nearest ahead to the farthest, in each row from left to right; cells of a column follow
@@ -67,7 +67,7 @@ pub struct DynvoxMovingBox {
 /// How a ray or a path ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
-pub enum DynvoxWayEnd {
+pub enum DynvoxPathEnd {
     /// It is free as far as was asked.
     Free = 0,
     /// At a surface of the map.
@@ -76,20 +76,20 @@ pub enum DynvoxWayEnd {
     Unknown,
 }
 
-/// How far a way is free.
+/// A ray or a path, as far as it is free.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct DynvoxWay {
-    /// What it ends at.
-    pub end: DynvoxWayEnd,
-    /// The length of its free part, m.
+pub struct DynvoxFreePath {
+    /// End of the free part.
+    pub end: DynvoxPathEnd,
+    /// Length of the free part, m.
     pub free_m: f64,
 }
 
 /// A robot that moves along a path: an upright cylinder.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct DynvoxRobot {
+pub struct DynvoxRobotCylinder {
     /// Its radius, m.
     pub radius_m: f64,
     /// From this height over the path, m, on surfaces are in its way.
@@ -116,12 +116,12 @@ impl From<&MovingBox> for DynvoxMovingBox {
     }
 }
 
-impl From<Way> for DynvoxWay {
-    fn from(way: Way) -> Self {
+impl From<FreePath> for DynvoxFreePath {
+    fn from(way: FreePath) -> Self {
         let end = match way.end {
-            WayEnd::Free => DynvoxWayEnd::Free,
-            WayEnd::Surface => DynvoxWayEnd::Surface,
-            WayEnd::Unknown => DynvoxWayEnd::Unknown,
+            PathEnd::Free => DynvoxPathEnd::Free,
+            PathEnd::Surface => DynvoxPathEnd::Surface,
+            PathEnd::Unknown => DynvoxPathEnd::Unknown,
         };
         Self { end, free_m: way.free_m }
     }
@@ -144,7 +144,7 @@ const fn code(state: CellState) -> u8 {
 /// uses it; `window` is null or points to a window whose buffers are as large as it says and
 /// overlap nothing.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn dynvox_plan(
+pub unsafe extern "C" fn dynvox_update_planning_maps(
     mapper: *mut DynvoxMapper,
     ahead_s: f32,
     window: *mut DynvoxWindow,
@@ -153,7 +153,7 @@ pub unsafe extern "C" fn dynvox_plan(
     unsafe {
         with(mapper, |mapper, buffer| {
             let mut to = read(window.cast_const())?;
-            mapper.plan(ahead_s);
+            mapper.update_planning_maps(ahead_s);
             let planning = mapper.planning();
             let (grid, cell_m) = (planning.grid(), planning.grid().cell_m());
             (to.size, to.cell_m) = (planning.size(), cell_m);
@@ -227,8 +227,8 @@ unsafe fn fill<T>(
     Ok(())
 }
 
-/// Writes the moving objects of the last dynvox_plan, where they were in the last frame, at most
-/// `capacity` of them, and to `count` how many there are.
+/// Writes the moving objects of the last dynvox_update_planning_maps, where they were in the last
+/// frame, at most `capacity` of them, and to `count` how many there are.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
@@ -258,23 +258,23 @@ pub unsafe extern "C" fn dynvox_moving_boxes(
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
-/// uses it; `origin_m` and `direction` are null or point to three numbers, `way` is null or points
-/// to a way.
+/// uses it; `origin_m` and `direction` are null or point to three numbers, `free_path` is null or
+/// points to a free path.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_ray(
     mapper: *mut DynvoxMapper,
     origin_m: *const f64,
     direction: *const f64,
     far_m: f64,
-    way: *mut DynvoxWay,
+    free_path: *mut DynvoxFreePath,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, _| {
-            let way = output(way)?;
+            let free_path = output(free_path)?;
             let (origin_m, direction) =
                 (read(origin_m.cast::<[f64; 3]>())?, read(direction.cast::<[f64; 3]>())?);
-            way.write(
+            free_path.write(
                 mapper.planning().ray(mapper.background(), origin_m, direction, far_m).into(),
             );
             Ok(())
@@ -288,23 +288,23 @@ pub unsafe extern "C" fn dynvox_ray(
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
 /// uses it; `points_m` is null or points to three times `count` numbers, `robot` is null or points
-/// to a robot, `way` is null or points to a way.
+/// to a robot, `free_path` is null or points to a free path.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_sweep(
     mapper: *mut DynvoxMapper,
     points_m: *const f64,
     count: usize,
-    robot: *const DynvoxRobot,
-    way: *mut DynvoxWay,
+    robot: *const DynvoxRobotCylinder,
+    free_path: *mut DynvoxFreePath,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
         with(mapper, |mapper, buffer| {
-            let (way, robot) = (output(way)?, read(robot)?);
+            let (free_path, robot) = (output(free_path)?, read(robot)?);
             let path = items(points_m.cast::<[f64; 3]>(), count, buffer)?;
-            let DynvoxRobot { radius_m, low_m, high_m, unknown_ends } = robot;
-            let robot = Sweep { radius_m, low_m, high_m, unknown_ends: unknown_ends != 0 };
-            way.write(mapper.planning().sweep(mapper.background(), path, &robot).into());
+            let DynvoxRobotCylinder { radius_m, low_m, high_m, unknown_ends } = robot;
+            let robot = RobotCylinder { radius_m, low_m, high_m, unknown_ends: unknown_ends != 0 };
+            free_path.write(mapper.planning().sweep(mapper.background(), path, &robot).into());
             Ok(())
         })
     }

@@ -132,9 +132,9 @@ pub struct DynvoxReport {
     pub blocks_capacity: u32,
     /// Blocks refused in this step: pool full, or beyond the map.
     pub blocks_refused: u32,
-    /// Blocks that left in this step and were kept by the store.
-    pub blocks_kept: u32,
-    /// Blocks that left in this step and are lost.
+    /// Blocks evicted and stored in this step.
+    pub blocks_stored: u32,
+    /// Blocks evicted and lost in this step.
     pub blocks_lost: u32,
     /// Voxels that pruning reset.
     pub voxels_pruned: u32,
@@ -164,7 +164,7 @@ impl From<&Report> for DynvoxReport {
             blocks_peak: report.blocks.peak,
             blocks_capacity: report.blocks.capacity,
             blocks_refused: allocation.refused + allocation.beyond + allocation.unlisted,
-            blocks_kept: allocation.eviction.kept,
+            blocks_stored: allocation.eviction.stored,
             blocks_lost: allocation.eviction.lost,
             voxels_pruned: report.prune.voxels_reset,
             input_digest: report.digests.input,

@@ -34,14 +34,14 @@ pub struct RightAhead {
 
 impl RightAhead {
     /// Whether the cameras seem to expose at the same time, where synchronous ones show at most
-    /// `most_m`. A distance four times as large is enough to say no, and after a gap a distance as
+    /// `max_m`. A distance four times as large is enough to say no, and after a gap a distance as
     /// large; a smaller one where few matches agree with the motion; and after a gap one that few
     /// matches leave open, too.
-    pub fn is_synchronous(&self, most_m: f64, agree: bool, after_gap: bool) -> bool {
+    pub fn is_synchronous(&self, max_m: f64, agree: bool, after_gap: bool) -> bool {
         let (distance_m, sigma_m) = (libm::fabs(self.distance_m), self.sigma_m);
-        let is_far = distance_m - 4.0 * sigma_m > if after_gap { most_m } else { 4.0 * most_m };
+        let is_far = distance_m - 4.0 * sigma_m > if after_gap { max_m } else { 4.0 * max_m };
         let may_be_far =
-            distance_m - sigma_m > most_m || after_gap && distance_m + sigma_m > 2.0 * most_m;
+            distance_m - sigma_m > max_m || after_gap && distance_m + sigma_m > 2.0 * max_m;
         !(is_far || !agree && may_be_far)
     }
 
@@ -300,20 +300,19 @@ mod tests {
     #[test]
     fn distance_and_deviation_are_those_of_weighted_least_squares() {
         let mut random = Random::new(6);
-        for most_px in [0.1, 0.5, 3.0] {
-            let noise: [f64; 60] = core::array::from_fn(|_| {
-                (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * most_px
-            });
+        for max_px in [0.1, 0.5, 3.0] {
+            let noise: [f64; 60] =
+                core::array::from_fn(|_| (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * max_px);
             let all = modelled(0.4, 1.0, 0.3, |index| noise[index]);
             let (found, [distance_m, sigma_m]) =
                 (RightAhead::of(&RIG, all.iter()).unwrap(), plainly(&all));
             assert!(
                 (found.distance_m - distance_m).abs() < 1e-9,
-                "{most_px} px: {found:?} {distance_m}"
+                "{max_px} px: {found:?} {distance_m}"
             );
             assert!(
                 (found.sigma_m - sigma_m).abs() < 1e-9 && sigma_m > 0.0,
-                "{most_px} px: {found:?} {sigma_m}"
+                "{max_px} px: {found:?} {sigma_m}"
             );
         }
     }

@@ -2,8 +2,8 @@ mod camera;
 mod clip;
 
 use super::{
-    Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus,
-    REFERENCE_FRAMES_MAX, SEGMENT_GAP_M, TimedMatches,
+    Egomotion, EgomotionConfig, Estimator, MAX_REFERENCE_FRAMES, MotionEstimate, MotionHypotheses,
+    MotionStatus, SEGMENT_GAP_M, TimedMatches,
 };
 use crate::{
     geometry::{StereoRig, Transform},

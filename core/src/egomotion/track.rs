@@ -15,14 +15,14 @@ const SEED: u64 = 0x6361_6D65_7261;
 
 /// An estimate with so many times fewer inliers than the one before it is not strong, however large
 /// their share.
-const FEWER_INLIERS_MAX: u32 = 4;
+const MAX_FEWER_INLIERS: u32 = 4;
 
 /// Distance by which the estimate of one frame's motion may be wrong, m.
 const NOISE_M: f64 = 0.1;
 
 /// Frames without an estimate after which the camera is lost: matches are sought with the last
 /// frame, although its pose is a guess.
-pub const REFERENCE_FRAMES_MAX: u32 = 8;
+pub const MAX_REFERENCE_FRAMES: u32 = 8;
 
 /// Height by which a segment of the map stands above where its first pose was guessed, m: farther
 /// than any frame is fused, so that no block of it is one of another segment.
@@ -52,7 +52,7 @@ pub struct Egomotion {
     motion_s: f64,
     /// Matches that motion explained.
     inliers: u32,
-    held: u32,
+    extrapolated: u32,
     /// Number of segments of the map were begun after the first.
     segment: u32,
     random: Random,
@@ -69,7 +69,7 @@ impl Default for Egomotion {
             t_current_previous: Transform::IDENTITY,
             motion_s: 0.0,
             inliers: 0,
-            held: 0,
+            extrapolated: 0,
             segment: 0,
             random: Random::new(SEED),
         }
@@ -107,7 +107,7 @@ impl Egomotion {
                     (motion, self.reference_s / f64::from(frames), estimate.inliers);
                 self.t_world_camera =
                     (self.t_world_reference * t_current_reference.inverse()).normalized();
-                self.held = 0;
+                self.extrapolated = 0;
                 self.refer_to_last();
             }
             _ => self.hold_from_reference(),
@@ -119,8 +119,8 @@ impl Egomotion {
     /// reference.
     pub fn advance(&mut self, t_current_previous: Option<Transform>) {
         match t_current_previous {
-            Some(motion) => (self.t_current_previous, self.held) = (motion, 0),
-            None => self.held = self.held.saturating_add(1),
+            Some(motion) => (self.t_current_previous, self.extrapolated) = (motion, 0),
+            None => self.extrapolated = self.extrapolated.saturating_add(1),
         }
         self.extrapolate();
         self.refer_to_last();
@@ -135,7 +135,7 @@ impl Egomotion {
 
     /// Holds the camera where the time since the reference is counted already.
     fn hold_from_reference(&mut self) {
-        self.held = self.held.saturating_add(1);
+        self.extrapolated = self.extrapolated.saturating_add(1);
         self.since_reference += 1;
         self.extrapolate();
         if self.is_lost() {
@@ -145,7 +145,7 @@ impl Egomotion {
 
     /// Tells that the camera has not been located for so long that its pose says nothing any more.
     pub fn is_lost(&self) -> bool {
-        self.held >= REFERENCE_FRAMES_MAX
+        self.extrapolated >= MAX_REFERENCE_FRAMES
     }
 
     /// Sets the pose at which a camera that was lost is found; its motion stays.
@@ -179,7 +179,7 @@ impl Egomotion {
         estimate: &MotionEstimate,
     ) -> Option<MotionStatus> {
         // Few matches can agree on anything.
-        let as_many = FEWER_INLIERS_MAX * estimate.inliers >= self.inliers;
+        let as_many = MAX_FEWER_INLIERS * estimate.inliers >= self.inliers;
         let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
         let after_gap = self.since_reference > 0;
         let strong = as_many && agree;
@@ -250,7 +250,7 @@ impl Egomotion {
     pub fn set_pose(&mut self, t_world_camera: &Transform) {
         self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
         self.t_world_camera = t_world_camera.normalized();
-        (self.held, self.motion_s) = (0, 0.0);
+        (self.extrapolated, self.motion_s) = (0, 0.0);
         self.refer_to_last();
     }
 
@@ -289,7 +289,7 @@ impl Egomotion {
             t_current_previous,
             motion_s,
             inliers,
-            held,
+            extrapolated,
             segment,
             random,
         } = self;
@@ -300,7 +300,7 @@ impl Egomotion {
         visitor.transform(t_current_previous);
         visitor.f64(motion_s);
         visitor.u32(inliers);
-        visitor.u32(held);
+        visitor.u32(extrapolated);
         visitor.u32(segment);
         random.visit(visitor);
     }
@@ -310,14 +310,14 @@ impl Egomotion {
         &self.t_world_camera
     }
 
-    /// The last motion, estimated or held.
+    /// The last motion, estimated or extrapolated.
     pub fn t_current_previous(&self) -> &Transform {
         &self.t_current_previous
     }
 
-    /// Frames in a row for which the motion has been held; 0 when the last one was estimated.
-    pub fn held_frames(&self) -> u32 {
-        self.held
+    /// Frames in a row whose motion was extrapolated; 0 when the last one was estimated.
+    pub fn extrapolated_frames(&self) -> u32 {
+        self.extrapolated
     }
 }
 

@@ -10,7 +10,7 @@ use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
 use crate::objects::MAX_OBJECTS;
 use crate::planning::MAX_SIDE_CELLS;
-use crate::scene_flow::FEATURES_MAX;
+use crate::scene_flow::MAX_FEATURES;
 use crate::tracking::MAX_DETECTIONS;
 use core::fmt;
 
@@ -274,9 +274,9 @@ impl<'o> Question<'o> {
             image_height: self.height,
             raw_width,
             raw_height,
-            features: (pixels / 16).clamp(2_000, FEATURES_MAX),
+            features: (pixels / 16).clamp(2_000, MAX_FEATURES),
             // A match begins with a feature.
-            matches: (pixels / 40).clamp(1_000, FEATURES_MAX),
+            matches: (pixels / 40).clamp(1_000, MAX_FEATURES),
             blocks: 0,
             visible_blocks: 0,
             history_frames: if self.bytes >= 96 << 20 { 200 } else { SHORT_HISTORY_FRAMES },

@@ -137,10 +137,10 @@ impl<'s> Localization<'s> {
 
     /// The origin of a pose that was estimated, if it was.
     fn origin(&self, is_estimated: bool) -> PoseOrigin {
-        match (is_estimated, self.camera.held_frames()) {
+        match (is_estimated, self.camera.extrapolated_frames()) {
             (false, _) => PoseOrigin::First,
             (true, 0) => PoseOrigin::Estimated,
-            (true, _) => PoseOrigin::Held,
+            (true, _) => PoseOrigin::Extrapolated,
         }
     }
 

@@ -11,7 +11,9 @@ use super::Mapper;
 use crate::{
     geometry::{GroundPlane, StereoRig, Transform},
     objects::PosedObject,
-    planning::{BoxFit, Grid, MARGIN_PX, MovingBox, Planning, PlanningReport, Sight, crossings},
+    planning::{
+        BoxFit, DepthView, Grid, MARGIN_PX, MovingBox, Planning, PlanningReport, crossings,
+    },
     tracking::{MotionState, Track},
 };
 
@@ -44,11 +46,11 @@ impl<'s> Mapper<'s> {
     /// for _ in 0..3 {
     ///     mapper.step(&StereoFrame { disparity_q8, t_world_camera: Some(Default::default()), ..StereoFrame::pair(view, wall) }, &Serial)?;
     /// }
-    /// let report = mapper.plan(0.0);
+    /// let report = mapper.update_planning_maps(0.0);
     /// assert!(report.free > 100);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn plan(&mut self, ahead_s: f32) -> PlanningReport {
+    pub fn update_planning_maps(&mut self, ahead_s: f32) -> PlanningReport {
         if self.planning.is_empty() {
             return PlanningReport::default();
         }
@@ -73,7 +75,7 @@ impl<'s> Mapper<'s> {
         ground: Option<GroundPlane>,
     ) {
         let rig = self.config.scaled_rig();
-        self.planning.observe(&Sight {
+        self.planning.observe(&DepthView {
             rig: &rig,
             t_world_camera,
             disparity_q8: self.stereo.disparity_q8(),
@@ -86,7 +88,7 @@ impl<'s> Mapper<'s> {
         self.planning.predict(ahead_s)
     }
 
-    /// The planner's window, as the last [`Mapper::plan`] left it.
+    /// The planner's window, as the last [`Mapper::update_planning_maps`] left it.
     pub fn planning(&self) -> &Planning<'s> {
         &self.planning
     }

@@ -55,9 +55,9 @@ pub enum PoseOrigin {
     First,
     /// Estimated from this frame.
     Estimated,
-    /// A guess: the estimate failed, and the motion before was held. The next frames are matched
-    /// with the last one whose pose is not a guess.
-    Held,
+    /// A guess: the estimate failed, and the motion before was continued. The next frames are
+    /// matched with the last one whose pose is not a guess.
+    Extrapolated,
     /// Given with the frame.
     Given,
     /// Found in the map after the camera was lost: the map looks from here like the image.
@@ -99,7 +99,7 @@ pub struct Report {
     /// How the pose came about.
     pub pose: PoseOrigin,
     /// Number of the map's segment, from 0. A camera lost for
-    /// [`crate::egomotion::REFERENCE_FRAMES_MAX`] frames that is not found in the map begins
+    /// [`crate::egomotion::MAX_REFERENCE_FRAMES`] frames that is not found in the map begins
     /// another one, [`crate::egomotion::SEGMENT_GAP_M`] above its guessed pose. Poses and map of a
     /// segment are right among themselves; where one stands beside another is not known.
     pub segment: u32,
@@ -138,7 +138,7 @@ impl Report {
         let blocks =
             allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
         let refused = blocks + self.instances.refused() + self.internal_faults;
-        if self.pose == PoseOrigin::Held
+        if self.pose == PoseOrigin::Extrapolated
             || self.segment > 0
             || refused > 0
             || self.self_calibration.is_uncorrected()

@@ -114,7 +114,7 @@ impl Mapper<'_> {
         let located = executor.stage(Stage::Egomotion, locate);
         // (B) Moving objects that no detector found, and (D) the objects' motions.
         let (rig, camera) = (seen.config.scaled_rig(), located.camera);
-        let fused = located.found.origin != PoseOrigin::Held && seen.is_due();
+        let fused = located.found.origin != PoseOrigin::Extrapolated && seen.is_due();
         let plans = fused && planning.seeks_ground();
         let segmentation = Segmentation { segmenter, plans };
         let (ground, segmentation) =

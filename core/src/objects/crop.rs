@@ -7,7 +7,7 @@
 //! Crops of objects whose motion is uncertain are kept in a ring until it is known; when the ring
 //! is full the oldest is dropped, and counted.
 //!
-//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`CROPS_MAX`] entries of
+//! Memory: 3 bytes a pixel of `capacity.crop_pixels`, 6 with colour, and [`MAX_CROPS`] entries of
 //! 152 bytes.
 
 use crate::{
@@ -25,7 +25,7 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 
 /// Most crops kept for later.
-pub(crate) const CROPS_MAX: usize = 128;
+pub(crate) const MAX_CROPS: usize = 128;
 /// Disparity units in a half pixel: the median is found to that, up to 256 px.
 const BIN: u16 = 128;
 
@@ -206,7 +206,7 @@ impl<'s> Crops<'s> {
         region_bytes::<u16>(capacity.crop_pixels)
             + region_bytes::<u8>(capacity.crop_pixels)
             + if capacity.colour { region_bytes::<[u8; 3]>(capacity.crop_pixels) } else { 0 }
-            + region_bytes::<Crop>(CROPS_MAX)
+            + region_bytes::<Crop>(MAX_CROPS)
     }
 
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
@@ -219,7 +219,7 @@ impl<'s> Crops<'s> {
             } else {
                 &mut []
             },
-            entries: carver.alloc("objects.crop", CROPS_MAX),
+            entries: carver.alloc("objects.crop", MAX_CROPS),
             len: 0,
             next: 0,
         }
@@ -240,7 +240,7 @@ impl<'s> Crops<'s> {
         let dropped = self.drop_where(|old, count| {
             let overlaps =
                 (old.start as usize) < span.end && (old.start + old.len) as usize > span.start;
-            overlaps || count >= CROPS_MAX
+            overlaps || count >= MAX_CROPS
         });
         let width = (crop.pixels.width as usize).max(1);
         self.disparity_q8
@@ -369,7 +369,7 @@ impl<'s> Crops<'s> {
 
     /// Pixels of a ring that would hold the crops kept now: from the oldest to the newest, and once
     /// more the largest, since a crop that does not fit at the end of the ring begins at its front.
-    pub fn enough_pixels(&self) -> usize {
+    pub fn required_pixels(&self) -> usize {
         let kept = clipped(self.entries, ..self.len);
         let oldest = kept.first().map_or(0, |crop| crop.start as usize);
         let pixels = self.disparity_q8.len();

@@ -14,7 +14,7 @@ mod tests;
 mod visit;
 
 pub use config::ObjectsConfig;
-pub(crate) use crop::CROPS_MAX;
+pub(crate) use crop::MAX_CROPS;
 pub use crop::Picture;
 pub use object::{
     MAX_OBJECTS, NoSink, Object, ObjectSink, ObjectSummary, RetiredObject, Retirement,
@@ -71,6 +71,6 @@ impl<'s> Objects<'s> {
 
     /// Adds what is in use to a footprint.
     pub(crate) fn note_use(&self, footprint: &mut Footprint) {
-        footprint.set_use::<Crop>("objects.crop", self.crops.len(), CROPS_MAX);
+        footprint.set_use::<Crop>("objects.crop", self.crops.len(), MAX_CROPS);
     }
 }

@@ -115,7 +115,7 @@ impl<'s> Objects<'s> {
         match track.motion_state.state() {
             MotionState::Uncertain => {
                 let dropped = self.crops.push(crop, disparity, &frame.picture);
-                let enough = self.crops.enough_pixels() as u32;
+                let enough = self.crops.required_pixels() as u32;
                 self.report.crop_pixels =
                     if enough > self.report.crop_pixels { enough } else { self.report.crop_pixels };
                 self.report.crops_dropped += dropped.unwrap_or(1);

@@ -19,7 +19,7 @@ pub(super) const OBJECT: u8 = 4;
 /// Above the flags of a cell: frames in a row that saw through all of it.
 const THROUGH_SHIFT: u32 = 3;
 /// Most that are counted.
-const THROUGH_MAX: u8 = 31;
+const MAX_THROUGH: u8 = 31;
 /// Frames in a row that saw through all of a cell, after which a surface in the map is not believed
 /// any more: what moved there before it was known to move. The map forgets it as well, but by its
 /// averages, which takes as many frames as it was seen in.
@@ -28,7 +28,7 @@ pub(super) const GHOST_FRAMES: u8 = 5;
 /// The bits of a cell that a frame saw through as a whole.
 pub(super) fn seen_through(bits: u8) -> u8 {
     let count = bits >> THROUGH_SHIFT;
-    let more = if count < THROUGH_MAX { count + 1 } else { count };
+    let more = if count < MAX_THROUGH { count + 1 } else { count };
     more << THROUGH_SHIFT | bits & (OCCUPIED | OBJECT) | FREE
 }
 
@@ -43,7 +43,7 @@ pub(super) fn is_ghost(bits: u8) -> bool {
 }
 
 /// Stamps above this are lowered by [`STAMP_STEP`], so that ages up to it stay exact.
-const STAMP_MAX: u16 = 65_000;
+const MAX_STAMP: u16 = 65_000;
 const STAMP_STEP: u16 = 32_500;
 
 /// Most cells along a side of the window.
@@ -144,7 +144,7 @@ impl<'s> Cells<'s> {
 
     /// Starts the next frame.
     pub fn advance(&mut self) {
-        if self.clock >= STAMP_MAX {
+        if self.clock >= MAX_STAMP {
             self.clock -= STAMP_STEP;
             self.observed_at
                 .iter_mut()

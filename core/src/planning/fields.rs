@@ -1,7 +1,8 @@
 //! Reading the window: cells, columns, distances, ways.
 
 use super::{
-    CellState, Column, Grid, MovingBox, Planning, PlanningConfig, PlanningReport, Sweep, Way,
+    CellState, Column, FreePath, Grid, MovingBox, Planning, PlanningConfig, PlanningReport,
+    RobotCylinder,
     cells::OBJECT,
     grid::Cell,
     query::{self, KnownSpace},
@@ -217,19 +218,24 @@ impl Planning<'_> {
     }
 
     /// Length by which a ray is free: from a point of the world, in a direction of any length, at most
-    /// `far_m`. See [`Way`].
+    /// `far_m`. See [`FreePath`].
     pub fn ray(
         &self,
         volume: &Volume<'_>,
         origin_m: [f64; 3],
         direction: [f64; 3],
         far_m: f64,
-    ) -> Way {
+    ) -> FreePath {
         query::ray(&self.known_space(volume), origin_m, direction, far_m)
     }
 
     /// Length by which a robot may follow a polyline of world points on the ground.
-    pub fn sweep(&self, volume: &Volume<'_>, path_m: &[[f64; 3]], robot: &Sweep) -> Way {
+    pub fn sweep(
+        &self,
+        volume: &Volume<'_>,
+        path_m: &[[f64; 3]],
+        robot: &RobotCylinder,
+    ) -> FreePath {
         query::sweep(&self.known_space(volume), self.config.min_weight, path_m, robot)
     }
 

@@ -35,7 +35,7 @@ pub(crate) const MARGIN_PX: f32 = 0.5;
 
 /// What a frame shows, as free space needs it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight<'a> {
+pub struct DepthView<'a> {
     /// The cameras, of the disparity image.
     pub rig: &'a StereoRig,
     /// Left camera to world.
@@ -73,7 +73,7 @@ struct Rays<'a> {
 pub(super) fn mark(
     config: &PlanningConfig,
     grid: &Grid,
-    sight: &Sight<'_>,
+    sight: &DepthView<'_>,
     pyramid: &Pyramid<'_>,
     cells: &mut Cells<'_>,
 ) {
@@ -90,7 +90,7 @@ impl<'a> Rays<'a> {
     fn new(
         config: &PlanningConfig,
         grid: &Grid,
-        sight: &Sight<'a>,
+        sight: &DepthView<'a>,
         pyramid: &'a Pyramid<'a>,
         cells: &Cells<'_>,
     ) -> Self {

@@ -42,11 +42,11 @@ pub use cells::{CellState, MAX_SIDE_CELLS};
 pub use config::{MAX_CELL_VOXELS, PlanningConfig};
 pub use distance::{DistanceField, NO_OBSTACLE};
 pub use fields::{Distance, Limits};
+pub use free_space::DepthView;
 pub(crate) use free_space::MARGIN_PX;
-pub use free_space::Sight;
 pub use grid::{Cell, Grid};
 pub use height_map::Column;
-pub use query::{Sweep, Way, WayEnd};
+pub use query::{FreePath, PathEnd, RobotCylinder};
 pub(crate) use surface::crossings;
 
 use crate::{
@@ -183,7 +183,7 @@ impl<'s> Planning<'s> {
 
     /// Moves the window to the camera and marks what a frame sees through. Nothing without a
     /// window, or where the pose lies beyond 2^24 cells.
-    pub fn observe(&mut self, sight: &Sight<'_>) {
+    pub fn observe(&mut self, sight: &DepthView<'_>) {
         let camera = self.grid.of_camera(sight.t_world_camera).1;
         let Some(cell) = self.grid.cell_at(camera).filter(|_| !self.is_empty()) else { return };
         let [width, length, _] = self.cells.size;
@@ -202,7 +202,7 @@ impl<'s> Planning<'s> {
 
     /// Finds the plane that ground is expected in: what the disparity image shows, or the camera's
     /// height where that is configured. A frame that shows no ground leaves the plane where it was.
-    fn level_ground(&mut self, sight: &Sight<'_>) {
+    fn level_ground(&mut self, sight: &DepthView<'_>) {
         let height_m = f64::from(self.config.camera_height_m);
         let shown = sight.ground.filter(|_| self.seeks_ground());
         let cell_m = self.grid.cell_m();
@@ -280,7 +280,7 @@ impl<'s> Planning<'s> {
         self.predict(ahead_s)
     }
 
-    /// Makes the whole of it from a map alone, without objects: as [`crate::Mapper::plan`] does
+    /// Makes the whole of it from a map alone, without objects: as [`crate::Mapper::update_planning_maps`] does
     /// with them.
     pub fn update(&mut self, volume: &Volume<'_>) -> PlanningReport {
         self.read(volume);

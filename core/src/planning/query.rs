@@ -14,7 +14,7 @@ use crate::volume::{BLOCK_SIDE, Volume};
 /// End of a ray or a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum WayEnd {
+pub enum PathEnd {
     /// It does not: it is free as far as was asked.
     Free,
     /// At a surface of the map.
@@ -26,17 +26,17 @@ pub enum WayEnd {
 /// Length by which a way is free.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Way {
+pub struct FreePath {
     /// End of the free part.
-    pub end: WayEnd,
-    /// The length of its free part, m.
+    pub end: PathEnd,
+    /// Length of the free part, m.
     pub free_m: f64,
 }
 
 /// A robot that moves along a path: an upright cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Sweep {
+pub struct RobotCylinder {
     /// Radius, m.
     pub radius_m: f64,
     /// From this height over the path, m, on surfaces are in its way,
@@ -66,7 +66,7 @@ pub(super) fn ray(
     origin_m: [f64; 3],
     direction: [f64; 3],
     far_m: f64,
-) -> Way {
+) -> FreePath {
     let length = libm::sqrt(direction.iter().map(|c| c * c).sum::<f64>());
     let voxel_m = f64::from(volume.config().voxel_size_m);
     let step_m = 0.5 * voxel_m;
@@ -77,7 +77,7 @@ pub(super) fn ray(
         && origin_m.iter().all(|c| c.is_finite())
         && (0.0..1e7).contains(&steps);
     if !is_usable {
-        return Way { end: WayEnd::Unknown, free_m: 0.0 };
+        return FreePath { end: PathEnd::Unknown, free_m: 0.0 };
     }
     let mut sampler = volume.sampler();
     // Signed distance at the step before, if it was before a surface.
@@ -91,8 +91,8 @@ pub(super) fn ray(
             Some(voxel) if voxel.sdf <= 0 && !bits_at(grid, cells, point).is_some_and(is_ghost) => {
                 let now = f64::from(voxel.sdf);
                 let back = before.map_or(0.0, |before| now / (now - before) * step_m);
-                return Way {
-                    end: WayEnd::Surface,
+                return FreePath {
+                    end: PathEnd::Surface,
                     free_m: if back < at_m { at_m - back } else { 0.0 },
                 };
             }
@@ -104,10 +104,10 @@ pub(super) fn ray(
         };
         before = None;
         if end == CellState::Unknown {
-            return Way { end: WayEnd::Unknown, free_m: at_m };
+            return FreePath { end: PathEnd::Unknown, free_m: at_m };
         }
     }
-    Way { end: WayEnd::Free, free_m: far_m }
+    FreePath { end: PathEnd::Free, free_m: far_m }
 }
 
 fn state_at(grid: &Grid, cells: &Cells<'_>, point_m: [f64; 3]) -> CellState {
@@ -131,8 +131,8 @@ pub(super) fn sweep(
     &KnownSpace { volume, grid, cells }: &KnownSpace<'_, '_, '_>,
     min_weight: u8,
     path_m: &[[f64; 3]],
-    robot: &Sweep,
-) -> Way {
+    robot: &RobotCylinder,
+) -> FreePath {
     let cell_m = grid.cell_m();
     let to_grid_m = |point: [f64; 3]| grid.of_world(point).map(|c| c * cell_m);
     let legs = || {
@@ -143,9 +143,9 @@ pub(super) fn sweep(
     };
     let whole_m = legs().map(|leg| leg.length_m).sum::<f64>();
     if !whole_m.is_finite() {
-        return Way { end: WayEnd::Unknown, free_m: 0.0 };
+        return FreePath { end: PathEnd::Unknown, free_m: 0.0 };
     }
-    let mut way = Way { end: WayEnd::Free, free_m: whole_m };
+    let mut way = FreePath { end: PathEnd::Free, free_m: whole_m };
     let voxel_m = f64::from(volume.config().voxel_size_m);
     let block_m = voxel_m * BLOCK_SIDE as f64;
     for slot in volume.pool().live() {
@@ -165,7 +165,7 @@ pub(super) fn sweep(
             for leg in legs() {
                 if let Some(at_m) = leg.touches(point, robot) {
                     if start_m + at_m < way.free_m {
-                        way = Way { end: WayEnd::Surface, free_m: start_m + at_m };
+                        way = FreePath { end: PathEnd::Surface, free_m: start_m + at_m };
                     }
                     break;
                 }
@@ -180,7 +180,7 @@ pub(super) fn sweep(
                 .first_unknown(grid, cells, robot, way.free_m - start_m)
                 .map(|at_m| start_m + at_m)
             {
-                return Way { end: WayEnd::Unknown, free_m: at_m };
+                return FreePath { end: PathEnd::Unknown, free_m: at_m };
             }
             start_m += leg.length_m;
         }
@@ -213,13 +213,13 @@ impl Leg {
     }
 
     /// Tells that something `reach_m` around a point may touch the robot.
-    fn is_within(&self, point: [f64; 3], robot: &Sweep, reach_m: f64) -> bool {
+    fn is_within(&self, point: [f64; 3], robot: &RobotCylinder, reach_m: f64) -> bool {
         let (reach_m, [along, beside]) = (reach_m + robot.radius_m, self.local(point));
         along > -reach_m && along < self.length_m + reach_m && libm::fabs(beside) < reach_m
     }
 
     /// Distance along the leg at which the robot touches a point first, m.
-    fn touches(&self, point: [f64; 3], robot: &Sweep) -> Option<f64> {
+    fn touches(&self, point: [f64; 3], robot: &RobotCylinder) -> Option<f64> {
         let [along, beside] = self.local(point);
         let square = robot.radius_m * robot.radius_m - beside * beside;
         if square < 0.0 {
@@ -240,7 +240,7 @@ impl Leg {
         &self,
         grid: &Grid,
         cells: &Cells<'_>,
-        robot: &Sweep,
+        robot: &RobotCylinder,
         until_m: f64,
     ) -> Option<f64> {
         let cell_m = grid.cell_m();

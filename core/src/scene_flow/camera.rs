@@ -4,7 +4,7 @@ use super::{
     SceneFlowConfig,
     features::{Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
-    strongest::{Held, Strongest, lists},
+    strongest::{CandidateSlot, Strongest, lists},
     suppression::{Field, SCRATCH_ROWS, suppress},
 };
 use crate::{
@@ -46,7 +46,7 @@ pub(super) struct Camera<'s> {
     blob: &'s mut [i16],
     corner: &'s mut [i16],
     sums: &'s mut [i16],
-    candidates: &'s mut [Held],
+    candidates: &'s mut [CandidateSlot],
     lists: &'s mut [u32],
 }
 
@@ -88,7 +88,7 @@ impl<'s> Camera<'s> {
             + region_bytes::<u16>(pixels)
             + 2 * region_bytes::<i16>(pixels)
             + region_bytes::<i16>(WORKING_ROWS * capacity.image_width)
-            + region_bytes::<Held>(capacity.features)
+            + region_bytes::<CandidateSlot>(capacity.features)
             + region_bytes::<u32>(lists(capacity))
     }
 

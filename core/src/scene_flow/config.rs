@@ -8,7 +8,7 @@ use crate::settings::{
 
 /// Most features of an image by default: as many as the presets of [`crate::Capacity`] have memory
 /// for.
-pub(crate) const FEATURES_MAX: usize = 20_000;
+pub(crate) const MAX_FEATURES: usize = 20_000;
 
 /// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement and no more
 /// features than motion gains by; [`SceneFlowConfig::SETTINGS`] has the ranges.
@@ -39,7 +39,7 @@ impl Default for SceneFlowConfig {
     fn default() -> Self {
         Self {
             response_min: 100,
-            features_max: FEATURES_MAX as u32,
+            features_max: MAX_FEATURES as u32,
             search_radius_px: 200,
             stereo_tolerance_px: 2,
             support_min: 4,

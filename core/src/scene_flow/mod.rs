@@ -50,7 +50,7 @@ mod support;
 mod suppression;
 
 pub use camera::FeatureCount;
-pub(crate) use config::FEATURES_MAX;
+pub(crate) use config::MAX_FEATURES;
 pub use config::SceneFlowConfig;
 pub use matcher::FlowMatcher;
 pub use matches::Match;

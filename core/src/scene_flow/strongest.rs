@@ -18,7 +18,7 @@ use bytemuck::{Pod, Zeroable};
 /// Side of the smallest cells, px: two to the power of this.
 const CELL_SHIFT: u32 = 5;
 /// Side of the largest, as wide as the largest image.
-const CELL_SHIFT_MAX: u32 = 13;
+const MAX_CELL_SHIFT: u32 = 13;
 /// Features a cell may have of a class, at least: where there are fewer to give, cells are larger.
 const QUOTA_MIN: usize = 4;
 
@@ -33,7 +33,7 @@ const END: u32 = u32::MAX;
 /// A feature of a list.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Held {
+pub(super) struct CandidateSlot {
     pub candidate: Candidate,
     /// Where the one before it of its list is held.
     before: u32,
@@ -41,7 +41,7 @@ pub(super) struct Held {
 
 /// The strongest so far.
 pub(super) struct Strongest<'a> {
-    slots: &'a mut [Held],
+    slots: &'a mut [CandidateSlot],
     len: usize,
     /// Where each list's last feature is held.
     last: &'a mut [u32],
@@ -56,14 +56,14 @@ impl<'a> Strongest<'a> {
     /// None yet, of an image of that size. At most `wanted` will be kept, and as many as there are
     /// slots; `last` has an entry for each of [`lists`].
     pub(super) fn new(
-        slots: &'a mut [Held],
+        slots: &'a mut [CandidateSlot],
         last: &'a mut [u32],
         [width, height]: [usize; 2],
         wanted: usize,
     ) -> Self {
         let mut shift = CELL_SHIFT;
         let mut shape = Shape::new(width, height, 1 << shift);
-        while shift < CELL_SHIFT_MAX && CLASSES * QUOTA_MIN * shape.cells() > wanted {
+        while shift < MAX_CELL_SHIFT && CLASSES * QUOTA_MIN * shape.cells() > wanted {
             shift += 1;
             shape = Shape::new(width, height, 1 << shift);
         }
@@ -86,7 +86,7 @@ impl<'a> Strongest<'a> {
             let Some(held) = self.slots.get(at as usize) else {
                 // The list has space.
                 let Some(free) = self.slots.get_mut(self.len) else { return self.dropped += 1 };
-                *free = Held { candidate, before: *last };
+                *free = CandidateSlot { candidate, before: *last };
                 *last = self.len as u32;
                 self.len += 1;
                 return;
@@ -104,7 +104,7 @@ impl<'a> Strongest<'a> {
     }
 
     /// How many of those to be kept found no slot, and the others.
-    pub(super) fn finish(self) -> (usize, &'a [Held]) {
+    pub(super) fn finish(self) -> (usize, &'a [CandidateSlot]) {
         let Self { slots, len, dropped, .. } = self;
         (dropped, slots.get(..len).unwrap_or_default())
     }
@@ -120,7 +120,7 @@ mod tests {
 
     /// What is kept, in order of position, and how many found no slot.
     fn keep(found: &[Candidate], slots: usize, wanted: usize) -> (Vec<Candidate>, usize) {
-        let (mut slots, mut last) = (vec![Held::default(); slots], [7; CLASSES * 5 * 3]);
+        let (mut slots, mut last) = (vec![CandidateSlot::default(); slots], [7; CLASSES * 5 * 3]);
         let mut strongest = Strongest::new(&mut slots, &mut last, SIZE, wanted);
         found.iter().for_each(|candidate| strongest.add(*candidate));
         let (dropped, kept) = strongest.finish();

@@ -17,9 +17,9 @@ pub(super) const CANDIDATE_SHARE_MIN: f32 = 0.85;
 /// top.
 const MOTION_MIN_M: f32 = 0.1;
 /// Most candidates of a frame.
-pub(super) const CANDIDATES_MAX: usize = 1024;
+pub(super) const MAX_CANDIDATES: usize = 1024;
 /// Most groups of a frame.
-pub(super) const GROUPS_MAX: usize = 16;
+pub(super) const MAX_GROUPS: usize = 16;
 
 /// Distance in the image at which two candidates may be neighbours, m, and at least, px.
 const NEIGHBOUR_M: f64 = 0.9;
@@ -125,13 +125,13 @@ fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
 }
 
 /// Sets `groups` to those that pass the gates; those on one object are merged. Returns
-/// how many groups lay beyond [`GROUPS_MAX`].
+/// how many groups lay beyond [`MAX_GROUPS`].
 pub(super) fn select<'m>(
     model: &StaticModel<'_>,
     candidates: &[Candidate],
     matches: impl Iterator<Item = (&'m Match, bool)> + Clone,
     values: &mut [f32],
-    groups: &mut Vec<Group, GROUPS_MAX>,
+    groups: &mut Vec<Group, MAX_GROUPS>,
 ) -> u32 {
     groups.clear();
     let mut refused = 0;
@@ -144,7 +144,7 @@ pub(super) fn select<'m>(
         };
         refused += u32::from(groups.push(group).is_err());
     }
-    let mut counts = [[0u32; 2]; GROUPS_MAX];
+    let mut counts = [[0u32; 2]; MAX_GROUPS];
     for (m, is_candidate) in matches {
         let Some(point) = model.current_point(m) else { continue };
         for (group, [all, own]) in groups.iter().zip(&mut counts) {
@@ -227,7 +227,7 @@ pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) 
 }
 
 /// Merges groups of one motion that lie close together: a near car has several.
-fn merge(groups: &mut Vec<Group, GROUPS_MAX>) {
+fn merge(groups: &mut Vec<Group, MAX_GROUPS>) {
     // The largest first, by a key that no two groups share; in place, for the stack.
     let key = |group: &Group| (u32::MAX - group.members, group.first);
     for at in 0..groups.len() {
@@ -257,7 +257,7 @@ fn merge(groups: &mut Vec<Group, GROUPS_MAX>) {
 
 /// Adds the groups of sparse matches: each widens the one on the same object, or is a new one where
 /// none lies, if it has `members_min` members. Returns how many there is no space for.
-pub(super) fn add(groups: &mut Vec<Group, GROUPS_MAX>, more: &[Group], members_min: u16) -> u32 {
+pub(super) fn add(groups: &mut Vec<Group, MAX_GROUPS>, more: &[Group], members_min: u16) -> u32 {
     let mut refused = 0;
     for group in more {
         if let Some(known) = groups.iter_mut().find(|known| known.is_same(group)) {
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn sparse_matches_widen_a_group_and_make_a_new_one_only_where_they_are_many() {
-        let mut groups = Vec::<Group, GROUPS_MAX>::new();
+        let mut groups = Vec::<Group, MAX_GROUPS>::new();
         assert!(groups.push(group(0.0, 1.0, 8.0, 10)).is_ok());
         assert_eq!(add(&mut groups, &[group(1.5, 1.0, 8.0, 4), group(20.0, 1.0, 8.0, 7)], 8), 0);
         assert_eq!((groups.len(), groups.first().unwrap().extent.high[0]), (1, 2.0));

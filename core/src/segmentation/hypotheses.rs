@@ -4,7 +4,7 @@
 use super::hypothesis::PREDICT_FRAMES;
 use super::{
     SegmentationConfig,
-    groups::{GROUPS_MAX, Group},
+    groups::{MAX_GROUPS, Group},
     hypothesis::{Hypothesis, Observed, RECENT},
     trail::Trail,
 };
@@ -12,7 +12,7 @@ use crate::{geometry::Transform, slices::clipped, state::Visitor, tracking::remo
 use nalgebra::Vector3;
 
 /// Most groups followed over frames.
-pub(super) const HYPOTHESES_MAX: usize = 64;
+pub(super) const MAX_HYPOTHESES: usize = 64;
 /// How far a group may lie from where the last one's motion predicts it, m, and by metre of depth.
 const DISTANCE_M: f64 = 1.5;
 const DISTANCE_PER_DEPTH: f64 = 0.06;
@@ -55,7 +55,7 @@ impl<'s> Hypotheses<'s> {
         groups: &[Group],
         t_world_camera: &Transform,
     ) -> u32 {
-        let mut used = [false; GROUPS_MAX];
+        let mut used = [false; MAX_GROUPS];
         let observed = |group: &Group| {
             let half = group
                 .extent

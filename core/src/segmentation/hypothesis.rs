@@ -128,7 +128,7 @@ impl Hypothesis {
         // The members are now on one part of it, now on another: its extent is theirs, and for a
         // while that of the frames before.
         let mut shift_m = Vector3::zeros();
-        for (((half_m, found_m), (offset_m, shift_m)), most_m) in self
+        for (((half_m, found_m), (offset_m, shift_m)), max_m) in self
             .half_m
             .iter_mut()
             .zip(found.half)
@@ -136,7 +136,7 @@ impl Hypothesis {
             .zip(KEPT_MAX_M)
         {
             let kept_m = if is_known { KEPT_SHARE * *half_m } else { 0.0 };
-            let free_m = max_f64(found_m, most_m - found_m);
+            let free_m = max_f64(found_m, max_m - found_m);
             let low_m = if is_known {
                 max_f64(-free_m, min_f64(-found_m, offset_m - kept_m))
             } else {

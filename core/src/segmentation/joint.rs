@@ -6,7 +6,7 @@
 //! `r' (2 V / n + Q + F)^-1 r` is compared with the same bound as that of one match. F is what no
 //! number of matches averages out: whole patterns are matched with a common error.
 //!
-//! Time: a comparison for each pair of at most [`JOINT_MAX`] matches.
+//! Time: a comparison for each pair of at most [`MAX_JOINT`] matches.
 
 use super::residual::CANDIDATE_CHI_SQUARE;
 use super::residual::{Residual, StaticModel};
@@ -15,7 +15,7 @@ use bytemuck::{Pod, Zeroable};
 use nalgebra::{Cholesky, Matrix3, Vector3};
 
 /// Most far matches of a frame.
-pub(super) const JOINT_MAX: usize = 1024;
+pub(super) const MAX_JOINT: usize = 1024;
 /// Depth from which on matches are tested together, m.
 pub(super) const FROM_M: f64 = 10.0;
 /// Distance in the image at which two matches are neighbours, m, and at least, px.

@@ -67,15 +67,15 @@ use crate::{
 };
 use candidate::Candidate;
 use collect::{Owned, SPARSE_VARIANCE};
-use groups::CANDIDATES_MAX;
-use hypotheses::{HYPOTHESES_MAX, Hypotheses};
+use groups::MAX_CANDIDATES;
+use hypotheses::{MAX_HYPOTHESES, Hypotheses};
 use hypothesis::Hypothesis;
-use joint::{FarMatch, JOINT_MAX};
+use joint::{FarMatch, MAX_JOINT};
 use lattice::{CELL_PX, Lattice};
 use observe::Contradictions;
-use patches::{PATCHES_MAX, PatchSearch};
+use patches::{MAX_PATCHES, PatchSearch};
 use residual::StaticModel;
-use seed::{SEEDS_MAX, Seed};
+use seed::{MAX_SEEDS, Seed};
 
 /// Score of an instance found by its motion.
 const SCORE: f32 = 0.9;
@@ -140,31 +140,31 @@ const fn cells(capacity: &Capacity) -> usize {
 impl<'s> MotionSegmenter<'s> {
     /// Bytes of the slab.
     pub(crate) const fn bytes(capacity: &Capacity) -> usize {
-        region_bytes::<Candidate>(CANDIDATES_MAX)
+        region_bytes::<Candidate>(MAX_CANDIDATES)
             + region_bytes::<u8>(capacity.matches)
-            + region_bytes::<FarMatch>(JOINT_MAX)
-            + region_bytes::<f32>(CANDIDATES_MAX)
+            + region_bytes::<FarMatch>(MAX_JOINT)
+            + region_bytes::<f32>(MAX_CANDIDATES)
             + 2 * region_bytes::<u8>(cells(capacity))
             + region_bytes::<u32>(cells(capacity))
-            + region_bytes::<Seed>(SEEDS_MAX)
-            + region_bytes::<Candidate>(PATCHES_MAX)
-            + region_bytes::<Hypothesis>(HYPOTHESES_MAX)
+            + region_bytes::<Seed>(MAX_SEEDS)
+            + region_bytes::<Candidate>(MAX_PATCHES)
+            + region_bytes::<Hypothesis>(MAX_HYPOTHESES)
     }
 
     /// Allocates its regions.
     pub(crate) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
-            candidates: carver.alloc("segmentation.candidate", CANDIDATES_MAX),
+            candidates: carver.alloc("segmentation.candidate", MAX_CANDIDATES),
             is_candidate: carver.alloc("segmentation.is_candidate", capacity.matches),
-            far: carver.alloc("segmentation.far", JOINT_MAX),
-            values: carver.alloc("segmentation.value", CANDIDATES_MAX),
+            far: carver.alloc("segmentation.far", MAX_JOINT),
+            values: carver.alloc("segmentation.value", MAX_CANDIDATES),
             cells: carver.alloc("segmentation.cell", cells(capacity)),
             blocked: carver.alloc("segmentation.blocked", cells(capacity)),
             queue: carver.alloc("segmentation.queue", cells(capacity)),
-            seeds: carver.alloc("segmentation.seed", SEEDS_MAX),
+            seeds: carver.alloc("segmentation.seed", MAX_SEEDS),
             seed_count: 0,
-            patches: carver.alloc("segmentation.patch", PATCHES_MAX),
-            hypotheses: Hypotheses::new(carver.alloc("segmentation.hypothesis", HYPOTHESES_MAX)),
+            patches: carver.alloc("segmentation.patch", MAX_PATCHES),
+            hypotheses: Hypotheses::new(carver.alloc("segmentation.hypothesis", MAX_HYPOTHESES)),
         }
     }
 

@@ -4,7 +4,7 @@ use super::groups::MEMBERS_MIN;
 use super::{
     MotionSegmenter, SegmentationReport,
     collect::{Owned, free_matches},
-    groups::{self, GROUPS_MAX, Group},
+    groups::{self, MAX_GROUPS, Group},
     joint,
     lattice::Lattice,
     patches::{PatchMemory, PatchSearch},
@@ -26,7 +26,7 @@ pub(super) struct Contradictions<'a> {
 /// The groups found so far.
 #[derive(Default)]
 struct Found {
-    groups: heapless::Vec<Group, GROUPS_MAX>,
+    groups: heapless::Vec<Group, MAX_GROUPS>,
     report: SegmentationReport,
 }
 
@@ -79,7 +79,7 @@ impl MotionSegmenter<'_> {
         let candidates = self.candidates.get_mut(..len).unwrap_or_default();
         groups::join(candidates, model.rig.focal_px);
         let marked = free_matches(sparse, self.is_candidate);
-        let mut groups = heapless::Vec::<Group, GROUPS_MAX>::new();
+        let mut groups = heapless::Vec::<Group, MAX_GROUPS>::new();
         found.report.refused += groups::select(model, candidates, marked, self.values, &mut groups);
         groups.retain(|group| !search.is_repeated(model, candidates, group));
         found.report.refused += groups::add(&mut found.groups, &groups, MEMBERS_MIN);

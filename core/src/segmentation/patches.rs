@@ -7,7 +7,7 @@
 //! move otherwise, from where a static point would be. The gates for the group of those that move
 //! as supposed are the same as for features: enough members, and few static patches among them.
 //!
-//! Time: at most [`SEARCHES_MAX`] patches a frame, each searched for once or twice.
+//! Time: at most [`MAX_SEARCHES`] patches a frame, each searched for once or twice.
 
 use super::groups::CANDIDATE_SHARE_MIN;
 use super::residual::CANDIDATE_CHI_SQUARE;
@@ -26,9 +26,9 @@ use crate::{
 use nalgebra::Vector3;
 
 /// Most patches of one of them.
-pub(super) const PATCHES_MAX: usize = 48;
+pub(super) const MAX_PATCHES: usize = 48;
 /// Most patches of a frame.
-const SEARCHES_MAX: usize = 384;
+const MAX_SEARCHES: usize = 384;
 
 /// Least share of moving patches on an object that was found before.
 const KNOWN_SHARE_MIN: f64 = 0.7;
@@ -75,7 +75,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
             images,
             t_previous_current: t_current_previous.inverse(),
             lattice,
-            left: SEARCHES_MAX,
+            left: MAX_SEARCHES,
         }
     }
 
@@ -88,7 +88,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
     ) -> Option<Group> {
         let PatchMemory { cells, queue, members, values } = memory;
         let pixels = self.lattice.grow(&seed.extent(), &[], cells, queue)?;
-        let every = self.lattice.marked(cells, &pixels).count().div_ceil(PATCHES_MAX);
+        let every = self.lattice.marked(cells, &pixels).count().div_ceil(MAX_PATCHES);
         let (mut moving, mut still) = (0usize, 0usize);
         let marked = self
             .lattice
@@ -180,7 +180,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
             return false;
         }
         let (mut still, mut searched) = (0u32, 0u32);
-        for member in candidates.iter().filter(|member| member.is_of(group.first)).take(PATCHES_MAX)
+        for member in candidates.iter().filter(|member| member.is_of(group.first)).take(MAX_PATCHES)
         {
             let Some(left) = self.left.checked_sub(1) else { break };
             self.left = left;

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
 /// Most supposed objects of a frame.
-pub(super) const SEEDS_MAX: usize = 32;
+pub(super) const MAX_SEEDS: usize = 32;
 /// How far an object reaches beyond a few members, m.
 const REACH_M: f64 = 0.3;
 /// The same along the depth, m for each m^2 of squared depth.

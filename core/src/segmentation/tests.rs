@@ -389,7 +389,7 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
     let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
     let static_world =
         World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
-    let mut storage = vec![Hypothesis::default(); HYPOTHESES_MAX];
+    let mut storage = vec![Hypothesis::default(); MAX_HYPOTHESES];
     let mut hypotheses = Hypotheses::new(&mut storage);
     let config = SegmentationConfig::default();
     let model = |camera: &CameraMotion| {

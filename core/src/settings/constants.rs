@@ -16,7 +16,7 @@ pub const CONSTANTS: &[(&str, &str)] = &[
     ("scene_flow.disparity_tolerance_px", "5"),
     ("scene_flow.flow_tolerance_px", "5"),
     ("scene_flow.bucket_px", "50"),
-    ("icp.held_min", "0.0005"),
+    ("icp.min_eigen_share", "0.0005"),
     ("icp.step_max_rad", "0.35"),
     ("icp.explained_min", "0.5"),
     ("icp.explained_px", "5"),

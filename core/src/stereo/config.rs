@@ -14,11 +14,11 @@ pub const CANDIDATE_STEP: usize = 5;
 /// Smallest cell of the grid prior, px: the bound on cells follows from it.
 pub const MIN_GRID_SIZE: usize = 10;
 /// Most passes of the adaptive mean.
-const MEAN_PASSES_MAX: u8 = 4;
+const MAX_MEAN_PASSES: u8 = 4;
 /// Widest search around the prior plane, px.
 pub const MAX_PLANE_RADIUS: usize = 16;
 /// Widest gap, px.
-const GAP_MAX: f32 = 4096.0;
+const MAX_GAP: f32 = 4096.0;
 
 /// Filling of a gap whose ends are two surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -208,13 +208,13 @@ impl StereoConfig {
                  keeps all ([decision 43](decisions/0043-lone-segments.md)).",
             ),
         Row::expert("stereo.lone_gap", "px", |c| Usize(&mut c.lone_gap))
-            .range(Range::Within(0.0, GAP_MAX))
+            .range(Range::Within(0.0, MAX_GAP))
             .text(
                 "Widest gap to the next segment of the same surface: a segment with wider ones is \
                  lone. No more than `gap_width` counts.",
             ),
         Row::user("stereo.gap_width", "px", |c| Usize(&mut c.gap_width))
-            .range(Range::Within(0.0, GAP_MAX))
+            .range(Range::Within(0.0, MAX_GAP))
             .published("3; DynSLAM: 21")
             .text("Widest gap filled along rows and columns; 0 fills none."),
         Row::expert("stereo.gap_ends", "", |c| Choice(&mut c.gap_ends)).published("farther").text(
@@ -223,7 +223,7 @@ impl StereoConfig {
                  ([decision 28](decisions/0028-gaps-within-a-surface.md)).",
         ),
         Row::expert("stereo.adaptive_mean", "passes", |c| U8(&mut c.adaptive_mean))
-            .range(Range::Within(0.0, MEAN_PASSES_MAX as f32))
+            .range(Range::Within(0.0, MAX_MEAN_PASSES as f32))
             .published("1")
             .text(
                 "Passes of an edge-preserving mean over the result; it also yields fractions of a \

@@ -76,13 +76,13 @@ impl core::fmt::Debug for StereoMatcher<'_> {
 }
 
 /// Support points there can be: one per candidate.
-const fn most_points(capacity: &Capacity) -> usize {
+const fn max_points(capacity: &Capacity) -> usize {
     support::candidates(capacity.image_width, CANDIDATE_STEP)
         * support::candidates(capacity.image_height, CANDIDATE_STEP)
 }
 
 /// Cells of the grid prior there can be.
-const fn most_cells(capacity: &Capacity) -> usize {
+const fn max_cells(capacity: &Capacity) -> usize {
     prior::cells(capacity.image_width, MIN_GRID_SIZE)
         * prior::cells(capacity.image_height, MIN_GRID_SIZE)
 }
@@ -93,7 +93,7 @@ const fn at_least_one(length: usize) -> usize {
 
 /// Entries of a region with one per pixel; one at least, so that there is an image to show before
 /// the first pair.
-const fn most_pixels(capacity: &Capacity) -> usize {
+const fn max_pixels(capacity: &Capacity) -> usize {
     at_least_one(capacity.image_width) * at_least_one(capacity.image_height)
 }
 
@@ -108,7 +108,7 @@ impl<'s> StereoMatcher<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
         let (pixels, points, cells) =
-            (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+            (max_pixels(capacity), max_points(capacity), max_cells(capacity));
         region_bytes::<u32>(pixels)
             + region_bytes::<u16>(pixels)
             + region_bytes::<i16>(pixels)
@@ -122,7 +122,7 @@ impl<'s> StereoMatcher<'s> {
     /// Takes the matcher's buffers from the slab.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let (pixels, points, cells) =
-            (most_pixels(capacity), most_points(capacity), most_cells(capacity));
+            (max_pixels(capacity), max_points(capacity), max_cells(capacity));
         Self {
             gradients: carver.alloc("stereo.gradients", pixels),
             disparity: carver.alloc("stereo.disparity", pixels),

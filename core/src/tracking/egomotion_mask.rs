@@ -23,7 +23,7 @@ pub struct CameraMotion {
 }
 
 /// Most objects found by their motion whose matches are excluded before they are found again.
-const MOVING_MAX: usize = 16;
+const MAX_MOVING: usize = 16;
 
 /// The matches that egomotion may use: none on a dynamic object, and none on a large one of unknown
 /// state, which may be most of what the camera sees. Among the rest RANSAC decides. Objects found
@@ -35,7 +35,7 @@ pub struct EgomotionMask<'t, 's> {
     refined: &'t [Match],
     previous: &'t MaskStore<'s>,
     /// Last masks of objects that were found by their motion.
-    moving: Vec<MaskHandle, MOVING_MAX>,
+    moving: Vec<MaskHandle, MAX_MOVING>,
     /// A bit for each instance whose matches are excluded.
     excluded: u64,
 }
@@ -92,7 +92,7 @@ impl<'s> Tracker<'s> {
             .iter()
             .filter(is_missing)
             .map(|track| track.mask)
-            .take(MOVING_MAX)
+            .take(MAX_MOVING)
             .collect();
         EgomotionMask {
             owner_codes: self.refined_owner,

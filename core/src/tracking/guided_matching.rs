@@ -7,7 +7,7 @@
 //! other; one that moved otherwise is not found within the 1.75 px that are searched, or is found
 //! to have moved otherwise.
 //!
-//! Time: at most [`GUIDED_MATCHES_MAX`] refinements an object and frame.
+//! Time: at most [`MAX_GUIDED_MATCHES`] refinements an object and frame.
 
 use super::match_assignment::pixel;
 use crate::{
@@ -18,11 +18,11 @@ use crate::{
 };
 
 /// Most patches searched for on one object.
-pub(crate) const GUIDED_MATCHES_MAX: usize = 256;
+pub(crate) const MAX_GUIDED_MATCHES: usize = 256;
 /// Least distance between two of them, px.
 const STEP_MIN_PX: i32 = 3;
 /// Most lines of the grid in a direction, more than any image needs.
-const LINES_MAX: i32 = 4096;
+const MAX_LINES: i32 = 4096;
 /// Half a patch and a pixel, px: all around it must lie under the mask, for at the rim a patch also
 /// shows what is behind.
 const RIM_PX: i32 = 5;
@@ -71,7 +71,7 @@ pub(super) fn search_by_projection(
     let pixels = masks.current.1.pixels;
     let step_px = step_px(pixels.width, pixels.height);
     let lines = |first: i32, length: i32| {
-        (0..LINES_MAX)
+        (0..MAX_LINES)
             .map(move |line| first + line * step_px)
             .take_while(move |at| *at < first + length)
     };
@@ -105,11 +105,11 @@ pub(super) fn search_by_projection(
     count
 }
 
-/// Distance of the grid's lines, so that a box has no more than about [`GUIDED_MATCHES_MAX`]
+/// Distance of the grid's lines, so that a box has no more than about [`MAX_GUIDED_MATCHES`]
 /// points.
 pub(crate) fn step_px(width: i32, height: i32) -> i32 {
     let area = f64::from(width) * f64::from(height);
-    let step = libm::ceil(libm::sqrt(area / GUIDED_MATCHES_MAX as f64)) as i32;
+    let step = libm::ceil(libm::sqrt(area / MAX_GUIDED_MATCHES as f64)) as i32;
     if step > STEP_MIN_PX { step } else { STEP_MIN_PX }
 }
 

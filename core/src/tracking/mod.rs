@@ -97,7 +97,7 @@ use crate::{
     scene_flow::Match,
 };
 use association::TrackTable;
-use guided_matching::GUIDED_MATCHES_MAX;
+use guided_matching::MAX_GUIDED_MATCHES;
 use image_velocity::measure_image_velocities;
 use instance::Instances;
 use motions::MotionInput;
@@ -127,7 +127,7 @@ impl<'s> Tracker<'s> {
             + Instances::bytes(capacity)
             + TrackTable::bytes(capacity)
             + 2 * region_bytes::<OwnerCode>(capacity.matches)
-            + region_bytes::<Match>(GUIDED_MATCHES_MAX)
+            + region_bytes::<Match>(MAX_GUIDED_MATCHES)
     }
 
     /// Allocates its regions.
@@ -146,7 +146,7 @@ impl<'s> Tracker<'s> {
             tracks: TrackTable::new_in(capacity, carver),
             refined_owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
-            guided_matches: carver.alloc("tracking.guided_matches", GUIDED_MATCHES_MAX),
+            guided_matches: carver.alloc("tracking.guided_matches", MAX_GUIDED_MATCHES),
             frame: 0,
             size: [0; 2],
             report: TrackingReport::default(),

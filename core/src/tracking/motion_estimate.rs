@@ -53,7 +53,7 @@ pub(super) struct ObjectMotion {
 #[derive(Clone, Copy)]
 struct DisparityRange {
     least_px: f64,
-    most_px: f64,
+    max_px: f64,
 }
 
 impl DisparityRange {
@@ -68,17 +68,17 @@ impl DisparityRange {
         let slack_px = 3.0 * core::f64::consts::SQRT_2 * NOISE_PX + 0.5;
         let depth_m = rig.focal_baseline_px_m() / median_px;
         let nearest_m = depth_m - EXTENT_M;
-        let most_px =
+        let max_px =
             if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
         Self {
             least_px: rig.focal_baseline_px_m() / (depth_m + EXTENT_M) - slack_px,
-            most_px: most_px + slack_px,
+            max_px: max_px + slack_px,
         }
     }
 
     fn contains(&self, m: &Match) -> bool {
         let disparity = disparity(m);
-        disparity >= self.least_px && disparity <= self.most_px
+        disparity >= self.least_px && disparity <= self.max_px
     }
 }
 

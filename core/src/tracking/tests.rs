@@ -3,7 +3,7 @@
 use super::*;
 use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut};
 
-pub(crate) use guided_matching::{GUIDED_MATCHES_MAX, step_px};
+pub(crate) use guided_matching::{MAX_GUIDED_MATCHES, step_px};
 pub(crate) use match_assignment::MatchOwner;
 pub(crate) use motion_filter::{MotionFilter, Observation};
 

@@ -120,7 +120,7 @@ impl Volume<'_> {
                     return;
                 };
                 report.made += 1;
-                report.eviction.returned += u32::from(self.load_into(slot, coord, store));
+                report.eviction.loaded += u32::from(self.load_into(slot, coord, store));
                 slot
             }
         };

@@ -83,8 +83,8 @@ impl ObservedDepth<'_> {
         for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in
             depths.iter_mut().zip(&within).zip(notes)
         {
-            let is_spoiled = disparity > spoiling.saturating_add(EDGE_Q8);
-            let noted = NotedDepth::new(within, level, is_spoiled);
+            let has_unreliable_colour = disparity > spoiling.saturating_add(EDGE_Q8);
+            let noted = NotedDepth::new(within, level, has_unreliable_colour);
             *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) {
                 noted
             } else {

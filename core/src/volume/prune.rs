@@ -39,9 +39,9 @@ impl PruneReport {
     }
 }
 
-/// What goes.
+/// The voxels and blocks that pruning removes.
 #[derive(Clone, Copy)]
-pub(super) struct Rule {
+pub(super) struct PruneRule {
     /// Voxels seen at most this often.
     pub weight: u8,
     /// Blocks farther from any surface than this share of the truncation; 0 is none.
@@ -85,7 +85,7 @@ impl Volume<'_> {
         let mut from = 0;
         while let Some(slot) = self.pool.next_live(from) {
             let (reset, freed) =
-                self.prune_block(slot, Rule { weight: prune_weight, ..self.rule() });
+                self.prune_block(slot, PruneRule { weight: prune_weight, ..self.rule() });
             report.add(reset, freed);
             from = slot.get() + 1;
         }
@@ -93,8 +93,8 @@ impl Volume<'_> {
     }
 
     /// What goes of a block that has left the window.
-    pub(super) fn rule(&self) -> Rule {
-        Rule { weight: self.config.prune_weight, distance: self.config.prune_distance }
+    pub(super) fn rule(&self) -> PruneRule {
+        PruneRule { weight: self.config.prune_weight, distance: self.config.prune_distance }
     }
 
     /// Visits blocks that are due. Those visible in the window will be due again, and do not go for
@@ -105,7 +105,7 @@ impl Volume<'_> {
             && let Some(slot) = self.history.take_due(from)
         {
             let in_window = self.history.covers(self.visible.last_visible(slot));
-            let rule = Rule {
+            let rule = PruneRule {
                 distance: if in_window { 0.0 } else { self.config.prune_distance },
                 ..self.rule()
             };
@@ -118,7 +118,7 @@ impl Volume<'_> {
 
     /// Resets the voxels of low weight in a block, and frees it when nothing near a surface is
     /// left. How many were reset, and whether it was freed.
-    pub(super) fn prune_block(&mut self, slot: Slot, rule: Rule) -> (u32, bool) {
+    pub(super) fn prune_block(&mut self, slot: Slot, rule: PruneRule) -> (u32, bool) {
         let (at, prune_weight, by_distance) = (slot.index(), rule.weight, rule.distance > 0.0);
         // Most blocks are known to hold no voxel of low weight without reading them.
         if !by_distance

@@ -213,11 +213,11 @@ impl<'a> Rays<'a> {
     /// wall is seen at a grazing angle. `beside_m` are the depths one step off.
     #[inline(always)]
     fn reach_m(&self, depth_m: f32, beside_m: [f32; 2], steps: usize) -> f32 {
-        let [least_m, most_m] = self.reach_m;
+        let [least_m, max_m] = self.reach_m;
         let half = 0.5 * steps as f32;
         let [above, left] = beside_m
             .map(|beside_m| if beside_m > 0.0 { half * (beside_m - depth_m).abs() } else { 0.0 });
-        min_f32(max_f32(least_m, max_f32(above, left)), most_m)
+        min_f32(max_f32(least_m, max_f32(above, left)), max_m)
     }
 
     /// Walks a band's rays until it ends or its list may be too short for another one.

@@ -58,20 +58,20 @@ impl BlockStore for NoStore {
     }
 }
 
-/// Blocks that left and came back.
+/// Counts of blocks evicted to the store and loaded from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct EvictionReport {
-    /// Blocks that left and were kept.
-    pub kept: u32,
-    /// Blocks that left and are lost.
+    /// Blocks evicted and stored.
+    pub stored: u32,
+    /// Blocks evicted and lost: the store refused them, or there is none.
     pub lost: u32,
-    /// Blocks that left with nothing in them, or nothing that pruning would have spared.
+    /// Blocks evicted with nothing in them, or nothing that pruning would have spared.
     pub empty: u32,
-    /// Blocks that came back.
-    pub returned: u32,
+    /// Blocks loaded from the store.
+    pub loaded: u32,
 }
 
 impl Volume<'_> {
@@ -94,7 +94,7 @@ impl Volume<'_> {
         }
         match self.evicted(slot) {
             Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
-            Some(block) if store.store(block) => report.kept += 1,
+            Some(block) if store.store(block) => report.stored += 1,
             _ => report.lost += 1,
         }
         self.free_block(slot);
@@ -119,7 +119,7 @@ impl Volume<'_> {
             from = slot.get() + 1;
             match self.evicted(slot) {
                 Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
-                Some(block) if store.store(block) => report.kept += 1,
+                Some(block) if store.store(block) => report.stored += 1,
                 _ => report.lost += 1,
             }
             self.free_block(slot);

@@ -18,7 +18,7 @@ pub struct Plan {
 impl Plan {
     /// Makes the window and copies it; `None` where the mapper has none.
     pub fn of(mapper: &mut Mapper<'_>, ahead_s: f32) -> Option<Self> {
-        let report = mapper.plan(ahead_s);
+        let report = mapper.update_planning_maps(ahead_s);
         let planning = mapper.planning();
         Some(Self {
             layers: PlanningLayers::of(planning)?,

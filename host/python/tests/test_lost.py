@@ -22,7 +22,7 @@ def reports(seed_after):
 def test_a_covered_camera_is_found_again():
     found = list(reports(3))
     assert [report["segment"] for report in found] == [0] * len(found)
-    assert {report["pose"] for report in found[COVERED + 1 : UNCOVERED]} == {"Held"}
+    assert {report["pose"] for report in found[COVERED + 1 : UNCOVERED]} == {"Extrapolated"}
     again = found[UNCOVERED + 1]
     assert (again["pose"], again["severity"], again["fused"]) == ("Relocalized", "recovered", True)
     assert found[-1]["severity"] == "info"

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Settings listed at most.
-const MOST_SETTINGS: usize = 20;
+const MAX_SETTINGS: usize = 20;
 
 #[derive(Debug, clap::Args)]
 pub struct DiffArgs {
@@ -58,13 +58,13 @@ fn to_json(comparison: &Comparison) -> serde_json::Value {
 fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {
     let [a, b] = names.map(|name| name.display().to_string());
     let mut text = String::new();
-    for setting in comparison.settings.iter().take(MOST_SETTINGS) {
+    for setting in comparison.settings.iter().take(MAX_SETTINGS) {
         let [one, other] =
             setting.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
         text += &format!("setting {}: {one} in {a}, {other} in {b}\n", setting.key);
     }
-    if comparison.settings.len() > MOST_SETTINGS {
-        text += &format!("and {} more settings\n", comparison.settings.len() - MOST_SETTINGS);
+    if comparison.settings.len() > MAX_SETTINGS {
+        text += &format!("and {} more settings\n", comparison.settings.len() - MAX_SETTINGS);
     }
     let shared = comparison.shared;
     text += &match (&comparison.divergence, comparison.prefix()) {

@@ -3,7 +3,7 @@
 use crate::formats::SUMMARY_FILE;
 use crate::report::{html::page, viewer};
 use crate::run::write_whole;
-use crate::scene::{MOST_TRIANGLES, Scene};
+use crate::scene::{MAX_TRIANGLES, Scene};
 use anyhow::{Context, bail};
 use maud::html;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Triangles at most; the mesh is simplified to as many
-    #[arg(long, value_name = "N", default_value_t = MOST_TRIANGLES)]
+    #[arg(long, value_name = "N", default_value_t = MAX_TRIANGLES)]
     triangles: usize,
     /// Write the file and leave the browser closed
     #[arg(long)]

@@ -39,7 +39,7 @@ pub struct FaultOutcome {
     /// Frames fused from a wrong pose.
     pub wrong_fused: usize,
     /// Frames whose pose was extrapolated.
-    pub held: usize,
+    pub extrapolated: usize,
     /// Frames reported to affect the map.
     pub map_affected: usize,
     /// Frames from the first with the fault until all that follow are right and nothing is reported
@@ -72,7 +72,7 @@ impl FaultOutcome {
                 outcome.unreported_frames += usize::from(wrong);
             }
             outcome.wrong_fused += usize::from(wrong && frame.fused);
-            outcome.held += usize::from(frame.pose == PoseOrigin::Held);
+            outcome.extrapolated += usize::from(frame.pose == PoseOrigin::Extrapolated);
             outcome.map_affected += usize::from(reported);
             if wrong || reported {
                 outcome.recovered_after = (first + since + 1 < frames.len()).then_some(since + 1);

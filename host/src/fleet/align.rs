@@ -20,7 +20,7 @@ use std::path::Path;
 /// Name of what alignment found.
 pub const ALIGNMENT_FILE: &str = "alignment.json";
 /// Surface points of a recording.
-const POINTS_MAX: usize = 200_000;
+const MAX_POINTS: usize = 200_000;
 /// Weight of a voxel that takes part.
 const MIN_WEIGHT: u8 = 3;
 /// How much surer the first recording is than the others: its given pose is the world's, so that
@@ -185,7 +185,7 @@ pub fn poses(
 
 impl Sampled {
     fn of(job: &Job, folder: &Path) -> Result<Self, FleetError> {
-        let points = field(job, folder)?.surface(POINTS_MAX);
+        let points = field(job, folder)?.surface(MAX_POINTS);
         let mut centre_m = [0.0; 3];
         points.iter().for_each(|point| {
             (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64)

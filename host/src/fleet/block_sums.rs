@@ -4,12 +4,12 @@ use dynvox_core::volume::BLOCK_VOXELS;
 
 /// Largest sum of weights of a voxel whose sum of weight times distance certainly fits 32 bits:
 /// 65,538 times 32,767 does.
-pub const WEIGHT_MAX: u32 = 65_535;
+pub const MAX_WEIGHT: u32 = 65_535;
 
 type Voxels<T> = [T; BLOCK_VOXELS];
 
 /// Sums of one block's voxels. Additions wrap around, so that they can be done in any order; a
-/// voxel with more than [`WEIGHT_MAX`] is counted and left out where its average is taken.
+/// voxel with more than [`MAX_WEIGHT`] is counted and left out where its average is taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BlockSums {
     /// Weight times signed distance, in units of truncation / 32,767.
@@ -28,7 +28,7 @@ pub struct BlockAverage {
     pub weight: Box<Voxels<u8>>,
     /// Red, green and blue, where the map has colour.
     pub colour: Option<Box<[Voxels<u8>; 3]>>,
-    /// Voxels with more than [`WEIGHT_MAX`], which are left out.
+    /// Voxels with more than [`MAX_WEIGHT`], which are left out.
     pub overflowed: u64,
 }
 
@@ -85,7 +85,7 @@ impl BlockSums {
             overflowed: 0,
         };
         for (voxel, &weight) in self.weight.iter().enumerate() {
-            if weight == 0 || weight > WEIGHT_MAX {
+            if weight == 0 || weight > MAX_WEIGHT {
                 average.overflowed += u64::from(weight > 0);
                 continue;
             }
@@ -205,9 +205,9 @@ mod tests {
         for _ in 0..257 {
             sums.observe(2, i16::MIN, 255, [0; 3]);
         }
-        assert_eq!(sums.weight[2], WEIGHT_MAX);
+        assert_eq!(sums.weight[2], MAX_WEIGHT);
         sums.observe(3, 5, 255, [0; 3]);
-        sums.weight[3] += WEIGHT_MAX;
+        sums.weight[3] += MAX_WEIGHT;
         let average = sums.average();
         assert_eq!(
             (average.sdf[0], average.weight[0], average.sdf[1], average.weight[1]),

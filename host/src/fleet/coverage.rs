@@ -4,7 +4,7 @@
 
 use super::FleetError;
 use super::block_sums::BlockSums;
-use super::merge::{Head, least};
+use super::merge::{TileCursor, least};
 use super::tile_folder::{WorldTile, tiles};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
         let mut heads = of_tile
             .iter()
-            .map(|(_, _, path)| Head::open(path, &mut lattice))
+            .map(|(_, _, path)| TileCursor::open(path, &mut lattice))
             .collect::<Result<Vec<_>, _>>()?;
         let mut tile = TileCoverage {
             sides: of_tile[0].0.sides,

@@ -37,7 +37,7 @@ const SIGMA_MIN_M: f64 = 0.01;
 const MEDIAN_LENGTH: f64 = 1.538;
 /// Cauchy's limit, in standard deviations.
 const LIMIT: f64 = 2.385;
-const ROUNDS_MAX: usize = 50;
+const MAX_ROUNDS: usize = 50;
 /// A round that changes no number of the motion by more ends them, m and rad.
 const STEP_MIN: f64 = 1e-9;
 
@@ -148,7 +148,7 @@ impl Estimate {
             weights: vec![1.0; points.len()],
         };
         let mut estimate = start.next(points, axes)?;
-        for _ in 1..ROUNDS_MAX {
+        for _ in 1..MAX_ROUNDS {
             let next = estimate.next(points, axes)?;
             let change = (next.rotation - estimate.rotation)
                 .amax()

@@ -40,7 +40,7 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
     for tile in all {
         let paths = folders.iter().filter_map(|folder| folder.get(&tile));
         let mut heads = paths
-            .map(|path| Head::open(path, &mut merged.lattice))
+            .map(|path| TileCursor::open(path, &mut merged.lattice))
             .collect::<Result<Vec<_>, _>>()?;
         let Some(lattice) = merged.lattice else { continue };
         merged.blocks +=
@@ -54,12 +54,12 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
 }
 
 /// A reader and the block it stands at.
-pub(super) struct Head {
+pub(super) struct TileCursor {
     reader: TileReader,
     pub(super) block: Option<(BlockCoord, BlockSums)>,
 }
 
-impl Head {
+impl TileCursor {
     /// Opens a tile of the lattice of those before it.
     pub(super) fn open(path: &Path, lattice: &mut Option<Lattice>) -> Result<Self, FleetError> {
         let mut reader = TileReader::open(path)?;
@@ -81,12 +81,12 @@ impl Head {
 }
 
 /// The least coordinates at which one of the readers stands.
-pub(super) fn least(heads: &[Head]) -> Option<BlockCoord> {
+pub(super) fn least(heads: &[TileCursor]) -> Option<BlockCoord> {
     heads.iter().filter_map(|head| Some(head.block.as_ref()?.0)).min()
 }
 
 /// The sum of all blocks at the least coordinates.
-fn next(heads: &mut [Head]) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
+fn next(heads: &mut [TileCursor]) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
     let Some(coord) = least(heads) else { return Ok(None) };
     let mut sum: Option<BlockSums> = None;
     for head in heads {

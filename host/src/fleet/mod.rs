@@ -36,7 +36,7 @@ mod tile_folder;
 
 pub use align::{ALIGNMENT_FILE, AlignedPair, AlignedRecording, Alignment, poses};
 pub use averages::Averages;
-pub use block_sums::{BlockSums, WEIGHT_MAX};
+pub use block_sums::{BlockSums, MAX_WEIGHT};
 pub use changes::{Change, ChangeKind, changes};
 pub use coverage::{Coverage, TileCoverage};
 pub use error::FleetError;

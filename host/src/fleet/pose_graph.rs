@@ -13,7 +13,7 @@ use super::register::{Uncertainty, motion_about, step_about};
 use dynvox_core::geometry::Transform;
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-const ITERATIONS_MAX: usize = 20;
+const MAX_ITERATIONS: usize = 20;
 /// Drift of a map, one standard deviation: of its length, as stereo odometry has it over 5 to 50 m.
 const DRIFT_SHARE: f64 = 0.005;
 /// And of its rotation, rad/m: 0.01 degrees.
@@ -55,7 +55,7 @@ pub fn with_drift(information: &Matrix6<f64>, way_m: f64) -> Matrix6<f64> {
 /// Where the maps lie in the world, from `start` on.
 pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transform> {
     let mut poses = start.to_vec();
-    for _ in 0..ITERATIONS_MAX {
+    for _ in 0..MAX_ITERATIONS {
         let mut matrix = DMatrix::zeros(6 * nodes.len(), 6 * nodes.len());
         let mut vector = DVector::zeros(6 * nodes.len());
         for (at, node) in nodes.iter().enumerate() {

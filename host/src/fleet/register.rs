@@ -15,7 +15,7 @@ use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// Points of one map in a registration at most.
-const POINTS_MAX: usize = 20_000;
+const MAX_POINTS: usize = 20_000;
 /// Points that must lie where the other map was seen.
 const POINTS_MIN: usize = 1_000;
 /// Share of these that must lie within the last limit.
@@ -29,7 +29,7 @@ const LIMITS: [f64; 3] = [0.9, 0.5, 0.25];
 /// The last limit, voxels.
 const NEAR_VOXELS: f64 = 2.0;
 /// Steps at one limit.
-const STEPS_MAX: usize = 12;
+const MAX_STEPS: usize = 12;
 /// A step that moves no point by more ends them, m.
 const STEP_MIN_M: f64 = 1e-5;
 /// Neighbouring points err alike: so many count as one.
@@ -158,7 +158,7 @@ pub fn register(
     let rms_before_m = pair.equations(guess, limits_m[0]).rms_m();
     let mut t_b_a = *guess;
     for &limit_m in &limits_m {
-        for _ in 0..STEPS_MAX {
+        for _ in 0..MAX_STEPS {
             let equations = pair.equations(&t_b_a, limit_m);
             let Some(solver) = equations.matrix.cholesky() else { break };
             let step = solver.solve(&-equations.vector);
@@ -334,6 +334,6 @@ impl Equations {
 /// Points that fulfil a condition, evenly chosen.
 fn chosen(points: &[SurfacePoint], fulfils: impl Fn(&SurfacePoint) -> bool) -> Vec<&SurfacePoint> {
     let all: Vec<&SurfacePoint> = points.iter().filter(|point| fulfils(point)).collect();
-    let stride = all.len().div_ceil(POINTS_MAX).max(1);
+    let stride = all.len().div_ceil(MAX_POINTS).max(1);
     all.into_iter().step_by(stride).collect()
 }

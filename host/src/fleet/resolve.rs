@@ -12,8 +12,8 @@
 //! **Memory.** One block of each epoch, and what has changed.
 
 use super::FleetError;
-use super::block_sums::{BlockAverage, BlockSums, WEIGHT_MAX};
-use super::merge::{Head, least};
+use super::block_sums::{BlockAverage, BlockSums, MAX_WEIGHT};
+use super::merge::{TileCursor, least};
 use super::tile_file::Lattice;
 use super::tile_folder::{WorldTile, tiles};
 use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord};
@@ -24,7 +24,7 @@ pub const CONTRADICTIONS_MIN: u32 = 16;
 /// Mean weight in these voxels from which on an epoch has seen them often enough.
 pub const SEEN_OFTEN: u64 = 4;
 /// Farthest behind a surface, as a share of the truncation, that still speaks of it.
-const BEHIND_MAX: f64 = 0.4;
+const MAX_BEHIND: f64 = 0.4;
 /// Nearest in front of a surface that is free space.
 const FREE_MIN: f64 = 0.5;
 /// From here on there is no surface within the truncation: less than 1, for values are averages and
@@ -97,7 +97,7 @@ pub fn resolve(
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
         let mut heads = of_tile
             .iter()
-            .map(|(_, path)| Head::open(path, &mut lattice))
+            .map(|(_, path)| TileCursor::open(path, &mut lattice))
             .collect::<Result<Vec<_>, _>>()?;
         while let Some(coord) = least(&heads) {
             let mut blocks = Vec::new();
@@ -183,13 +183,13 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
 
 fn statement(sums: &BlockSums, voxel: usize) -> Statement {
     let weight = sums.weight[voxel];
-    if weight == 0 || weight > WEIGHT_MAX {
+    if weight == 0 || weight > MAX_WEIGHT {
         return Statement::Nothing;
     }
     match share(sums, voxel) {
         share if share >= FREE_MIN => Statement::Free,
         share if share > 0.0 => Statement::Nothing,
-        share if share >= -BEHIND_MAX => Statement::Surface,
+        share if share >= -MAX_BEHIND => Statement::Surface,
         _ => Statement::Behind,
     }
 }

@@ -31,7 +31,7 @@ const HEAD_FILE: &str = "submap.json";
 
 /// What is known of a map.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Head {
+struct SubmapHeader {
     voxel_size_m: f32,
     truncation_m: f32,
     colour: bool,
@@ -175,7 +175,7 @@ pub fn keep(
             return Err(not_stored(&kept, &path));
         }
     }
-    let head = Head {
+    let head = SubmapHeader {
         voxel_size_m: lattice.voxel_size_m,
         truncation_m: lattice.truncation_m,
         colour: lattice.colour,
@@ -206,7 +206,8 @@ impl Submap {
     /// # Errors
     /// The folder is no map, or not as it was written.
     pub fn open(folder: &Path) -> Result<Self, FleetError> {
-        let Head { voxel_size_m, truncation_m, colour, position, .. } = Head::read(folder)?;
+        let SubmapHeader { voxel_size_m, truncation_m, colour, position, .. } =
+            SubmapHeader::read(folder)?;
         let store =
             BlockFile::reopen(&folder.join(BLOCKS_FILE), voxel_size_m, truncation_m, &position)
                 .map_err(|_| {
@@ -223,7 +224,8 @@ impl Submap {
         let camera = |(frame, rows): (usize, [f64; 12])| {
             Some(CameraPose { frame, segment: 0, t_map_camera: transform(&rows)? })
         };
-        let cameras = Head::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
+        let cameras =
+            SubmapHeader::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
         cameras.ok_or_else(|| {
             FleetError::content(folder, "is damaged. Remove the folder and make it again")
         })
@@ -237,11 +239,11 @@ impl Submap {
     /// # Errors
     /// The folder is no map.
     pub fn left_out_frames(folder: &Path) -> Result<usize, FleetError> {
-        Ok(Head::read(folder)?.left_out_frames)
+        Ok(SubmapHeader::read(folder)?.left_out_frames)
     }
 }
 
-impl Head {
+impl SubmapHeader {
     fn read(folder: &Path) -> Result<Self, FleetError> {
         let path = folder.join(HEAD_FILE);
         let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;

@@ -44,7 +44,7 @@ impl Observer for BlockHistoryObserver {
         let mut left = self.note_visible(volume, frame.row.frame as u32);
         let report = &frame.row.report;
         let eviction = &report.allocation.eviction;
-        if report.prune.blocks_freed + eviction.kept + eviction.lost + eviction.empty > 0 {
+        if report.prune.blocks_freed + eviction.stored + eviction.lost + eviction.empty > 0 {
             left.extend(self.take_absent(volume));
         }
         let fate = |coord: &[i16; 3]| {

@@ -103,10 +103,10 @@ impl Observer for BlocksObserver {
         let (allocation, prune) = (&row.report.allocation, &row.report.prune);
         totals.peak = row.report.blocks.peak;
         totals.refused += u64::from(row.blocks_refused());
-        totals.stored += u64::from(allocation.eviction.kept);
+        totals.stored += u64::from(allocation.eviction.stored);
         totals.lost += u64::from(allocation.eviction.lost);
         totals.empty += u64::from(allocation.eviction.empty);
-        totals.loaded += u64::from(allocation.eviction.returned);
+        totals.loaded += u64::from(allocation.eviction.loaded);
         totals.probes_most = totals.probes_most.max(allocation.probes_most);
         totals.prune_visited += u64::from(prune.visited);
         totals.voxels_reset += u64::from(prune.voxels_reset);

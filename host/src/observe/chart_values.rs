@@ -6,7 +6,7 @@ use dynvox_core::Stage;
 use serde::{Deserialize, Serialize};
 
 /// Points kept at most; beyond them two become one.
-const MOST_POINTS: usize = 1120;
+const MAX_POINTS: usize = 1120;
 /// Values of a point.
 const VALUES: usize = 9 + 2 * STAGES;
 
@@ -95,7 +95,7 @@ impl Point {
     }
 }
 
-/// The charted values of a run, in at most `MOST_POINTS` points of equally many frames; the last
+/// The charted values of a run, in at most `MAX_POINTS` points of equally many frames; the last
 /// one may have fewer.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ChartValues {
@@ -113,7 +113,7 @@ impl ChartValues {
         match self.points.last_mut() {
             Some(last) if !begins => last.merge(&point),
             _ => {
-                if self.points.len() == MOST_POINTS {
+                if self.points.len() == MAX_POINTS {
                     self.halve();
                 }
                 self.points.push(point);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_long_run_has_no_more_points_than_a_short_one_and_keeps_its_peaks() {
-        let short = run(MOST_POINTS);
+        let short = run(MAX_POINTS);
         assert_eq!(
             (short.frames_per_point(), short.frames()[1], short.series(Charted::Step)[1]),
             (1, 11, 1.0)

@@ -68,7 +68,7 @@ impl FrameRow {
             return match icp.status {
                 IcpStatus::Tracked => "tracked",
                 IcpStatus::TooFewPairs => "tracking_failure_too_few_pairs",
-                IcpStatus::NotHeld => "tracking_failure_direction_not_held",
+                IcpStatus::Degenerate => "tracking_failure_degenerate_direction",
                 IcpStatus::OffTheMap => "tracking_failure_off_the_map",
                 IcpStatus::TooFar => "tracking_failure_too_far",
                 IcpStatus::Contradicted => "tracking_failure_contradicted_by_the_images",
@@ -76,7 +76,7 @@ impl FrameRow {
         }
         match self.report.egomotion.map(|motion| motion.status) {
             None if self.report.pose == PoseOrigin::Given => "given",
-            None if self.report.pose == PoseOrigin::Held => "frozen_image",
+            None if self.report.pose == PoseOrigin::Extrapolated => "frozen_image",
             None => "first",
             Some(_) if self.report.pose == PoseOrigin::Relocalized => "relocalized",
             Some(MotionStatus::Estimated) => "estimated",
@@ -90,8 +90,8 @@ impl FrameRow {
     }
 
     /// Whether the pose was extrapolated at constant velocity for want of an estimate.
-    pub fn held(&self) -> bool {
-        self.report.pose == PoseOrigin::Held
+    pub fn is_extrapolated(&self) -> bool {
+        self.report.pose == PoseOrigin::Extrapolated
     }
 
     /// Matches the estimate was made of, inliers among them, and their root mean square error in
@@ -130,7 +130,7 @@ impl FrameRow {
                 self.report.segment
             )
         });
-        let guessed = self.held().then(|| {
+        let guessed = self.is_extrapolated().then(|| {
             format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " "))
         });
         let counts = [

@@ -9,8 +9,8 @@ const FREE: i8 = 0;
 const OCCUPIED: i8 = 100;
 const UNKNOWN: i8 = -1;
 
-/// The window from above, after [`dynvox_core::Mapper::plan`]: rows from the nearest to the
-/// farthest ahead, columns from left to right.
+/// The window from above, after [`dynvox_core::Mapper::update_planning_maps`]: rows from the
+/// nearest to the farthest ahead, columns from left to right.
 #[derive(Clone, Debug)]
 pub struct PlanningLayers {
     /// Columns and rows.

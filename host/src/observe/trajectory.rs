@@ -9,7 +9,7 @@ use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
 
 /// Points kept of the path, at most.
-const MOST_POINTS: usize = 4096;
+const MAX_POINTS: usize = 4096;
 
 /// Frames the depth tracker lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,14 +34,14 @@ pub struct TrajectorySection {
     /// Errors against them, of the map's first segment: where another one stands is not known.
     pub errors: Option<TrajectoryErrors>,
     /// Frames whose pose was extrapolated at constant velocity.
-    pub held_frames: usize,
+    pub extrapolated_frames: usize,
     /// Segments of the map: 1 where the camera was never lost.
     pub segments: u32,
     /// Frames the depth tracker lost, where it is used.
     pub failures: Option<TrackingFailures>,
 }
 
-/// A path with at most `MOST_POINTS` points: every so many frames one, and the last frame's.
+/// A path with at most `MAX_POINTS` points: every so many frames one, and the last frame's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ThinnedPath {
     points_m: Vec<[f64; 3]>,
@@ -55,7 +55,7 @@ pub struct ThinnedPath {
 impl ThinnedPath {
     fn add(&mut self, position_m: [f64; 3]) {
         if self.frames.is_multiple_of(1 << self.doublings) {
-            if self.points_m.len() == MOST_POINTS {
+            if self.points_m.len() == MAX_POINTS {
                 self.points_m = self.points_m.iter().step_by(2).copied().collect();
                 self.doublings += 1;
             }
@@ -88,7 +88,7 @@ pub struct TrajectoryObserver {
     path: ThinnedPath,
     /// Number and pose of each frame, where true poses are known.
     compared: Vec<(usize, Transform)>,
-    held_frames: usize,
+    extrapolated_frames: usize,
     segments: u32,
     /// Frames the depth tracker lost, and number and cause of the first.
     lost_frames: usize,
@@ -102,7 +102,7 @@ impl Default for TrajectoryObserver {
             tum: GrowingFile::new(TIMED_TRAJECTORY_FILE),
             path: ThinnedPath::default(),
             compared: Vec::new(),
-            held_frames: 0,
+            extrapolated_frames: 0,
             segments: 1,
             lost_frames: 0,
             first_lost: None,
@@ -130,7 +130,7 @@ impl Observer for TrajectoryObserver {
         if run.plan.dataset.truth().is_some() && row.report.segment == 0 {
             self.compared.push((row.frame, pose));
         }
-        self.held_frames += usize::from(row.held());
+        self.extrapolated_frames += usize::from(row.is_extrapolated());
         self.segments = row.report.segment + 1;
         if let Some(status) =
             row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked)
@@ -153,7 +153,7 @@ impl Observer for TrajectoryObserver {
             path: self.path,
             errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,
-            held_frames: self.held_frames,
+            extrapolated_frames: self.extrapolated_frames,
             segments: self.segments,
             failures: self.first_lost.map(|(first, status)| TrackingFailures {
                 frames: self.lost_frames,
@@ -181,7 +181,7 @@ mod tests {
         let mut path = ThinnedPath::default();
         (0..10_000).for_each(|at| path.add([0.0, 0.0, 0.5 * f64::from(at)]));
         let points: Vec<[f64; 3]> = path.points_m().collect();
-        assert!(points.len() <= MOST_POINTS && path.doublings == 2, "{}", points.len());
+        assert!(points.len() <= MAX_POINTS && path.doublings == 2, "{}", points.len());
         assert_eq!(
             (points[1][2], points[points.len() - 1][2], path.length_m()),
             (2.0, 4_999.5, 4_999.5)

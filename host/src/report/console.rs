@@ -170,8 +170,10 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             ),
             ("", "their poses are extrapolated, and they are not in the map. --egomotion stereo follows fast motion".to_owned()),
         ],
-        None if trajectory.held_frames > 0 => {
-            let extrapolated = ("poses extrapolated", format!("in {} frames: too few matches", trajectory.held_frames));
+        None if trajectory.extrapolated_frames > 0 => {
+            let frames = trajectory.extrapolated_frames;
+            let extrapolated =
+                ("poses extrapolated", format!("in {frames} frames: too few matches"));
             let apart = format!("{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above the one before", trajectory.segments);
             [extrapolated].into_iter().chain((trajectory.segments > 1).then_some(("segments of the map", apart))).collect()
         }

@@ -25,7 +25,7 @@ pub struct RigSummary {
     row_error_px: f64,
     /// Frames that said something about it.
     disparity_frames: u32,
-    /// `sound`, `off` or `recalibrate`.
+    /// `sound`, `inaccurate` or `recalibrate`.
     calibration: &'static str,
     /// Whether it was taken out of depth and motion.
     corrected: bool,
@@ -48,7 +48,7 @@ pub fn summary(run: &RunRecord) -> Option<RigSummary> {
         disparity_frames: report.frames,
         calibration: match report.state() {
             CalibrationState::Sound => "sound",
-            CalibrationState::Off => "off",
+            CalibrationState::Inaccurate => "inaccurate",
             CalibrationState::Recalibrate => "recalibrate",
         },
         corrected: report.corrected,
@@ -81,7 +81,7 @@ pub fn sentence(run: &RunRecord) -> String {
     };
     match report.state() {
         CalibrationState::Sound => format!("sound: {value}"),
-        CalibrationState::Off => {
+        CalibrationState::Inaccurate => {
             format!("{value}, {done}; another run begins with it: --config calibration.toml")
         }
         CalibrationState::Recalibrate => {

@@ -86,7 +86,7 @@ struct EgomotionSummary {
     ate_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     without_boresight: Option<WithoutBoresight>,
-    held_frames: usize,
+    extrapolated_frames: usize,
     segments: u32,
     /// `stereo`, `icp` or `file`.
     source: &'static str,
@@ -268,7 +268,7 @@ impl EgomotionSummary {
             rpe_r_deg: errors.map(|errors| errors.rpe_r_deg),
             ate_m: errors.map(|errors| errors.ate_m),
             without_boresight: errors.and_then(|errors| errors.without_boresight),
-            held_frames: trajectory.held_frames,
+            extrapolated_frames: trajectory.extrapolated_frames,
             segments: trajectory.segments,
             source: trajectory.source,
             status: if failures.is_some() { "tracking failure" } else { "ok" },
@@ -297,7 +297,7 @@ impl EvictSummary {
             out: blocks.totals.stored + blocks.totals.lost,
             back: blocks.totals.loaded,
             empty: blocks.totals.empty,
-            end: u64::from(blocks.store.end.kept),
+            end: u64::from(blocks.store.end.stored),
             disk_records: blocks.store.records,
             disk_bytes: blocks.store.bytes,
         }

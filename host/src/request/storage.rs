@@ -23,7 +23,7 @@ pub struct Storage {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Streaming {
     /// Bytes the file may grow to; limited by the disk when absent.
-    pub most_bytes: Option<u64>,
+    pub max_bytes: Option<u64>,
     /// Keep the file as a part of the result.
     pub keep_file: bool,
 }
@@ -32,7 +32,7 @@ impl Storage {
     /// Store of evicted blocks; `None` where they are lost.
     pub fn streaming(&self) -> Option<Streaming> {
         (!self.lose_evicted).then_some(Streaming {
-            most_bytes: self.most_mib.map(|mib| mib.saturating_mul(MIB)),
+            max_bytes: self.most_mib.map(|mib| mib.saturating_mul(MIB)),
             keep_file: self.keep_blocks,
         })
     }

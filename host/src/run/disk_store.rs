@@ -57,7 +57,7 @@ impl DiskStore {
             config.volume.voxel_size_m,
             config.volume.truncation_m,
         )?;
-        file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
+        file.limit(streaming.max_bytes.unwrap_or(u64::MAX));
         Ok(Self::of(Some(file)))
     }
 
@@ -75,7 +75,7 @@ impl DiskStore {
             config.volume.truncation_m,
             at,
         )?;
-        file.limit(streaming.most_bytes.unwrap_or(u64::MAX));
+        file.limit(streaming.max_bytes.unwrap_or(u64::MAX));
         Ok(Self::of(Some(file)))
     }
 

@@ -54,11 +54,11 @@ impl Progress {
     }
 
     /// Frame `done` (from 1) is mapped; the block pool is `fill` full, in 0 to 1.
-    pub fn frame(&self, done: usize, fps: f64, fill: f64, held: bool) {
+    pub fn frame(&self, done: usize, fps: f64, fill: f64, extrapolated: bool) {
         let words = format!(
             "{fps:5.1} fps  pool {:3.0} %{}",
             100.0 * fill,
-            if held { "  pose held" } else { "" }
+            if extrapolated { "  pose extrapolated" } else { "" }
         );
         match self {
             Self::Quiet => {}

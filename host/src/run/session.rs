@@ -227,7 +227,7 @@ impl<'p, 's> Session<'p, 's> {
             position + 1,
             fps,
             f64::from(blocks.used) / f64::from(blocks.capacity),
-            row.held(),
+            row.is_extrapolated(),
         );
         let evicted = self.store.take_evicted();
         let mut view =

@@ -32,6 +32,6 @@ impl<'s> MapView<'s> for LiveMap<'_, 's> {
     }
 
     fn plan(&mut self, ahead_s: f32) -> PlanningReport {
-        self.mapper.plan(ahead_s)
+        self.mapper.update_planning_maps(ahead_s)
     }
 }

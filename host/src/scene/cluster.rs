@@ -71,7 +71,7 @@ fn mean(sum: u32, count: u32) -> u8 {
 
 /// A mesh that is simplified while it comes in.
 pub struct VertexClustering {
-    most_triangles: usize,
+    max_triangles: usize,
     cell_m: f32,
     cells: HashMap<[i32; 3], u32>,
     clusters: Vec<Cluster>,
@@ -84,9 +84,9 @@ pub struct VertexClustering {
 
 impl VertexClustering {
     /// Cells of this side, and so many triangles at most.
-    pub fn new(cell_m: f32, most_triangles: usize) -> Self {
+    pub fn new(cell_m: f32, max_triangles: usize) -> Self {
         Self {
-            most_triangles,
+            max_triangles,
             cell_m,
             cells: HashMap::new(),
             clusters: Vec::new(),
@@ -122,8 +122,8 @@ impl VertexClustering {
 
     /// Whether more stay than may.
     pub fn is_full(&self) -> bool {
-        self.triangles.len() > self.most_triangles
-            || self.clusters.len() > CELLS_PER_TRIANGLE * self.most_triangles
+        self.triangles.len() > self.max_triangles
+            || self.clusters.len() > CELLS_PER_TRIANGLE * self.max_triangles
     }
 
     /// The number of the cell that a vertex is in; it counts there unless it has just done so.

@@ -27,7 +27,7 @@ use dynvox_core::geometry::Transform;
 /// Name of the folder of objects in the run folder.
 pub const OBJECTS_FOLDER: &str = "objects";
 /// Triangles of all meshes together, unless something else is asked for.
-pub const MOST_TRIANGLES: usize = 500_000;
+pub const MAX_TRIANGLES: usize = 500_000;
 
 /// A cell and those around it.
 fn neighbourhood([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {

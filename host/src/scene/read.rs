@@ -15,11 +15,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Frames at most: of a longer run every second, third and so on is shown.
-const MOST_FRAMES: usize = 5_000;
+const MAX_FRAMES: usize = 5_000;
 /// Objects may have this share of all triangles.
 const OBJECT_SHARE: usize = 5;
 /// Triangles of one object at most.
-const MOST_OBJECT_TRIANGLES: usize = 20_000;
+const MAX_OBJECT_TRIANGLES: usize = 20_000;
 /// Triangles of one object that are always granted.
 const LEAST_OBJECT_TRIANGLES: usize = 500;
 
@@ -29,12 +29,12 @@ impl Scene {
     ///
     /// # Errors
     /// There is no trajectory or no table of frames, or a file is damaged.
-    pub fn read(folder: &Path, most_triangles: usize) -> Result<Self, FormatError> {
-        let objects = objects(&folder.join(OBJECTS_FOLDER), most_triangles / OBJECT_SHARE)?;
+    pub fn read(folder: &Path, max_triangles: usize) -> Result<Self, FormatError> {
+        let objects = objects(&folder.join(OBJECTS_FOLDER), max_triangles / OBJECT_SHARE)?;
         let of_objects: usize = objects.iter().map(|object| object.mesh.triangles.len()).sum();
         let map = folder.join(MAP_FILE);
         let (static_map, static_triangles) = if map.is_file() {
-            simplified(&map, true, most_triangles.saturating_sub(of_objects))?
+            simplified(&map, true, max_triangles.saturating_sub(of_objects))?
         } else {
             (IndexedMesh::default(), 0)
         };
@@ -74,13 +74,13 @@ pub fn object_files(folder: &Path) -> Result<Vec<(u32, String)>, FormatError> {
 }
 
 /// The objects in a folder, by track and then by name.
-fn objects(folder: &Path, most_triangles: usize) -> Result<Vec<SceneObject>, FormatError> {
+fn objects(folder: &Path, max_triangles: usize) -> Result<Vec<SceneObject>, FormatError> {
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
     let names = object_files(folder)?;
     let each =
-        (most_triangles / names.len().max(1)).clamp(LEAST_OBJECT_TRIANGLES, MOST_OBJECT_TRIANGLES);
+        (max_triangles / names.len().max(1)).clamp(LEAST_OBJECT_TRIANGLES, MAX_OBJECT_TRIANGLES);
     let object = |(id, name): (u32, String)| {
         let t_world_object = read_numbered(&folder.join(format!("{name}_kitti.txt")))?;
         let (mesh, _) = simplified(&folder.join(format!("{name}.ply")), false, each)?;
@@ -96,7 +96,7 @@ fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatErro
     let poses = read_poses(&folder.join(TRAJECTORY_FILE))?.poses;
     let truth_file = folder.join(TRUE_TRAJECTORY_FILE);
     let truth = if truth_file.is_file() { read_poses(&truth_file)?.poses } else { Vec::new() };
-    let every = rows.len().div_ceil(MOST_FRAMES).max(1);
+    let every = rows.len().div_ceil(MAX_FRAMES).max(1);
     let frame = |(row, t_world_camera): (FrameColumns, Transform)| SceneFrame {
         row,
         t_world_camera,

@@ -32,10 +32,10 @@ const COUNTS: usize = 2;
 pub fn simplified(
     path: &Path,
     static_only: bool,
-    most_triangles: usize,
+    max_triangles: usize,
 ) -> Result<(IndexedMesh, u64), FormatError> {
     let mut mesh = MeshFile { ply: PlyMesh::open(path)?, static_only };
-    mesh.simplified(most_triangles.max(LEAST_TRIANGLES)).map_err(FormatError::read(path))
+    mesh.simplified(max_triangles.max(LEAST_TRIANGLES)).map_err(FormatError::read(path))
 }
 
 struct MeshFile {
@@ -53,11 +53,11 @@ struct Clustered {
 }
 
 impl MeshFile {
-    fn simplified(&mut self, most_triangles: usize) -> io::Result<(IndexedMesh, u64)> {
-        let mut cell_m = self.cell_m(most_triangles)?;
+    fn simplified(&mut self, max_triangles: usize) -> io::Result<(IndexedMesh, u64)> {
+        let mut cell_m = self.cell_m(max_triangles)?;
         loop {
             let Clustered { clustering, read, asked_for } =
-                self.clustered(cell_m, most_triangles, 1)?;
+                self.clustered(cell_m, max_triangles, 1)?;
             if !clustering.is_full() {
                 return Ok((clustering.finish(), asked_for));
             }
@@ -67,8 +67,8 @@ impl MeshFile {
 
     /// How large cells have to be: of a mesh with more triangles than may stay, those that stay of
     /// some of its pieces tell.
-    fn cell_m(&mut self, most_triangles: usize) -> io::Result<f32> {
-        let (all, most) = (self.ply.triangles as f64, most_triangles as f64);
+    fn cell_m(&mut self, max_triangles: usize) -> io::Result<f32> {
+        let (all, most) = (self.ply.triangles as f64, max_triangles as f64);
         if all <= most {
             return Ok(LEAST_CELL_M);
         }
@@ -76,7 +76,7 @@ impl MeshFile {
         let mut cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
         for _ in 0..COUNTS {
             let Clustered { clustering, read, .. } =
-                self.clustered(cell_m, most_triangles, every)?;
+                self.clustered(cell_m, max_triangles, every)?;
             let will_stay = clustering.triangles() as f64 * all / read as f64;
             cell_m = (cell_m * growth(will_stay / most)).max(LEAST_CELL_M);
         }
@@ -87,11 +87,11 @@ impl MeshFile {
     fn clustered(
         &mut self,
         cell_m: f32,
-        most_triangles: usize,
+        max_triangles: usize,
         every: usize,
     ) -> io::Result<Clustered> {
         let (mut clustering, mut read, mut asked_for) =
-            (VertexClustering::new(cell_m, most_triangles), 0, 0);
+            (VertexClustering::new(cell_m, max_triangles), 0, 0);
         let static_only = self.static_only;
         self.ply.faces(every, |corners, vertices| {
             read += 1;

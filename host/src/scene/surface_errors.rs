@@ -56,7 +56,7 @@ impl SurfaceErrorMap {
     }
 
     /// The error that four of five comparisons are below, m; `None` without any.
-    pub fn most_m(&self) -> Option<f32> {
+    pub fn max_m(&self) -> Option<f32> {
         let mut errors_m: Vec<f32> =
             self.cells.values().flatten().map(|(_, error_m)| *error_m).collect();
         errors_m.sort_unstable_by(f32::total_cmp);
@@ -75,11 +75,11 @@ mod tests {
     #[test]
     fn the_nearest_comparison_within_reach_counts() {
         let folder = tempfile::TempDir::new().unwrap();
-        assert_eq!(SurfaceErrorMap::read(folder.path()).unwrap().most_m(), None);
+        assert_eq!(SurfaceErrorMap::read(folder.path()).unwrap().max_m(), None);
         let rows = "x_m,y_m,z_m,points,error_m\n0.1,0.1,0.1,3,0.02\n0.5,0.1,0.1,1,0.4\n";
         std::fs::write(folder.path().join("surface_errors.csv"), rows).unwrap();
         let errors = SurfaceErrorMap::read(folder.path()).unwrap();
-        assert_eq!(errors.most_m(), Some(0.4));
+        assert_eq!(errors.max_m(), Some(0.4));
         assert_eq!(
             [0.2, 0.35, 0.75, 0.9].map(|x| errors.error_m([x, 0.1, 0.1])),
             [Some(0.02), Some(0.4), Some(0.4), None]

@@ -100,7 +100,7 @@ fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
     for file in ["trajectory_kitti.txt", "trajectory_tum.txt"] {
         let given = summary(run(file, &["--egomotion", &format!("file:stereo/{file}")]));
         assert_eq!(
-            (&given["egomotion"]["source"], &given["egomotion"]["held_frames"]),
+            (&given["egomotion"]["source"], &given["egomotion"]["extrapolated_frames"]),
             (&"file".into(), &0.into())
         );
         let [there, here] =

@@ -10,7 +10,7 @@ use std::ptr;
 /// Calls of one program at most.
 const CALLS: usize = 12;
 /// Largest buffer, bytes: larger mappers are left out.
-const BUFFER_MAX: usize = 8 << 20;
+const MAX_BUFFER: usize = 8 << 20;
 /// Bytes before and behind the buffer that no call may touch.
 const GUARD: usize = 64;
 const GUARDED: u8 = 0xA5;
@@ -298,7 +298,7 @@ pub fn calls(bytes: &[u8]) -> bool {
     let mut len = 0;
     // SAFETY: both point to values of this function's own.
     let known = unsafe { dynvox_bytes(&raw const capacity, &raw mut len) };
-    if known != DynvoxStatus::Ok || len > BUFFER_MAX {
+    if known != DynvoxStatus::Ok || len > MAX_BUFFER {
         return false;
     }
     let mut caller = Caller::new(len);

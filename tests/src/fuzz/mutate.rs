@@ -30,9 +30,9 @@ const WORDS: [&[u8]; 24] = [
     b"-",
 ];
 /// Longest input that is made, bytes.
-const LENGTH_MAX: usize = 1 << 20;
+const MAX_LENGTH: usize = 1 << 20;
 /// Changes of one input at most.
-const CHANGES_MAX: u32 = 6;
+const MAX_CHANGES: u32 = 6;
 
 /// Changes inputs by seeded draws: equal seeds give equal inputs on every machine.
 pub struct Mutator(Random);
@@ -51,10 +51,10 @@ impl Mutator {
     pub fn mutate(&mut self, seeds: &[Vec<u8>]) -> Vec<u8> {
         let at = self.below(seeds.len());
         let mut bytes = seeds.get(at).cloned().unwrap_or_default();
-        for _ in 0..=self.0.below(CHANGES_MAX) {
+        for _ in 0..=self.0.below(MAX_CHANGES) {
             self.change(&mut bytes, seeds);
         }
-        bytes.truncate(LENGTH_MAX);
+        bytes.truncate(MAX_LENGTH);
         bytes
     }
 

@@ -7,7 +7,7 @@ use crate::imports::{Source, module};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most `use` declarations that hand a name on.
-const HANDED_ON_MAX: usize = 8;
+const MAX_HANDED_ON: usize = 8;
 
 /// A module's path from the root of its crate.
 type Module = Vec<String>;
@@ -99,7 +99,7 @@ impl Names {
 
     /// The module whose file defines a path.
     fn file_of(&self, mut path: Module) -> Module {
-        for _ in 0..HANDED_ON_MAX {
+        for _ in 0..MAX_HANDED_ON {
             let next = (0..=path.len()).rev().find_map(|len| {
                 let target = self.handed_on.get(&path[..len])?;
                 (*target != path[..len]).then(|| joined(target, &path[len..]))

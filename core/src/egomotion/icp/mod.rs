@@ -65,7 +65,7 @@ pub enum IcpStatus {
     /// The map shows too little, or the frame has too little depth.
     TooFewPairs,
     /// Pairs leave a direction free.
-    NotHeld,
+    Degenerate,
     /// Most points in view of the map lie off it.
     OffTheMap,
     /// The motion is larger than it may be.
@@ -80,7 +80,7 @@ impl IcpStatus {
         match self {
             Self::Tracked => "tracked",
             Self::TooFewPairs => "too few pairs",
-            Self::NotHeld => "direction not held",
+            Self::Degenerate => "degenerate direction",
             Self::OffTheMap => "off the map",
             Self::TooFar => "too far",
             Self::Contradicted => "contradicted by the images",
@@ -105,8 +105,8 @@ pub struct IcpReport {
     pub pairs: u32,
     /// Root mean square distance of the pairs from their planes, m.
     pub residual_rms_m: f64,
-    /// Share of the pairs that hold the direction held worst.
-    pub held: f64,
+    /// Share of the pairs that constrain the least constrained direction.
+    pub eigen_share: f64,
     /// Steps, over all levels.
     pub steps: u32,
     /// Matches of the images that agree, and how many were asked.
@@ -183,7 +183,7 @@ pub fn track(
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
             (report.points, report.pairs) = (sums.points, sums.pairs);
             report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
-            report.held = sums.equations.min_eigen_share();
+            report.eigen_share = sums.equations.min_eigen_share();
             report.t_current_previous = t_previous_current.inverse();
             report.status = classify(config, &report);
         }
@@ -197,8 +197,8 @@ fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
         IcpStatus::TooFewPairs
-    } else if report.held < f64::from(HELD_MIN) {
-        IcpStatus::NotHeld
+    } else if report.eigen_share < f64::from(HELD_MIN) {
+        IcpStatus::Degenerate
     } else if f64::from(report.pairs) < f64::from(config.pairs_min) * f64::from(report.points) {
         IcpStatus::OffTheMap
     } else if !(way_m <= f64::from(config.step_max_m) && turn_rad <= f64::from(STEP_MAX_RAD)) {

@@ -28,7 +28,7 @@ fn a_dark_right_camera_repeats_the_last_motion() {
             );
             let expected =
                 if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
-            assert_eq!((estimate.status, camera.held_frames()), (expected, frame - 1));
+            assert_eq!((estimate.status, camera.extrapolated_frames()), (expected, frame - 1));
             let (distance, _) = between(camera.t_current_previous(), &step.inverse());
             assert!(distance < 0.02);
         }
@@ -70,7 +70,7 @@ fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen
             matcher.keep_previous();
         }
         let (distance, _) = between(camera.t_world_camera(), &t_world_camera);
-        let guessed = camera.held_frames() > 0;
+        let guessed = camera.extrapolated_frames() > 0;
         assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
         assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
     }
@@ -91,7 +91,7 @@ fn the_time_of_frames_without_matches_counts_in_the_motion_over_them() {
     let over_two = matches(60, 30, &(motion() * motion()), &mut random);
     let estimate = camera.step(&config, &RIG, at_10_hz(&over_two), &mut estimator);
     assert_eq!(
-        (estimate.status, camera.held_frames()),
+        (estimate.status, camera.extrapolated_frames()),
         (MotionStatus::Estimated, 0),
         "half of the matches agree with what was expected"
     );
@@ -119,7 +119,7 @@ fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
     let leap = motion() * Transform::from_translation([0.0, 0.0, -1.0]);
     let (estimate, camera) = after_one_frame(&leap, 30);
     assert_eq!(
-        (estimate.status, estimate.t_current_previous, camera.held_frames()),
+        (estimate.status, estimate.t_current_previous, camera.extrapolated_frames()),
         (MotionStatus::Implausible, None, 1)
     );
     assert!(between(camera.t_current_previous(), &motion()).0 < 1e-3, "it moves on as before");
@@ -146,7 +146,7 @@ fn a_camera_stands_at_once_where_it_could_brake() {
 fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_above_its_guess() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
-    for frame in 1..=REFERENCE_FRAMES_MAX {
+    for frame in 1..=MAX_REFERENCE_FRAMES {
         assert_eq!((camera.is_lost(), camera.since_reference()), (false, frame - 1));
         camera.hold(0.1);
     }
@@ -155,7 +155,7 @@ fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_ab
         assert!(
             (camera.t_world_camera().translation_m[2]
                 - 1.0
-                - f64::from(REFERENCE_FRAMES_MAX + frame))
+                - f64::from(MAX_REFERENCE_FRAMES + frame))
             .abs()
                 < 1e-9
         );

@@ -150,11 +150,11 @@ fn a_held_camera_expects_the_way_since_its_reference_and_one_frame_more() {
     let turn = Transform::new([0.0, 0.02, 0.0], [0.1, 0.0, -1.0]);
     let mut camera = Egomotion { t_current_previous: turn, motion_s: 0.1, ..Egomotion::default() };
     assert!(is_near(&camera.expected(), &turn));
-    for frames in 1..REFERENCE_FRAMES_MAX {
+    for frames in 1..MAX_REFERENCE_FRAMES {
         camera.hold(0.1);
         let whole = (0..=frames).fold(Transform::IDENTITY, |way, _| turn * way);
         assert!(is_near(&camera.expected(), &whole), "after {frames} frames");
-        assert_eq!((camera.since_reference(), camera.held_frames()), (frames, frames));
+        assert_eq!((camera.since_reference(), camera.extrapolated_frames()), (frames, frames));
         assert!((camera.reference_s - 0.1 * f64::from(frames)).abs() < 1e-6);
         let there = (0..frames).fold(Transform::IDENTITY, |way, _| way * turn.inverse());
         assert!(
@@ -175,15 +175,17 @@ fn a_given_pose_tells_the_motion_and_ends_what_was_held() {
     let mut camera = moving();
     camera.hold(0.1);
     camera.advance(None);
-    assert_eq!((camera.held_frames(), camera.since_reference()), (2, 0));
+    assert_eq!((camera.extrapolated_frames(), camera.since_reference()), (2, 0));
     let (before, pose) =
         (*camera.t_world_camera(), Transform::new([0.0, 0.3, 0.0], [2.0, 0.0, 5.0]));
     camera.set_pose(&pose);
     assert!(is_near(camera.t_world_camera(), &pose) && is_near(&camera.t_world_reference, &pose));
     assert!(is_near(&(before * camera.t_current_previous().inverse()), &pose));
-    assert_eq!((camera.held_frames(), camera.motion_s), (0, 0.0));
+    assert_eq!((camera.extrapolated_frames(), camera.motion_s), (0, 0.0));
     camera.advance(Some(ahead(-0.5)));
-    assert!(is_near(camera.t_world_camera(), &(pose * ahead(0.5))) && camera.held_frames() == 0);
+    assert!(
+        is_near(camera.t_world_camera(), &(pose * ahead(0.5))) && camera.extrapolated_frames() == 0
+    );
     camera.begin_segment();
     let guessed = camera.t_world_camera().translation_m;
     assert!(
@@ -203,7 +205,7 @@ fn every_field_and_every_figure_of_the_estimate_is_in_the_digest() {
         |camera| camera.t_current_previous.rotation[1] += 0.1,
         |camera| camera.motion_s += 1.0,
         |camera| camera.inliers += 1,
-        |camera| camera.held += 1,
+        |camera| camera.extrapolated += 1,
         |camera| camera.segment += 1,
         |camera| camera.random = Random::new(1),
     ];

@@ -18,7 +18,7 @@ fn nothing_that_took_place_is_nothing_to_say() {
     assert_eq!(severity_of(|report| report.prune.blocks_freed = 9), Severity::Info);
     assert_eq!(severity_of(|report| report.allocation.made = 9), Severity::Info);
     assert_eq!(
-        severity_of(|report| report.allocation.eviction.kept = 9),
+        severity_of(|report| report.allocation.eviction.stored = 9),
         Severity::Info,
         "a block that was stored is not lost"
     );
@@ -26,7 +26,7 @@ fn nothing_that_took_place_is_nothing_to_say() {
 
 #[test]
 fn a_guessed_pose_and_all_that_rests_on_it_affect_the_map() {
-    assert_eq!(severity_of(|report| report.pose = PoseOrigin::Held), Severity::MapAffected);
+    assert_eq!(severity_of(|report| report.pose = PoseOrigin::Extrapolated), Severity::MapAffected);
     assert_eq!(severity_of(|report| report.segment = 1), Severity::MapAffected);
     assert_eq!(severity_of(|report| report.pose = PoseOrigin::Relocalized), Severity::Recovered);
 }

@@ -32,12 +32,12 @@ fn a_window_changes_no_digest_and_without_one_nothing_is_planned() {
     let digests =
         |reports: &[Report]| reports.iter().map(|report| report.digest).collect::<Vec<_>>();
     let with = mapped(&WITH_WINDOW, &walk, |mapper, reports| {
-        let report = mapper.plan(0.0);
+        let report = mapper.update_planning_maps(0.0);
         assert!(report.occupied > 50 && report.free > 50, "{report:?}");
         digests(reports)
     });
     let without = mapped(&CAPACITY, &walk, |mapper, reports| {
-        assert_eq!(mapper.plan(0.0), crate::planning::PlanningReport::default());
+        assert_eq!(mapper.update_planning_maps(0.0), crate::planning::PlanningReport::default());
         assert!(mapper.planning().is_empty() && mapper.planning().slice_distance([0; 3]).is_none());
         digests(reports)
     });
@@ -51,7 +51,7 @@ fn a_resumed_run_plans_as_the_one_that_never_stopped() {
         for at in FRAMES..FRAMES + 2 {
             walk.step(at, mapper);
         }
-        let reports = [mapper.plan(0.0), mapper.plan_ahead(1.5)];
+        let reports = [mapper.update_planning_maps(0.0), mapper.plan_ahead(1.5)];
         (reports, mapper.planning().digest())
     };
     let (bytes, expected) =
@@ -63,15 +63,15 @@ fn a_resumed_run_plans_as_the_one_that_never_stopped() {
 fn asking_for_a_plan_changes_no_later_frame() {
     let walk = Walk::new(FRAMES + 1);
     let asked = mapped(&WITH_WINDOW, &walk, |mapper, _| {
-        mapper.plan(0.0);
+        mapper.update_planning_maps(0.0);
         mapper.plan_ahead(3.0);
         let report = walk.step(FRAMES, mapper);
-        mapper.plan(0.0);
+        mapper.update_planning_maps(0.0);
         (report.digest, mapper.planning().digest())
     });
     let not_asked = mapped(&WITH_WINDOW, &walk, |mapper, _| {
         let report = walk.step(FRAMES, mapper);
-        mapper.plan(0.0);
+        mapper.update_planning_maps(0.0);
         (report.digest, mapper.planning().digest())
     });
     assert_eq!(asked, not_asked);

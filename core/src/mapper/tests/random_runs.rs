@@ -82,7 +82,7 @@ struct Coverage {
     measured: u32,
     objects: u32,
     waiting: u32,
-    held: u32,
+    extrapolated: u32,
     missed: u32,
     tracked_only: u32,
     evicted: u32,
@@ -94,7 +94,7 @@ impl Coverage {
         self.measured += mapper.tracks().filter(|track| track.inliers > 0).count() as u32;
         self.objects += report.instances.objects.objects;
         self.waiting += report.instances.objects.caught_up;
-        self.held += u32::from(report.pose == PoseOrigin::Held);
+        self.extrapolated += u32::from(report.pose == PoseOrigin::Extrapolated);
         self.missed += report.instances.tracks.tracks - report.instances.tracks.detected;
         self.tracked_only += report.instances.detections.tracked_only;
         self.evicted += report.allocation.eviction.lost;
@@ -102,8 +102,17 @@ impl Coverage {
     }
 
     fn least(&self) -> u32 {
-        let Self { measured, objects, waiting, held, missed, tracked_only, evicted, pruned } = self;
-        *[measured, objects, waiting, held, missed, tracked_only, evicted, pruned]
+        let Self {
+            measured,
+            objects,
+            waiting,
+            extrapolated,
+            missed,
+            tracked_only,
+            evicted,
+            pruned,
+        } = self;
+        *[measured, objects, waiting, extrapolated, missed, tracked_only, evicted, pruned]
             .into_iter()
             .min()
             .unwrap()

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     PoseOrigin,
-    egomotion::REFERENCE_FRAMES_MAX,
+    egomotion::MAX_REFERENCE_FRAMES,
     view::{RaycastError, RaycastView},
 };
 
@@ -82,7 +82,7 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
 
 /// Frames until the camera is covered, and the first that is seen again.
 const SEEN: usize = 5;
-const AGAIN: usize = SEEN + REFERENCE_FRAMES_MAX as usize + 1;
+const AGAIN: usize = SEEN + MAX_REFERENCE_FRAMES as usize + 1;
 
 /// Walks, is covered until it is lost, and goes on; the last report, and how far its pose is from
 /// where the camera is, m.
@@ -108,11 +108,11 @@ fn lost(capacity: &Capacity) -> (Report, f64) {
         } else if at < SEEN {
             PoseOrigin::Estimated
         } else {
-            PoseOrigin::Held
+            PoseOrigin::Extrapolated
         };
         assert!(last.pose == expected || at == AGAIN + 1, "frame {at}: {:?}", last.pose);
         assert!(
-            !last.fused || last.pose != PoseOrigin::Held,
+            !last.fused || last.pose != PoseOrigin::Extrapolated,
             "a frame whose pose is a guess is not fused"
         );
     }

@@ -204,7 +204,7 @@ fn of_more_crops_than_there_are_entries_the_latest_wait() {
     with(&Capacity { crop_pixels: 400_000, ..CAPACITY }, &config, |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         let board = Board { half_m: [0.8, 0.5], points: 20, ..Board::CAR };
-        let dropped: u32 = (0..CROPS_MAX as u32 + 12)
+        let dropped: u32 = (0..MAX_CROPS as u32 + 12)
             .map(|frame| {
                 let z = 0.01 * f64::from(frame);
                 run.step(shift(0.0, 0.0, z), &[(&board, Some(shift(0.0, 0.0, 9.0)))])
@@ -219,9 +219,9 @@ fn of_more_crops_than_there_are_entries_the_latest_wait() {
             .of(1)
             .map(|(crop, ..)| crop.t_world_camera.translation_m[2])
             .collect();
-        assert_eq!((cameras.len(), dropped), (CROPS_MAX, 12));
+        assert_eq!((cameras.len(), dropped), (MAX_CROPS, 12));
         assert!(
-            (cameras[0] - 0.12).abs() < 1e-9 && (cameras[CROPS_MAX - 1] - 1.39).abs() < 1e-9,
+            (cameras[0] - 0.12).abs() < 1e-9 && (cameras[MAX_CROPS - 1] - 1.39).abs() < 1e-9,
             "{cameras:?}"
         );
     });

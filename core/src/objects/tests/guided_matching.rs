@@ -99,11 +99,11 @@ fn the_grid_is_no_finer_than_three_pixels_and_holds_at_most_its_capacity() {
         let step = step_px(width, height);
         let points = (width / step) * (height / step);
         assert!(
-            step >= 3 && points <= GUIDED_MATCHES_MAX as i32,
+            step >= 3 && points <= MAX_GUIDED_MATCHES as i32,
             "{width} x {height}: {step}, {points}"
         );
         assert!(
-            step == 3 || points * 3 > GUIDED_MATCHES_MAX as i32,
+            step == 3 || points * 3 > MAX_GUIDED_MATCHES as i32,
             "{width} x {height}: {step}, {points}"
         );
     }

@@ -27,7 +27,7 @@ use crate::{
         CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt,
         MotionConfig, MotionEvidence, MotionState, Overlap, StateConfig, TrackCount, TrackReport,
         Tracker, TrackingConfig,
-        tests::{GUIDED_MATCHES_MAX, MatchOwner, step_px},
+        tests::{MAX_GUIDED_MATCHES, MatchOwner, step_px},
     },
 };
 use nalgebra::{Point3, Vector3};

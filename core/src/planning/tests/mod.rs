@@ -110,7 +110,7 @@ impl Scene {
         self.volume.fuse(&view, seen, &Serial);
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
         let ground = GroundPlane::find(&RIG, disparity_q8);
-        self.planning.observe(&Sight {
+        self.planning.observe(&DepthView {
             rig: &RIG,
             t_world_camera: &t_world_camera,
             disparity_q8,

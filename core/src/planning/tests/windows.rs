@@ -154,7 +154,7 @@ fn what_moved_on_is_no_obstacle_once_it_is_seen_through_and_a_thin_pole_stays_on
     scene.planning.update(&scene.volume);
     assert_eq!([state(&scene, car), state(&scene, pole)], [CellState::Free, CellState::Occupied]);
     let through = scene.planning.ray(&scene.volume, [-1.1, 0.6, 2.0], [0.0, 0.0, 1.0], 5.0);
-    assert_eq!(through.end, WayEnd::Free, "{through:?}");
+    assert_eq!(through.end, PathEnd::Free, "{through:?}");
 }
 
 #[test]

@@ -109,7 +109,7 @@ pub enum CalibrationState {
     #[default]
     Sound,
     /// The offset is above .3 px: depth at 20 m is off by 2 per cent and more without correction.
-    Off,
+    Inaccurate,
     /// The offset is above 1 px: the cameras should be calibrated anew.
     Recalibrate,
 }
@@ -142,7 +142,7 @@ impl SelfCalibrationReport {
         if !self.known || offset <= Self::WARNING_PX {
             CalibrationState::Sound
         } else if offset <= Self::RECALIBRATE_PX {
-            CalibrationState::Off
+            CalibrationState::Inaccurate
         } else {
             CalibrationState::Recalibrate
         }

@@ -159,7 +159,7 @@ fn what_is_only_to_be_reported_is_not_applied_and_what_is_off_not_sought() {
     let with = |self_calibration| RigConfig { self_calibration, ..RigConfig::default() };
     let reported = driven(&with(SelfCalibrationMode::Report), &offset(0.7), DRIVING, FAR_M, 30);
     assert!(reported.applied.is_zero() && (reported.report().offset_px - 0.7).abs() < 0.05);
-    assert_eq!(reported.report().state(), CalibrationState::Off);
+    assert_eq!(reported.report().state(), CalibrationState::Inaccurate);
     let off = driven(&with(SelfCalibrationMode::Off), &offset(0.7), DRIVING, FAR_M, 30);
     assert_eq!(off.report(), SelfCalibrationReport::default());
 }

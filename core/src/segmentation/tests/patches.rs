@@ -94,7 +94,7 @@ fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_el
             );
             let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
             let (mut members, mut values) =
-                (vec![Candidate::default(); PATCHES_MAX], vec![0.0; CANDIDATES_MAX]);
+                (vec![Candidate::default(); MAX_PATCHES], vec![0.0; MAX_CANDIDATES]);
             let extent = extent::Extent {
                 low: [1.8, 0.4, extent_z_m - 0.1],
                 high: [3.2, 1.4, extent_z_m + 0.1],

@@ -26,7 +26,7 @@ use crate::{
 
 /// Slope from which on a triangle bridges two surfaces, px of disparity per px: its plane is searched
 /// but not preferred. Without a limit 4.8 instead of 4.5 % are off on KITTI 2012.
-const PLANE_SLOPE_MAX: f32 = 0.7;
+const MAX_PLANE_SLOPE: f32 = 0.7;
 /// Difference from which on the ends of a gap are two surfaces, px, as published.
 const GAP_DISCONTINUITY: u16 = 3;
 
@@ -162,7 +162,7 @@ impl StereoMatcher<'_> {
                 for (mesh, out) in [(left_mesh, &mut *band.left), (right_mesh, &mut *band.right)] {
                     executor.vectors().run(RasterisePlanes {
                         mesh,
-                        slope_max: PLANE_SLOPE_MAX,
+                        slope_max: MAX_PLANE_SLOPE,
                         first: band.first,
                         width,
                         out,

@@ -14,9 +14,9 @@ use crate::{
 use bytemuck::TransparentWrapper;
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
-const PAST_MAX: usize = 5;
+const MAX_PAST: usize = 5;
 /// The shares of a colour seen for each weight of the past, times -32,768.
-const COLOUR_SHARES: [i16; PAST_MAX + 1] = [
+const COLOUR_SHARES: [i16; MAX_PAST + 1] = [
     share_of_one(0),
     share_of_one(1),
     share_of_one(2),

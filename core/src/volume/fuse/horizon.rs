@@ -15,7 +15,7 @@ const TILE_SHIFT: u32 = 3;
 /// From level to level, as a shift.
 const LEVEL_SHIFT: u32 = 2;
 /// Most tiles of a level to look at along an axis before the next one is asked.
-const MOST_TILES: usize = 4;
+const MAX_TILES: usize = 4;
 
 /// Greatest depths by tile.
 #[derive(Clone, Copy)]
@@ -61,8 +61,8 @@ impl<'a> Horizon<'a> {
     /// image.
     pub fn greatest_m(&self, columns: [usize; 2], rows: [usize; 2]) -> f32 {
         let across = |shift: u32, [first, last]: [usize; 2]| (last >> shift) - (first >> shift);
-        let few = across(self.fine.shift, columns) < MOST_TILES
-            && across(self.fine.shift, rows) < MOST_TILES;
+        let few = across(self.fine.shift, columns) < MAX_TILES
+            && across(self.fine.shift, rows) < MAX_TILES;
         let Tiles { depth_m, columns: stride, shift } = if few { self.fine } else { self.coarse };
         let [first, last] = columns.map(|column| column >> shift);
         let mut greatest_m = 0.0;

@@ -55,10 +55,10 @@ fn run(
     with_volume(&Capacity { blocks, ..CAPACITY }, config, |volume| {
         let add = |sum: &mut EvictionReport, report: EvictionReport| {
             *sum = EvictionReport {
-                kept: sum.kept + report.kept,
+                stored: sum.stored + report.stored,
                 lost: sum.lost + report.lost,
                 empty: sum.empty + report.empty,
-                returned: sum.returned + report.returned,
+                loaded: sum.loaded + report.loaded,
             };
         };
         for (i, &z) in positions_m.iter().enumerate() {
@@ -101,8 +101,8 @@ fn a_run_that_needs_five_pools_leaves_the_same_map_as_an_unbounded_one() {
     run(6_000, &config(0), &ahead, &mut unbounded);
     let pool = unbounded.blocks.len() / 5;
     let report = run(pool, &config(0), &ahead, &mut streamed);
-    assert!(unbounded.blocks.len() >= 5 * pool && report.kept as usize >= unbounded.blocks.len());
-    assert_eq!((report.lost, report.returned), (0, 0));
+    assert!(unbounded.blocks.len() >= 5 * pool && report.stored as usize >= unbounded.blocks.len());
+    assert_eq!((report.lost, report.loaded), (0, 0));
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
 }
 
@@ -112,7 +112,7 @@ fn there_and_back_again_is_the_same_map_too() {
     let (mut unbounded, mut streamed) = (MemoryStore::default(), MemoryStore::default());
     run(6_000, &config(0), &way, &mut unbounded);
     let report = run(unbounded.blocks.len() * 2 / 5, &config(0), &way, &mut streamed);
-    assert!(report.returned > 0 && report.lost == 0);
+    assert!(report.loaded > 0 && report.lost == 0);
     assert!(unbounded.blocks == streamed.blocks, "bit for bit");
 }
 
@@ -136,7 +136,7 @@ fn what_a_closed_store_refuses_is_counted_as_lost() {
     let ahead: Vec<f64> = (0..60).map(|i| f64::from(i) * 0.4).collect();
     let mut closed = MemoryStore { is_closed: true, ..MemoryStore::default() };
     let report = run(900, &config(0), &ahead, &mut closed);
-    assert!(report.lost > 900 && report.kept == 0);
+    assert!(report.lost > 900 && report.stored == 0);
 }
 
 #[test]

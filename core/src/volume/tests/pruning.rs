@@ -4,7 +4,7 @@ mod by_distance;
 
 use super::*;
 use crate::random::Random;
-use crate::volume::{block::Voxels, prune::Rule};
+use crate::volume::{block::Voxels, prune::PruneRule};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A config that prunes weights up to `prune_weight` after `prune_lag` frames.
@@ -13,8 +13,8 @@ fn pruning(prune_weight: u8, prune_lag: u32) -> VolumeConfig {
 }
 
 /// Resets voxels of low weight, wherever they are.
-fn by_weight(weight: u8) -> Rule {
-    Rule { weight, distance: 0.0 }
+fn by_weight(weight: u8) -> PruneRule {
+    PruneRule { weight, distance: 0.0 }
 }
 
 /// Makes a block whose voxels all have that weight, with its digest entered.

@@ -89,7 +89,8 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     if !args.json {
         outln!(
-            "| fault | unreported error, m | deg | wrong and unreported | fused from a wrong pose | held | map affected | recovered after |"
+            "| fault | unreported error, m | deg | wrong and unreported | fused from a wrong pose \
+             | extrapolated | map affected | recovered after |"
         );
         outln!("|---|---|---|---|---|---|---|---|");
     }
@@ -112,13 +113,14 @@ fn line(FaultRow { fault, outcome }: &FaultRow) -> String {
         unreported_deg,
         unreported_frames,
         wrong_fused,
-        held,
+        extrapolated,
         map_affected,
         recovered_after,
     } = outcome;
     let recovered = recovered_after.map_or_else(|| "not".to_owned(), |frames| frames.to_string());
     format!(
-        "| `{fault}` | {unreported_m:.2} | {unreported_deg:.2} | {unreported_frames} | {wrong_fused} | {held} | {map_affected} | {recovered} |"
+        "| `{fault}` | {unreported_m:.2} | {unreported_deg:.2} | {unreported_frames} \
+         | {wrong_fused} | {extrapolated} | {map_affected} | {recovered} |"
     )
 }
 

@@ -4,7 +4,7 @@
 use crate::formats::{SETTINGS_FILE, SUMMARY_FILE, TRUE_TRAJECTORY_FILE, kitti_line};
 use crate::report::{self, Summary};
 use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
-use crate::scene::{MOST_TRIANGLES, Scene, glb};
+use crate::scene::{MAX_TRIANGLES, Scene, glb};
 use maud::html;
 use std::fs::File;
 use std::io::{BufWriter, Result, Write};
@@ -27,7 +27,7 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
             Incomplete::add_missing(&mut incomplete, name, &error.to_string());
         }
     }
-    let scene = Scene::read(folder.path(), MOST_TRIANGLES);
+    let scene = Scene::read(folder.path(), MAX_TRIANGLES);
     if let Ok(scene) = &scene
         && let Err(error) = folder.write(GLB_FILE, |out| glb::write(out, scene))
     {

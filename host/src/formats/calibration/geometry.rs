@@ -35,15 +35,15 @@ impl RectifiedSize {
     /// Least side, px.
     const LEAST_PX: u32 = 32;
     /// Largest side, px.
-    const MOST_PX: u32 = 4_096;
+    const MAX_PX: u32 = 4_096;
 
     /// One row per setting.
     pub const SETTINGS: &'static [Row] = &[
         Row::user("rectify.width_px", "px", |c| Number(c.width_px.map(f64::from)))
-            .range(Range::Within(Self::LEAST_PX as f32, Self::MOST_PX as f32))
+            .range(Range::Within(Self::LEAST_PX as f32, Self::MAX_PX as f32))
             .text("Width of rectified images; with `height_px` or not at all."),
         Row::user("rectify.height_px", "px", |c| Number(c.height_px.map(f64::from)))
-            .range(Range::Within(Self::LEAST_PX as f32, Self::MOST_PX as f32))
+            .range(Range::Within(Self::LEAST_PX as f32, Self::MAX_PX as f32))
             .text("Height of rectified images."),
         Row::user("rectify.focal_px", "px", |c| Number(c.focal_px)).range(Range::POSITIVE).text(
             "Focal length of rectified images, with a size only; the least that leaves no pixel \
@@ -56,7 +56,7 @@ impl RectifiedSize {
     /// # Errors
     /// Sizes out of range, or one figure without the other.
     pub fn sizing(&self) -> Result<Sizing, String> {
-        let sides = Self::LEAST_PX..=Self::MOST_PX;
+        let sides = Self::LEAST_PX..=Self::MAX_PX;
         match (self.width_px, self.height_px, self.focal_px) {
             (None, None, None) => {
                 let [max_width, max_height] = LARGEST_PX;
@@ -68,7 +68,7 @@ impl RectifiedSize {
                 Err(format!(
                     "the rectified size {width} x {height} px must lie within {} to {} px a side",
                     Self::LEAST_PX,
-                    Self::MOST_PX
+                    Self::MAX_PX
                 ))
             }
             (Some(_), Some(_), Some(focal_px)) if !(focal_px.is_finite() && focal_px > 0.0) => {

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 /// Most numbers in a list of a calibration.
-const MOST_NUMBERS: usize = 64;
+const MAX_NUMBERS: usize = 64;
 
 /// Reads values one by one; `None` where the bytes end.
 struct Reader<'m> {
@@ -131,7 +131,7 @@ impl CameraInfo {
         let (height, width) = (reader.u32()?, reader.u32()?);
         let model = reader.text()?.to_owned();
         let count = reader.u32()? as usize;
-        if count > MOST_NUMBERS {
+        if count > MAX_NUMBERS {
             return None;
         }
         let distortion = (0..count).map(|_| reader.f64()).collect::<Option<_>>()?;

@@ -21,7 +21,7 @@ enum Planted {
 }
 
 /// A recording with a fault.
-struct Spoilt<'s> {
+struct CorruptedSource<'s> {
     source: &'s dyn FrameSource,
     frames: &'s [StereoImages],
     planted: Planted,
@@ -52,7 +52,7 @@ fn resampled(from: &Image<u8>, at: impl Fn(f64, f64) -> [f64; 2]) -> Image<u8> {
     Image::new(width, height, (0..width * height).map(pixel).collect()).unwrap()
 }
 
-impl FrameSource for Spoilt<'_> {
+impl FrameSource for CorruptedSource<'_> {
     fn info(&self) -> &SourceInfo {
         &self.info
     }
@@ -115,7 +115,7 @@ fn found(source: &dyn FrameSource, frames: &[StereoImages], planted: Planted) ->
     if planted == Planted::Millimetres {
         info.rig.baseline_m *= 1e3;
     }
-    let spoilt = Spoilt { source, frames, planted, info };
+    let spoilt = CorruptedSource { source, frames, planted, info };
     examine(&spoilt, &(0..spoilt.len()).collect::<Vec<_>>()).unwrap()
 }
 

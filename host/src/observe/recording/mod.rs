@@ -24,7 +24,7 @@ pub const RECORDING_FILE: &str = "run.mcap";
 /// What the map shows, and the planner's window, are in every so many frames.
 const MAP_EVERY: usize = 10;
 /// Poses in the trajectory at the end, at most.
-const MOST_POSES: usize = 5_000;
+const MAX_POSES: usize = 5_000;
 
 /// Writes the recording. What the disk refuses ends it, and the run goes on without it.
 #[derive(Default, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ struct Recording {
     writer: mcap::Writer<BufWriter<File>>,
     channels: [u16; TOPICS.len()],
     sequence: u32,
-    /// Every so many frames' poses are in the trajectory, so that there are at most [`MOST_POSES`].
+    /// Every so many frames' poses are in the trajectory, so that there are at most [`MAX_POSES`].
     poses_every: usize,
     poses: Vec<Transform>,
 }
@@ -90,7 +90,7 @@ impl Recording {
         if position.is_multiple_of(self.poses_every) {
             self.poses.push(*t_world_camera);
         }
-        if self.poses.len() > MOST_POSES {
+        if self.poses.len() > MAX_POSES {
             self.poses = self.poses.iter().step_by(2).copied().collect();
             self.poses_every *= 2;
         }

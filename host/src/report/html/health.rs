@@ -60,7 +60,7 @@ fn counters(run: &RunRecord) -> Vec<Vec<String>> {
         ("blocks loaded back", totals.loaded),
         ("most comparisons in one lookup of the index", u64::from(totals.probes_most)),
         ("blocks lost", blocks.lost()),
-        ("blocks stored at the end", u64::from(blocks.store.end.kept)),
+        ("blocks stored at the end", u64::from(blocks.store.end.stored)),
         ("records on disk, superseded ones included", blocks.store.records),
         ("bytes on disk", blocks.store.bytes),
         ("most frames in the pruning window", totals.history_frames_most as u64),
@@ -74,7 +74,7 @@ fn counters(run: &RunRecord) -> Vec<Vec<String>> {
         ("values of given depth refused", health.depth_values_refused),
         ("detections refused", u64::from(health.detections.refused())),
         ("tracks and object volumes refused", health.tracks_refused),
-        ("poses extrapolated", trajectory.held_frames as u64),
+        ("poses extrapolated", trajectory.extrapolated_frames as u64),
         ("segments of the map", u64::from(trajectory.segments)),
     ];
     rows.iter().map(|(name, value)| vec![(*name).to_owned(), grouped(*value)]).collect()

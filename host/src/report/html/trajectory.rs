@@ -28,7 +28,7 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Trajectory from above" }
             p.soft.small {
-                (format!("{length_m:.1} m travelled; ")) (trajectory.held_frames) " of " (run.frames.len())
+                (format!("{length_m:.1} m travelled; ")) (trajectory.extrapolated_frames) " of " (run.frames.len())
                 " poses extrapolated at constant velocity"
             }
             (from_above(&paths))

@@ -8,7 +8,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 
 /// Points of a cloud at most: of more, every second, third and so on is shown.
-const MOST_POINTS: usize = 60_000;
+const MAX_POINTS: usize = 60_000;
 /// Steps along the longest side of a cloud's box.
 const STEPS: f32 = 65_535.0;
 /// What pruning took.
@@ -87,7 +87,7 @@ fn cloud(
     points: &[([f32; 3], [u8; 3])],
     side_m: f32,
 ) -> io::Result<Option<Cloud>> {
-    let every = points.len().div_ceil(MOST_POINTS).max(1);
+    let every = points.len().div_ceil(MAX_POINTS).max(1);
     let mut points: Vec<_> = points.iter().step_by(every).copied().collect();
     let positions_m = points.iter().map(|(at, _)| *at).collect();
     let Some(bounds_m) = IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m() else {
@@ -119,16 +119,16 @@ mod tests {
     #[test]
     fn a_cloud_is_thinned_out_and_keeps_places_and_colours() {
         assert!(cloud("a", String::new(), &[], 1.0).unwrap().is_none());
-        let points: Vec<_> = (0..3 * MOST_POINTS)
+        let points: Vec<_> = (0..3 * MAX_POINTS)
             .map(|at| ([(at % 200) as f32, 5.0, (at / 200) as f32], [1, 2, 3]))
             .collect();
         let Cloud { head, bytes } = cloud("a", "b".to_owned(), &points, 0.4).unwrap().unwrap();
-        assert_eq!((head.points, head.low_m, head.size_m), (MOST_POINTS, [0.0, 5.0, 0.0], 899.0));
+        assert_eq!((head.points, head.low_m, head.size_m), (MAX_POINTS, [0.0, 5.0, 0.0], 899.0));
         let mut planes = Vec::new();
         flate2::read::ZlibDecoder::new(&bytes[..]).read_to_end(&mut planes).unwrap();
-        assert_eq!(planes.len(), 9 * MOST_POINTS);
+        assert_eq!(planes.len(), 9 * MAX_POINTS);
         let sums = [6, 7, 8].map(|plane| {
-            planes[plane * MOST_POINTS..][..MOST_POINTS]
+            planes[plane * MAX_POINTS..][..MAX_POINTS]
                 .iter()
                 .map(|&byte| u32::from(byte))
                 .sum::<u32>()

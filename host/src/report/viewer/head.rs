@@ -14,7 +14,7 @@ const ROTATION_DIGITS: i32 = 5;
 
 /// The run.
 #[derive(Debug, Serialize)]
-pub struct Head<'s> {
+pub struct ViewerIndex<'s> {
     name: &'s str,
     /// Numbers of the frames.
     frames: Vec<usize>,
@@ -64,7 +64,7 @@ struct ObjectHead<'s> {
     poses: Vec<[f64; 7]>,
 }
 
-impl<'s> Head<'s> {
+impl<'s> ViewerIndex<'s> {
     /// All but the tiles.
     pub fn of(name: &'s str, scene: &'s Scene, values: [Option<ValueHead>; VALUES]) -> Self {
         let frames = &scene.frames;

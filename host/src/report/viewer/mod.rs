@@ -15,7 +15,7 @@ use crate::formats::FormatError;
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
-use head::Head;
+use head::ViewerIndex;
 use maud::{Markup, PreEscaped, html};
 use std::io;
 use std::path::Path;
@@ -48,7 +48,7 @@ pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, Form
             tiles::tiles(&object.mesh, &values.of_object(object), Some(at)).map_err(failed)?,
         );
     }
-    let mut head = Head::of(name, scene, values.heads());
+    let mut head = ViewerIndex::of(name, scene, values.heads());
     let mut elements = Vec::new();
     for (at, tile) in tiles.into_iter().enumerate() {
         elements.push((format!("dynvox-tile-{at}"), STANDARD.encode(&tile.bytes)));
@@ -74,7 +74,7 @@ fn data(id: &str, text: &str) -> Markup {
     html! { script type="text/plain" id=(id) { (PreEscaped(text)) } }
 }
 
-fn deflated(head: &Head<'_>) -> io::Result<Vec<u8>> {
+fn deflated(head: &ViewerIndex<'_>) -> io::Result<Vec<u8>> {
     let mut out = ZlibEncoder::new(Vec::new(), Compression::default());
     serde_json::to_writer(&mut out, head)?;
     out.finish()

@@ -64,7 +64,7 @@ impl<'s> SurfaceValues<'s> {
                 low: first.row.frame as f32,
                 high: last.row.frame as f32,
             }),
-            error_m: scene.errors.most_m().map(|high| Scale { low: 0.0, high }),
+            error_m: scene.errors.max_m().map(|high| Scale { low: 0.0, high }),
         }
     }
 

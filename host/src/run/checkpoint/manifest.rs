@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Differences listed at most.
-const MOST_DIFFERENCES: usize = 5;
+const MAX_DIFFERENCES: usize = 5;
 
 /// Start of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,9 +57,9 @@ impl RunManifest {
                 one.values.each_ref().map(|value| value.as_deref().unwrap_or("not set"));
             format!("{} was {then} and is {now}", one.key)
         };
-        let mut sentences: Vec<String> = all.iter().take(MOST_DIFFERENCES).map(sentence).collect();
-        if all.len() > MOST_DIFFERENCES {
-            sentences.push(format!("and {} more", all.len() - MOST_DIFFERENCES));
+        let mut sentences: Vec<String> = all.iter().take(MAX_DIFFERENCES).map(sentence).collect();
+        if all.len() > MAX_DIFFERENCES {
+            sentences.push(format!("and {} more", all.len() - MAX_DIFFERENCES));
         }
         Err(ResumeError::Different { differences: sentences.join("; ") })
     }

@@ -9,7 +9,7 @@ use dynvox_core::{
     digest::Digest,
     image::View,
     objects::{ObjectSink, RetiredObject},
-    planning::Sweep,
+    planning::RobotCylinder,
     view::Raycaster,
     volume::{BlockStore, EvictedBlock, LoadedBlock, ObservationWeight},
 };
@@ -96,7 +96,7 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     }
     inspect(mapper, &mut digest);
     digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
-    digest.u64(u64::from(mapper.stream_out(&mut blocks).kept));
+    digest.u64(u64::from(mapper.stream_out(&mut blocks).stored));
     digest.u64(blocks.0.finish());
     digest.u64(objects.0.finish());
     digest.finish()
@@ -134,7 +134,7 @@ fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
 /// The maps for planners: the window now and later, distances, a ray and a path.
 #[inline(never)]
 fn plan(mapper: &mut Mapper<'_>, digest: &mut Digest) {
-    digest.u64(u64::from(mapper.plan(black_box(0.0)).occupied));
+    digest.u64(u64::from(mapper.update_planning_maps(black_box(0.0)).occupied));
     digest.u64(mapper.planning().digest());
     digest.u64(u64::from(mapper.plan_ahead(black_box(0.5)).obstacles));
     let (planning, volume) = (mapper.planning(), mapper.background());
@@ -142,7 +142,7 @@ fn plan(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let camera = mapper.t_world_camera().translation_m;
     let ahead = [camera[0], camera[1], camera[2] + 10.0];
     digest.f64(planning.ray(volume, black_box(camera), [0.0, 0.1, 1.0], 20.0).free_m);
-    let robot = Sweep { radius_m: 0.4, low_m: -1.0, high_m: 0.5, unknown_ends: true };
+    let robot = RobotCylinder { radius_m: 0.4, low_m: -1.0, high_m: 0.5, unknown_ends: true };
     digest.f64(planning.sweep(volume, black_box(&[camera, ahead]), &robot).free_m);
     let cell = planning.origin();
     let gradients =

@@ -11,9 +11,9 @@ use static_cell::ConstStaticCell;
 /// it.
 const FRAMES: usize = 14;
 /// Space for a snapshot of a map whose pool is full.
-const MOST_BYTES: usize = 6 << 20;
+const MAX_BYTES: usize = 6 << 20;
 
-static BYTES: ConstStaticCell<[u8; MOST_BYTES]> = ConstStaticCell::new([0; MOST_BYTES]);
+static BYTES: ConstStaticCell<[u8; MAX_BYTES]> = ConstStaticCell::new([0; MAX_BYTES]);
 
 /// Digest of the snapshot's bytes and of the frames after it; 0 where one of both cannot be had.
 #[inline(never)]

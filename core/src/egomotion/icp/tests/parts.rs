@@ -196,7 +196,7 @@ fn each_test_of_a_motion_decides_by_itself() {
     };
     assert_eq!(status(&|_| ()), IcpStatus::Tracked, "each at its bound");
     assert_eq!(status(&|report| (report.pairs, report.points) = (99, 99)), IcpStatus::TooFewPairs);
-    assert_eq!(status(&|report| report.held = 0.000_499), IcpStatus::NotHeld);
+    assert_eq!(status(&|report| report.eigen_share = 0.000_499), IcpStatus::Degenerate);
     assert_eq!(status(&|report| report.points = 401), IcpStatus::OffTheMap);
     for (way_m, turn_rad, expected) in [
         (2.0, 0.0, IcpStatus::Tracked),
@@ -232,7 +232,7 @@ fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
     let all = [
         IcpStatus::Tracked,
         IcpStatus::TooFewPairs,
-        IcpStatus::NotHeld,
+        IcpStatus::Degenerate,
         IcpStatus::OffTheMap,
         IcpStatus::TooFar,
         IcpStatus::Contradicted,
@@ -247,7 +247,7 @@ fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
         [
             "tracked",
             "too few pairs",
-            "direction not held",
+            "degenerate direction",
             "off the map",
             "too far",
             "contradicted by the images"

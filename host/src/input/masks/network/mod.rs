@@ -176,13 +176,13 @@ impl Network {
 /// suppression.
 fn without_doubles(mut boxes: Vec<DetectedBox>) -> Vec<DetectedBox> {
     /// Overlap from which on two boxes are one object's.
-    const OVERLAP_MAX: f64 = 0.45;
+    const MAX_OVERLAP: f64 = 0.45;
     // A stable order: the same boxes stay from run to run.
     boxes.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<DetectedBox> = Vec::new();
     for one in boxes {
         if kept.iter().all(|better| {
-            !better.class.agrees_with(one.class) || overlap(better, &one) < OVERLAP_MAX
+            !better.class.agrees_with(one.class) || overlap(better, &one) < MAX_OVERLAP
         }) {
             kept.push(one);
         }

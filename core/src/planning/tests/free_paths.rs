@@ -27,58 +27,62 @@ fn a_ray_ends_at_the_first_surface_or_where_nothing_was_seen() {
         scene.planning.ray(&scene.volume, from, direction, far_m)
     };
     let wall = ray([-1.0, 0.0, 2.0], [0.0, 0.0, 3.0], 20.0);
-    assert_eq!(wall.end, WayEnd::Surface);
+    assert_eq!(wall.end, PathEnd::Surface);
     assert!((wall.free_m - 6.0).abs() < 0.05, "{wall:?}");
-    assert_eq!(ray([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0], 3.0), Way { end: WayEnd::Free, free_m: 3.0 });
+    assert_eq!(
+        ray([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0], 3.0),
+        FreePath { end: PathEnd::Free, free_m: 3.0 }
+    );
     let down = ray([0.0, 0.0, 4.0], [0.0, 1.0, 0.0], 20.0);
-    assert!(down.end == WayEnd::Surface && (down.free_m - 1.5).abs() < 0.05, "{down:?}");
+    assert!(down.end == PathEnd::Surface && (down.free_m - 1.5).abs() < 0.05, "{down:?}");
     assert_eq!(
         ray([0.0, 0.0, 12.0], [0.0, 0.0, 1.0], 5.0),
-        Way { end: WayEnd::Unknown, free_m: 0.0 },
+        FreePath { end: PathEnd::Unknown, free_m: 0.0 },
         "behind the wall"
     );
-    assert_eq!(ray([0.0, 0.0, 3.0], [0.0; 3], 5.0).end, WayEnd::Unknown, "no direction");
-    assert_eq!(ray([f64::NAN; 3], [0.0, 0.0, 1.0], 5.0).end, WayEnd::Unknown);
+    assert_eq!(ray([0.0, 0.0, 3.0], [0.0; 3], 5.0).end, PathEnd::Unknown, "no direction");
+    assert_eq!(ray([f64::NAN; 3], [0.0, 0.0, 1.0], 5.0).end, PathEnd::Unknown);
 }
 
 #[test]
 fn a_path_is_free_until_the_robots_rim_touches() {
     let scene = scene();
-    let robot = Sweep { radius_m: 0.4, low_m: 0.2, high_m: 1.0, unknown_ends: false };
-    let sweep = |path: &[[f64; 3]], robot: &Sweep| scene.planning.sweep(&scene.volume, path, robot);
+    let robot = RobotCylinder { radius_m: 0.4, low_m: 0.2, high_m: 1.0, unknown_ends: false };
+    let sweep =
+        |path: &[[f64; 3]], robot: &RobotCylinder| scene.planning.sweep(&scene.volume, path, robot);
     let ground = |x: f64, z: f64| [x, 1.5, z];
     let straight = sweep(&[ground(-1.0, 3.0), ground(-1.0, 12.0)], &robot);
     assert!(
-        straight.end == WayEnd::Surface && (straight.free_m - 4.6).abs() < 0.06,
+        straight.end == PathEnd::Surface && (straight.free_m - 4.6).abs() < 0.06,
         "a wall at 8, less the radius: {straight:?}"
     );
     let bar = sweep(&[ground(1.0, 2.0), ground(1.0, 3.0), ground(1.0, 7.0)], &robot);
     assert!(
-        bar.end == WayEnd::Surface && (bar.free_m - 2.6).abs() < 0.06,
+        bar.end == PathEnd::Surface && (bar.free_m - 2.6).abs() < 0.06,
         "a bar at 5, less the radius: {bar:?}"
     );
     assert_eq!(
         sweep(&[ground(1.0, 2.0), ground(1.0, 4.5), ground(-0.6, 4.5), ground(-0.6, 7.0)], &robot)
             .end,
-        WayEnd::Free,
+        PathEnd::Free,
         "around it"
     );
-    let over = Sweep { low_m: 0.8, ..robot };
-    assert_eq!(sweep(&[ground(1.0, 2.0), ground(1.0, 7.0)], &over).end, WayEnd::Free, "over it");
-    let unknown = Sweep { unknown_ends: true, ..robot };
-    assert_eq!(sweep(&[ground(-1.0, 4.0), ground(-1.0, 7.0)], &unknown).end, WayEnd::Free);
+    let over = RobotCylinder { low_m: 0.8, ..robot };
+    assert_eq!(sweep(&[ground(1.0, 2.0), ground(1.0, 7.0)], &over).end, PathEnd::Free, "over it");
+    let unknown = RobotCylinder { unknown_ends: true, ..robot };
+    assert_eq!(sweep(&[ground(-1.0, 4.0), ground(-1.0, 7.0)], &unknown).end, PathEnd::Free);
     let back = sweep(&[ground(0.0, 4.0), ground(0.0, -4.0)], &unknown);
     assert!(
-        back.end == WayEnd::Unknown && back.free_m > 1.0 && back.free_m < 4.5,
+        back.end == PathEnd::Unknown && back.free_m > 1.0 && back.free_m < 4.5,
         "behind the camera nothing is known: {back:?}"
     );
-    assert_eq!(sweep(&[], &robot), Way { end: WayEnd::Free, free_m: 0.0 });
+    assert_eq!(sweep(&[], &robot), FreePath { end: PathEnd::Free, free_m: 0.0 });
 }
 
 #[test]
 fn a_path_touches_where_a_search_over_fine_steps_does() {
     let scene = scene();
-    let robot = Sweep { radius_m: 0.5, low_m: 0.2, high_m: 1.2, unknown_ends: false };
+    let robot = RobotCylinder { radius_m: 0.5, low_m: 0.2, high_m: 1.2, unknown_ends: false };
     let mut points = Vec::new();
     for slot in scene.volume.pool().live() {
         let coord = scene.volume.blocks().coord(slot).unwrap();
@@ -102,7 +106,7 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
             })
         };
         let first = (0..=1_000).map(|n| f64::from(n) / 1_000.0).find(|s| touches(*s));
-        assert_eq!(way.end == WayEnd::Surface, first.is_some(), "{from:?} to {to:?}");
+        assert_eq!(way.end == PathEnd::Surface, first.is_some(), "{from:?} to {to:?}");
         if let Some(first) = first {
             touched += 1;
             assert!(
