@@ -37,7 +37,7 @@ fn raw_rig() -> RawRig {
 
 fn rectify(criterion: &mut Criterion) {
     let sizing = Sizing::Given { width: 1_242, height: 375, focal_px: Some(721.5) };
-    let (rectification, rig) = Rectification::of(&raw_rig(), sizing).expect("a rig");
+    let (rectification, rig) = Rectification::new(&raw_rig(), sizing).expect("a rig");
     let bytes = Rectifier::bytes(&CAPACITY) + RectifiedImages::bytes(&CAPACITY);
     let mut slab = vec![0u8; bytes + SLAB_ALIGN];
     let mut carver = Carver::new(&mut slab, bytes).expect("a slab");

@@ -62,8 +62,8 @@ fn main() -> anyhow::Result<()> {
         let Some(depth_m) = raycaster.depth_m() else { continue };
         frames.push(frame.compare(&depth_m, plan.config.rig.focal_baseline_px_m(), 1.0).0);
     }
-    let figures =
-        ReferenceFigures::of("reference", 0, &frames, None).context("no frame has a reference")?;
+    let figures = ReferenceFigures::from_frames("reference", 0, &frames, None)
+        .context("no frame has a reference")?;
     let fused = figures.still.fused;
     let (accuracy, completeness) =
         (fused.accuracy_alone.unwrap_or_default(), fused.completeness.unwrap_or_default());

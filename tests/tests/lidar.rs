@@ -139,14 +139,14 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
     }
     assert!(near > 0 && near < compared, "the scene must have both: {near} of {compared}");
     for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
-        let fused = ReferenceFigures::of("exact", 0, frames, None).unwrap().still.fused;
+        let fused = ReferenceFigures::from_frames("exact", 0, frames, None).unwrap().still.fused;
         assert!(fused.points > 10_000);
         assert!(
             fused.accuracy.unwrap() > 0.99 && fused.completeness.unwrap() > 0.99,
             "{name}: {fused:?}"
         );
     }
-    let fused = ReferenceFigures::of("exact", 0, &shifted, None).unwrap().still.fused;
+    let fused = ReferenceFigures::from_frames("exact", 0, &shifted, None).unwrap().still.fused;
     assert_eq!(fused.completeness, Some(1.0));
     let kept = shifted.iter().map(|frame| frame.regions[0].accuracy(1, 0).unwrap()).sum::<f64>()
         / f64::from(FRAMES);

@@ -104,7 +104,7 @@ impl DynvoxRawRig {
         };
         let focal_px = if self.focal_px == 0.0 { None } else { Some(self.focal_px) };
         let sizing = Sizing::Given { width: self.width, height: self.height, focal_px };
-        Rectification::of(&rig, sizing).map(Some).map_err(|_| DynvoxStatus::Config)
+        Rectification::new(&rig, sizing).map(Some).map_err(|_| DynvoxStatus::Config)
     }
 }
 

@@ -71,7 +71,7 @@ fn digest_of_core(capacity: &Capacity) -> u64 {
         t_right_left_m: [-0.5, 0.0, 0.0].into(),
     };
     let sizing = Sizing::Given { width: RECTIFIED[0], height: RECTIFIED[1], focal_px: None };
-    let (rectification, rig) = Rectification::of(&rig, sizing).unwrap();
+    let (rectification, rig) = Rectification::new(&rig, sizing).unwrap();
     let config = Config { rectification: Some(rectification), ..Config::for_rig(rig) };
     let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(capacity, &config, &mut slab).unwrap();

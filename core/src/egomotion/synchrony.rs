@@ -46,7 +46,7 @@ impl RightAhead {
     }
 
     /// Estimates it from the current positions of matches; `None` where they do not determine it.
-    pub fn of<'m>(
+    pub fn from_matches<'m>(
         rig: &StereoRig,
         matches: impl Iterator<Item = &'m Match> + Clone,
     ) -> Option<Self> {
@@ -135,7 +135,8 @@ mod tests {
     fn a_right_camera_ahead_is_found_beside_errors_of_the_calibration() {
         let mut random = Random::new(3);
         for ahead_m in [-0.8, -0.1, 0.0, 0.05, 0.4] {
-            let found = RightAhead::of(&RIG, matches(ahead_m, &mut random).iter()).unwrap();
+            let found =
+                RightAhead::from_matches(&RIG, matches(ahead_m, &mut random).iter()).unwrap();
             // To first order in the distance.
             assert!(
                 (found.distance_m - ahead_m).abs() < 4.0 * found.sigma_m + 0.2 * ahead_m.abs(),
@@ -165,10 +166,10 @@ mod tests {
     #[test]
     fn matches_that_say_nothing_give_no_estimate() {
         let all = matches(0.4, &mut Random::new(3));
-        assert_eq!(RightAhead::of(&RIG, all.iter().take(MATCHES_MIN - 1)), None);
-        assert_eq!(RightAhead::of(&RIG, [all[0]; 50].iter()), None, "one point alone");
+        assert_eq!(RightAhead::from_matches(&RIG, all.iter().take(MATCHES_MIN - 1)), None);
+        assert_eq!(RightAhead::from_matches(&RIG, [all[0]; 50].iter()), None, "one point alone");
         let far = all.map(|m| Match { current_right: m.current_left, ..m });
-        assert_eq!(RightAhead::of(&RIG, far.iter()), None, "without disparity");
+        assert_eq!(RightAhead::from_matches(&RIG, far.iter()), None, "without disparity");
     }
 
     #[test]
@@ -239,7 +240,8 @@ mod tests {
             [(0.0, 0.0, 0.0), (0.5, -3.0, 0.2), (-1.5, 2.0, -0.7), (0.0, 0.0, 0.05)]
         {
             let found =
-                RightAhead::of(&RIG, modelled(shift_px, longer, ahead_m, |_| 0.0).iter()).unwrap();
+                RightAhead::from_matches(&RIG, modelled(shift_px, longer, ahead_m, |_| 0.0).iter())
+                    .unwrap();
             assert!(
                 (found.distance_m - ahead_m).abs() < 1e-4 && found.sigma_m < 1e-4,
                 "{ahead_m}: {found:?}"
@@ -305,7 +307,7 @@ mod tests {
                 core::array::from_fn(|_| (f64::from(random.below(2_001)) / 1_000.0 - 1.0) * max_px);
             let all = modelled(0.4, 1.0, 0.3, |index| noise[index]);
             let (found, [distance_m, sigma_m]) =
-                (RightAhead::of(&RIG, all.iter()).unwrap(), plainly(&all));
+                (RightAhead::from_matches(&RIG, all.iter()).unwrap(), plainly(&all));
             assert!(
                 (found.distance_m - distance_m).abs() < 1e-9,
                 "{max_px} px: {found:?} {distance_m}"
@@ -320,15 +322,15 @@ mod tests {
     #[test]
     fn twenty_matches_are_enough() {
         let all = modelled(0.4, 1.0, 0.3, |_| 0.0);
-        assert!(RightAhead::of(&RIG, all.iter().take(MATCHES_MIN)).is_some());
+        assert!(RightAhead::from_matches(&RIG, all.iter().take(MATCHES_MIN)).is_some());
         // Matches without disparity are none.
         let some = core::array::from_fn::<_, 21, _>(|at| {
             if at < 2 { Match { current_right: all[at].current_left, ..all[at] } } else { all[at] }
         });
-        assert_eq!(RightAhead::of(&RIG, some.iter()), None);
+        assert_eq!(RightAhead::from_matches(&RIG, some.iter()), None);
         // All of one disparity: distance and focal length cannot be told apart.
         let alike = all
             .map(|m| Match { current_right: [m.current_left[0] - 9.0, m.current_right[1]], ..m });
-        assert_eq!(RightAhead::of(&RIG, alike.iter()), None);
+        assert_eq!(RightAhead::from_matches(&RIG, alike.iter()), None);
     }
 }

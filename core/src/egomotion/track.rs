@@ -89,7 +89,7 @@ impl Egomotion {
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
         let (expected, matches) = (self.expected(), matches.into_iter());
-        let right_ahead = RightAhead::of(rig, matches.clone());
+        let right_ahead = RightAhead::from_matches(rig, matches.clone());
         let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
         let found = estimator.estimate(config, rig, matches, hypotheses);
         let mut estimate = MotionEstimate { right_ahead, ..found };

@@ -49,7 +49,7 @@ impl DisparityCorrection {
             quartic_px: self.quartic_px as f32,
             row_quadratic_px: self.row_quadratic_px as f32,
             roll_rad: 0.0,
-            shares: Shares::of(rig),
+            shares: Shares::new(rig),
         }
     }
 

@@ -104,7 +104,7 @@ impl RowCorrection {
     /// Prepares it for the images of a rig. A principal point in column 0 has no sides, one in row
     /// 0 no first row: what grows towards them is left out.
     pub(crate) fn for_rig(&self, rig: &StereoRig) -> RowShift {
-        RowShift { terms_px: self.terms().map(|term| term as f32), shares: Shares::of(rig) }
+        RowShift { terms_px: self.terms().map(|term| term as f32), shares: Shares::new(rig) }
     }
 }
 

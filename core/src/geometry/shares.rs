@@ -13,7 +13,7 @@ pub(crate) struct Shares {
 impl Shares {
     /// Those of a rig. A principal point in column 0 has no side, one in row 0 no first row: the
     /// share is 0 then.
-    pub(crate) fn of(rig: &StereoRig) -> Self {
+    pub(crate) fn new(rig: &StereoRig) -> Self {
         Self {
             center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
             per_px: Self::per_px(rig).map(|per_px| per_px as f32),

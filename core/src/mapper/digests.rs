@@ -65,7 +65,7 @@ pub struct ObjectDigests([ObjectDigest; MAX_OBJECTS]);
 
 impl ObjectDigests {
     /// From those there are, in any order.
-    pub fn of(objects: impl Iterator<Item = ObjectDigest>) -> Self {
+    pub fn from_objects(objects: impl Iterator<Item = ObjectDigest>) -> Self {
         let mut digests = Self::default();
         digests.0.iter_mut().zip(objects).for_each(|(slot, object)| *slot = object);
         // Those that are none go last.
@@ -177,7 +177,7 @@ mod tests {
     use std::format;
 
     fn objects(all: &[(u32, u64)]) -> ObjectDigests {
-        ObjectDigests::of(all.iter().map(|&(id, digest)| ObjectDigest { id, digest }))
+        ObjectDigests::from_objects(all.iter().map(|&(id, digest)| ObjectDigest { id, digest }))
     }
 
     #[test]

@@ -276,7 +276,7 @@ impl Mapper<'_> {
             egomotion: self.egomotion_digest(egomotion),
             tracks: self.tracks_digest(),
             background: self.static_map.volume.digest(),
-            objects: ObjectDigests::of(
+            objects: ObjectDigests::from_objects(
                 self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest }),
             ),
         }

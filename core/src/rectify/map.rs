@@ -34,7 +34,7 @@ pub(super) struct Packing {
 
 impl Packing {
     /// For raw images of this size.
-    pub(super) fn of(camera: &RawCamera) -> Self {
+    pub(super) fn new(camera: &RawCamera) -> Self {
         let (whole_u, whole_v) = (bits(camera.width), bits(camera.height));
         let spare = u32::BITS - whole_u - whole_v;
         let (fraction_u, fraction_v) = (spare.div_ceil(2).min(8), (spare / 2).min(8));
@@ -76,7 +76,7 @@ fn bits(side: u32) -> u32 {
 
 /// Makes the map of one camera for a rectified image `width` wide.
 pub(super) fn fill(map: &mut [u32], width: usize, camera: &TurnedCamera, rig: &StereoRig) {
-    let packing = Packing::of(&camera.raw);
+    let packing = Packing::new(&camera.raw);
     for (v, row) in map.chunks_exact_mut(width.max(1)).enumerate() {
         for (u, entry) in row.iter_mut().enumerate() {
             let raw = camera.raw_pixel(rig, [u as f64, v as f64]);
@@ -124,7 +124,7 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     if [raw.width(), raw.height()] != [camera.width as usize, camera.height as usize] {
         return;
     }
-    let packing = Packing::of(camera);
+    let packing = Packing::new(camera);
     let (data, stride) = raw.strided();
     // From a pixel to its right lower neighbour, both included.
     let span = stride + 2;

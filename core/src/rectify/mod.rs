@@ -30,7 +30,7 @@
 //! let camera = RawCamera { lens, width: 752, height: 480 };
 //! let raw = RawRig { left: camera, right: camera, r_right_left: Matrix3::identity(), t_right_left_m: Vector3::new(-0.11, 0.0, 0.0) };
 //! let sizing = Sizing::Automatic { max_width: 640, max_height: 480 };
-//! let (rectification, rig) = Rectification::of(&raw, sizing)?;
+//! let (rectification, rig) = Rectification::new(&raw, sizing)?;
 //! assert_eq!(rectification.width, 640);
 //! assert!(rig.focal_px < 458.0 && (rig.baseline_m - 0.11).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

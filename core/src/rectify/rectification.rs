@@ -62,7 +62,7 @@ impl Rectification {
     ///
     /// # Errors
     /// See [`RectifyProblem`].
-    pub fn of(rig: &RawRig, sizing: Sizing) -> Result<(Self, StereoRig), RectifyProblem> {
+    pub fn new(rig: &RawRig, sizing: Sizing) -> Result<(Self, StereoRig), RectifyProblem> {
         let Alignment { r_rectified_left, r_rectified_right, baseline_m } = rig.align()?;
         let left = TurnedCamera { raw: rig.left, r_rectified_raw: r_rectified_left };
         let right = TurnedCamera { raw: rig.right, r_rectified_raw: r_rectified_right };

@@ -162,7 +162,8 @@ fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
     for lens in lenses() {
         let raw = raw_rig(lens);
         let (rectification, rig) =
-            Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+            Rectification::new(&raw, Sizing::Automatic { max_width: 400, max_height: 300 })
+                .unwrap();
         let left = see_raw(&raw.left, &Matrix3::identity(), &Vector3::zeros());
         let right = see_raw(&raw.right, &raw.r_right_left, &raw.t_right_left_m);
         let [left, right] = [&left, &right].map(|pixels| View::new(pixels, 640, 480).unwrap());
@@ -201,7 +202,7 @@ fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
 fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
     let raw = raw_rig(lenses()[1]);
     let (rectification, rig) =
-        Rectification::of(&raw, Sizing::Given { width: 400, height: 300, focal_px: Some(150.0) })
+        Rectification::new(&raw, Sizing::Given { width: 400, height: 300, focal_px: Some(150.0) })
             .unwrap();
     with_rectifier(&rectification, &rig, |rectifier, images| {
         let invalid = rectifier.invalid().unwrap().left;
@@ -233,7 +234,7 @@ fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
 fn threads_change_nothing_and_rows_may_be_padded() {
     let raw = raw_rig(lenses()[3]);
     let (rectification, rig) =
-        Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+        Rectification::new(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
     let noise: Vec<u8> =
         (0..700 * 480u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let padded = View::with_stride(&noise, 640, 480, 700).unwrap();
@@ -257,7 +258,7 @@ fn without_raw_pixels_it_costs_nothing_and_takes_nothing() {
     assert!(carver.footprint().regions().is_empty());
     let raw = raw_rig(lenses()[0]);
     let (rectification, rig) =
-        Rectification::of(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
+        Rectification::new(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
     assert_eq!(
         rectifier.prepare(&rectification, &rig),
         Err(RectifierError::RawTooLarge { width: 0, height: 0 })

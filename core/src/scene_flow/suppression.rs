@@ -240,7 +240,7 @@ impl<const SIGN: i16> Block<'_, SIGN> {
             return None;
         }
         // Most are weaker than a pixel of the seven rows about them.
-        let about = Surroundings::of(u, width);
+        let about = Surroundings::new(u, width);
         let beaten = about.any(self.strongest, row, |x| x * SIGN > SIGN * response)?;
         let sparse = !beaten && is_peak::<SIGN>(self.field, u, v, SIGN * response);
         Some(Candidate {
@@ -264,7 +264,7 @@ struct Surroundings {
 
 impl Surroundings {
     #[inline(always)]
-    fn of(u: usize, width: usize) -> Self {
+    fn new(u: usize, width: usize) -> Self {
         // At the margin as well.
         const { assert!(FEATURE_MARGIN + SPARSE_RADIUS >= 16 && 2 * SPARSE_RADIUS < 32) }
         let left = u.saturating_sub(SPARSE_RADIUS);
@@ -284,7 +284,7 @@ impl Surroundings {
 /// Whether no response within [`SPARSE_RADIUS`] of (u, v) is stronger, nor as strong and earlier.
 #[inline(always)]
 fn is_peak<const SIGN: i16>(field: Field<'_>, u: usize, v: usize, strongest: i16) -> bool {
-    let about = Surroundings::of(u, field.width);
+    let about = Surroundings::new(u, field.width);
     for y in v.saturating_sub(SPARSE_RADIUS)..=v + SPARSE_RADIUS {
         // As strong is too strong before (u, v) in scan order, and allowed from there on.
         let bound = if y < v { strongest } else { strongest + 1 };

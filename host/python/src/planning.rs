@@ -21,7 +21,7 @@ impl Plan {
         let report = mapper.update_planning_maps(ahead_s);
         let planning = mapper.planning();
         Some(Self {
-            layers: PlanningLayers::of(planning)?,
+            layers: PlanningLayers::from_planning(planning)?,
             boxes: planning.boxes().iter().map(BoxDescription::from).collect(),
             report,
         })

@@ -187,14 +187,17 @@ fn figures(
 ) -> anyhow::Result<RunResult> {
     let result = || -> anyhow::Result<RunResult> {
         let record = run::record(request.resolve()?, &folder.scratch_dir(key))?;
-        Ok(RunResult::of(plan.runs.get(key).context("it is of no point of the sweep")?, &record)?)
+        Ok(RunResult::from_run(
+            plan.runs.get(key).context("it is of no point of the sweep")?,
+            &record,
+        )?)
     };
     result().with_context(|| format!("run {key} ended"))
 }
 
 /// Does the run of a job in the folder of a sweep.
 pub fn figures_of(folder: &Path, job: &Job) -> anyhow::Result<RunResult> {
-    let folder = SweepFolder::of(folder);
+    let folder = SweepFolder::new(folder);
     figures(&folder, &folder.plan()?, &job.name, &job.request)
 }
 

@@ -51,7 +51,7 @@ impl FaultOutcome {
     /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the
     /// frame before it on, so that drift until then does not count, and within a segment of the map
     /// from its first frame on.
-    pub fn of(frames: &[EvaluatedFrame], first: usize) -> Self {
+    pub fn from_frames(frames: &[EvaluatedFrame], first: usize) -> Self {
         let Some(mut before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
         let mut outcome = Self { recovered_after: Some(0), ..Self::default() };
         for (since, frame) in frames.iter().skip(first).enumerate() {
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn a_wrong_pose_counts_as_unreported_only_where_nothing_is_said() {
         let (info, affected) = (Severity::Info, Severity::MapAffected);
-        let outcome = FaultOutcome::of(
+        let outcome = FaultOutcome::from_frames(
             &run_with(&[(0.0, info), (0.1, info), (2.0, affected), (1.0, info), (0.2, info)]),
             1,
         );
@@ -115,11 +115,11 @@ mod tests {
         );
         assert_eq!(outcome.recovered_after, Some(3));
         assert_eq!(
-            FaultOutcome::of(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after,
+            FaultOutcome::from_frames(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after,
             Some(0)
         );
         assert_eq!(
-            FaultOutcome::of(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after,
+            FaultOutcome::from_frames(&run_with(&[(0.0, info), (9.0, info)]), 1).recovered_after,
             None
         );
     }
@@ -131,17 +131,19 @@ mod tests {
             (100.0, Severity::MapAffected),
             (100.1, Severity::MapAffected),
         ]);
-        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 2);
+        assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 2);
         frames[1..].iter_mut().for_each(|frame| frame.segment = 1);
-        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 0);
+        assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 0);
         frames[2].t_world_camera = Transform::IDENTITY;
-        assert_eq!(FaultOutcome::of(&frames, 1).wrong_fused, 1);
+        assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 1);
     }
 
     #[test]
     fn drift_before_the_fault_does_not_count() {
-        let outcome =
-            FaultOutcome::of(&run_with(&[(5.0, Severity::Info), (5.0, Severity::Info)]), 1);
+        let outcome = FaultOutcome::from_frames(
+            &run_with(&[(5.0, Severity::Info), (5.0, Severity::Info)]),
+            1,
+        );
         assert_eq!((outcome.unreported_m, outcome.unreported_frames), (0.0, 0));
     }
 }

@@ -137,11 +137,11 @@ impl SeenSide {
         if middles.is_empty() || samples.is_empty() {
             return None;
         }
-        let truth = PointGrid::of(&samples, reach_m);
+        let truth = PointGrid::new(&samples, reach_m);
         let mut distances: Vec<f64> =
             middles.iter().map(|middle| truth.distance_m(middle)).collect();
         distances.sort_by(f64::total_cmp);
-        let mesh = PointGrid::of(&middles, reach_m);
+        let mesh = PointGrid::new(&middles, reach_m);
         let there = samples.iter().filter(|sample| mesh.distance_m(sample).is_finite()).count();
         Some(SurfaceFigures {
             median_m: distances
@@ -169,7 +169,7 @@ struct PointGrid<'p> {
 }
 
 impl<'p> PointGrid<'p> {
-    fn of(points: &'p [Point3<f64>], reach_m: f64) -> Self {
+    fn new(points: &'p [Point3<f64>], reach_m: f64) -> Self {
         let mut cells: HashMap<[i32; 3], Vec<&Point3<f64>>> = HashMap::new();
         points.iter().for_each(|point| cells.entry(cell(point, reach_m)).or_default().push(point));
         Self { cells, reach_m }

@@ -66,7 +66,7 @@ struct Point {
 }
 
 impl Point {
-    fn of(row: &FrameRow) -> Self {
+    fn from_row(row: &FrameRow) -> Self {
         let mut point = Self { frame: row.frame, values: [f32::NAN; VALUES] };
         let (report, (matches, inliers, _)) = (&row.report, row.matches());
         let mut set = |value: Charted, to: f64| point.values[value.at()] = to as f32;
@@ -108,7 +108,7 @@ pub struct ChartValues {
 impl ChartValues {
     /// Adds a frame.
     pub(super) fn add(&mut self, row: &FrameRow) {
-        let point = Point::of(row);
+        let point = Point::from_row(row);
         let begins = self.frames.is_multiple_of(self.frames_per_point());
         match self.points.last_mut() {
             Some(last) if !begins => last.merge(&point),

@@ -31,7 +31,7 @@ pub struct PlanningLayers {
 
 impl PlanningLayers {
     /// Reads the window; `None` without cells.
-    pub fn of(planning: &Planning<'_>) -> Option<Self> {
+    pub fn from_planning(planning: &Planning<'_>) -> Option<Self> {
         let ([width, length, _], [x, y, z], grid) =
             (planning.size(), planning.origin(), planning.grid());
         if width * length == 0 {

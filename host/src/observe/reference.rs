@@ -54,7 +54,7 @@ impl ReferencePlan {
         reference: Reference,
         delay: usize,
     ) -> Option<Self> {
-        Self::of(reference, delay, reference.positions(dataset, indices, delay))
+        Self::new(reference, delay, reference.positions(dataset, indices, delay))
     }
 
     /// Some frames against exact depth, at once; `None` where there is no exact depth.
@@ -65,10 +65,10 @@ impl ReferencePlan {
         } else {
             Vec::new()
         };
-        Self::of(Reference::Exact, 0, positions)
+        Self::new(Reference::Exact, 0, positions)
     }
 
-    fn of(reference: Reference, delay: usize, positions: Vec<usize>) -> Option<Self> {
+    fn new(reference: Reference, delay: usize, positions: Vec<usize>) -> Option<Self> {
         let count = PICTURES.min(positions.len());
         let drawn = (1..=count)
             .filter_map(|at| positions.get(at * positions.len() / count - 1).copied())
@@ -147,7 +147,7 @@ impl Observer for ReferenceObserver {
 
     fn finish(self, run: &ObservedRun<'_>, _: &Finished) -> Result<Self::Section, ObserveError> {
         Ok(run.reference.as_ref().map(|plan| ReferenceSection {
-            figures: ReferenceFigures::of(
+            figures: ReferenceFigures::from_frames(
                 plan.reference.name(),
                 plan.delay,
                 &self.frames,
@@ -176,7 +176,7 @@ impl ReferenceObserver {
         let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
         let (evaluated, shown_px) = due.compare(map_depth_m, focal_baseline_px_m, enlarged);
         self.frames.push(evaluated);
-        self.outcomes.push(PointOutcomes::of(due, &shown_px, enlarged));
+        self.outcomes.push(PointOutcomes::from_frame(due, &shown_px, enlarged));
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
         for (sample, &shown_px) in
             due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static)
@@ -282,7 +282,7 @@ fn region(
 ) -> Region {
     let instances = &run.plan.config.tracking;
     if instances.dynamic {
-        return Region::of(mapper.instance_at(u, v).as_ref());
+        return Region::from_instance(mapper.instance_at(u, v).as_ref());
     }
     let (width, height) = run.plan.dataset.size();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
@@ -293,7 +293,7 @@ fn region(
             && instances.is_reconstructable(one.pixels.intersection(&image).area(), width)
     };
     let object = images.masks.instances.iter().find(taken);
-    Region::of(
+    Region::from_instance(
         object
             .map(|one| InstanceAt { class: one.class, track: None, state: MotionState::Uncertain })
             .as_ref(),

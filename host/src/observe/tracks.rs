@@ -222,7 +222,7 @@ fn overlaps(mapper: &Mapper<'_>, exact: &Image<u8>) -> (Overlaps, BTreeSet<u16>)
     let (mut labels, mut by_motion) =
         (BTreeMap::<(Option<u32>, Class), u16>::new(), BTreeSet::new());
     let width = exact.width();
-    let overlaps = Overlaps::of(exact.pixels().iter().enumerate().map(|(at, truth)| {
+    let overlaps = Overlaps::from_pairs(exact.pixels().iter().enumerate().map(|(at, truth)| {
         let found =
             mapper.instance_at((at % width) as i32, (at / width) as i32).map_or(0, |instance| {
                 let next = labels.len() as u16 + 1;

@@ -26,7 +26,7 @@ struct Block {
 
 impl VolumeCopy {
     /// Copies a volume.
-    pub fn of(volume: &Volume<'_>) -> Self {
+    pub fn new(volume: &Volume<'_>) -> Self {
         let (pool, blocks) = (volume.pool(), volume.blocks());
         let mut copy = Self {
             config: *volume.config(),
@@ -156,7 +156,7 @@ mod tests {
                 let (mut own, mut copied) = (Vec::new(), Vec::new());
                 let mesh = MeshConfig::default();
                 volume.triangles(&mesh, &mut |triangle| own.push(triangle));
-                let copy = VolumeCopy::of(volume);
+                let copy = VolumeCopy::new(volume);
                 let count =
                     copy.triangles(&mesh, &mut |triangle: Triangle| copied.push(triangle)).unwrap();
                 assert!(

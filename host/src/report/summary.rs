@@ -123,7 +123,7 @@ struct ObjectSummary {
 }
 
 impl ObjectSummary {
-    fn of(track: &TrackRecord, objects: &[ReconstructedObject]) -> Self {
+    fn new(track: &TrackRecord, objects: &[ReconstructedObject]) -> Self {
         let errors = track.errors.as_ref();
         Self {
             id: track.id,
@@ -202,7 +202,7 @@ struct HealthSummary {
 
 impl Summary {
     /// Collects the figures of a run.
-    pub fn of(run: &RunRecord) -> Self {
+    pub fn new(run: &RunRecord) -> Self {
         let sections = &run.sections;
         let stage = |of: StageStatistics| StageSummary {
             median_ms: of.median_ms,
@@ -226,14 +226,14 @@ impl Summary {
                 .into_iter()
                 .map(|(name, of)| (name, stage(of)))
                 .collect(),
-            egomotion: EgomotionSummary::of(&sections.trajectory),
+            egomotion: EgomotionSummary::new(&sections.trajectory),
             rig: super::rig::summary(run),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
             objects: sections
                 .tracks
                 .tracks
                 .iter()
-                .map(|track| ObjectSummary::of(track, &sections.objects.objects))
+                .map(|track| ObjectSummary::new(track, &sections.objects.objects))
                 .collect(),
             objects_truth: sections.tracks.figures.clone(),
             masks_truth: sections.tracks.masks.clone(),
@@ -246,9 +246,9 @@ impl Summary {
                 object_triangles: sections.blocks.mesh.object_triangles,
                 swept_triangles: sections.objects.swept_triangles,
             },
-            prune: PruneSummary::of(&sections.blocks.totals),
-            evict: EvictSummary::of(&sections.blocks),
-            health: HealthSummary::of(run),
+            prune: PruneSummary::new(&sections.blocks.totals),
+            evict: EvictSummary::new(&sections.blocks),
+            health: HealthSummary::new(run),
             input: InputSummary {
                 warnings: run.plan.warnings.clone(),
                 skipped: run.skipped.clone(),
@@ -259,7 +259,7 @@ impl Summary {
 }
 
 impl EgomotionSummary {
-    fn of(trajectory: &TrajectorySection) -> Self {
+    fn new(trajectory: &TrajectorySection) -> Self {
         let (errors, failures) = (trajectory.errors.as_ref(), trajectory.failures);
         Self {
             t_err_percent: errors.and_then(|errors| errors.t_err_percent),
@@ -279,7 +279,7 @@ impl EgomotionSummary {
 }
 
 impl PruneSummary {
-    fn of(totals: &BlockTotals) -> Self {
+    fn new(totals: &BlockTotals) -> Self {
         Self {
             visited: totals.prune_visited,
             voxels_reset: totals.voxels_reset,
@@ -292,7 +292,7 @@ impl PruneSummary {
 }
 
 impl EvictSummary {
-    fn of(blocks: &BlocksSection) -> Self {
+    fn new(blocks: &BlocksSection) -> Self {
         Self {
             out: blocks.totals.stored + blocks.totals.lost,
             back: blocks.totals.loaded,
@@ -305,7 +305,7 @@ impl EvictSummary {
 }
 
 impl HealthSummary {
-    fn of(run: &RunRecord) -> Self {
+    fn new(run: &RunRecord) -> Self {
         let (blocks, health) = (&run.sections.blocks, &run.sections.health);
         Self {
             blocks_refused: blocks.totals.refused,

@@ -9,7 +9,9 @@ pub(super) struct RetiredVolumes(pub Vec<RetiredVolume>);
 
 impl ObjectSink for RetiredVolumes {
     fn retire(&mut self, object: RetiredObject<'_, '_>) {
-        self.0
-            .push(RetiredVolume { summary: object.summary, volume: VolumeCopy::of(object.volume) });
+        self.0.push(RetiredVolume {
+            summary: object.summary,
+            volume: VolumeCopy::new(object.volume),
+        });
     }
 }

@@ -48,7 +48,7 @@ pub struct FrameSample {
 }
 
 impl FrameSample {
-    fn of(frame: &EvaluatedFrame) -> Self {
+    fn new(frame: &EvaluatedFrame) -> Self {
         let counts = &frame.regions[Region::Static as usize];
         Self {
             frame: frame.frame,
@@ -63,17 +63,17 @@ impl RunResult {
     ///
     /// # Errors
     /// The summary cannot be turned into JSON.
-    pub fn of(request: &Request, run: &RunRecord) -> Result<Self, serde_json::Error> {
+    pub fn from_run(request: &Request, run: &RunRecord) -> Result<Self, serde_json::Error> {
         let charts = run.frames.charts();
         Ok(Self {
             request: request.clone(),
-            summary: serde_json::to_value(Summary::of(run))?,
+            summary: serde_json::to_value(Summary::new(run))?,
             samples: run
                 .sections
                 .reference
                 .iter()
                 .flat_map(|reference| &reference.frames)
-                .map(FrameSample::of)
+                .map(FrameSample::new)
                 .collect(),
             outcomes: run
                 .sections

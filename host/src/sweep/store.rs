@@ -41,7 +41,7 @@ impl SweepFolder {
     }
 
     /// The folder of a plan that is there.
-    pub fn of(root: &Path) -> Self {
+    pub fn new(root: &Path) -> Self {
         Self { root: root.to_path_buf() }
     }
 
@@ -118,7 +118,7 @@ impl SweepFolder {
 pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Results), SweepError> {
     let mut merged: Option<(Plan, Results)> = None;
     for root in parts {
-        let part = SweepFolder::of(root);
+        let part = SweepFolder::new(root);
         let plan = part.plan()?;
         let results = part.results(&plan)?;
         let Some((first, all)) = &mut merged else {

@@ -38,7 +38,7 @@ const ROOFS: [(u8, u8, u8); 4] = [(136, 72, 54), (112, 66, 56), (84, 84, 90), (1
 const BOARDS: [(u8, u8, u8); 6] =
     [(170, 40, 36), (36, 84, 60), (40, 56, 104), (224, 196, 90), (60, 56, 54), (212, 208, 200)];
 
-fn of(rgb: (u8, u8, u8)) -> Tone {
+fn tone_of(rgb: (u8, u8, u8)) -> Tone {
     let (red, green, blue) = rgb;
     tone(red, green, blue)
 }
@@ -90,7 +90,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
     let floors = [2, 3, 3, 4, 4, 5][rng.below(6)];
     let ground_height = rng.between(3.3, 3.9);
     let floor_height = rng.between(2.9, 3.3);
-    let frame_tone = of(rng.pick(&FRAMES));
+    let frame_tone = tone_of(rng.pick(&FRAMES));
     if shop {
         shop_floor(mesh, rng, &house, ground_height, frame_tone);
     } else {
@@ -123,15 +123,15 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
 /// Draws a house's measures and what covers it, and whether a shop is in it.
 fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, bool) {
     let style = rng.unit();
-    let wall_tone = of(rng.pick(&WALLS));
-    let brick_tone = of(rng.pick(&BRICKS));
+    let wall_tone = tone_of(rng.pick(&WALLS));
+    let brick_tone = tone_of(rng.pick(&BRICKS));
     let wall = match style {
         s if s < 0.55 => Surface::new(Kind::Plaster, wall_tone, seed),
         s if s < 0.87 => Surface::new(Kind::Brick, brick_tone, seed)
             .with(scaled(tone(176, 168, 156), rng.between(0.6, 1.0))),
         _ => Surface::new(Kind::Stone, scaled(wall_tone, 0.75), seed).with(tone(120, 112, 102)),
     };
-    let trim_tone = of(rng.pick(&TRIMS));
+    let trim_tone = tone_of(rng.pick(&TRIMS));
     let shop = width > 6.5 && rng.chance(0.3);
     let base_surface = if rng.chance(0.5) {
         Surface::new(Kind::Stone, scaled(tone(150, 144, 134), rng.between(0.7, 1.1)), seed ^ 7)
@@ -139,7 +139,7 @@ fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, b
     } else {
         Surface::new(Kind::Plaster, scaled(wall_tone, 0.5), seed ^ 7)
     };
-    let shutter_tone = of(rng.pick(&DOORS));
+    let shutter_tone = tone_of(rng.pick(&DOORS));
     let shuttered = !shop && rng.chance(0.25);
     let house = House {
         width,

@@ -27,7 +27,7 @@ fn config(focal_px: Option<f64>) -> Config {
         t_right_left_m: Vector3::new(-RIG.baseline_m, 0.0, 0.0),
     };
     let sizing = Sizing::Given { width: WIDTH as u32, height: HEIGHT as u32, focal_px };
-    let (rectification, rig) = Rectification::of(&raw, sizing).unwrap();
+    let (rectification, rig) = Rectification::new(&raw, sizing).unwrap();
     Config { rig, rectification: Some(rectification), ..Walk::config() }
 }
 

@@ -241,7 +241,7 @@ impl SelfCalibration {
         let residuals = Residuals::new(rig, t_current_previous, &self.applied, &at);
         let (mut offset, mut sides) = (Sums::<8>::ZERO, Sums::<11>::ZERO);
         for [previous, current] in observations {
-            let Some(match_rows) = residuals.of(&previous, &current) else { continue };
+            let Some(match_rows) = residuals.match_rows(&previous, &current) else { continue };
             let [middle, wide] = [OFFSET_KNEE, SIDES_KNEE].map(|knee| match_rows.weight(knee));
             for row in &match_rows.rows {
                 let [a, b, c, d, e, f, constant, slope, quartic, quadratic, error] = *row;

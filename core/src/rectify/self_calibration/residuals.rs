@@ -71,7 +71,7 @@ impl<'r> Residuals<'r> {
     }
 
     /// The rows of a match; `None` where it is too far, too near or not finite.
-    pub(super) fn of(
+    pub(super) fn match_rows(
         &self,
         previous: &StereoObservation,
         current: &StereoObservation,

@@ -132,7 +132,7 @@ fn outcome(request: &Request, fault: &str, at: usize) -> anyhow::Result<FaultOut
         Ok(request.resolve()?)
     };
     let plan = trial().with_context(|| format!("{fault} cannot be tried"))?;
-    Ok(FaultOutcome::of(&evaluated(&plan)?, at))
+    Ok(FaultOutcome::from_frames(&evaluated(&plan)?, at))
 }
 
 /// Maps the frames of a plan and puts the truth beside each.

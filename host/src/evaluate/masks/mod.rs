@@ -27,7 +27,7 @@ pub struct Overlaps {
 
 impl Overlaps {
     /// Counts pairs of labels: found, true.
-    pub fn of(pairs: impl Iterator<Item = (u16, u16)>) -> Self {
+    pub fn from_pairs(pairs: impl Iterator<Item = (u16, u16)>) -> Self {
         let mut counted = Self::default();
         for (found, truth) in pairs.filter(|pair| *pair != (0, 0)) {
             *counted.both.entry((found, truth)).or_default() += 1;
@@ -44,7 +44,7 @@ impl Overlaps {
 
     /// Of two images of labels of one size.
     pub fn of_images(found: &Image<u16>, truth: &Image<u16>) -> Self {
-        Self::of(found.pixels().iter().copied().zip(truth.pixels().iter().copied()))
+        Self::from_pairs(found.pixels().iter().copied().zip(truth.pixels().iter().copied()))
     }
 
     /// Masks found, each with its pixels.
@@ -119,7 +119,7 @@ mod tests {
         // Label 1 covers the true mask 7 by half and has as much beside it; label 2 shares a pixel
         // with it.
         let pairs = [(1, 7), (1, 7), (1, 0), (1, 0), (2, 7), (0, 7), (0, 0), (3, 9)];
-        let overlaps = Overlaps::of(pairs.into_iter());
+        let overlaps = Overlaps::from_pairs(pairs.into_iter());
         assert_eq!(overlaps.found().collect::<Vec<_>>(), [(1, 4), (2, 1), (3, 1)]);
         assert_eq!(overlaps.truth().collect::<Vec<_>>(), [(7, 4), (9, 1)]);
         assert_eq!(overlaps.best_for_truth(7), Some((1, 2.0 / 6.0)));

@@ -162,7 +162,7 @@ mod tests {
         // not found.
         let pairs =
             [(10, 1), (10, 1), (10, 1), (0, 1), (0, 2), (11, 3), (11, 3), (11, 0)].into_iter();
-        let overlaps = Overlaps::of(pairs);
+        let overlaps = Overlaps::from_pairs(pairs);
         let compared = |objects| ComparedMasks {
             overlaps: &overlaps,
             objects,

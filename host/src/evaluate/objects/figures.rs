@@ -50,12 +50,14 @@ pub struct Medians {
 
 impl ObjectFigures {
     /// Sums up; `None` when nothing was compared.
-    pub(super) fn of(
+    pub(super) fn from_comparisons(
         comparisons: &BTreeMap<u32, Vec<TrackComparison>>,
         association: Option<AssociationFigures>,
     ) -> Option<Self> {
-        let tracks: Vec<TrackErrors> =
-            comparisons.values().map(|comparisons| TrackErrors::of(comparisons)).collect();
+        let tracks: Vec<TrackErrors> = comparisons
+            .values()
+            .map(|comparisons| TrackErrors::from_comparisons(comparisons))
+            .collect();
         let medians = |moving: bool, from_m: f64, to_m: f64| {
             let all = comparisons.values().flatten();
             let within =
@@ -68,8 +70,8 @@ impl ObjectFigures {
             tracks: tracks.len(),
             association,
             tracks_late: tracks.iter().filter(|track| track.late_frames > 0).count(),
-            late_near: LateStates::of(comparisons, 0.0..NEAR_M),
-            late_far: LateStates::of(comparisons, NEAR_M..FAR_M),
+            late_near: LateStates::from_comparisons(comparisons, 0.0..NEAR_M),
+            late_far: LateStates::from_comparisons(comparisons, NEAR_M..FAR_M),
             flips: tracks.iter().map(|track| track.flips).sum(),
             moving_near: medians(true, 0.0, NEAR_M),
             moving_far: medians(true, NEAR_M, FAR_M),

@@ -22,7 +22,7 @@ pub struct LateStates {
 
 impl LateStates {
     /// Counts the tracks at those distances, m.
-    pub(super) fn of(
+    pub(super) fn from_comparisons(
         comparisons: &BTreeMap<u32, Vec<TrackComparison>>,
         distances_m: Range<f64>,
     ) -> Self {

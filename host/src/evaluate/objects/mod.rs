@@ -61,7 +61,7 @@ impl Visibility {
         }
     }
 
-    fn of(object: &PixelBox, size: (usize, usize)) -> Self {
+    fn from_box(object: &PixelBox, size: (usize, usize)) -> Self {
         let (right, bottom) = (object.left + object.width, object.top + object.height);
         if object.left <= 0 || object.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32
         {
@@ -182,7 +182,7 @@ impl ObjectErrors {
                 settled: frame - first.max(changed),
                 distance_m: (truth.t_world_camera.inverse() * object.t_world_object).translation_m
                     [2],
-                view: Visibility::of(&object.pixels, size),
+                view: Visibility::from_box(&object.pixels, size),
                 error,
                 true_speed_m_s: object.speed_m_s,
                 speed_m_s: track.speed_m_s.map(|[speed, _]| f64::from(speed)),
@@ -195,7 +195,10 @@ impl ObjectErrors {
 
     /// Each track's errors, by its number.
     pub fn tracks(&self) -> BTreeMap<u32, TrackErrors> {
-        self.tracks.iter().map(|(&id, comparisons)| (id, TrackErrors::of(comparisons))).collect()
+        self.tracks
+            .iter()
+            .map(|(&id, comparisons)| (id, TrackErrors::from_comparisons(comparisons)))
+            .collect()
     }
 
     /// Every comparison, by frame and then by track.
@@ -211,7 +214,7 @@ impl ObjectErrors {
 
     /// Errors over all; `None` when nothing was compared.
     pub fn figures(&self) -> Option<ObjectFigures> {
-        ObjectFigures::of(&self.tracks, self.association.figures())
+        ObjectFigures::from_comparisons(&self.tracks, self.association.figures())
     }
 }
 

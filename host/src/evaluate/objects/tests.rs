@@ -199,19 +199,20 @@ fn late_tracks_are_counted_by_distance_and_by_what_could_be_seen_of_them() {
     ];
     let comparisons = (1..).zip(tracks).collect();
     assert_eq!(
-        LateStates::of(&comparisons, 0.0..NEAR_M),
+        LateStates::from_comparisons(&comparisons, 0.0..NEAR_M),
         LateStates { tracks: 3, late: 2, late_cut: 1, late_small: 1 }
     );
     assert_eq!(
-        LateStates::of(&comparisons, NEAR_M..FAR_M),
+        LateStates::from_comparisons(&comparisons, NEAR_M..FAR_M),
         LateStates { tracks: 1, late: 1, late_cut: 0, late_small: 0 }
     );
 }
 
 #[test]
 fn an_object_at_the_border_is_cut_and_one_of_few_pixels_small() {
-    let of =
-        |left, top, width, height| Visibility::of(&PixelBox { left, top, width, height }, SIZE);
+    let of = |left, top, width, height| {
+        Visibility::from_box(&PixelBox { left, top, width, height }, SIZE)
+    };
     assert_eq!([of(1, 1, 30, 30), of(1, 1, 638, 190)], [Visibility::Whole; 2]);
     assert_eq!([of(1, 1, 29, 90), of(1, 1, 90, 29)], [Visibility::Small; 2]);
     assert_eq!(

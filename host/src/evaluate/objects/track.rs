@@ -46,7 +46,7 @@ pub struct TrackErrors {
 }
 
 impl TrackErrors {
-    pub(super) fn of(comparisons: &[TrackComparison]) -> Self {
+    pub(super) fn from_comparisons(comparisons: &[TrackComparison]) -> Self {
         let mut confusion = [[0; 3]; 2];
         let mut votes = BTreeMap::<u32, usize>::new();
         let (mut late_frames, mut flips) = (0, 0);

@@ -77,7 +77,7 @@ pub struct ReferenceFigures {
 
 impl ReferenceFigures {
     /// Sums up; `None` without a frame.
-    pub fn of(
+    pub fn from_frames(
         source: &'static str,
         delay_frames: usize,
         frames: &[EvaluatedFrame],

@@ -22,7 +22,7 @@ pub struct PointOutcomes {
 
 impl PointOutcomes {
     /// Of a frame whose map disparities are these, px; `enlarged` as in [`PendingFrame::compare`].
-    pub fn of(frame: &PendingFrame, shown_px: &[f32], enlarged: f32) -> Self {
+    pub fn from_frame(frame: &PendingFrame, shown_px: &[f32], enlarged: f32) -> Self {
         let words = frame.samples.len().div_ceil(WORD);
         let (mut shown, mut right) = (vec![0; words], vec![0; words]);
         for (at, (sample, &px)) in frame.samples.iter().zip(shown_px).enumerate() {

@@ -19,7 +19,7 @@ impl Region {
     pub const ALL: [Self; 3] = [Self::Static, Self::Dynamic, Self::Ignored];
 
     /// By what a pixel shows.
-    pub fn of(object: Option<&InstanceAt>) -> Self {
+    pub fn from_instance(object: Option<&InstanceAt>) -> Self {
         let Some(object) = object else { return Self::Static };
         match object.class.treatment() {
             Treatment::Ignore => Self::Static,

@@ -38,7 +38,7 @@ struct Masks(Vec<(PixelBox, InstanceAt)>);
 
 impl Masks {
     fn region(&self, u: i32, v: i32) -> Region {
-        Region::of(
+        Region::from_instance(
             self.0.iter().find(|(pixels, _)| pixels.contains(u, v)).map(|(_, instance)| instance),
         )
     }
@@ -148,7 +148,7 @@ fn every_point_of_the_hand_made_scene_is_counted_once_and_right() {
         assert!(counts.sources.iter().all(|of| of.missing_alone <= counts.missing
             && of.errors.iter().all(|&errors| errors + counts.missing <= counts.total)));
     }
-    let figures = ReferenceFigures::of("lidar", 0, &[found], None).unwrap();
+    let figures = ReferenceFigures::from_frames("lidar", 0, &[found], None).unwrap();
     assert_eq!(
         (figures.left_out_points, figures.ignored_points, figures.epipolar_violations),
         (3, 2, 1)
@@ -213,7 +213,7 @@ fn frames_without_a_compared_point_are_left_out_of_the_means() {
         counts(&[[20.0, 20.0, 0.0]]),
         counts(&[]),
     ];
-    let fused = ReferenceFigures::of("lidar", 0, &frames, None).unwrap().still;
+    let fused = ReferenceFigures::from_frames("lidar", 0, &frames, None).unwrap().still;
     assert_eq!(
         (fused.fused.accuracy, fused.fused.completeness, fused.frames),
         (Some(0.5), Some(0.5), 2)
@@ -222,9 +222,9 @@ fn frames_without_a_compared_point_are_left_out_of_the_means() {
         (fused.fused.f1.unwrap() - 2.0 / 3.0).abs() < 1e-12,
         "the second frame has no accuracy, hence no F1"
     );
-    assert!(ReferenceFigures::of("lidar", 0, &[], None).is_none());
+    assert!(ReferenceFigures::from_frames("lidar", 0, &[], None).is_none());
     assert!(
-        ReferenceFigures::of("lidar", 20, &frames, None).unwrap().dynamic.is_none(),
+        ReferenceFigures::from_frames("lidar", 20, &frames, None).unwrap().dynamic.is_none(),
         "objects' places in past frames are not kept"
     );
 }

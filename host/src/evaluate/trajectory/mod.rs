@@ -151,7 +151,7 @@ struct SegmentError {
 }
 
 impl SegmentError {
-    fn of(segment: &Segment) -> Self {
+    fn new(segment: &Segment) -> Self {
         let (error, Segment { length_m, estimated, actual }) = (segment.error(), segment);
         let [estimated_m, actual_m] =
             [estimated, actual].map(|moved| Vector3::from(moved.translation_m));
@@ -164,7 +164,7 @@ impl SegmentError {
 
     fn mean(segments: &[Segment]) -> Option<Self> {
         let count = segments.len() as f64;
-        let sum = segments.iter().map(Self::of).fold(Self::default(), |sum, segment| Self {
+        let sum = segments.iter().map(Self::new).fold(Self::default(), |sum, segment| Self {
             percent: sum.percent + segment.percent,
             deg_per_m: sum.deg_per_m + segment.deg_per_m,
             vector_percent: sum.vector_percent + segment.vector_percent,

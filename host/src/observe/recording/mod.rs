@@ -132,7 +132,7 @@ impl Recording {
         }
         if frame.position.is_multiple_of(MAP_EVERY) && !frame.view.mapper().planning().is_empty() {
             frame.view.plan(0.0);
-            if let Some(layers) = PlanningLayers::of(frame.view.mapper().planning()) {
+            if let Some(layers) = PlanningLayers::from_planning(frame.view.mapper().planning()) {
                 self.write(Topic::Planning, time_ns, &messages::planning(stamp, &layers))?;
             }
         }

@@ -245,7 +245,7 @@ fn row_of(row: &FrameDigests) -> Option<Row> {
         egomotion: hex(&row.egomotion_digest)?,
         tracks: hex(&row.tracks_digest)?,
         background: hex(&row.background_digest)?,
-        objects: ObjectDigests::of(objects.into_iter()),
+        objects: ObjectDigests::from_objects(objects.into_iter()),
     };
     let outcome = Outcome {
         pose: None,
@@ -266,7 +266,7 @@ mod tests {
         change: impl Fn(usize, &mut StageDigests),
     ) -> RunDigests {
         let rows = frames.map(|frame| {
-            let objects = ObjectDigests::of(
+            let objects = ObjectDigests::from_objects(
                 [ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter(),
             );
             let mut stages =
@@ -295,7 +295,8 @@ mod tests {
         assert_eq!(divergence(&late), Some((3, Some(Digested::Matches))));
         let object = |frame: usize, stages: &mut StageDigests| {
             if frame == 4 {
-                stages.objects = ObjectDigests::of([ObjectDigest { id: 3, digest: 7 }].into_iter());
+                stages.objects =
+                    ObjectDigests::from_objects([ObjectDigest { id: 3, digest: 7 }].into_iter());
             }
         };
         assert_eq!(divergence(&object), Some((4, Some(Digested::Object(9)))));

@@ -66,7 +66,7 @@ struct ObjectHead<'s> {
 
 impl<'s> ViewerIndex<'s> {
     /// All but the tiles.
-    pub fn of(name: &'s str, scene: &'s Scene, values: [Option<ValueHead>; VALUES]) -> Self {
+    pub fn new(name: &'s str, scene: &'s Scene, values: [Option<ValueHead>; VALUES]) -> Self {
         let frames = &scene.frames;
         Self {
             name,

@@ -40,7 +40,7 @@ const SCRIPT: [&str; 8] = [
 /// The encoder's.
 pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
     let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
-    let values = SurfaceValues::of(scene);
+    let values = SurfaceValues::new(scene);
     let mut tiles = tiles::tiles(&scene.static_map, &values.of_static(&scene.static_map), None)
         .map_err(failed)?;
     for (at, object) in scene.objects.iter().enumerate() {
@@ -48,7 +48,7 @@ pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, Form
             tiles::tiles(&object.mesh, &values.of_object(object), Some(at)).map_err(failed)?,
         );
     }
-    let mut head = ViewerIndex::of(name, scene, values.heads());
+    let mut head = ViewerIndex::new(name, scene, values.heads());
     let mut elements = Vec::new();
     for (at, tile) in tiles.into_iter().enumerate() {
         elements.push((format!("dynvox-tile-{at}"), STANDARD.encode(&tile.bytes)));

@@ -50,7 +50,7 @@ pub struct SurfaceValues<'s> {
 
 impl<'s> SurfaceValues<'s> {
     /// What is known of a scene.
-    pub fn of(scene: &'s Scene) -> Self {
+    pub fn new(scene: &'s Scene) -> Self {
         let mut weights = scene.static_map.weights.clone();
         weights.sort_unstable();
         let most = weights.get(weights.len() * 19 / 20).copied().unwrap_or_default();

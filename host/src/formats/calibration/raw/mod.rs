@@ -165,7 +165,7 @@ impl StereoCalibration {
                 let right = TurnedCamera { raw: self.right, r_rectified_raw: r_rectified_right };
                 Ok((Rectification::given(left, right, size)?, rig))
             }
-            _ => Rectification::of(&self.raw_rig(), sizing),
+            _ => Rectification::new(&self.raw_rig(), sizing),
         }
     }
 
