@@ -174,7 +174,7 @@ fn render(frame: usize) -> Frame {
     }
 }
 
-/// One thread; sums the times of the stages `instances` and `segmentation`.
+/// One thread; sums the times of tracking with objects, and of segmentation.
 #[derive(Default)]
 struct Timed(Mutex<[Duration; 2]>);
 
@@ -182,9 +182,12 @@ impl Executor for Timed {
     fn stage<R>(&self, stage: Stage, work: impl FnOnce() -> R) -> R {
         let begin = ThreadTime::now();
         let result = work();
-        if let Some(which) =
-            [Stage::Instances, Stage::Segmentation].iter().position(|one| *one == stage)
-        {
+        let which = match stage {
+            Stage::Tracking | Stage::Objects => Some(0),
+            Stage::Segmentation => Some(1),
+            _ => None,
+        };
+        if let Some(which) = which {
             self.0.lock().unwrap()[which] += begin.elapsed();
         }
         result

@@ -38,6 +38,7 @@ pub mod scene_flow;
 pub mod segmentation;
 pub mod settings;
 mod slices;
+mod stages;
 mod state;
 pub mod stereo;
 pub mod tracking;
@@ -50,5 +51,6 @@ pub use mapper::{
     RestoreError, SetError, Severity, StageDigests, StepError, StereoFrame,
 };
 pub use memory::{Capacity, Footprint, Slab};
-pub use parallel::{Executor, Serial, Stage};
+pub use parallel::{Executor, Serial};
 pub use settings::{Problem, Problems};
+pub use stages::{Stage, StageNames};

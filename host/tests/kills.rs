@@ -127,7 +127,7 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
     let longest = begin.elapsed();
     let of = summary(&root.join("whole"));
     assert!(
-        of["evict"]["out"].as_u64() > Some(0) && of["evict"]["back"].as_u64() > Some(0),
+        of["evict"]["stored"].as_u64() > Some(0) && of["evict"]["loaded"].as_u64() > Some(0),
         "{of}"
     );
     assert!(of["objects"].as_array().unwrap().len() > 1, "{of}");

@@ -118,7 +118,7 @@ fn a_changed_pixel_of_a_fixture_is_named_and_a_blessing_keeps_its_reason_beside_
         [2],
         "pairs are matched each by itself"
     );
-    assert_eq!(found[0].columns, ["input", "disparity", "digest"]);
+    assert_eq!(found[0].columns, ["input", "stereo", "digest"]);
     assert!(matches!(fixtures::bless(&copy, " \n ", &Serial), Err(FixtureError::NoReason)));
     assert_eq!(
         fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"),

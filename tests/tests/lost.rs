@@ -166,7 +166,5 @@ fn a_camera_that_sees_another_street_begins_a_segment_apart() {
     let pose = |index: usize| reports[index].t_world_camera;
     let height_m = |pose: Transform| -pose.translation_m[1];
     assert!((height_m(pose(began)) - height_m(pose(began - 1)) - SEGMENT_GAP_M).abs() < 1.0);
-    assert!(
-        !reports[began - 1].fused && reports[began].fused && reports[began].allocation.made > 0
-    );
+    assert!(!reports[began - 1].fused && reports[began].fused && reports[began].allocate.made > 0);
 }

@@ -345,7 +345,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
                 assert_sound(report, &mapper, seed);
                 let stored =
                     [store.kept - before[0], store.lost - before[1], store.returned - before[2]];
-                let of = report.allocation.eviction;
+                let of = report.allocate.eviction;
                 assert_eq!(
                     [of.stored, of.lost, of.loaded],
                     stored,

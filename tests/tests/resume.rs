@@ -49,7 +49,7 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
             snapshots.push((at, bytes));
             tracks = tracks.max(mapper.tracks().count());
             objects = objects.max(mapper.objects().count());
-            waiting = waiting.max(mapper.background().history().len());
+            waiting = waiting.max(mapper.static_map().history().len());
         }
         assert_eq!(line(&step(&mut mapper, pair)), golden[at]);
     }

@@ -57,7 +57,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut NoStore);
     assert_eq!(
-        sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused),
+        sum(&reports, |report| report.allocate.eviction.lost + report.allocate.refused),
         0,
         "the large pool holds it all"
     );
@@ -70,15 +70,12 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut store);
-    let evicted = sum(&reports, |report| report.allocation.eviction.stored);
+    let evicted = sum(&reports, |report| report.allocate.eviction.stored);
     assert!(evicted > 1_000, "{evicted} blocks left: the pool is outgrown");
-    assert_eq!(
-        sum(&reports, |report| report.allocation.eviction.lost + report.allocation.refused),
-        0
-    );
+    assert_eq!(sum(&reports, |report| report.allocate.eviction.lost + report.allocate.refused), 0);
     let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
     let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
-    let mut source = PoolAndFile::new(mapper.background(), &mut store);
+    let mut source = PoolAndFile::new(mapper.static_map(), &mut store);
     let count = mesh::triangles(
         &mut source,
         how,
@@ -121,12 +118,12 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
     let reports = map_clip(clip, &mut mapper, &mut store);
     assert!(store.failure().is_some() && store.bytes() <= 300_000);
-    let kept = sum(&reports, |report| report.allocation.eviction.stored);
-    assert!(kept > 0 && sum(&reports, |report| report.allocation.eviction.lost) > 0);
+    let kept = sum(&reports, |report| report.allocate.eviction.stored);
+    assert!(kept > 0 && sum(&reports, |report| report.allocate.eviction.lost) > 0);
     assert_eq!(u64::from(kept), store.records());
     for report in &reports {
         let harmed = report.severity() == Severity::MapAffected;
-        assert_eq!(harmed, report.allocation.eviction.lost > 0, "frame {}", report.frame);
+        assert_eq!(harmed, report.allocate.eviction.lost > 0, "frame {}", report.frame);
     }
     let stored: BTreeSet<_> =
         store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
@@ -147,13 +144,13 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let reports = map_clip(&clip, &mut mapper, &mut store);
         let pruned = mapper.finish();
         let last = reports.last().expect("frames were taken");
-        let made = sum(&reports, |report| report.allocation.made);
+        let made = sum(&reports, |report| report.allocate.made);
         let left = sum(&reports, |report| {
-            report.allocation.eviction.stored
-                + report.allocation.eviction.empty
+            report.allocate.eviction.stored
+                + report.allocate.eviction.empty
                 + report.prune.blocks_freed
         });
-        let now = mapper.background().pool().len() as u32;
+        let now = mapper.static_map().pool().len() as u32;
         assert_eq!(
             made,
             left + pruned.blocks_freed + now,
@@ -161,9 +158,9 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         );
         assert!(
             last.blocks.peak as usize <= blocks
-                && sum(&reports, |report| report.allocation.refused) > 0
+                && sum(&reports, |report| report.allocate.refused) > 0
         );
-        assert_eq!(sum(&reports, |report| report.allocation.eviction.lost), 0);
+        assert_eq!(sum(&reports, |report| report.allocate.eviction.lost), 0);
         if prune_weight > 0 {
             assert!(
                 sum(&reports, |report| report.prune.early) > 0,

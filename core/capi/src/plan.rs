@@ -275,7 +275,7 @@ pub unsafe extern "C" fn dynvox_ray(
             let (origin_m, direction) =
                 (read(origin_m.cast::<[f64; 3]>())?, read(direction.cast::<[f64; 3]>())?);
             free_path.write(
-                mapper.planning().ray(mapper.background(), origin_m, direction, far_m).into(),
+                mapper.planning().ray(mapper.static_map(), origin_m, direction, far_m).into(),
             );
             Ok(())
         })
@@ -304,7 +304,7 @@ pub unsafe extern "C" fn dynvox_sweep(
             let path = items(points_m.cast::<[f64; 3]>(), count, buffer)?;
             let DynvoxRobotCylinder { radius_m, low_m, high_m, unknown_ends } = robot;
             let robot = RobotCylinder { radius_m, low_m, high_m, unknown_ends: unknown_ends != 0 };
-            free_path.write(mapper.planning().sweep(mapper.background(), path, &robot).into());
+            free_path.write(mapper.planning().sweep(mapper.static_map(), path, &robot).into());
             Ok(())
         })
     }

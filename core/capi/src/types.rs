@@ -147,7 +147,7 @@ pub struct DynvoxReport {
 
 impl From<&Report> for DynvoxReport {
     fn from(report: &Report) -> Self {
-        let allocation = &report.allocation;
+        let allocation = &report.allocate;
         Self {
             frame: report.frame,
             severity: match report.severity() {

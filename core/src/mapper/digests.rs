@@ -12,36 +12,47 @@
 use crate::{digest::Digest, objects::MAX_OBJECTS};
 use core::fmt;
 
-/// What is digested, in the order data flows.
+/// Outcome with a digest of its own, in the order data flows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Digested {
     /// The images and detections as they came in.
     Input,
     /// The disparity image.
-    Disparity,
+    Stereo,
     /// The scene flow's matches: sparse, refined, selected.
-    Matches,
+    SceneFlow,
     /// The camera's motion and pose.
     Egomotion,
     /// The tracks: boxes, masks, motions, states, what waits to be fused.
-    Tracks,
+    Tracking,
     /// The static map.
-    Background,
+    StaticMap,
     /// The object of that id: its summary and its map.
     Object(u32),
+}
+
+impl Digested {
+    /// Name of the digest: a field of [`StageDigests`], and NAME in the column `NAME_digest` of
+    /// `frames.csv`. [`crate::Stage::names`] tells which stages change it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Input => "input",
+            Self::Stereo => "stereo",
+            Self::SceneFlow => "scene_flow",
+            Self::Egomotion => "egomotion",
+            Self::Tracking => "tracking",
+            Self::StaticMap => "static_map",
+            Self::Object(_) => "objects",
+        }
+    }
 }
 
 impl fmt::Display for Digested {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Input => f.write_str("input"),
-            Self::Disparity => f.write_str("disparity"),
-            Self::Matches => f.write_str("matches"),
-            Self::Egomotion => f.write_str("egomotion"),
-            Self::Tracks => f.write_str("tracks"),
-            Self::Background => f.write_str("background"),
             Self::Object(id) => write!(f, "object {id}"),
+            stage => f.write_str(stage.name()),
         }
     }
 }
@@ -96,27 +107,39 @@ impl fmt::Display for ObjectDigests {
 pub struct StageDigests {
     /// See [`Digested::Input`]: a changed decoder is told from a changed core.
     pub input: u64,
-    /// See [`Digested::Disparity`].
-    pub disparity: u64,
-    /// See [`Digested::Matches`].
-    pub matches: u64,
+    /// See [`Digested::Stereo`].
+    pub stereo: u64,
+    /// See [`Digested::SceneFlow`].
+    pub scene_flow: u64,
     /// See [`Digested::Egomotion`].
     pub egomotion: u64,
-    /// See [`Digested::Tracks`].
-    pub tracks: u64,
-    /// See [`Digested::Background`].
-    pub background: u64,
+    /// See [`Digested::Tracking`].
+    pub tracking: u64,
+    /// See [`Digested::StaticMap`].
+    pub static_map: u64,
     /// See [`Digested::Object`].
     pub objects: ObjectDigests,
 }
 
 impl StageDigests {
+    /// All digests but those of objects, in the order data flows.
+    pub const fn in_order(&self) -> [(Digested, u64); 6] {
+        [
+            (Digested::Input, self.input),
+            (Digested::Stereo, self.stereo),
+            (Digested::SceneFlow, self.scene_flow),
+            (Digested::Egomotion, self.egomotion),
+            (Digested::Tracking, self.tracking),
+            (Digested::StaticMap, self.static_map),
+        ]
+    }
+
     /// One for all that came out of frame `frame`; the input is not in it.
     pub fn whole(&self, frame: u32) -> u64 {
         let mut digest = Digest::default();
-        let stages = [self.disparity, self.matches, self.egomotion, self.tracks, self.background];
         digest.u64(u64::from(frame));
-        stages.iter().for_each(|&stage| digest.u64(stage));
+        let outcomes = self.in_order().into_iter().filter(|(of, _)| *of != Digested::Input);
+        outcomes.for_each(|(_, outcome)| digest.u64(outcome));
         for object in self.objects.iter() {
             digest.u64(u64::from(object.id));
             digest.u64(object.digest);
@@ -124,27 +147,19 @@ impl StageDigests {
         digest.finish()
     }
 
-    /// The first stage, in the order data flows, whose digest differs from another step's.
+    /// The first outcome, in the order data flows, whose digest differs from another step's.
     ///
     /// ```
     /// use dynvox_core::{Digested, StageDigests};
     ///
-    /// let one = StageDigests { disparity: 1, matches: 2, ..StageDigests::default() };
-    /// let other = StageDigests { disparity: 1, matches: 3, ..StageDigests::default() };
-    /// assert_eq!(one.first_difference(&other), Some(Digested::Matches));
+    /// let one = StageDigests { stereo: 1, scene_flow: 2, ..StageDigests::default() };
+    /// let other = StageDigests { stereo: 1, scene_flow: 3, ..StageDigests::default() };
+    /// assert_eq!(one.first_difference(&other), Some(Digested::SceneFlow));
     /// assert_eq!(one.first_difference(&one), None);
     /// ```
     pub fn first_difference(&self, other: &Self) -> Option<Digested> {
-        let stages = [
-            (Digested::Input, self.input, other.input),
-            (Digested::Disparity, self.disparity, other.disparity),
-            (Digested::Matches, self.matches, other.matches),
-            (Digested::Egomotion, self.egomotion, other.egomotion),
-            (Digested::Tracks, self.tracks, other.tracks),
-            (Digested::Background, self.background, other.background),
-        ];
-        let stage =
-            stages.iter().find(|(_, mine, theirs)| mine != theirs).map(|&(stage, ..)| stage);
+        let mut pairs = self.in_order().into_iter().zip(other.in_order());
+        let stage = pairs.find(|(mine, theirs)| mine != theirs).map(|((stage, _), _)| stage);
         // The object of lowest id that differs or that only one step has.
         let alone = |of: &Self, than: Self| {
             of.objects
@@ -162,10 +177,8 @@ impl StageDigests {
 /// zeros for a stage that did not run.
 impl fmt::Display for StageDigests {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for stage in
-            [self.input, self.disparity, self.matches, self.egomotion, self.tracks, self.background]
-        {
-            write!(f, "{stage:016x} ")?;
+        for (_, digest) in self.in_order() {
+            write!(f, "{digest:016x} ")?;
         }
         self.objects.fmt(f)
     }
@@ -184,16 +197,16 @@ mod tests {
     fn names_the_first_stage_that_differs_and_the_object_by_its_id() {
         let one = StageDigests {
             input: 1,
-            disparity: 2,
-            matches: 3,
+            stereo: 2,
+            scene_flow: 3,
             egomotion: 4,
-            tracks: 5,
-            background: 6,
+            tracking: 5,
+            static_map: 6,
             objects: objects(&[(9, 1), (2, 7)]),
         };
         assert_eq!(one.first_difference(&one), None);
         assert_eq!(
-            one.first_difference(&StageDigests { background: 0, egomotion: 0, ..one }),
+            one.first_difference(&StageDigests { static_map: 0, egomotion: 0, ..one }),
             Some(Digested::Egomotion)
         );
         assert_eq!(

@@ -293,7 +293,7 @@ impl<'s> Mapper<'s> {
     }
 
     /// The static map.
-    pub fn background(&self) -> &Volume<'s> {
+    pub fn static_map(&self) -> &Volume<'s> {
         &self.static_map.volume
     }
 

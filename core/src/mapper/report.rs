@@ -91,7 +91,7 @@ pub struct Report {
     /// Where the left camera is: camera to world; the first frame's camera is the world.
     pub t_world_camera: Transform,
     /// What rectification did; `None` where pairs come rectified.
-    pub rectification: Option<RectifyReport>,
+    pub rectify: Option<RectifyReport>,
     /// The stereo matcher.
     pub stereo: StereoReport,
     /// The scene flow.
@@ -116,7 +116,7 @@ pub struct Report {
     /// map. Nor is one between two turns of `mapper.fuse_every`.
     pub fused: bool,
     /// Blocks made and refused.
-    pub allocation: AllocationReport,
+    pub allocate: AllocationReport,
     /// What pruning did.
     pub prune: PruneReport,
     /// The static map's pool.
@@ -134,7 +134,7 @@ impl Report {
     /// The worst event of this step. The map is affected where anything that belongs in a map was
     /// refused or lost: blocks of any map, detections, tracks, objects, masks and crops.
     pub fn severity(&self) -> Severity {
-        let allocation = &self.allocation;
+        let allocation = &self.allocate;
         let blocks =
             allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
         let refused = blocks + self.instances.refused() + self.internal_faults;
@@ -155,14 +155,14 @@ impl Report {
     }
 
     /// The report with the digest of what went in and with what rectification made of it.
-    pub(crate) fn with_input(self, input: u64, rectification: Option<RectifyReport>) -> Self {
-        let digest = rectification.map_or(self.digest, |report| {
+    pub(crate) fn with_input(self, input: u64, rectify: Option<RectifyReport>) -> Self {
+        let digest = rectify.map_or(self.digest, |report| {
             let mut digest = Digest::default();
             digest.u64(self.digest);
             digest.u64(report.digest);
             digest.finish()
         });
-        Self { digests: StageDigests { input, ..self.digests }, rectification, digest, ..self }
+        Self { digests: StageDigests { input, ..self.digests }, rectify, digest, ..self }
     }
 
     /// Features and matches beyond the capacity.

@@ -85,7 +85,7 @@ impl<'s> StaticMap<'s> {
         };
         executor.stage(Stage::Fuse, || observed.write(&mut depths, executor));
         let mut depth_m = depths.peeled_mut();
-        executor.stage(Stage::Instances, || tracked.mask_dynamic_depth(&mut depth_m));
+        executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
     }
 
     /// Allocates blocks around the depth that was taken, and averages it in.

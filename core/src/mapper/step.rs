@@ -105,7 +105,7 @@ impl Mapper<'_> {
         // (B) Detections, associated with tracks, and the matches assigned to them.
         tracker.set_frame_interval_s(seen.interval_s);
         let (detections, matches) = (frame.detections, seen.matches());
-        let mut assigned = executor.stage(Stage::Instances, || {
+        let mut assigned = executor.stage(Stage::Tracking, || {
             tracker.detect(seen.number, detections, seen.size(), matches).assign_matches()
         });
         // (C.2) The camera's own motion, from what does not move; the first camera is the world.
@@ -122,7 +122,7 @@ impl Mapper<'_> {
         let estimator = &mut localization.estimator;
         let estimate_motions =
             || assigned.estimate_motions(&rig, &camera, seen.search(), estimator);
-        let mut tracked = executor.stage(Stage::Instances, estimate_motions);
+        let mut tracked = executor.stage(Stage::Tracking, estimate_motions);
         // (E) The static map without what may move, and objects' maps; not at a pose extrapolated.
         let erase_trails = || static_map.erase_trails(&camera, segmenter);
         let voxels_erased = executor.stage(Stage::Prune, erase_trails);
@@ -132,10 +132,10 @@ impl Mapper<'_> {
             allocation = static_map.fuse(&seen, &camera, executor, store);
         }
         let shown = seen.of_objects(&rig, &camera.t_world_camera);
-        let tracking = executor.stage(Stage::Instances, || {
+        executor.stage(Stage::Objects, || {
             objects.reconstruct(&tracked, fused.then_some(&shown), executor, sink);
-            tracked.commit()
         });
+        let tracking = executor.stage(Stage::Tracking, || tracked.commit());
         // (F) Noise last observed a fixed lag ago is removed.
         let prune = || executor.stage(Stage::Prune, || static_map.volume.prune());
         let prune = fused.then(prune).unwrap_or_default();
@@ -217,7 +217,7 @@ impl Mapper<'_> {
         let report = Report {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
-            rectification: None,
+            rectify: None,
             stereo,
             scene_flow,
             pose: found.origin,
@@ -232,7 +232,7 @@ impl Mapper<'_> {
                 found.matches_excluded,
             ),
             fused,
-            allocation,
+            allocate: allocation,
             prune,
             blocks: self.block_count(),
             internal_faults: self.check_invariants(),
@@ -271,11 +271,11 @@ impl Mapper<'_> {
     pub(super) fn digests(&mut self, egomotion: Option<&MotionEstimate>) -> StageDigests {
         StageDigests {
             input: 0,
-            disparity: self.stereo.digest(),
-            matches: self.scene_flow.digest(),
+            stereo: self.stereo.digest(),
+            scene_flow: self.scene_flow.digest(),
             egomotion: self.egomotion_digest(egomotion),
-            tracks: self.tracks_digest(),
-            background: self.static_map.volume.digest(),
+            tracking: self.tracking_digest(),
+            static_map: self.static_map.volume.digest(),
             objects: ObjectDigests::from_objects(
                 self.objects.digests().map(|(id, digest)| ObjectDigest { id, digest }),
             ),
@@ -292,7 +292,7 @@ impl Mapper<'_> {
     }
 
     /// Digest of the tracks by age, their masks, and the crops that wait to be fused.
-    fn tracks_digest(&mut self) -> u64 {
+    fn tracking_digest(&mut self) -> u64 {
         Hasher::digest(|hasher| {
             self.tracker.visit(hasher);
             if self.config.segmentation.enabled {

@@ -4,13 +4,13 @@
 //! [`Executor`] to do them. Whether they run one after the other or at once is the caller's business
 //! and can never change a result: no band reads what another one writes.
 
+use crate::Stage;
+
 mod bands;
-mod stage;
 mod vectors;
 
 pub use bands::each;
 pub(crate) use bands::{BANDS, Bands, zip2, zip3};
-pub use stage::Stage;
 pub use vectors::Vectors;
 pub(crate) use vectors::{Level, Work};
 

@@ -4,7 +4,7 @@
 use super::hypothesis::PREDICT_FRAMES;
 use super::{
     SegmentationConfig,
-    groups::{MAX_GROUPS, Group},
+    groups::{Group, MAX_GROUPS},
     hypothesis::{Hypothesis, Observed, RECENT},
     trail::Trail,
 };

@@ -68,7 +68,7 @@ use crate::{
 use candidate::Candidate;
 use collect::{Owned, SPARSE_VARIANCE};
 use groups::MAX_CANDIDATES;
-use hypotheses::{MAX_HYPOTHESES, Hypotheses};
+use hypotheses::{Hypotheses, MAX_HYPOTHESES};
 use hypothesis::Hypothesis;
 use joint::{FarMatch, MAX_JOINT};
 use lattice::{CELL_PX, Lattice};

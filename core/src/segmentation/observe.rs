@@ -4,7 +4,7 @@ use super::groups::MEMBERS_MIN;
 use super::{
     MotionSegmenter, SegmentationReport,
     collect::{Owned, free_matches},
-    groups::{self, MAX_GROUPS, Group},
+    groups::{self, Group, MAX_GROUPS},
     joint,
     lattice::Lattice,
     patches::{PatchMemory, PatchSearch},

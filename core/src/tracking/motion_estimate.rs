@@ -68,8 +68,7 @@ impl DisparityRange {
         let slack_px = 3.0 * core::f64::consts::SQRT_2 * NOISE_PX + 0.5;
         let depth_m = rig.focal_baseline_px_m() / median_px;
         let nearest_m = depth_m - EXTENT_M;
-        let max_px =
-            if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
+        let max_px = if nearest_m > 0.0 { rig.focal_baseline_px_m() / nearest_m } else { f64::MAX };
         Self {
             least_px: rig.focal_baseline_px_m() / (depth_m + EXTENT_M) - slack_px,
             max_px: max_px + slack_px,

@@ -286,7 +286,7 @@ fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
     let mut triangles = Triangles::default();
     let in_memory: HashSet<_> = running.mapper.with_dependent(|_, mapper| {
         mapper.triangles(&mut |triangle| triangles.add(triangle));
-        let volume = mapper.background();
+        let volume = mapper.static_map();
         volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).collect()
     });
     if let Some(file) = running.blocks.file_mut() {

@@ -34,7 +34,7 @@ def test_street(command_line):
 
 def test_street_in_little_memory_with_blocks_evicted_and_loaded(command_line):
     summary = compare(command_line, None, memory="18MiB", threads=1, frames=20)
-    assert summary["evict"]["out"] > 0 and summary["evict"]["back"] > 0, summary["evict"]
+    assert summary["evict"]["stored"] > 0 and summary["evict"]["loaded"] > 0, summary["evict"]
 
 
 def test_street_with_masks_depth_and_noise(command_line):
@@ -61,7 +61,7 @@ def test_colour_pictures_alone_give_the_bits_of_their_grey_and_colour(data):
     dataset = dynvox.Dataset(data / "kitti-tracking", sequence="0003", frames=3, instances="none")
     grey, alone = dataset.mapper(), dataset.mapper()
     for frame in dataset:
-        assert grey.step(**frame)["digests"]["disparity"] == alone.step(frame["colour"], frame["right"])["digests"]["disparity"]
+        assert grey.step(**frame)["digests"]["stereo"] == alone.step(frame["colour"], frame["right"])["digests"]["stereo"]
         assert grey.digest == alone.digest
 
 

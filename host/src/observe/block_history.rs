@@ -40,10 +40,10 @@ impl Observer for BlockHistoryObserver {
         run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        let volume = frame.view.mapper().background();
+        let volume = frame.view.mapper().static_map();
         let mut left = self.note_visible(volume, frame.row.frame as u32);
         let report = &frame.row.report;
-        let eviction = &report.allocation.eviction;
+        let eviction = &report.allocate.eviction;
         if report.prune.blocks_freed + eviction.stored + eviction.lost + eviction.empty > 0 {
             left.extend(self.take_absent(volume));
         }
@@ -62,7 +62,7 @@ impl Observer for BlockHistoryObserver {
         run: &ObservedRun<'_>,
         end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        let pruned = self.take_absent(end.view.mapper().background());
+        let pruned = self.take_absent(end.view.mapper().static_map());
         let kept = std::mem::take(&mut self.sightings).into_iter().flatten();
         let rows = pruned.into_iter().map(|(coord, last)| (coord, last, BlockFate::Pruned));
         self.write(run, rows.chain(kept.map(|(coord, last)| (coord, last, BlockFate::Map))))

@@ -100,7 +100,7 @@ impl Observer for BlocksObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let (totals, row) = (&mut self.totals, frame.row);
-        let (allocation, prune) = (&row.report.allocation, &row.report.prune);
+        let (allocation, prune) = (&row.report.allocate, &row.report.prune);
         totals.peak = row.report.blocks.peak;
         totals.refused += u64::from(row.blocks_refused());
         totals.stored += u64::from(allocation.eviction.stored);

@@ -56,7 +56,7 @@ impl BoundUses {
     fn add(&mut self, row: &FrameRow, mapper: &Mapper<'_>, lost_blocks: u64) {
         let report = &row.report;
         self.add_flow(&report.scene_flow);
-        let (blocks, allocation) = (&report.blocks, &report.allocation);
+        let (blocks, allocation) = (&report.blocks, &report.allocate);
         let refused = allocation.refused + allocation.eviction.lost;
         self.blocks.add(
             blocks.peak as usize + lost_blocks as usize + allocation.refused as usize,
@@ -173,7 +173,7 @@ impl Observer for BoundsObserver {
         _: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        self.lost_blocks += u64::from(frame.row.report.allocation.eviction.lost);
+        self.lost_blocks += u64::from(frame.row.report.allocate.eviction.lost);
         self.uses.add(frame.row, frame.view.mapper(), self.lost_blocks);
         Ok(())
     }

@@ -1,8 +1,9 @@
 //! What is recorded of every frame.
 
 use crate::input::MaskRefusals;
-use dynvox_core::egomotion::MotionStatus;
 use dynvox_core::egomotion::icp::IcpStatus;
+use dynvox_core::egomotion::{MotionStatus, RightAhead};
+use dynvox_core::rectify::self_calibration::SelfCalibrationReport;
 use dynvox_core::{PoseOrigin, Report, Severity, Stage};
 use serde::{Deserialize, Serialize};
 
@@ -94,6 +95,16 @@ impl FrameRow {
         self.report.pose == PoseOrigin::Extrapolated
     }
 
+    /// Distance of the right camera ahead of its place, where matches show it.
+    pub fn right_ahead(&self) -> Option<RightAhead> {
+        self.report.egomotion.and_then(|motion| motion.right_ahead)
+    }
+
+    /// Findings of self-calibration, where enough is known.
+    pub fn rig(&self) -> Option<&SelfCalibrationReport> {
+        Some(&self.report.self_calibration).filter(|rig| rig.known)
+    }
+
     /// Matches the estimate was made of, inliers among them, and their root mean square error in
     /// px; for the depth tracker the matches that were checked, and those that agree.
     pub fn matches(&self) -> (u32, u32, f64) {
@@ -122,7 +133,7 @@ impl FrameRow {
     /// What affected the map in this frame, in words.
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) =
-            (&self.report.allocation, self.motion(), &self.mask_refusals);
+            (&self.report.allocate, self.motion(), &self.mask_refusals);
         let instances = &self.report.instances;
         let lost = (self.report.segment > 0).then(|| {
             format!(
@@ -162,7 +173,7 @@ impl FrameRow {
     /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the
     /// list of visible ones.
     pub fn blocks_refused(&self) -> u32 {
-        let allocation = &self.report.allocation;
+        let allocation = &self.report.allocate;
         allocation.refused + allocation.beyond + allocation.unlisted
     }
 }

@@ -31,7 +31,7 @@ mod written_file;
 pub use block_history::BlockHistoryObserver;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
-pub use chart_values::{ChartValues, Charted};
+pub use chart_values::ChartValues;
 pub use frame::{FrameRow, STAGES, StageTime, StepTimes};
 pub use frame_log::{FrameLog, StageStatistics};
 pub use frame_pictures::FramePictures;

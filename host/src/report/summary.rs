@@ -172,8 +172,12 @@ struct PruneSummary {
 
 #[derive(Debug, Serialize)]
 struct EvictSummary {
-    out: u64,
-    back: u64,
+    /// Evicted and stored.
+    stored: u64,
+    /// Evicted and lost.
+    lost: u64,
+    /// Loaded from the store.
+    loaded: u64,
     /// Evicted with nothing in them.
     empty: u64,
     /// Stored at the end of the run.
@@ -294,8 +298,9 @@ impl PruneSummary {
 impl EvictSummary {
     fn new(blocks: &BlocksSection) -> Self {
         Self {
-            out: blocks.totals.stored + blocks.totals.lost,
-            back: blocks.totals.loaded,
+            stored: blocks.totals.stored,
+            lost: blocks.totals.lost,
+            loaded: blocks.totals.loaded,
             empty: blocks.totals.empty,
             end: u64::from(blocks.store.end.stored),
             disk_records: blocks.store.records,

@@ -128,7 +128,7 @@ impl MeshOutput {
             .filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none())
         {
             None => {
-                let volume = mapper.background();
+                let volume = mapper.static_map();
                 if let Ok(ply) = &mut ply {
                     volume.mesh(&mapper.config().mesh, |_| true, ply);
                 }
@@ -193,7 +193,7 @@ fn pool_and_file(
         HostSlab::map(store::mesh::slab_bytes(colour)).ok_or(std::io::ErrorKind::OutOfMemory)?;
     let (how, memory) =
         ((&mapper.config().volume, &mapper.config().mesh), (slab.bytes_mut(), colour));
-    let mut source = PoolAndFile::new(mapper.background(), file);
+    let mut source = PoolAndFile::new(mapper.static_map(), file);
     store::mesh::triangles(&mut source, how, memory, &HashSet::new(), ply)
         .map(drop)
         .map_err(too_small)

@@ -137,7 +137,7 @@ fn map(
     let Session { mut mapper, store, state, since, .. } = session;
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),
-        blocks: mapper.background().pool().len(),
+        blocks: mapper.static_map().pool().len(),
         pruned,
         output: MeshOutput::begin(
             &mut mapper,

@@ -321,7 +321,7 @@ impl<'p, 's> Session<'p, 's> {
             stamp_ns: None,
             time_s: 0.0,
             report,
-            history_frames: self.mapper.background().history().len(),
+            history_frames: self.mapper.static_map().history().len(),
             track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic]
                 .map(tracks_in),
             disparity_mean_px: mean_px(self.mapper.disparity_q8()),

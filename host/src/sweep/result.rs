@@ -3,7 +3,6 @@
 
 use super::SweepError;
 use crate::evaluate::reference::{EvaluatedFrame, PointOutcomes, Region};
-use crate::observe::Charted;
 use crate::report::Summary;
 use crate::request::Request;
 use crate::run::{RunRecord, write_whole};
@@ -82,11 +81,7 @@ impl RunResult {
                 .flat_map(|reference| &reference.outcomes)
                 .cloned()
                 .collect(),
-            blocks: charts
-                .series(Charted::BlocksUsed)
-                .into_iter()
-                .map(|blocks| blocks as u32)
-                .collect(),
+            blocks: charts.series("blocks_used").into_iter().map(|blocks| blocks as u32).collect(),
             blocks_every: charts.frames_per_point(),
         })
     }

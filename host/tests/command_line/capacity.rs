@@ -70,7 +70,7 @@ fn the_least_bounds_hold_the_same_run() {
     let again = run(root, "least", &[&["--capacity", "least.toml"], &LAG[..]].concat());
     assert_eq!((refused(&again), again["slab_bytes"].as_u64()), (vec![], Some(least)));
     // Where crops wait in their ring is in the digest of the tracks, so that one differs.
-    for column in ["input", "disparity", "matches", "egomotion", "background", "objects"] {
+    for column in ["input", "stereo", "scene_flow", "egomotion", "static_map", "objects"] {
         assert_eq!(
             digests(&root.join("least"), column),
             digests(&root.join("large"), column),

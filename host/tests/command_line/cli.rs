@@ -221,7 +221,7 @@ fn a_full_disk_is_warned_of_once_and_counted_and_the_run_goes_on() {
     let (full, warning) = run("full", &["--stream-mib", "1"]);
     let (lost, _) = run("lost", &["--no-stream"]);
     assert!(
-        kept["evict"]["out"].as_u64() > Some(0) && kept["health"]["blocks_lost"] == 0,
+        kept["evict"]["stored"].as_u64() > Some(0) && kept["health"]["blocks_lost"] == 0,
         "{kept}"
     );
     assert_eq!(warning.matches("map.blocks cannot grow").count(), 1, "{warning}");

@@ -59,7 +59,8 @@ fn one_bit_of_a_stages_digest_names_the_stage() {
     let csv = root.path().join("dirty/frames.csv");
     let clean = fs::read_to_string(&csv).unwrap();
     let table: Vec<Vec<&str>> = clean.lines().map(|line| line.split(',').collect()).collect();
-    for stage in ["input", "disparity", "matches", "egomotion", "tracks", "background", "objects"] {
+    for stage in ["input", "stereo", "scene_flow", "egomotion", "tracking", "static_map", "objects"]
+    {
         let column = table[0].iter().position(|name| *name == format!("{stage}_digest")).unwrap();
         let mut dirty: Vec<Vec<String>> =
             table.iter().map(|row| row.iter().map(|&cell| cell.to_owned()).collect()).collect();
@@ -128,8 +129,8 @@ fn what_is_no_run_folder_or_an_old_or_damaged_one_is_told_with_what_to_do() {
     run(root.path(), "old", &[]);
     let csv = root.path().join("old/frames.csv");
     let text = fs::read_to_string(&csv).unwrap();
-    fs::write(&csv, text.replace("disparity_digest", "other")).unwrap();
-    trouble("old", "has no column disparity_digest: an older dynvox wrote it");
+    fs::write(&csv, text.replace("stereo_digest", "other")).unwrap();
+    trouble("old", "has no column stereo_digest: an older dynvox wrote it");
     fs::write(&csv, &text[..text.len() - 30]).unwrap();
     trouble("old", "line 5 cannot be read");
 }

@@ -97,7 +97,7 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
     assert_eq!(names(root.path()), ["elsewhere", "stopped", "whole"]);
     let of = summary(&root.path().join("whole"));
     assert!(
-        of["evict"]["back"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2,
+        of["evict"]["loaded"].as_u64().unwrap() > 0 && of["objects"].as_array().unwrap().len() > 2,
         "{of}"
     );
     assert!(!names(&root.path().join("whole/objects")).is_empty());

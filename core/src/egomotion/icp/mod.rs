@@ -38,8 +38,8 @@ use pyramid::Pyramid;
 
 /// Fewest pairs a motion is sought with.
 const PAIRS_MIN: u32 = 100;
-/// Least share of the pairs that must hold the direction held worst: a flat wall holds none.
-const HELD_MIN: f32 = 0.0005;
+/// Least share of the pairs in the least constrained direction: a flat wall constrains one only.
+const MIN_EIGEN_SHARE: f32 = 0.0005;
 /// Largest rotation between two frames, rad.
 const STEP_MAX_RAD: f32 = 0.35;
 /// Least share of the matches of the images, which the tracker does not use, that its motion must
@@ -197,7 +197,7 @@ fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
         IcpStatus::TooFewPairs
-    } else if report.eigen_share < f64::from(HELD_MIN) {
+    } else if report.eigen_share < f64::from(MIN_EIGEN_SHARE) {
         IcpStatus::Degenerate
     } else if f64::from(report.pairs) < f64::from(config.pairs_min) * f64::from(report.points) {
         IcpStatus::OffTheMap

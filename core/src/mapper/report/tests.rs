@@ -16,9 +16,9 @@ fn nothing_that_took_place_is_nothing_to_say() {
         assert_eq!(severity_of(|report| report.pose = pose), Severity::Info, "{pose:?}");
     }
     assert_eq!(severity_of(|report| report.prune.blocks_freed = 9), Severity::Info);
-    assert_eq!(severity_of(|report| report.allocation.made = 9), Severity::Info);
+    assert_eq!(severity_of(|report| report.allocate.made = 9), Severity::Info);
     assert_eq!(
-        severity_of(|report| report.allocation.eviction.stored = 9),
+        severity_of(|report| report.allocate.eviction.stored = 9),
         Severity::Info,
         "a block that was stored is not lost"
     );
@@ -34,10 +34,10 @@ fn a_guessed_pose_and_all_that_rests_on_it_affect_the_map() {
 #[test]
 fn everything_refused_or_lost_affects_the_map() {
     let counters: [fn(&mut Report) -> &mut u32; 16] = [
-        |report| &mut report.allocation.refused,
-        |report| &mut report.allocation.beyond,
-        |report| &mut report.allocation.unlisted,
-        |report| &mut report.allocation.eviction.lost,
+        |report| &mut report.allocate.refused,
+        |report| &mut report.allocate.beyond,
+        |report| &mut report.allocate.unlisted,
+        |report| &mut report.allocate.eviction.lost,
         |report| &mut report.instances.detections.bad_score,
         |report| &mut report.instances.detections.bad_box,
         |report| &mut report.instances.detections.bad_mask,
@@ -128,7 +128,7 @@ fn a_rig_that_is_off_is_recovered_where_it_is_corrected_and_affects_the_map_wher
 #[test]
 fn a_dropped_feature_does_not_hide_a_refused_block() {
     let both =
-        severity_of(|report| (report.scene_flow.left.dropped, report.allocation.refused) = (9, 1));
+        severity_of(|report| (report.scene_flow.left.dropped, report.allocate.refused) = (9, 1));
     assert_eq!(both, Severity::MapAffected);
 }
 
@@ -142,12 +142,12 @@ fn names_are_those_of_the_tables() {
 fn the_digest_of_a_rectified_frame_holds_that_of_its_images() {
     let report = Report { digest: 7, ..Report::default() };
     let plain = report.with_input(5, None);
-    assert_eq!((plain.digests.input, plain.digest, plain.rectification.is_none()), (5, 7, true));
+    assert_eq!((plain.digests.input, plain.digest, plain.rectify.is_none()), (5, 7, true));
     let rectified = |digest: u64| {
         report.with_input(5, Some(RectifyReport { digest, ..RectifyReport::default() }))
     };
     assert_eq!(rectified(1).digests.input, 5);
-    assert!(rectified(1).rectification.is_some());
+    assert!(rectified(1).rectify.is_some());
     let mut digests = vec![plain.digest, rectified(1).digest, rectified(2).digest];
     digests.sort_unstable();
     digests.dedup();

@@ -145,11 +145,11 @@ fn bounds_views_and_settings_say_what_they_miss() {
 fn what_was_digested_goes_by_its_name() {
     let names: Vec<_> = [
         Digested::Input,
-        Digested::Disparity,
-        Digested::Matches,
+        Digested::Stereo,
+        Digested::SceneFlow,
         Digested::Egomotion,
-        Digested::Tracks,
-        Digested::Background,
+        Digested::Tracking,
+        Digested::StaticMap,
         Digested::Object(17),
     ]
     .iter()
@@ -157,6 +157,6 @@ fn what_was_digested_goes_by_its_name() {
     .collect();
     assert_eq!(
         names,
-        ["input", "disparity", "matches", "egomotion", "tracks", "background", "object 17"]
+        ["input", "stereo", "scene_flow", "egomotion", "tracking", "static_map", "object 17"]
     );
 }

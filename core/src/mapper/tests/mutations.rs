@@ -47,7 +47,7 @@ fn a_bit_of_a_voxel_of_the_background() {
                     |mapper: &mut Mapper<'_>| mapper.static_map.volume.flip(slot, voxel, bit);
                 assert_eq!(
                     named_by(&walk, mapper, reports, flip),
-                    Some(Digested::Background),
+                    Some(Digested::StaticMap),
                     "voxel {voxel}, bit {bit}"
                 );
                 flip(mapper);
@@ -75,7 +75,7 @@ fn a_bit_of_a_match() {
             let flip = |mapper: &mut Mapper<'_>| mapper.scene_flow.flip(at, coordinate, bit);
             assert_eq!(
                 named_by(&walk, mapper, reports, flip),
-                Some(Digested::Matches),
+                Some(Digested::SceneFlow),
                 "match {at}, coordinate {coordinate}"
             );
             flip(mapper);
@@ -96,8 +96,8 @@ fn a_bit_of_a_component_of_the_pose() {
 
 #[test]
 fn a_bit_of_a_disparity_and_of_a_track() {
-    assert_eq!(named(|mapper| mapper.stereo.flip(WIDTH * 80 + 133, 0)), Some(Digested::Disparity));
-    assert_eq!(named(|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracks));
+    assert_eq!(named(|mapper| mapper.stereo.flip(WIDTH * 80 + 133, 0)), Some(Digested::Stereo));
+    assert_eq!(named(|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracking));
 }
 
 #[test]
@@ -135,6 +135,6 @@ fn what_changes_in_memory_between_two_frames_is_named_in_the_next_one() {
         let slot = visible[visible.len() / 2];
         mapper.static_map.volume.flip_behind_its_back(slot, 200, 23);
     };
-    assert_eq!(named(&raw), Some(Digested::Background));
-    assert_eq!(named(&|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracks));
+    assert_eq!(named(&raw), Some(Digested::StaticMap));
+    assert_eq!(named(&|mapper| mapper.tracker.flip_track(0)), Some(Digested::Tracking));
 }

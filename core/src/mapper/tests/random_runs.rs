@@ -97,7 +97,7 @@ impl Coverage {
         self.extrapolated += u32::from(report.pose == PoseOrigin::Extrapolated);
         self.missed += report.instances.tracks.tracks - report.instances.tracks.detected;
         self.tracked_only += report.instances.detections.tracked_only;
-        self.evicted += report.allocation.eviction.lost;
+        self.evicted += report.allocate.eviction.lost;
         self.pruned += report.prune.visited;
     }
 

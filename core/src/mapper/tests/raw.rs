@@ -64,11 +64,7 @@ fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
             StageDigests { input: 0, ..raw.digests },
             StageDigests { input: 0, ..report.digests }
         );
-        assert!(
-            raw.rectification.is_some()
-                && report.rectification.is_none()
-                && raw.digest != report.digest
-        );
+        assert!(raw.rectify.is_some() && report.rectify.is_none() && raw.digest != report.digest);
     }
 }
 
@@ -87,7 +83,7 @@ fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
         let mut valid = 0;
         for at in 0..3 {
             let report = walk.step(at, mapper);
-            assert!(report.rectification.unwrap().invalid_left > 1_000);
+            assert!(report.rectify.unwrap().invalid_left > 1_000);
             let invalid = mapper.rectifier.invalid().unwrap();
             for (v, row) in mapper.disparity_q8().rows().enumerate() {
                 valid += row.iter().filter(|disparity| **disparity != 0).count();

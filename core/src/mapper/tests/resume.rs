@@ -72,7 +72,7 @@ fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
         assert!(last.instances.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
         let left: u32 = reports
             .iter()
-            .map(|report| report.allocation.eviction.lost + report.allocation.refused)
+            .map(|report| report.allocate.eviction.lost + report.allocate.refused)
             .sum();
         assert_eq!(
             left > 0,
@@ -96,10 +96,7 @@ fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
                     (report.digest, report.frame, report.blocks),
                     (expected.digest, expected.frame, expected.blocks)
                 );
-                assert_eq!(
-                    (report.allocation, report.prune),
-                    (expected.allocation, expected.prune)
-                );
+                assert_eq!((report.allocate, report.prune), (expected.allocate, expected.prune));
             }
         }
     }
@@ -165,7 +162,7 @@ fn the_end_of_a_resumed_drive_prunes_and_hands_over_the_same() {
     let walk = Walk::new(FRAMES);
     let (_, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 8);
     let finish = |mapper: &mut Mapper<'_>| {
-        (mapper.finish(), mapper.background().digest(), mapper.background().pool().len())
+        (mapper.finish(), mapper.static_map().digest(), mapper.static_map().pool().len())
     };
     let resumed = restored(&CAPACITY, &Walk::config(), &snapshots[0].1, finish).unwrap();
     assert_eq!(with_mapper(&walk, 8, |mapper, _| finish(mapper)), resumed);

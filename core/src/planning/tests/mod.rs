@@ -1,9 +1,9 @@
 //! Analytic scenes with closed answers, and slow twins of what is fast.
 
 mod distances;
+mod free_paths;
 mod ground;
 mod objects;
-mod ways;
 mod windows;
 
 use super::{cells::Cells, *};

@@ -5,7 +5,7 @@ mod frames;
 mod tracks;
 
 pub use blocks::{BlockFate, block_rows};
-pub use frames::{FrameDigests, frame_row, read_frame_digests};
+pub use frames::{Cell, FrameColumn, FrameDigests, frame_columns, frame_row, read_frame_digests};
 pub use tracks::track_rows;
 
 use serde::Serialize;

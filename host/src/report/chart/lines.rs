@@ -18,6 +18,20 @@ pub struct Series<'a> {
     pub values: Vec<f64>,
 }
 
+impl Series<'_> {
+    /// The same line in another unit: values times `factor`.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.values.iter_mut().for_each(|value| *value *= factor);
+        self
+    }
+
+    /// Sizes of the values, without their signs.
+    pub fn sizes(mut self) -> Self {
+        self.values.iter_mut().for_each(|value| *value = value.abs());
+        self
+    }
+}
+
 /// Lines over frames; the y axis begins at 0 and reaches at least `least_top`.
 pub fn lines(frames: &[usize], series: &[Series<'_>], title: &str, least_top: f64) -> Markup {
     let finite =

@@ -240,11 +240,11 @@ fn row_of(row: &FrameDigests) -> Option<Row> {
     };
     let stages = StageDigests {
         input: hex(&row.input_digest)?,
-        disparity: hex(&row.disparity_digest)?,
-        matches: hex(&row.matches_digest)?,
+        stereo: hex(&row.stereo_digest)?,
+        scene_flow: hex(&row.scene_flow_digest)?,
         egomotion: hex(&row.egomotion_digest)?,
-        tracks: hex(&row.tracks_digest)?,
-        background: hex(&row.background_digest)?,
+        tracking: hex(&row.tracking_digest)?,
+        static_map: hex(&row.static_map_digest)?,
         objects: ObjectDigests::from_objects(objects.into_iter()),
     };
     let outcome = Outcome {
@@ -269,8 +269,12 @@ mod tests {
             let objects = ObjectDigests::from_objects(
                 [ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter(),
             );
-            let mut stages =
-                StageDigests { input: frame as u64, tracks: 5, objects, ..StageDigests::default() };
+            let mut stages = StageDigests {
+                input: frame as u64,
+                tracking: 5,
+                objects,
+                ..StageDigests::default()
+            };
             change(frame, &mut stages);
             (frame, Row { digest: stages.whole(frame as u32), stages, outcome: Outcome::default() })
         });
@@ -289,10 +293,10 @@ mod tests {
         assert_eq!(divergence(&|_, _| {}), None);
         let late = |frame: usize, stages: &mut StageDigests| {
             if frame >= 3 {
-                (stages.background, stages.matches) = (1, 1);
+                (stages.static_map, stages.scene_flow) = (1, 1);
             }
         };
-        assert_eq!(divergence(&late), Some((3, Some(Digested::Matches))));
+        assert_eq!(divergence(&late), Some((3, Some(Digested::SceneFlow))));
         let object = |frame: usize, stages: &mut StageDigests| {
             if frame == 4 {
                 stages.objects =

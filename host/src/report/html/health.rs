@@ -1,7 +1,6 @@
 //! Matches, disparity density, and everything that was refused or lost.
 
 use super::{frames, series, table};
-use crate::observe::Charted;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::text::{grouped, lost_because};
 use crate::run::RunRecord;
@@ -12,15 +11,15 @@ pub fn section(run: &RunRecord) -> Markup {
     let matches = lines(
         &frames,
         &[
-            series(run, "matches", COLOURS[5], Charted::Matches),
-            series(run, "inliers", COLOURS[0], Charted::Inliers),
+            series(run, "matches", COLOURS[5], "matches"),
+            series(run, "inliers", COLOURS[0], "inliers"),
         ],
         "matches",
         0.0,
     );
     let density = lines(
         &frames,
-        &[series(run, "pixels with a disparity", COLOURS[3], Charted::Density)],
+        &[series(run, "pixels with a disparity", COLOURS[3], "stereo_density").scaled(100.0)],
         "%",
         100.0,
     );

@@ -1,7 +1,7 @@
 //! Memory: the block pool, the process, the slab region by region.
 
 use super::{constant, frames, series, table};
-use crate::observe::{BoundUse, Charted};
+use crate::observe::BoundUse;
 use crate::report::bounds;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::text::{MIB, grouped};
@@ -13,8 +13,8 @@ pub fn section(run: &RunRecord) -> Markup {
     let pool = lines(
         &frames,
         &[
-            series(run, "blocks in use", COLOURS[0], Charted::BlocksUsed),
-            series(run, "visible", COLOURS[3], Charted::BlocksVisible),
+            series(run, "blocks in use", COLOURS[0], "blocks_used"),
+            series(run, "visible", COLOURS[3], "blocks_visible"),
             constant(run, "pool", COLOURS[5], plan.capacity.blocks as f64),
         ],
         "blocks",
@@ -23,7 +23,8 @@ pub fn section(run: &RunRecord) -> Markup {
     let resident = lines(
         &frames,
         &[
-            series(run, "resident memory of the process", COLOURS[4], Charted::Resident),
+            series(run, "resident memory of the process", COLOURS[4], "rss_bytes")
+                .scaled(1.0 / MIB),
             constant(run, "slab", COLOURS[5], plan.capacity.bytes() as f64 / MIB),
             constant(run, "limit", COLOURS[2], plan.rss_limit_bytes as f64 / MIB),
         ],

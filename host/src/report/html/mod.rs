@@ -12,7 +12,6 @@ mod time;
 mod trajectory;
 
 use super::chart::Series;
-use crate::observe::Charted;
 use crate::run::RunRecord;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -93,9 +92,10 @@ fn table(heads: &[(&str, bool)], rows: &[Vec<String>]) -> Markup {
     }
 }
 
-/// One value a frame, or for several frames where there are many.
-fn series<'a>(run: &RunRecord, name: &'a str, colour: &'a str, value: Charted) -> Series<'a> {
-    Series { name, colour, values: run.frames.charts().series(value) }
+/// A charted column of `frames.csv`: one value for each frame, or for several frames where there
+/// are many.
+fn series<'a>(run: &RunRecord, name: &'a str, colour: &'a str, column: &str) -> Series<'a> {
+    Series { name, colour, values: run.frames.charts().series(column) }
 }
 
 /// The same value for all frames.

@@ -1,7 +1,6 @@
 //! What the run found left of the calibration's error.
 
 use super::{frames, series};
-use crate::observe::Charted;
 use crate::report::chart::{COLOURS, lines};
 use crate::report::rig::{is_warning, sentence};
 use crate::run::RunRecord;
@@ -11,8 +10,9 @@ pub fn section(run: &RunRecord) -> Markup {
     let chart = lines(
         &frames(run),
         &[
-            series(run, "size of what was found", COLOURS[0], Charted::OffsetFound),
-            series(run, "size of what was taken out", COLOURS[3], Charted::OffsetApplied),
+            series(run, "size of what was found", COLOURS[0], "disparity_offset_px").sizes(),
+            series(run, "size of what was taken out", COLOURS[3], "disparity_offset_applied_px")
+                .sizes(),
         ],
         "px",
         0.1,

@@ -1,7 +1,6 @@
 //! Time per stage.
 
 use super::{frames, series, table};
-use crate::observe::Charted;
 use crate::report::chart::{COLOURS, Series, lines, stacked};
 use crate::run::RunRecord;
 use dynvox_core::Stage;
@@ -9,8 +8,8 @@ use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let frames = frames(run);
-    let mut wall = vec![series(run, "whole step", "currentColor", Charted::Step)];
-    wall.extend(stages(run, Charted::Wall));
+    let mut wall = vec![series(run, "whole step", "currentColor", "step_ms")];
+    wall.extend(stages(run, "ms"));
     let rows: Vec<Vec<String>> = run
         .frames
         .stage_statistics()
@@ -29,17 +28,20 @@ pub fn section(run: &RunRecord) -> Markup {
             }
             div.two {
                 div { (lines(&frames, &wall, "ms, wall", 0.0)) }
-                div { (stacked(&frames, &stages(run, Charted::Cpu), "ms, CPU")) }
+                div { (stacked(&frames, &stages(run, "cpu_ms"), "ms, CPU")) }
             }
             (table(&[("stage", false), ("median, ms", true), ("p99, ms", true), ("CPU median, ms", true), ("frames", true)], &rows))
         }
     }
 }
 
-/// A line for each stage within the step.
-fn stages(run: &RunRecord, of: fn(Stage) -> Charted) -> Vec<Series<'static>> {
+/// A line for each stage within the step: its column of `frames.csv` that ends in `_{end}`.
+fn stages(run: &RunRecord, end: &str) -> Vec<Series<'static>> {
     let within = Stage::ALL.iter().enumerate().filter(|(_, stage)| **stage != Stage::Raycast);
     within
-        .map(|(at, stage)| series(run, stage.name(), COLOURS[at % COLOURS.len()], of(*stage)))
+        .map(|(at, stage)| {
+            let column = format!("{}_{end}", stage.name());
+            series(run, stage.name(), COLOURS[at % COLOURS.len()], &column)
+        })
         .collect()
 }

@@ -1,6 +1,8 @@
 //! Ground floors: homes and shops.
 
-use super::{BOARDS, DOORS, House, Opening, Storey, floor_front, of, sill_and_surround, window};
+use super::{
+    BOARDS, DOORS, House, Opening, Storey, floor_front, sill_and_surround, tone_of, window,
+};
 use crate::synth::mesh::{Mesh, Parallelogram, Point};
 use crate::synth::random::Rng;
 use crate::synth::surface::{Kind, Surface, Tone, tone};
@@ -17,7 +19,7 @@ pub fn home_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
         let middle = (column as f64 + 0.5) * spacing;
         if column == door_at {
             let (half, head) = (0.55, -2.45);
-            let door = Surface::new(Kind::Door, of(rng.pick(&DOORS)), rng.seed())
+            let door = Surface::new(Kind::Door, tone_of(rng.pick(&DOORS)), rng.seed())
                 .with(frame)
                 .sized(2.0 * half, 2.35);
             let pane = mesh.surface(door);
@@ -90,7 +92,7 @@ pub fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
     }
     floor_front(mesh, house, house.base, Storey { top: -height, bottom: 0.1 }, &openings);
     let letters = if rng.chance(0.6) { tone(238, 234, 220) } else { tone(236, 200, 84) };
-    let sign = Surface::new(Kind::Board, of(rng.pick(&BOARDS)), rng.seed()).with(letters);
+    let sign = Surface::new(Kind::Board, tone_of(rng.pick(&BOARDS)), rng.seed()).with(letters);
     let board = mesh.surface(sign.sized(house.width - 0.6, 0.62));
     let (low, high) =
         (Point::new(0.3, -height + 0.14, 0.0), Point::new(house.width - 0.3, -height + 0.76, 0.12));
@@ -109,7 +111,7 @@ pub fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
 
 fn awning(mesh: &mut Mesh, rng: &mut Rng, house: &House, y: f64) {
     let mut cloth =
-        Surface::new(Kind::Fence, of(rng.pick(&BOARDS)), rng.seed()).with(tone(230, 226, 216));
+        Surface::new(Kind::Fence, tone_of(rng.pick(&BOARDS)), rng.seed()).with(tone(230, 226, 216));
     cloth.two_sided = true;
     let cloth = mesh.surface(cloth);
     let (origin, across) = (Point::new(0.4, y, 0.02), Point::new(house.width - 0.8, 0.0, 0.0));

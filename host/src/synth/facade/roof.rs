@@ -1,6 +1,6 @@
 //! Roofs, flat and pitched, with chimneys and dormers.
 
-use super::{House, ROOFS, ledge, of, window};
+use super::{House, ROOFS, ledge, tone_of, window};
 use crate::synth::mesh::{Mesh, Parallelogram, Point};
 use crate::synth::random::Rng;
 use crate::synth::surface::{Kind, Surface, Tone, scaled, tone};
@@ -13,7 +13,7 @@ pub fn roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64, frame: Tone
     }
     let tiles = mesh.surface(Surface::new(
         Kind::Tiles,
-        scaled(of(rng.pick(&ROOFS)), rng.between(0.7, 1.2)),
+        scaled(tone_of(rng.pick(&ROOFS)), rng.between(0.7, 1.2)),
         rng.seed(),
     ));
     let rise = 0.5 * house.depth * rng.between(0.6, 0.95);

@@ -117,11 +117,11 @@ fn written(frame: &FrameDigests) -> Line {
     let mut line = Line::new().decimal(frame.frame).str(" ").hex(frame.digest).str(" ");
     for stage in [
         stages.input,
-        stages.disparity,
-        stages.matches,
+        stages.stereo,
+        stages.scene_flow,
         stages.egomotion,
-        stages.tracks,
-        stages.background,
+        stages.tracking,
+        stages.static_map,
     ] {
         line = line.hex(stage).str(" ");
     }

@@ -137,7 +137,7 @@ fn plan(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     digest.u64(u64::from(mapper.update_planning_maps(black_box(0.0)).occupied));
     digest.u64(mapper.planning().digest());
     digest.u64(u64::from(mapper.plan_ahead(black_box(0.5)).obstacles));
-    let (planning, volume) = (mapper.planning(), mapper.background());
+    let (planning, volume) = (mapper.planning(), mapper.static_map());
     digest.u64(planning.digest());
     let camera = mapper.t_world_camera().translation_m;
     let ahead = [camera[0], camera[1], camera[2] + 10.0];

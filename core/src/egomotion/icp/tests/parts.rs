@@ -187,8 +187,12 @@ fn a_pair_counts_by_its_distance_from_the_plane_and_its_noise() {
 #[test]
 fn each_test_of_a_motion_decides_by_itself() {
     let config = IcpConfig { pairs_min: 0.25, step_max_m: 2.0, ..IcpConfig::default() };
-    let good =
-        IcpReport { points: 400, pairs: 100, held: f64::from(HELD_MIN), ..IcpReport::default() };
+    let good = IcpReport {
+        points: 400,
+        pairs: 100,
+        eigen_share: f64::from(MIN_EIGEN_SHARE),
+        ..IcpReport::default()
+    };
     let status = |change: &dyn Fn(&mut IcpReport)| {
         let mut report = good;
         change(&mut report);

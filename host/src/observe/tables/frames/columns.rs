@@ -1,0 +1,185 @@
+//! Columns of `frames.csv` but for those of the stages: a column is one entry of these tables.
+//! The values of a `charted` column are kept for charts of the report.
+
+use super::{Cell, FrameColumn, Value};
+use crate::observe::FrameRow;
+use std::borrow::Cow;
+
+/// All tables, in the order of the columns.
+pub(super) static TABLES: [&[FrameColumn]; 5] = [FRAME, POSE, INPUT, MAP, OBJECTS];
+
+type Of = fn(&FrameRow) -> Cell;
+
+const fn column(name: &'static str, unit: &'static str, doc: &'static str, of: Of) -> FrameColumn {
+    FrameColumn { name: Cow::Borrowed(name), unit, doc, value: Value::Of(of), charted: false }
+}
+
+const fn charted(name: &'static str, unit: &'static str, doc: &'static str, of: Of) -> FrameColumn {
+    FrameColumn { name: Cow::Borrowed(name), unit, doc, value: Value::Of(of), charted: true }
+}
+
+/// The frame as a whole.
+static FRAME: &[FrameColumn] = &[
+    column("frame", "", "number of the frame in the data set", |row| row.frame.into()),
+    column("time_s", "s", "time of the frame, by its stamp or by an assumed rate", |row| {
+        Cell::Number(row.time_s)
+    }),
+    column("digest", "", "hash of the results of all stages", |row| {
+        Cell::Text(format!("{:016x}", row.report.digest))
+    }),
+    charted("step_ms", "ms", "wall time of the step", |row| Cell::rounded(row.step_ms, 4)),
+    column("step_cpu_ms", "ms", "CPU time of all threads in the step", |row| {
+        Cell::rounded(row.times.cpu_ms, 4)
+    }),
+    column("severity", "", "worst event: info, recovered or map affected", |row| {
+        row.severity().name().into()
+    }),
+];
+
+/// The camera's pose and the rig.
+static POSE: &[FrameColumn] = &[
+    column("motion", "", "way in which the pose was found, in one word", |row| row.motion().into()),
+    column(
+        "segment",
+        "",
+        "number of the map's segment: another one begins, 100 m above, where the camera was lost \
+         and not found again",
+        |row| row.report.segment.into(),
+    ),
+    charted("matches", "", "matches that the pose was estimated from", |row| {
+        row.matches().0.into()
+    }),
+    charted("inliers", "", "inliers among these matches", |row| row.matches().1.into()),
+    column("residual_px", "px", "RMS error of the inliers", |row| {
+        Cell::rounded(row.matches().2, 4)
+    }),
+    column(
+        "right_ahead_m",
+        "m",
+        "distance of the right camera ahead of its place, as matches show it: far where the \
+         cameras do not expose at the same time",
+        |row| Cell::if_known(row.right_ahead().map(|ahead| ahead.distance_m), 4),
+    ),
+    column("right_ahead_sigma_m", "m", "standard deviation of `right_ahead_m`", |row| {
+        Cell::if_known(row.right_ahead().map(|ahead| ahead.sigma_m), 4)
+    }),
+    charted(
+        "disparity_offset_px",
+        "px",
+        "offset that self-calibration found: what must be added to disparities",
+        |row| Cell::if_known(row.rig().map(|rig| rig.offset_px), 4),
+    ),
+    column("disparity_offset_sigma_px", "px", "standard deviation of the offset", |row| {
+        Cell::if_known(row.rig().map(|rig| rig.offset_sigma_px), 4)
+    }),
+    charted("disparity_offset_applied_px", "px", "offset added to the disparities", |row| {
+        Cell::rounded(row.report.self_calibration.applied_offset_px, 4)
+    }),
+    column("icp_points", "", "pixels with depth, of the depth tracker", |row| {
+        row.report.icp.map(|icp| icp.points).into()
+    }),
+    column("icp_pairs", "", "pairs of points that the depth tracker compared", |row| {
+        row.report.icp.map(|icp| icp.pairs).into()
+    }),
+    column("icp_residual_m", "m", "RMS distance of the pairs", |row| {
+        Cell::if_known(row.report.icp.map(|icp| icp.residual_rms_m), 4)
+    }),
+    column("icp_eigen_share", "", "share of the pairs in the least constrained direction", |row| {
+        Cell::if_known(row.report.icp.map(|icp| icp.eigen_share), 5)
+    }),
+];
+
+/// Features, disparity and the process.
+static INPUT: &[FrameColumn] = &[
+    column("features_dropped", "", "features and matches that did not fit", |row| {
+        row.report.dropped_features().into()
+    }),
+    charted("stereo_density", "", "share of pixels with a disparity", |row| {
+        Cell::rounded(f64::from(row.report.stereo.density()), 4)
+    }),
+    column("disparity_mean_px", "px", "mean disparity of these pixels", |row| {
+        Cell::if_known(row.disparity_mean_px, 4)
+    }),
+    column("depth_refused", "", "invalid values of given depth", |row| row.depth_refused.into()),
+    charted("rss_bytes", "bytes", "resident memory of the process", |row| row.rss_bytes.into()),
+];
+
+/// The static map.
+static MAP: &[FrameColumn] = &[
+    charted("blocks_used", "", "blocks in the pool", |row| row.report.blocks.used.into()),
+    column("blocks_peak", "", "most blocks in the pool so far", |row| {
+        row.report.blocks.peak.into()
+    }),
+    charted("blocks_visible", "", "blocks visible in the frame", |row| {
+        row.report.blocks.visible.into()
+    }),
+    column("blocks_made", "", "blocks made", |row| row.report.allocate.made.into()),
+    column("blocks_refused", "", "blocks refused: no slot, or beyond the map", |row| {
+        row.blocks_refused().into()
+    }),
+    column("blocks_stored", "", "blocks evicted and stored", |row| {
+        row.report.allocate.eviction.stored.into()
+    }),
+    column("blocks_lost", "", "blocks evicted and not stored", |row| {
+        row.report.allocate.eviction.lost.into()
+    }),
+    column("blocks_empty", "", "blocks evicted with nothing in them", |row| {
+        row.report.allocate.eviction.empty.into()
+    }),
+    column("blocks_loaded", "", "blocks loaded from the store", |row| {
+        row.report.allocate.eviction.loaded.into()
+    }),
+    column("probes_most", "", "most comparisons in one lookup of the index", |row| {
+        row.report.allocate.probes_most.into()
+    }),
+    column("prune_visited", "", "blocks that pruning visited", |row| {
+        row.report.prune.visited.into()
+    }),
+    column("prune_voxels_reset", "", "voxels that pruning reset", |row| {
+        row.report.prune.voxels_reset.into()
+    }),
+    column("prune_blocks_freed", "", "blocks that pruning freed", |row| {
+        row.report.prune.blocks_freed.into()
+    }),
+    column("prune_carried_over", "", "blocks whose pruning waits for a later frame", |row| {
+        row.report.prune.carried_over.into()
+    }),
+    column("prune_early", "", "frames pruned before their lag", |row| {
+        row.report.prune.early.into()
+    }),
+    column(
+        "prune_voxels_erased",
+        "",
+        "voxels reset where an object had been before it was known to move",
+        |row| row.report.prune.voxels_erased.into(),
+    ),
+    column("history_frames", "", "frames in the visible history", |row| row.history_frames.into()),
+];
+
+/// Detections, tracks, objects.
+static OBJECTS: &[FrameColumn] = &[
+    column("detections_given", "", "detections given with the frame", |row| {
+        row.report.instances.detections.given.into()
+    }),
+    column("detections_accepted", "", "detections accepted", |row| {
+        row.report.instances.detections.accepted.into()
+    }),
+    column("detections_refused", "", "detections refused", |row| {
+        row.report.instances.detections.refused().into()
+    }),
+    column("tracks", "", "tracks", |row| row.report.instances.tracks.tracks.into()),
+    column("uncertain", "", "tracks seen whose motion state is uncertain", |row| {
+        row.track_states[0].into()
+    }),
+    column("static", "", "static tracks seen", |row| row.track_states[1].into()),
+    column("dynamic", "", "dynamic tracks seen", |row| row.track_states[2].into()),
+    column("objects", "", "objects with a volume", |row| {
+        row.report.instances.objects.objects.into()
+    }),
+    column("object_blocks", "", "blocks of all objects", |row| {
+        row.report.instances.objects.blocks.into()
+    }),
+    column("matches_excluded", "", "matches excluded from egomotion", |row| {
+        row.report.instances.matches_excluded.into()
+    }),
+];
