@@ -24,7 +24,7 @@ const BLOCKS: usize = 53_000;
 const SLICE: usize = 1_000;
 const SLOTS: usize = 1 << 17;
 
-/// What a table has to do.
+/// Operations that an index of blocks needs.
 trait Table {
     fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot>;
     fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot);

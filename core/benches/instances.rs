@@ -70,8 +70,8 @@ fn texture(surface: i64, a: f64, b: f64) -> u8 {
     (40.0 + 70.0 * noise(0.07) + 60.0 * noise(0.25) + 60.0 * noise(0.9)) as u8
 }
 
-/// What a ray along (x, y, 1) from a camera `eye_x` to the right of the left one meets: the car
-/// (plus 1; 0 none) and its brightness.
+/// Casts a ray along (x, y, 1) from a camera `eye_x` to the right of the left one; returns the car
+/// it meets (plus 1; 0 for none) and its brightness.
 fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
     let along = frame as f64 * STEP_M;
     let mut nearest = (f64::INFINITY, 0, 0u8);
@@ -103,7 +103,7 @@ fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
     (nearest.1, nearest.2)
 }
 
-/// What is to be seen of a car.
+/// Part of the image that shows a car.
 struct Car {
     left: usize,
     top: usize,

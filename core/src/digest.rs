@@ -20,7 +20,7 @@ const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 const LANES: usize = 8;
 /// Bytes that all lanes take in at once.
 const STRIPE_BYTES: usize = 8 * LANES;
-/// Where lanes start, and what they are multiplied by in the end: odd numbers without a pattern.
+/// Start values and final factors of the lanes: odd numbers without a pattern.
 const KEYS: [u64; LANES] = [
     finished(MULTIPLIER) | 1,
     finished(MULTIPLIER.wrapping_mul(2)) | 1,
@@ -92,7 +92,7 @@ impl Digest {
         self.end_run(bytes.len());
     }
 
-    /// As [`Digest::bytes`] of whole stripes, to be compiled for its caller's vectors.
+    /// Digests whole stripes like [`Digest::bytes`], to be compiled for its caller's vectors.
     #[inline(always)]
     pub(crate) fn whole_bytes<const N: usize>(&mut self, bytes: &[u8; N]) {
         const { assert!(N.is_multiple_of(STRIPE_BYTES)) }
@@ -100,7 +100,7 @@ impl Digest {
         self.end_run(N);
     }
 
-    /// As [`Digest::i16s`] of whole stripes, to be compiled for its caller's vectors.
+    /// Digests whole stripes like [`Digest::i16s`], to be compiled for its caller's vectors.
     #[inline(always)]
     pub(crate) fn whole_i16s<const N: usize>(&mut self, values: &[i16; N]) {
         const { assert!(N.is_multiple_of(STRIPE_BYTES / 2)) }

@@ -9,7 +9,7 @@ pub(crate) fn word(flags: &[u8]) -> u64 {
     }
 }
 
-/// As [`word`], where fewer than eight are left.
+/// Packs flags like [`word`], if fewer than eight are left.
 #[cold]
 #[inline(never)]
 fn last_word(flags: &[u8]) -> u64 {

@@ -18,7 +18,7 @@ impl Invariants {
         self.faults = self.faults.saturating_add(u32::from(!holds));
     }
 
-    /// What did not hold.
+    /// Returns the number of conditions that did not hold.
     pub fn faults(self) -> u32 {
         self.faults
     }

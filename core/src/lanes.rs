@@ -1,6 +1,6 @@
 //! Neighbours worked on at once, in loops that compilers turn into vectors.
 
-/// How many: as many numbers of 32 bits as the widest vector holds.
+/// Number of lanes: as many numbers of 32 bits as the widest vector has.
 pub(crate) const LANES: usize = 8;
 /// One value for each of them.
 pub(crate) type Eight<T> = [T; LANES];

@@ -44,7 +44,7 @@ pub(crate) fn padded<T: Copy, const N: usize>(
     }
 }
 
-/// As [`padded`], where a border of the row is among them.
+/// Pads like [`padded`], if a border of the row is among the items.
 #[cold]
 #[inline(never)]
 fn padded_at_border<T: Copy, const N: usize>(

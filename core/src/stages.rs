@@ -3,7 +3,7 @@
 //! A stage has one name. It is the name of its field in [`crate::Report`] and in
 //! [`crate::StageDigests`], of its folder in the core and of its regions in the slab, of
 //! `stages.NAME` in `summary.json`, and of the columns `NAME_ms`, `NAME_cpu_ms` and `NAME_digest`
-//! of `frames.csv`. Three stages change one thing, the static map: they share a folder, `volume`,
+//! of `frames.csv`. Three stages change the static map: they share a folder, `volume`,
 //! and a digest, `static_map`. [`StageNames`] tells such folders and digests.
 
 /// A stage of the pipeline, as a name for measurements.

@@ -68,7 +68,8 @@ fn main() -> anyhow::Result<()> {
     let (accuracy, completeness) =
         (fused.accuracy_alone.unwrap_or_default(), fused.completeness.unwrap_or_default());
     println!(
-        "{} frames, {} points, {blocks} blocks: accuracy {accuracy:.4}, completeness {completeness:.4}",
+        "{} frames, {} points, {blocks} blocks: accuracy {accuracy:.4}, completeness \
+         {completeness:.4}",
         frames.len(),
         fused.points
     );

@@ -318,7 +318,8 @@ fn print_heights(mut errors: Vec<f32>, mut slopes: Vec<f32>, missed: usize) {
         values.get((values.len() as f64 * share) as usize).copied().unwrap_or(f32::NAN)
     };
     println!(
-        "ground columns {}: height error median {:.3} m, 95 % {:.3} m, mean {bias:.3} m; {missed} without ground",
+        "ground columns {}: height error median {:.3} m, 95 % {:.3} m, mean {bias:.3} m; {missed} \
+         without ground",
         errors.len(),
         at(&errors, 0.5),
         at(&errors, 0.95)

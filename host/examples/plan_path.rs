@@ -23,7 +23,8 @@ use std::collections::{BinaryHeap, HashMap};
 
 const SIDE: usize = 160;
 const RADIUS_M: f64 = 0.4;
-/// What a planner keeps off obstacles: the radius, and a cell for what cells leave open.
+/// Distance that a planner keeps from obstacles, m: the radius, and a cell for the grid's
+/// resolution.
 const CLEAR_M: f64 = 0.65;
 const SPEED_M_S: f64 = 4.0;
 const HORIZON_S: usize = 8;
@@ -81,7 +82,7 @@ fn plan(fields: &Fields, start: [i32; 2], goal: [i32; 2]) -> Option<Vec<[i32; 2]
     None
 }
 
-/// How far a goal that nothing may stand at is moved at most, cells: 1.5 m.
+/// Largest distance by which a goal inside an obstacle is moved, cells: 1.5 m.
 const GOAL_CELLS: i32 = 8;
 
 impl Fields {
@@ -99,7 +100,7 @@ impl Fields {
         nearest.map_or(goal, |[x, y]| [goal[0] + x, goal[1] + y])
     }
 
-    /// How far the nearest obstacle is, at the two nearest times.
+    /// Returns the distance to the nearest obstacle at a time, m, from the two nearest grids.
     fn clear_m(&self, [x, y]: [i32; 2], time_s: f64) -> f64 {
         let inside = (0..SIDE as i32).contains(&x) && (0..SIDE as i32).contains(&y);
         let at = |time: usize| {
@@ -144,7 +145,7 @@ impl Car {
     }
 }
 
-/// What is really there when the robot starts.
+/// True scene when the robot starts.
 struct Truth {
     cars: Vec<Car>,
     /// Points of what stands, higher than a kerb and lower than a van, across the ground.
@@ -413,7 +414,8 @@ fn main() -> anyhow::Result<()> {
         ratios.extend(ratio);
         if collides || ratio.is_none_or(|ratio| ratio > 1.1) {
             println!(
-                "street {seed}: nearest {:.2} m after {:.1} s, path {length:.1} m, {:?} times the exact one",
+                "street {seed}: nearest {:.2} m after {:.1} s, path {length:.1} m, {:?} times the \
+                 exact one",
                 nearest.0, nearest.1, ratio
             );
         }
@@ -421,10 +423,12 @@ fn main() -> anyhow::Result<()> {
     ratios.sort_by(f64::total_cmp);
     let within = ratios.iter().filter(|ratio| **ratio <= 1.1).count();
     println!(
-        "{streets} streets: {collisions} collisions, {without} without a path where there is one, {neither} where exact geometry has none either"
+        "{streets} streets: {collisions} collisions, {without} without a path where there is one, \
+         {neither} where exact geometry has none either"
     );
     println!(
-        "{} paths compared: {within} at most 10 % longer than on exact geometry, median {:.3}, longest {:.3}",
+        "{} paths compared: {within} at most 10 % longer than on exact geometry, median {:.3}, \
+         longest {:.3}",
         ratios.len(),
         ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN),
         ratios.last().copied().unwrap_or(f64::NAN)

@@ -43,12 +43,12 @@ const STREET: [&str; 17] = [
     "1",
 ];
 
-/// What became of the killed runs.
+/// Counts of the killed runs.
 #[derive(Debug, Default)]
 struct Counts {
     /// Killed before their end.
     killed: u32,
-    /// Of these, killed again before the end of their resumption.
+    /// Number of these that were killed again before their resumption ended.
     killed_again: u32,
     /// Had no snapshot yet, and were started again.
     started_again: u32,
@@ -88,7 +88,7 @@ fn killed_once_written(root: &Path, args: &[&str], file: &Path) {
     assert!(killed(run), "the run ended before it was killed");
 }
 
-/// Whether the killed run had come to its end, and removed what it no longer needed.
+/// Returns true if the killed run had come to its end, and removed what it no longer needed.
 fn is_complete(root: &Path) -> bool {
     let folder = root.join("killed");
     folder.exists() && !names(&folder).iter().any(|name| name.starts_with("run.snapshot"))

@@ -31,7 +31,7 @@ impl HeapSlab {
         Self(vec![0; capacity.bytes() + SLAB_ALIGN])
     }
 
-    /// Its bytes.
+    /// Returns the bytes of the slab.
     pub fn bytes(&mut self) -> &mut [u8] {
         &mut self.0
     }
@@ -52,12 +52,12 @@ impl Clip {
         Self { street, frames }
     }
 
-    /// Its default configuration.
+    /// Returns the default configuration for the street.
     pub fn config(&self) -> Config {
         Config::for_rig(self.street.rig())
     }
 
-    /// Its frames as the core takes them.
+    /// Returns the frames as the core takes them.
     pub fn stereo(&self) -> impl Iterator<Item = StereoFrame<'_>> {
         let (width, height) =
             (self.street.config().width as usize, self.street.config().height as usize);
@@ -67,7 +67,7 @@ impl Clip {
         })
     }
 
-    /// What a detector without faults would see in each frame.
+    /// Returns the masks that a detector without faults would give in each frame.
     pub fn sightings(&self) -> Vec<Vec<InstanceMask>> {
         let of = |frame: &SynthFrame| {
             let image = PixelBox {

@@ -72,8 +72,8 @@ pub fn parts(rust: &str) -> Parts {
     parts
 }
 
-/// Whether a piece of prose begins at `at`, and where that piece, or the one character of code,
-/// ends.
+/// Returns true if a piece of prose begins at `at`, and the end of that piece, or of the one
+/// character of code.
 fn next(chars: &[char], at: usize) -> (bool, usize) {
     let rest = &chars[at..];
     let before = at.checked_sub(1).map(|before| chars[before]);
@@ -144,7 +144,8 @@ mod tests {
 
     #[test]
     fn tells_code_from_comments_and_literals() {
-        let rust = "let a = \"in \\\" text\"; // a note\nlet b = r#\"raw \" text\"#; /* one /* two */ */ let c: &'static str = 'x';";
+        let rust = "let a = \"in \\\" text\"; // a note\nlet b = r#\"raw \" text\"#; /* one /* two \
+                    */ */ let c: &'static str = 'x';";
         let Parts { code, prose } = parts(rust);
         assert_eq!(
             code.split_whitespace().collect::<Vec<_>>().join(" "),

@@ -237,7 +237,7 @@ fn a_use_of_the_command_line_is_found_however_it_is_written() {
     }
 }
 
-/// Whether code leads a path through the module of the command line.
+/// Returns true if code leads a path through the module of the command line.
 fn uses_the_command_line(code: &str) -> bool {
     let code = parts(code).code;
     let starts = ["dynvox::", "crate::"].into_iter().flat_map(|root| code.match_indices(root));
@@ -270,7 +270,8 @@ fn what_is_allowed_or_no_import_is_not_a_fault() {
     let clean = [
         "use crate::{memory::Capacity, parallel::{Executor, each}};",
         "use super::{super::block::Blocks, band};",
-        "// use crate::mapper::Mapper;\n/// [`crate::mapper::Mapper`]\nconst TEXT: &str = \"crate::mapper\";",
+        "// use crate::mapper::Mapper;\n/// [`crate::mapper::Mapper`]\nconst TEXT: &str = \
+         \"crate::mapper\";",
         "#[cfg(test)]\nmod tests {\n    use crate::mapper::Mapper;\n    fn f() { if true { } }\n}",
         "#[cfg(test)]\nuse crate::mapper::Mapper;\nfn f() {}",
         "use crate::Capacity;",
@@ -384,17 +385,21 @@ fn a_circle_is_found_through_a_mod_that_hands_names_on() {
 }
 
 /// The root of a planted crate.
-const LIB: &str = "pub mod mapper;\npub mod memory;\npub use mapper::{Mapper, Report};\npub use memory::Capacity;";
+const LIB: &str = "pub mod mapper;\npub mod memory;\npub use mapper::{Mapper, Report};\npub use \
+                   memory::Capacity;";
 
-/// What breaks the rules: every folder stands in the table, imports only what its line names, and a
-/// line names only lines before it, so that there can be no cycle.
+/// Lists violations of the rules: every folder stands in the table, imports only what its line
+/// names, and a line names only lines before it, so that there can be no cycle.
 fn faults(layers: Layers, read: &Crate) -> Vec<String> {
     let mut faults = Vec::new();
     for (at, (name, allowed)) in layers.iter().enumerate() {
         for below in
             allowed.iter().filter(|below| !layers[..at].iter().any(|(name, _)| name == *below))
         {
-            faults.push(format!("{name} may import {below}, which stands after it: order the table, or break the cycle"));
+            faults.push(format!(
+                "{name} may import {below}, which stands after it: order the \
+                                 table, or break the cycle"
+            ));
         }
     }
     for folder in &read.folders {

@@ -109,7 +109,7 @@ fn mapped_by_c(fixture: &Path, bytes: usize, settings: &[String]) -> String {
     String::from_utf8_lossy(&ran.stdout).into_owned()
 }
 
-/// The same as they are on file.
+/// Returns the digests as they are on file.
 fn on_file(fixture: &Path) -> String {
     let digests = fs::read_to_string(fixture.join("digests.txt")).expect("the digests are there");
     let lines = digests.lines().filter(|line| !line.starts_with('#'));

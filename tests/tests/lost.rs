@@ -53,7 +53,7 @@ fn map_covered(before: &Street, after: &Street) -> Vec<Report> {
         .collect()
 }
 
-/// The same through the C interface.
+/// Maps the covered street through the C interface.
 fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
     let (rig, capacity) = (DynvoxRig::from(&before.rig()), DynvoxCapacity::from(&CAPACITY));
     let (mut len, mut mapper, mut config) =

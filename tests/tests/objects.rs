@@ -157,7 +157,7 @@ impl Sequence {
     }
 }
 
-/// Which true car a track follows.
+/// Returns the true car that a track follows.
 fn truth<'f>(
     frame: &'f SynthFrame,
     seen: &[Seen],
@@ -302,14 +302,23 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
             .tracks()
             .filter(|track| track.detected && tracks.contains(&track.id))
             .filter_map(|track| {
-                let near = |seen: &&Seen| (seen.pixels[0] - track.pixels.left).abs() + (seen.pixels[1] - track.pixels.top).abs();
+                let near = |seen: &&Seen| {
+                    (seen.pixels[0] - track.pixels.left).abs()
+                        + (seen.pixels[1] - track.pixels.top).abs()
+                };
                 Some((seen.iter().min_by_key(near)?.truth, track.state.name()))
             })
             .collect();
         for (truth, state) in states {
-            let pixels = composed.iter().zip(&frame.depth_m).zip(&frame.instances).filter(|(_, mask)| usize::from(**mask) == truth + 1);
+            let pixels = composed
+                .iter()
+                .zip(&frame.depth_m)
+                .zip(&frame.instances)
+                .filter(|(_, mask)| usize::from(**mask) == truth + 1);
             let (mut shown, mut right, mut all) = (0, 0, 0);
-            for (((depth_m, _, layer), true_m), _) in pixels.filter(|((_, true_m), _)| **true_m < 20.0) {
+            for (((depth_m, _, layer), true_m), _) in
+                pixels.filter(|((_, true_m), _)| **true_m < 20.0)
+            {
                 all += 1;
                 shown += u32::from(*layer > 0);
                 right += u32::from(*layer > 0 && (depth_m - true_m).abs() < 0.05 * true_m);
@@ -319,7 +328,8 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
             }
             cars.push(state);
             println!(
-                "frame {index}, car {truth}, {state}: of {all} pixels nearer than 20 m {shown} show an object, {right} at its distance"
+                "frame {index}, car {truth}, {state}: of {all} pixels nearer than 20 m {shown} \
+                 show an object, {right} at its distance"
             );
             totals = [totals[0] + all, totals[1] + shown, totals[2] + right];
         }

@@ -52,7 +52,7 @@ const VALUES: [&str; 22] = [
     "normal",
 ];
 
-/// What happened, so that a test of nothing is noticed.
+/// Counts of events, so that a test of nothing is noticed.
 #[derive(Debug, Default)]
 struct Counts {
     runs: u64,

@@ -12,7 +12,7 @@ const PAINTED: usize = 512 * 1024;
 const MARGIN: usize = 1024;
 const PAINT: u8 = 0xA5;
 
-/// Where the caller's stack ends now, roughly.
+/// Returns the approximate end of the caller's stack.
 #[inline(never)]
 fn stack_pointer() -> *mut u8 {
     let mut here = 0u8;
@@ -43,7 +43,7 @@ fn used() -> usize {
     deepest - kept
 }
 
-/// What `work` gives, in its caller's frame, and the stack it took below that.
+/// Returns the result of `work`, run in its caller's frame, and the stack it took below that.
 #[inline(never)]
 fn painted<R>(work: impl FnOnce() -> R) -> (R, usize) {
     paint();

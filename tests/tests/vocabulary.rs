@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The list, which names every word it bans, and this test.
 const EXEMPT: [&str; 2] = ["tests/vocabulary.txt", "tests/tests/vocabulary.rs"];
-/// Where the changelog names keys that were renamed, up to the next heading.
+/// Heading under which the changelog names renamed keys, up to the next heading.
 const RENAMED: &str = "### Renamed";
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -209,8 +209,10 @@ fn only_words_of_the_field_are_used() {
 
 #[test]
 fn the_count_sees_names_words_and_phrases() {
-    let list = "word | room | * | buffer |\nname | keep | core | store | to keep\nphrase | goes on behind | * | resumes after |";
-    let rust = "/// It goes\n/// on behind it. Keep this.\nfn mask_room(keep: u8) { values.keep(); let text = \"a room\"; }";
+    let list = "word | room | * | buffer |\nname | keep | core | store | to keep\nphrase | goes on \
+                behind | * | resumes after |";
+    let rust = "/// It goes\n/// on behind it. Keep this.\nfn mask_room(keep: u8) \
+                { values.keep(); let text = \"a room\"; }";
     let found = banned(Path::new("core/a.rs"), rust, &rules(list));
     let words: Vec<_> = found.iter().map(|(word, _)| word.as_str()).collect();
     assert_eq!(words, ["room", "room", "keep", "goes on behind"]);

@@ -60,9 +60,9 @@ pub struct DynvoxCapacity {
     pub planning_length: usize,
     /// Height of the planner's window, cells.
     pub planning_height: usize,
-    /// Whether distances are kept for every cell of the window, and not for a slice alone: 0 or 1.
+    /// 1 if distances are kept for every cell of the window, 0 if for a slice only.
     pub planning_distance_3d: u8,
-    /// Whether voxels have colour: 0 or 1.
+    /// 1 if voxels have colour, else 0.
     pub colour: u8,
 }
 
@@ -94,7 +94,7 @@ impl From<&Capacity> for DynvoxCapacity {
 }
 
 impl DynvoxCapacity {
-    /// As the core takes it; refused where a bound is not one a mapper can work with.
+    /// Converts the bounds to the core's; refused if a mapper cannot work with one of them.
     pub(crate) fn checked(&self) -> Result<Capacity, DynvoxStatus> {
         let capacity = Capacity {
             image_width: self.image_width,

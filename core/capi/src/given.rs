@@ -66,7 +66,7 @@ pub unsafe fn items<'a, T>(
     Ok(unsafe { slice::from_raw_parts(pointer, len) })
 }
 
-/// As [`items`], to be written to.
+/// Borrows items like [`items`], for writing.
 ///
 /// # Safety
 /// `pointer` is null, misaligned or points to `len` items that nothing else reads or writes for 'a.

@@ -23,7 +23,7 @@ pub struct DynvoxPicture {
     pub normal: *mut i8,
     /// Three bytes a pixel: red, green, blue.
     pub colour: *mut u8,
-    /// How often the surface was observed.
+    /// Number of observations of the surface.
     pub weight: *mut u8,
     /// Written: columns.
     pub width: usize,
@@ -174,8 +174,8 @@ pub unsafe extern "C" fn dynvox_finish(mapper: *mut DynvoxMapper) -> DynvoxStatu
     }
 }
 
-/// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be
-/// null.
+/// Finishes like dynvox_finish; the objects that are still in the mapper leave to `objects`, which
+/// may be null.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread

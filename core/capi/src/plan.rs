@@ -18,7 +18,7 @@ pub struct DynvoxWindow {
     pub columns_capacity: usize,
     /// Cells that `cells` holds, unless it is null.
     pub cells_capacity: usize,
-    /// Of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
+    /// State of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
     pub state: *mut u8,
     /// Distance to the nearest obstacle, m, below 0 inside one; the largest float without an
     /// obstacle.
@@ -29,7 +29,7 @@ pub struct DynvoxWindow {
     pub slope: *mut f32,
     /// Height of the step through the column, m.
     pub step_m: *mut f32,
-    /// Of each cell: 0 unknown, 1 free, 2 occupied.
+    /// State of each cell: 0 unknown, 1 free, 2 occupied.
     pub cells: *mut u8,
     /// Written: cells to the right, ahead and upwards.
     pub size: [usize; 3],
@@ -64,7 +64,7 @@ pub struct DynvoxMovingBox {
     pub sigma_m_s: f32,
 }
 
-/// How a ray or a path ends.
+/// End of a ray or a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxPathEnd {
@@ -72,7 +72,7 @@ pub enum DynvoxPathEnd {
     Free = 0,
     /// At a surface of the map.
     Surface,
-    /// Where nothing was ever seen.
+    /// Cell that was never observed.
     Unknown,
 }
 
@@ -90,13 +90,13 @@ pub struct DynvoxFreePath {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxRobotCylinder {
-    /// Its radius, m.
+    /// Radius of the robot, m.
     pub radius_m: f64,
     /// From this height over the path, m, on surfaces are in its way.
     pub low_m: f64,
     /// Up to this one.
     pub high_m: f64,
-    /// Whether what was never seen is in its way as well: 0 or 1.
+    /// 1 if cells that were never observed end the path as well, else 0.
     pub unknown_ends: u8,
 }
 
@@ -282,8 +282,8 @@ pub unsafe extern "C" fn dynvox_ray(
     }
 }
 
-/// How far a robot may follow a polyline of `count` world points on the ground, three numbers each,
-/// before it touches a surface.
+/// Measures how far a robot may follow a polyline of `count` world points on the ground, three
+/// numbers each, before it touches a surface.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread

@@ -32,7 +32,7 @@ pub struct DynvoxRawCamera {
     pub center_px: [f64; 2],
     /// DYNVOX_LENS_...
     pub model: DynvoxLensModel,
-    /// Its parameters; those that the model does not have are not read.
+    /// Parameters of the model; those that it does not have are not read.
     pub parameters: [f64; 8],
 }
 
@@ -75,7 +75,8 @@ pub struct DynvoxRawRig {
     pub width: u32,
     /// Rows of the rectified images, px.
     pub height: u32,
-    /// Their focal length, px; 0 takes the least that shows no pixel without image.
+    /// Focal length of the rectified images, px; 0 takes the least that shows no pixel without
+    /// image.
     pub focal_px: f64,
 }
 

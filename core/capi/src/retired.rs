@@ -17,9 +17,9 @@ pub struct DynvoxRetired {
     pub id: u32,
     /// Number of the trajectory segment within the track.
     pub segment_id: u32,
-    /// Its class, as in DynvoxDetection.
+    /// Class of the object, as in DynvoxDetection.
     pub class_code: u8,
-    /// Whether it moves.
+    /// Motion state of the object.
     pub state: DynvoxMotionState,
     /// First frame it was fused in.
     pub first_frame: u32,
@@ -29,7 +29,7 @@ pub struct DynvoxRetired {
     pub frames: u32,
     /// Blocks of its volume.
     pub blocks: u32,
-    /// Its frame to the world, when it was fused last.
+    /// Pose of the object in the world when it was fused last.
     pub t_world_object: DynvoxPose,
     /// For dynvox_retired_triangles.
     pub volume: *const c_void,
@@ -61,7 +61,7 @@ impl DynvoxObjectSink {
     }
 }
 
-/// What `DynvoxRetired::volume` points to.
+/// Target of `DynvoxRetired::volume`.
 struct RetiredVolume<'v, 's> {
     volume: &'v Volume<'s>,
     mesh: MeshConfig,

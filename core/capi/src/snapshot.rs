@@ -42,7 +42,7 @@ pub unsafe extern "C" fn dynvox_save(
     }
 }
 
-/// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and
+/// Creates a mapper like dynvox_create, in the state in which dynvox_save was called: capacity and
 /// configuration must be those of the saved one. No mapper is made from a damaged snapshot
 /// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
 ///

@@ -55,25 +55,47 @@ impl DynvoxStatus {
         match self {
             Self::Ok => c"ok",
             Self::Null => c"a pointer is null: give one",
-            Self::Misaligned => c"a pointer is misaligned: buffers begin at a multiple of dynvox_alignment()",
+            Self::Misaligned => {
+                c"a pointer is misaligned: buffers begin at a multiple of \
+                                  dynvox_alignment()"
+            }
             Self::TooSmall => c"a buffer is too small: dynvox_bytes says how much is needed",
-            Self::NoMapper => c"the handle is not a mapper's: create one, and do not use a destroyed one",
-            Self::Busy => c"a callback called its own mapper: call it after the callback has returned",
+            Self::NoMapper => {
+                c"the handle is not a mapper's: create one, and do not use a \
+                                destroyed one"
+            }
+            Self::Busy => {
+                c"a callback called its own mapper: call it after the callback has \
+                            returned"
+            }
             Self::Overlap => c"a frame lies within the mapper's buffer: keep it elsewhere",
             Self::Unknown => c"an unknown value: see the enumeration in the header",
             Self::Config => c"the configuration cannot be used: dynvox_config_problem says why",
             Self::Pose => c"a pose is not finite, not a rotation, or beyond the map",
             Self::Size => c"an image's size does not suit the profile",
-            Self::SizeChanged => c"a frame's size differs from that of the frames before: create another mapper",
+            Self::SizeChanged => {
+                c"a frame's size differs from that of the frames before: create \
+                                   another mapper"
+            }
             Self::TooMany => c"too many detections: give the best 64",
             Self::NoFrame => c"no frame yet: step first",
-            Self::Value => c"the text is not a value of this setting: a run's config.toml shows one of each",
-            Self::Capacity => {
-                c"a bound is not one a mapper can work with: begin with dynvox_capacity_of_profile or dynvox_capacity_for_budget"
+            Self::Value => {
+                c"the text is not a value of this setting: a run's config.toml shows \
+                             one of each"
             }
-            Self::Snapshot => c"the snapshot is damaged, or of another version, capacity or configuration",
+            Self::Capacity => {
+                c"a bound is not one a mapper can work with: begin with dynvox_capacity_of_profile \
+                  or dynvox_capacity_for_budget"
+            }
+            Self::Snapshot => {
+                c"the snapshot is damaged, or of another version, capacity or \
+                                configuration"
+            }
             Self::Callback => c"a callback refused",
-            Self::Time => c"a frame's time is not after that of the frame before: leave the frame out",
+            Self::Time => {
+                c"a frame's time is not after that of the frame before: leave the frame \
+                            out"
+            }
         }
     }
 }

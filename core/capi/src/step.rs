@@ -33,8 +33,8 @@ pub unsafe extern "C" fn dynvox_step(
     unsafe { dynvox_step_with(mapper, frame, store, ptr::null(), report) }
 }
 
-/// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be
-/// null.
+/// Steps like dynvox_step; objects that leave the mapper within the step go to `objects`, which may
+/// be null.
 ///
 /// # Safety
 /// As dynvox_step; `objects` is null or points to a sink.

@@ -9,7 +9,7 @@ use crate::{
 use core::ffi::c_void;
 use dynvox_core::tracking::{MotionState, TrackReport};
 
-/// Whether a track moves.
+/// Motion state of a track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxMotionState {
@@ -25,17 +25,17 @@ pub enum DynvoxMotionState {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxTrack {
-    /// Its number, from 1, never used again.
+    /// Id of the track, from 1, never used again.
     pub id: u32,
-    /// Its class, as in DynvoxDetection.
+    /// Class of the object, as in DynvoxDetection.
     pub class_code: u8,
-    /// Whether it was detected in this frame: 0 or 1.
+    /// 1 if the track was detected in this frame, else 0.
     pub detected: u8,
-    /// Whether its motion was measured in this frame; if not it is extrapolated: 0 or 1.
+    /// 1 if the motion was measured in this frame, 0 if it is extrapolated.
     pub measured: u8,
-    /// Whether `t_world_object` says where it is: 0 or 1.
+    /// 1 if `t_world_object` is known, else 0.
     pub has_pose: u8,
-    /// Whether it moves.
+    /// Motion state of the object.
     pub state: DynvoxMotionState,
     /// Score of its last detection.
     pub score: f32,
@@ -53,11 +53,11 @@ pub struct DynvoxTrack {
     pub height: i32,
     /// Speed over ground, m/s; negative while no motion was ever measured.
     pub speed_m_s: f32,
-    /// Its error, one sigma, m/s.
+    /// Standard deviation of the speed, m/s.
     pub speed_sigma_m_s: f32,
     /// Centre of its matches in the world, m.
     pub center_world_m: [f64; 3],
-    /// Its frame to the world.
+    /// Pose of the object in the world.
     pub t_world_object: DynvoxPose,
     /// Matches assigned to it in this frame.
     pub matches: u32,

@@ -48,7 +48,7 @@ pub struct DynvoxDetection {
     /// 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle,
     /// 10 animal, 11 moving object.
     pub class_code: u8,
-    /// How sure the detector is, 0 to 1.
+    /// Confidence of the detector, 0 to 1.
     pub score: f32,
     /// First column of the box, px; may lie beside the image.
     pub left: i32,
@@ -68,9 +68,9 @@ pub struct DynvoxDetection {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxFrame {
-    /// Of every image, px.
+    /// Width of every image, px.
     pub width: usize,
-    /// Of every image, px.
+    /// Height of every image, px.
     pub height: usize,
     /// Left grey image.
     pub left: DynvoxImage,
@@ -80,20 +80,19 @@ pub struct DynvoxFrame {
     pub colour: DynvoxImage,
     /// Detections in any order; null without detections.
     pub detections: *const DynvoxDetection,
-    /// How many.
+    /// Number of detections.
     pub detection_count: usize,
-    /// Where the camera is, for those who know; null lets the mapper find out.
+    /// Pose of the left camera in the world, if known; null lets the mapper estimate it.
     pub t_world_camera: *const DynvoxPose,
-    /// When the pair was taken, ns since any moment that stays the same, rising from frame to
-    /// frame; null where nothing tells: then "tracking.frame_interval_s" has passed since the frame
-    /// before.
+    /// Time of the pair, ns since any moment that stays the same, rising from frame to frame; null
+    /// if unknown: then "tracking.frame_interval_s" has passed since the frame before.
     pub time_ns: *const u64,
     /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
     /// values without padding; null lets the mapper match the pair.
     pub disparity_q8: *const u16,
 }
 
-/// How much a step's events matter.
+/// Severity of a step's events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxSeverity {
@@ -105,7 +104,7 @@ pub enum DynvoxSeverity {
     MapAffected,
 }
 
-/// What one step did.
+/// Report of one step.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxReport {
@@ -113,9 +112,9 @@ pub struct DynvoxReport {
     pub frame: u32,
     /// The worst that happened.
     pub severity: DynvoxSeverity,
-    /// Where the left camera is.
+    /// Pose of the left camera in the world.
     pub t_world_camera: DynvoxPose,
-    /// Whether the frame went into the map.
+    /// True if the frame was fused into the map.
     pub fused: bool,
     /// Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
     /// lost and not found again.

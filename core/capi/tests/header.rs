@@ -30,13 +30,14 @@ fn the_header_is_what_the_source_says() {
     );
 }
 
-/// Whether a compiler takes the header, alone and with all warnings as errors.
+/// Returns true if a compiler accepts the header by itself, with all warnings as errors.
 fn compiles(variable: &str, default: &str, language: &str, standard: &str) {
     let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("include");
     let folder = env::temp_dir().join(format!("dynvox-header-{}-{language}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
     let source = folder.join("alone");
-    let text = "#include \"dynvox.h\"\nint main(void) { DynvoxConfig config; return config.settings_len == 0 ? 0 : (int)sizeof(DynvoxTrack); }\n";
+    let text = "#include \"dynvox.h\"\nint main(void) \
+                { DynvoxConfig config; return config.settings_len == 0 ? 0 : (int)sizeof(DynvoxTrack); }\n";
     fs::write(
         &source,
         text.replace("DynvoxConfig config;", "DynvoxConfig config = {0};")

@@ -65,8 +65,9 @@ pub struct MotionEstimate {
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
     pub steps: u32,
-    /// Of the camera: how far ahead of where the calibration has it the right one seems to stand;
-    /// far where both do not expose at the same time. `None` where too few matches tell.
+    /// For the camera: distance by which the right one seems to be ahead of its calibrated
+    /// position; far if both do not expose at the same time. `None` if too few matches determine
+    /// it.
     pub right_ahead: Option<RightAhead>,
 }
 
@@ -148,6 +149,7 @@ impl<'s> Estimator<'s> {
         if rig.validate().is_err() {
             return MotionEstimate::failed(MotionStatus::BadRig, 0, 0, 0);
         }
+        // The share of inliers is asked of all matches, so it sets the bound before any is drawn.
         self.points.fill(matches, rig);
         let matches = self.points.len();
         let needed = usize::from(config.matches_min).max(3);
@@ -155,14 +157,17 @@ impl<'s> Estimator<'s> {
             return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
         }
         let needed = needed.max(libm::ceilf(config.inlier_share_min * matches as f32) as usize);
+        // A hypothesis from the last motion needs fewer steps than one from rest.
         let start = initial.copied().unwrap_or(Transform::IDENTITY);
         let (best, samples) = self.ransac(config, rig, random, &start);
         let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);
         let mut motion = best;
+        // Each round refines on the inliers of the motion before it.
         for round in 0..ROUNDS {
             let inlier_px = if round == 0 { config.inlier_px } else { config.refined_inlier_px };
             self.inlier_len = self.points.select(&motion, rig, inlier_px, self.inliers);
             estimate.inliers = self.inlier_len as u32;
+            // Too few inliers: the motion of the few is as likely a coincidence.
             if self.inlier_len < needed {
                 return estimate;
             }
@@ -173,6 +178,7 @@ impl<'s> Estimator<'s> {
             }
             motion = better;
         }
+        // The residual is reported without robust weights: it is what the inliers really show.
         let matrix = RotationMatrix::new(&motion);
         let mut sums = NormalEquations::ZERO;
         for point in self.inlier_points() {
@@ -246,6 +252,7 @@ impl<'s> Estimator<'s> {
             self.points.get(b as usize)?,
             self.points.get(c as usize)?,
         ];
+        // Three matches determine a motion; Gauss-Newton finds it from the start.
         let mut motion = *start;
         for _ in 0..config.sample_steps {
             let matrix = RotationMatrix::new(&motion);

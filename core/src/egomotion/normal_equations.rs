@@ -32,7 +32,7 @@ impl RotationMatrix {
         Self { rows: motion.rotation_matrix(), translation_m: motion.translation_m }
     }
 
-    /// Where a point is in the current camera.
+    /// Transforms a point into the current camera.
     fn transform(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let ([a, b, c], [tx, ty, tz]) = (self.rows, self.translation_m);
         let row = |r: [f64; 3], t: f64| r[0] * x + r[1] * y + r[2] * z + t;
@@ -109,9 +109,9 @@ impl NormalEquations {
         self.weight += weight;
     }
 
-    /// How well the translation held worst is held, as a share of what rows that all point its way
-    /// would do; a bound from below, from the trace of the translation's covariance. 0 where the
-    /// rows do not determine a motion.
+    /// Returns a lower bound of the information on the translation's least determined direction, as
+    /// a share of what rows that all point that way would give, from the trace of the translation's
+    /// covariance. 0 if the rows do not determine a motion.
     pub(super) fn min_eigen_share(&self) -> f64 {
         let variance = |axis: usize| {
             let unit = core::array::from_fn(|at| if at == axis { 1.0 } else { 0.0 });
@@ -129,11 +129,12 @@ impl NormalEquations {
         self.solve_for(self.vector.map(|x| -x))
     }
 
-    /// What the sums' matrix turns into `right`.
+    /// Solves the sums' matrix for `right`.
     #[expect(clippy::indexing_slicing, reason = "all indices run below N, the length of every row")]
     fn solve_for(&self, right: [f64; N]) -> Option<[f64; N]> {
         let mut lower = self.matrix;
         let mut pivot = [0.0; N];
+        // Cholesky's factors without square roots: L D L'.
         for j in 0..N {
             let mut d = lower[j][j];
             for k in 0..j {
@@ -152,6 +153,7 @@ impl NormalEquations {
                 lower[i][j] = sum / d;
             }
         }
+        // Forward substitution, then division by D and backward substitution.
         let mut step = right;
         for i in 0..N {
             for k in 0..i {

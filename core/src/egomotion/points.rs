@@ -24,7 +24,7 @@ pub(super) struct Points<'s> {
     left_v: &'s mut [f32],
     right_u: &'s mut [f32],
     right_v: &'s mut [f32],
-    /// Which of the matches each point was.
+    /// Index of the match that each point came from.
     source: &'s mut [u32],
     len: usize,
 }
@@ -113,7 +113,7 @@ impl<'s> Points<'s> {
         })
     }
 
-    /// Which of the matches handed to [`Points::fill`] a point was.
+    /// Returns the index, among the matches handed to [`Points::fill`], of a point's match.
     pub(super) fn source(&self, index: usize) -> Option<u32> {
         self.source.get(index).copied()
     }

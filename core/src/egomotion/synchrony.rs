@@ -21,22 +21,22 @@ const DETERMINANT_MIN: f64 = 1e-6;
 /// Fewest matches that say something.
 const MATCHES_MIN: usize = 20;
 
-/// How far ahead of where the calibration has it the right camera stands.
+/// Distance by which the right camera is ahead of its calibrated position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RightAhead {
     /// The distance, m; below 0 where it stands behind.
     pub distance_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the distance, m.
     pub sigma_m: f64,
 }
 
 impl RightAhead {
-    /// Whether the cameras seem to expose at the same time, where synchronous ones show at most
-    /// `max_m`. A distance four times as large is enough to say no, and after a gap a distance as
-    /// large; a smaller one where few matches agree with the motion; and after a gap one that few
-    /// matches leave open, too.
+    /// Returns true if the cameras seem to expose at the same time, for which synchronous ones show
+    /// at most `max_m`. They do not if the distance is certainly four times as large, or after a
+    /// gap as large; if a smaller one comes with few matches that agree with the motion; and after
+    /// a gap, if few matches leave it open.
     pub fn is_synchronous(&self, max_m: f64, agree: bool, after_gap: bool) -> bool {
         let (distance_m, sigma_m) = (libm::fabs(self.distance_m), self.sigma_m);
         let is_far = distance_m - 4.0 * sigma_m > if after_gap { max_m } else { 4.0 * max_m };
@@ -64,8 +64,8 @@ impl RightAhead {
     }
 }
 
-/// What a match says: how the rows' difference changes with shift, focal length and distance, and
-/// that difference, px.
+/// Linearises a match: the change of the rows' difference with shift, focal length and distance,
+/// and that difference, px.
 fn row(rig: &StereoRig, m: &Match) -> Option<(Vector3<f64>, f64)> {
     let disparity_px = f64::from(m.current_left[0]) - f64::from(m.current_right[0]);
     let y_px = f64::from(m.current_left[1]) - rig.center_v_px;

@@ -88,19 +88,24 @@ impl Egomotion {
         >,
         estimator: &mut Estimator<'_>,
     ) -> MotionEstimate {
+        // The last motion is the first guess; the rows' differences tell whether cameras expose
+        // together.
         let (expected, matches) = (self.expected(), matches.into_iter());
         let right_ahead = RightAhead::from_matches(rig, matches.clone());
         let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
         let found = estimator.estimate(config, rig, matches, hypotheses);
         let mut estimate = MotionEstimate { right_ahead, ..found };
+        // After lost frames the motion spans several: the share of one is checked.
         self.reference_s += f64::from(interval_s);
         let frames = self.since_reference + 1;
         let motion = estimate
             .t_current_previous
             .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
+        // A motion that no camera can make is not taken, however many matches agree.
         if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
             estimate = MotionEstimate { status, t_current_previous: None, ..estimate };
         }
+        // A pose is chained to its reference frame, so that guesses in between leave no trace.
         match (&estimate.t_current_previous, motion) {
             (Some(t_current_reference), Some(motion)) => {
                 (self.t_current_previous, self.motion_s, self.inliers) =
@@ -170,8 +175,8 @@ impl Egomotion {
         }
     }
 
-    /// Why a camera cannot have moved so since the reference, a frame's share of it being `motion`;
-    /// `None` where it can.
+    /// Returns the reason why a camera cannot have moved so since the reference, with `motion` a
+    /// frame's share of it; `None` if it can.
     fn doubt(
         &self,
         config: &EgomotionConfig,
@@ -202,7 +207,7 @@ impl Egomotion {
         }
     }
 
-    /// Whether a camera that moved as it last did can move so in the next `frame_s`.
+    /// Returns true if the camera, given its last motion, can move so in the next `frame_s`.
     fn can_accelerate_to(
         &self,
         config: &EgomotionConfig,
@@ -219,8 +224,8 @@ impl Egomotion {
         (now - then).norm() <= config.acceleration_max_m_s2 * frame_s * frame_s + NOISE_M
     }
 
-    /// Whether a camera that moved as it last did can stand still for the next `interval_s`: if
-    /// not, images that repeat the last ones are old.
+    /// Returns true if the camera, given its last motion, can stand still for the next
+    /// `interval_s`: if not, images that repeat the last ones are old.
     pub fn may_stand(&self, config: &EgomotionConfig, interval_s: f32) -> bool {
         self.can_accelerate_to(config, &Transform::IDENTITY, f64::from(interval_s))
     }

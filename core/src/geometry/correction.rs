@@ -8,7 +8,7 @@ use crate::image::{DISPARITY_ONE_PX, DisparityQ8};
 /// offset.
 pub(crate) const ROW_SQUARE_MEAN: f64 = 0.2;
 
-/// What must be added to a disparity, by where the right camera sees the point.
+/// Correction added to a disparity, by where the right camera sees the point.
 ///
 /// At shares `s` of the way from the principal point to the side of the image and `t` to its first
 /// row: `offset + slope s + quartic s⁴ + quadratic (t² - 1/5)`. The offset is what is left of the
@@ -17,7 +17,7 @@ pub(crate) const ROW_SQUARE_MEAN: f64 = 0.2;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DisparityCorrection {
-    /// The same everywhere, px.
+    /// Constant part of the correction, px.
     pub offset_px: f64,
     /// Growth with the column, px at the right side.
     pub slope_px: f64,
@@ -53,8 +53,8 @@ impl DisparityCorrection {
         }
     }
 
-    /// What must be added to a disparity whose point the right camera of this rig sees at `[u, v]`,
-    /// px.
+    /// Returns the correction for a disparity whose point the right camera of this rig sees at
+    /// `[u, v]`, px.
     ///
     /// ```
     /// use dynvox_core::geometry::{DisparityCorrection, StereoRig};
@@ -68,26 +68,26 @@ impl DisparityCorrection {
         self.for_rig(rig).at(right_px)
     }
 
-    /// Whether it changes nothing.
+    /// Returns true if the correction changes nothing.
     pub fn is_zero(&self) -> bool {
         *self == Self::default()
     }
 }
 
 impl PixelCorrection {
-    /// The same for a right camera that is turned as well: where that moves rows by an angle times
-    /// the column, it moves columns by the angle times the row.
+    /// Returns the correction for a right camera that is rotated as well: where the rotation moves
+    /// rows by an angle times the column, it moves columns by the angle times the row.
     pub(crate) fn rolled(self, roll_rad: f64) -> Self {
         Self { roll_rad: roll_rad as f32, ..self }
     }
 
-    /// What must be added to a disparity whose point the right camera sees at `[u, v]`.
+    /// Returns the correction for a disparity whose point the right camera sees at `[u, v]`, px.
     #[inline]
     pub(crate) fn at(&self, [u_px, v_px]: [f32; 2]) -> f32 {
         self.in_row(self.of_row(v_px), u_px)
     }
 
-    /// What all columns of a row share.
+    /// Returns the part of the correction that all columns of a row share, px.
     #[inline(always)]
     fn of_row(&self, v_px: f32) -> f32 {
         let share = self.shares.down(v_px);
@@ -96,7 +96,7 @@ impl PixelCorrection {
             + self.roll_rad * self.shares.below_px(v_px)
     }
 
-    /// What must be added in a column of a row, given what its columns share.
+    /// Returns the correction in a column of a row, given the part that its columns share, px.
     #[inline(always)]
     fn in_row(&self, row_px: f32, u_px: f32) -> f32 {
         let share = self.shares.across(u_px);
@@ -104,7 +104,7 @@ impl PixelCorrection {
         row_px + self.slope_px * share + self.quartic_px * (square * square)
     }
 
-    /// Where the right camera of the corrected rig sees what is seen at `[u, v]`.
+    /// Maps a pixel of the right camera to that of the corrected rig.
     #[inline]
     pub(crate) fn corrected(&self, [u_px, v_px]: [f32; 2]) -> [f32; 2] {
         [u_px - self.at([u_px, v_px]), v_px]

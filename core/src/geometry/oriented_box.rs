@@ -17,7 +17,7 @@ pub(crate) struct OrientedBox {
 }
 
 impl OrientedBox {
-    /// Whether a point of the world lies in it; not where the point is no number.
+    /// Returns true if a point of the world lies in the box; false if the point is not finite.
     #[inline]
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         let at = self.t_box_world.transform_point(point_m);

@@ -8,8 +8,8 @@ pub const DEPTH_MIN_M: f64 = 0.05;
 /// Smallest disparity a point is triangulated from, px.
 pub const DISPARITY_MIN_PX: f64 = 0.1;
 
-/// Where both cameras see a point, px from the principal point. Rectified cameras see it in the
-/// same row.
+/// Projections of a point into both cameras, px from the principal point. Rectified cameras see it
+/// in the same row.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct StereoObservation {
     /// Column in the left image.
@@ -48,7 +48,7 @@ pub struct StereoRig {
     pub baseline_m: f64,
 }
 
-/// Why a rig cannot be used.
+/// Reason why a rig cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -106,7 +106,7 @@ impl StereoRig {
         [f64::from(u) - self.center_u_px, f64::from(v) - self.center_v_px]
     }
 
-    /// What a pixel of the left and a pixel of the right image show; its row is the mean of both.
+    /// Combines a pixel of the left and one of the right image; the row is the mean of both.
     pub(crate) fn observation(&self, left: [f32; 2], right: [f32; 2]) -> StereoObservation {
         let ([u_left_px, v_left], [u_right_px, v_right]) =
             (self.centered(left), self.centered(right));
@@ -118,8 +118,8 @@ impl StereoRig {
         [(u_px - self.center_u_px) / self.focal_px, (v_px - self.center_v_px) / self.focal_px, 1.0]
     }
 
-    /// Where both cameras see a point of the left camera's frame, m; `None` nearer than
-    /// [`DEPTH_MIN_M`], behind the camera, or where the depth is not a number.
+    /// Projects a point of the left camera's frame, m, into both cameras; `None` nearer than
+    /// [`DEPTH_MIN_M`], behind the camera, or if the depth is not a number.
     pub(crate) fn project(&self, [x, y, z]: [f64; 3]) -> Option<StereoObservation> {
         (z > DEPTH_MIN_M).then(|| {
             let u_left_px = self.focal_px * x / z;

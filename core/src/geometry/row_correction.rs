@@ -2,7 +2,7 @@
 
 use super::{Shares, StereoRig};
 
-/// What must be added to the rows of the right image, so that both cameras see a point in the same
+/// Correction added to the rows of the right image, so that both cameras see a point in the same
 /// row.
 ///
 /// At shares `s` of the way from the principal point to the side of the image and `t` to its first
@@ -13,7 +13,7 @@ use super::{Shares, StereoRig};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RowCorrection {
-    /// The same everywhere, px.
+    /// Constant part of the correction, px.
     pub constant_px: f64,
     /// Growth with the column, px at the right side.
     pub column_px: f64,
@@ -28,7 +28,7 @@ pub struct RowCorrection {
 }
 
 impl RowCorrection {
-    /// How many terms it has.
+    /// Number of terms.
     pub(crate) const TERMS: usize = 6;
 
     /// Powers of a pixel's shares, in the order of the terms.
@@ -36,7 +36,7 @@ impl RowCorrection {
         [1.0, s, t, s * s, s * t, t * t]
     }
 
-    /// What the terms are, in the order of the fields.
+    /// Returns the terms in the order of the fields.
     pub(crate) fn terms(&self) -> [f64; Self::TERMS] {
         let Self {
             constant_px,
@@ -63,7 +63,8 @@ impl RowCorrection {
         }
     }
 
-    /// What is added at shares of the way from the principal point to side and first row, px.
+    /// Returns the correction at shares of the way from the principal point to side and first row,
+    /// px.
     pub(crate) fn at(&self, shares: [f64; 2]) -> f64 {
         self.terms()
             .iter()
@@ -116,7 +117,8 @@ pub(crate) struct RowShift {
 }
 
 impl RowShift {
-    /// How far below row `v` of the right image the left one sees what is in column `u` there, px.
+    /// Returns the distance, px, by which the left image sees a point below row `v`, which the
+    /// right one has in column `u`.
     #[inline(always)]
     pub(crate) fn at(&self, [u_px, v_px]: [f32; 2]) -> f32 {
         let (s, t) = (self.shares.across(u_px), self.shares.down(v_px));

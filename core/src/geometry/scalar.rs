@@ -11,12 +11,12 @@ pub(crate) fn max_f32(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// As [`min_f32`].
+/// Returns the smaller value, like [`min_f32`].
 pub(crate) fn min_f64(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// As [`max_f32`].
+/// Returns the larger value, like [`max_f32`].
 pub(crate) fn max_f64(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
@@ -40,8 +40,8 @@ pub(crate) const fn rounded_i32(value: f32) -> i32 {
     ((value + MAGIC).to_bits() as i32).wrapping_sub(MAGIC.to_bits() as i32)
 }
 
-/// As [`floor_i32`] of a `value` within ±2^22, in loops: its cast, which saturates, is one that
-/// compilers do one by one.
+/// Rounds down like [`floor_i32`], for a `value` within ±2^22, in loops: compilers cannot vectorise
+/// the saturating cast there.
 #[inline(always)]
 pub(crate) fn floored_i32(value: f32) -> i32 {
     let near = rounded_i32(value);

@@ -11,8 +11,8 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// Those of a rig. A principal point in column 0 has no side, one in row 0 no first row: the
-    /// share is 0 then.
+    /// Makes the shares of a rig. A principal point in column 0 has no side, one in row 0 no first
+    /// row: the share is 0 then.
     pub(crate) fn new(rig: &StereoRig) -> Self {
         Self {
             center_px: [rig.center_u_px as f32, rig.center_v_px as f32],
@@ -41,7 +41,7 @@ impl Shares {
         self.below_px(v_px) * per_px
     }
 
-    /// How far row `v` lies below the principal point, px.
+    /// Returns the distance of row `v` below the principal point, px.
     #[inline(always)]
     pub(crate) fn below_px(&self, v_px: f32) -> f32 {
         let [_, center_px] = self.center_px;

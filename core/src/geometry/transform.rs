@@ -81,8 +81,7 @@ impl Transform {
         (Self::new([a, b, c], [x, y, z]) * *self).normalized()
     }
 
-    /// The same motion with its quaternion rescaled to length 1: long products accumulate rounding
-    /// errors.
+    /// Rescales the quaternion to length 1: long products accumulate rounding errors.
     #[must_use]
     pub fn normalized(&self) -> Self {
         let [x, y, z, w] = self.rotation;
@@ -105,13 +104,13 @@ impl Transform {
         Self { rotation, translation_m: rotate(rotation, [-tx, -ty, -tz]) }
     }
 
-    /// Where a point goes, m.
+    /// Transforms a point, m.
     pub fn transform_point<P: Into<[f64; 3]> + From<[f64; 3]>>(&self, point_m: P) -> P {
         let ([x, y, z], [tx, ty, tz]) = (rotate(self.rotation, point_m.into()), self.translation_m);
         P::from([x + tx, y + ty, z + tz])
     }
 
-    /// Where a direction goes: rotated, not moved.
+    /// Rotates a direction, without the translation.
     pub fn rotate<V: Into<[f64; 3]> + From<[f64; 3]>>(&self, direction: V) -> V {
         V::from(rotate(self.rotation, direction.into()))
     }
@@ -144,7 +143,7 @@ impl Transform {
         [[a, b, c, x], [d, e, f, y], [g, h, i, z]]
     }
 
-    /// How far the motion moves the origin, m.
+    /// Returns the distance by which the motion moves the origin, m.
     pub fn distance_m(&self) -> f64 {
         let [x, y, z] = self.translation_m;
         libm::sqrt(x * x + y * y + z * z)
@@ -173,13 +172,12 @@ impl Transform {
         )
     }
 
-    /// Whether all seven numbers are finite.
+    /// Returns true if all seven numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.rotation.iter().chain(&self.translation_m).all(|value| value.is_finite())
     }
 
-    /// Whether the quaternion has length 1, but for what rounding takes from it; `false` where it
-    /// is not finite.
+    /// Returns true if the quaternion has length 1, up to rounding; `false` if it is not finite.
     ///
     /// ```
     /// use dynvox_core::geometry::Transform;

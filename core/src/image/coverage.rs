@@ -25,7 +25,7 @@ impl<'a> InvalidPixels<'a> {
         Some(Self { words, width })
     }
 
-    /// Whether pixel (u, v) is not to be used; those beyond the image are not.
+    /// Returns true if pixel (u, v) is invalid; pixels outside the image are.
     pub(crate) fn contains(&self, u: usize, v: usize) -> bool {
         if u >= self.width {
             return true;

@@ -60,17 +60,17 @@ impl DisparityQ8 {
         f32::from(self.0) / f32::from(DISPARITY_ONE_PX)
     }
 
-    /// Whether there is a disparity.
+    /// Returns true if there is a disparity.
     pub const fn is_known(self) -> bool {
         self.0 != 0
     }
 
-    /// Whether the core's own matcher filled this one in between measured ones.
+    /// Returns true if the core's own matcher filled this one in between measured ones.
     pub const fn is_filled(self) -> bool {
         self.0 & Self::FILLED != 0
     }
 
-    /// The same disparity, marked as filled in; none stays none.
+    /// Marks the disparity as filled in; none stays none.
     #[must_use]
     pub(crate) const fn filled(self) -> Self {
         if self.is_known() { Self(self.0 | Self::FILLED) } else { self }

@@ -41,7 +41,7 @@ impl<'a, T> View<'a, T> {
         Self::with_stride(data, width, height, width)
     }
 
-    /// As [`View::new`] with rows `stride` items apart.
+    /// Makes a view like [`View::new`], with rows `stride` items apart.
     ///
     /// ```
     /// use dynvox_core::image::View;
@@ -171,7 +171,7 @@ impl<'a, T> ViewMut<'a, T> {
         ViewMut { data: T::peel_slice_mut(self.data), width: self.width, height: self.height }
     }
 
-    /// The same image, read-only.
+    /// Returns a read-only view of the image.
     pub fn as_view(&self) -> View<'_, T> {
         View { data: self.data, width: self.width, height: self.height, stride: self.width }
     }

@@ -56,8 +56,8 @@ impl Capacity {
             .saturating_add(cells.saturating_mul(CELL))
     }
 
-    /// Whether [`Capacity::bytes`] can be counted in numbers up to `last`, which on this machine is
-    /// `usize::MAX`.
+    /// Returns true if [`Capacity::bytes`] can be counted in numbers up to `last`, which on this
+    /// machine is `usize::MAX`.
     pub(super) const fn is_countable(&self, last: u64) -> bool {
         self.bytes_at_most() < last
     }

@@ -34,18 +34,17 @@ const OBJECTS: [(usize, usize); 6] =
     [(16, 4_000), (8, 1_200), (4, 700), (2, 300), (2, 150), (0, 0)];
 /// Volumes of objects may take one part in so many of what the image leaves.
 const OBJECTS_SHARE: usize = 5;
-/// The same where their number is asked for.
+/// Share of the blocks for objects if their number is asked for, as a divisor.
 const ASKED_OBJECTS_SHARE: usize = 2;
 /// Waiting crops may take one part in so many of what the image leaves.
 const CROPS_SHARE: usize = 16;
 /// Voxel size the numbers of visible blocks are for, m.
 const VOXEL_SIZE_M: f32 = 0.05;
 
-/// What a budget is asked for besides bytes and image size. The default leaves all to the rules.
+/// Wishes for a budget besides bytes and image size. The default leaves all to the rules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BudgetOptions {
-    /// Whether voxels have colour; where it is not said, they have it where 20,000 blocks with
-    /// colour fit.
+    /// True if voxels have colour; if absent, they have it where 20,000 blocks with colour fit.
     pub colour: Option<bool>,
     /// Objects reconstructed at once, at most [`MAX_OBJECTS`]; as many as a fifth of the budget
     /// allows where it is not said.
@@ -57,7 +56,7 @@ pub struct BudgetOptions {
     pub raw_image: [usize; 2],
 }
 
-/// Why there is no capacity for a budget.
+/// Reason why there is no capacity for a budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -85,7 +84,8 @@ impl fmt::Display for BudgetError {
             Self::Image => {
                 write!(
                     f,
-                    "images must be from {MIN_WIDTH} x {MIN_HEIGHT} px to {MAX_SIDE} px a side ({MAX_RAW_SIDE} where they are rectified)"
+                    "images must be from {MIN_WIDTH} x {MIN_HEIGHT} px to {MAX_SIDE} px a side \
+                     ({MAX_RAW_SIDE} where they are rectified)"
                 )
             }
             Self::Objects => {
@@ -104,7 +104,7 @@ impl core::error::Error for BudgetError {}
 pub struct CapacityProblem {
     /// The bound: `visible_blocks`.
     pub bound: &'static str,
-    /// What it must be: "must be above 0".
+    /// Rule that the bound breaks: "must be above 0".
     pub rule: &'static str,
 }
 
@@ -161,7 +161,7 @@ impl Capacity {
         Ok(if solved.blocks >= MIN_BLOCKS { solved } else { question.filled(least) })
     }
 
-    /// Whether every bound is one a mapper can work with.
+    /// Checks that a mapper can work with every bound.
     ///
     /// # Errors
     /// The first bound that is not.
@@ -265,7 +265,7 @@ impl<'o> Question<'o> {
         Ok(Self { bytes, width, height, options, visible })
     }
 
-    /// What follows from the image alone: no block, no object.
+    /// Returns the bounds that follow from the image only: no block, no object.
     fn image_only(&self, colour: bool) -> Capacity {
         let pixels = self.width * self.height;
         let [raw_width, raw_height] = self.options.raw_image;
@@ -363,7 +363,7 @@ impl<'o> Question<'o> {
         if most < MAX_COUNT { most + 1 } else { MAX_COUNT + 1 }
     }
 
-    /// The same with so many blocks; at most four in five of them are visible at once.
+    /// Returns the capacity with so many blocks; at most four in five of them are visible at once.
     fn with_blocks(&self, capacity: &Capacity, blocks: usize) -> Capacity {
         let most = blocks - blocks / 5;
         Capacity {

@@ -19,7 +19,7 @@ impl Clock {
         Self { last_ns: None, interval_s: assumed_s }
     }
 
-    /// Whether a frame of this time may follow.
+    /// Returns true if a frame of this time may follow.
     pub fn may_follow(&self, time_ns: Option<u64>) -> bool {
         self.last_ns.zip(time_ns).is_none_or(|(last_ns, time_ns)| last_ns < time_ns)
     }

@@ -32,7 +32,7 @@ use crate::{
 pub struct Config {
     /// The cameras.
     pub rig: StereoRig,
-    /// How raw pairs become those of `rig`; `None` where they come rectified.
+    /// Rectification of raw pairs to `rig`; `None` if they come rectified.
     pub rectification: Option<Rectification>,
     /// Settings of the rig in addition to its calibration.
     pub rig_settings: RigConfig,
@@ -44,7 +44,7 @@ pub struct Config {
     pub egomotion: EgomotionConfig,
     /// The camera's motion from depth, where that is asked for.
     pub icp: IcpConfig,
-    /// What the loop does, and when.
+    /// Settings of the loop over frames.
     pub mapper: MapperConfig,
     /// Instances and tracks.
     pub tracking: TrackingConfig,
@@ -56,7 +56,7 @@ pub struct Config {
     pub volume: VolumeConfig,
     /// Views of the map.
     pub raycast: RaycastConfig,
-    /// Its triangles.
+    /// Settings of meshes.
     pub mesh: MeshConfig,
     /// Maps for planners, where the capacity has a window for them.
     pub planning: PlanningConfig,

@@ -8,7 +8,7 @@ pub const MIN_WIDTH: usize = 64;
 /// Least image height the matchers can use, px.
 pub const MIN_HEIGHT: usize = 32;
 
-/// Why a mapper cannot be made.
+/// Reason why a mapper cannot be made.
 ///
 /// ```
 /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig};
@@ -48,7 +48,7 @@ impl fmt::Display for NewError {
 
 impl core::error::Error for NewError {}
 
-/// Why a frame cannot be taken. The mapper is as it was before.
+/// Reason why a frame is refused. The mapper is unchanged.
 ///
 /// ```
 /// use dynvox_core::{

@@ -34,14 +34,14 @@ pub struct StereoFrame<'a> {
     /// own. Motion still needs both images. Values no pair of this width can have are refused and
     /// counted.
     pub disparity_q8: Option<View<'a, u16>>,
-    /// Where the left camera is, camera to world, from elsewhere: it replaces the camera's own
+    /// Pose of the left camera, camera to world, from elsewhere: it replaces the camera's own
     /// egomotion. Give it with every frame, in one world.
     pub t_world_camera: Option<Transform>,
-    /// When the pair was taken, ns since any moment that stays the same: later than that of the
-    /// frame before. Where two frames in a row have it, objects move by the true time between them;
-    /// else by `frame_interval_s` of the configuration.
+    /// Time of the pair, ns since any moment that stays the same: later than that of the frame
+    /// before. If two frames in a row have it, objects move by the true time between them; else by
+    /// `frame_interval_s` of the configuration.
     pub time_ns: Option<u64>,
-    /// What a detector saw in the left image, in any order; empty without a detector.
+    /// Detections in the left image, in any order; empty without a detector.
     pub detections: &'a [Detection<'a>],
 }
 

@@ -111,6 +111,7 @@ impl<'s> Localization<'s> {
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
+        // A guess says nothing of how the camera moved: objects get no motion from it.
         let is_measured = matches!(
             found.origin,
             PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
@@ -158,6 +159,7 @@ impl<'s> Localization<'s> {
         let included = selection.iter().filter(|&&index| over_several || mask.includes(index));
         let excluded = selection.len() - included.clone().count();
         let matches = included.filter_map(|&index| refined.get(index as usize));
+        // The rig with the baseline that is in use, not the calibrated one.
         let (rig, was_lost) = (seen.config.scaled_rig(), self.camera.is_lost());
         let estimate = self.camera.step(
             &seen.config.egomotion,
@@ -175,6 +177,7 @@ impl<'s> Localization<'s> {
                 &motion,
             );
         }
+        // After a long loss the map, not the last pose, has to say where the camera is.
         let ends_loss = was_lost && !self.camera.is_lost();
         let is_found = ends_loss && self.end_loss(seen, static_map, executor);
         Found {

@@ -219,6 +219,7 @@ impl<'s> Mapper<'s> {
         if !(right && colour && class && disparity) {
             return Err(StepError::SizesDiffer);
         }
+        // Buffers have the capacity's size; the matchers need a margin around each pixel.
         if size[0] > self.capacity.image_width || size[1] > self.capacity.image_height {
             return Err(StepError::TooLarge {
                 width: self.capacity.image_width,
@@ -234,6 +235,7 @@ impl<'s> Mapper<'s> {
         if !frame.t_world_camera.is_none_or(|pose| pose.is_rotation()) {
             return Err(StepError::PoseNotRotation);
         }
+        // Motions are divided by time: a clock that stands or runs back is refused.
         if !self.clock.may_follow(frame.time_ns) {
             return Err(StepError::TimeNotLater);
         }
@@ -250,7 +252,7 @@ impl<'s> Mapper<'s> {
         self.finish_with(&mut NoSink)
     }
 
-    /// As [`Mapper::finish`], with a sink for the remaining objects.
+    /// Finishes like [`Mapper::finish`], with a sink for the remaining objects.
     pub fn finish_with<O: ObjectSink>(&mut self, objects: &mut O) -> PruneReport {
         self.objects.finish(objects);
         self.static_map.volume.finish()

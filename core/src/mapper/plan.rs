@@ -93,7 +93,7 @@ impl<'s> Mapper<'s> {
         &self.planning
     }
 
-    /// As [`Mapper::planning`], to cut other slices.
+    /// Returns the planning maps like [`Mapper::planning`], to cut other slices.
     pub fn planning_mut(&mut self) -> &mut Planning<'s> {
         &mut self.planning
     }
@@ -165,6 +165,7 @@ impl<'s> Mapper<'s> {
                     (instance.track == Some(track.id)).then_some((u, v, disparity))
                 })
         };
+        // The median disparity is the object's: windows and rims show other surfaces.
         let mut counts = [0u32; DISPARITIES];
         for (_, _, disparity) in shown() {
             if let Some(count) = counts.get_mut(usize::from(disparity >> 8)) {
@@ -181,6 +182,7 @@ impl<'s> Mapper<'s> {
         let depth_m = |disparity_px: f64| rig.focal_baseline_px_m() / disparity_px;
         let middle_m = depth_m(middle as f64 + 0.5);
         let extent_m = f64::from(self.config.objects.extent_m);
+        // Pixels near that depth span the box.
         for (u, v, disparity) in shown() {
             let z = depth_m(f64::from(disparity) / 256.0);
             if libm::fabs(z - middle_m) <= extent_m {

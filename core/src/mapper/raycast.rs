@@ -45,10 +45,10 @@ impl<'s> Mapper<'s> {
         Ok(&map.raycaster)
     }
 
-    /// As [`Mapper::raycast`], and before it every object where it is now: each pixel shows what is
-    /// nearest (the compositing of Section III-E). [`Raycaster::layer`] is 0 for the static map and
-    /// n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and one more for each
-    /// object; there are at most [`crate::objects::MAX_OBJECTS`].
+    /// Raycasts the map like [`Mapper::raycast`], and every object at its current pose: each pixel
+    /// shows the nearest surface (the compositing of Section III-E). [`Raycaster::layer`] is 0 for
+    /// the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and one
+    /// more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
     pub fn raycast_composed<E: Executor>(
         &mut self,
         view: impl Into<RaycastView>,

@@ -164,12 +164,14 @@ fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f6
             }
         }
     }
+    // A view that shows little of the map proves nothing.
     let pixels = (width * height / 4) as f64;
     if (count as f64) < 2.0 * SHOWN_MIN * pixels {
         return None;
     }
     let n = count as f64;
     let [a, b] = sums.map(|sum| sum as f64);
+    // Pearson's correlation from the sums.
     let variance = [squares[0] as f64 - a * a / n, squares[1] as f64 - b * b / n];
     let scale = libm::sqrt(variance[0] * variance[1]);
     (scale > 0.0).then(|| (products as f64 - a * b / n) / scale)

@@ -13,7 +13,7 @@ use crate::{
     volume::{AllocationReport, PruneReport},
 };
 
-/// How much a step's events matter.
+/// Severity of a step's events.
 ///
 /// ```
 /// use dynvox_core::Severity;
@@ -45,7 +45,7 @@ impl Severity {
     }
 }
 
-/// How the camera's pose came about.
+/// Source of the camera's pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -88,15 +88,15 @@ pub struct BlockCount {
 pub struct Report {
     /// Number of the frame, from 0.
     pub frame: u32,
-    /// Where the left camera is: camera to world; the first frame's camera is the world.
+    /// Pose of the left camera: camera to world; the first frame's camera defines the world.
     pub t_world_camera: Transform,
-    /// What rectification did; `None` where pairs come rectified.
+    /// Report of the rectification; `None` if pairs come rectified.
     pub rectify: Option<RectifyReport>,
     /// The stereo matcher.
     pub stereo: StereoReport,
     /// The scene flow.
     pub scene_flow: FlowReport,
-    /// How the pose came about.
+    /// Source of the pose: measured, extrapolated, or given.
     pub pose: PoseOrigin,
     /// Number of the map's segment, from 0. A camera lost for
     /// [`crate::egomotion::MAX_REFERENCE_FRAMES`] frames that is not found in the map begins
@@ -108,16 +108,16 @@ pub struct Report {
     pub egomotion: Option<MotionEstimate>,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
-    /// What the rig's disparity was found to be off by.
+    /// Report of the self-calibration.
     pub self_calibration: SelfCalibrationReport,
-    /// What moves or could; [`crate::Mapper::tracks`] has the tracks one by one.
+    /// Counts of objects and detections; [`crate::Mapper::tracks`] has the tracks one by one.
     pub instances: InstancesReport,
-    /// Whether the frame was fused. One whose pose had to be guessed is not: it would smear the
-    /// map. Nor is one between two turns of `mapper.fuse_every`.
+    /// True if the frame was fused. A frame whose pose was extrapolated is not, because it would
+    /// smear the map; nor is one between two turns of `mapper.fuse_every`.
     pub fused: bool,
     /// Blocks made and refused.
     pub allocate: AllocationReport,
-    /// What pruning did.
+    /// Report of pruning.
     pub prune: PruneReport,
     /// The static map's pool.
     pub blocks: BlockCount,

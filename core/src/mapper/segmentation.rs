@@ -10,7 +10,7 @@ use crate::{
 /// The parts of a mapper that segment a frame by motion.
 pub(super) struct Segmentation<'m, 's> {
     pub segmenter: &'m mut MotionSegmenter<'s>,
-    /// Whether the planner needs the ground of this frame.
+    /// True if the planner needs the ground of this frame.
     pub plans: bool,
 }
 

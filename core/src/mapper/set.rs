@@ -16,7 +16,7 @@ use crate::{
 };
 use core::fmt;
 
-/// Why a setting cannot be set. Nothing has changed.
+/// Reason why a setting cannot be set. Nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

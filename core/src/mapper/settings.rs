@@ -6,7 +6,7 @@ use crate::settings::{
     check, choices, rules,
 };
 
-/// Where the camera's motion comes from, unless a frame brings its pose.
+/// Source of the camera's motion, unless a frame brings its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

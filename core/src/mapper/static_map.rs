@@ -107,6 +107,7 @@ impl<'s> StaticMap<'s> {
             colour: seen.frame.colour,
             class: seen.frame.class,
         };
+        // Blocks first, so that fusion finds every block that the frame observes.
         let allocation = executor.stage(Stage::Allocate, || {
             self.volume.allocate(&view, observation.depth.depth_m(), store, executor)
         });

@@ -49,8 +49,8 @@ impl Mapper<'_> {
         self.step_with(frame, executor, &mut NoStore, &mut NoSink)
     }
 
-    /// As [`Mapper::step`], with a store for blocks that are evicted and loaded again when they are
-    /// visible, and a sink for objects that retire.
+    /// Steps like [`Mapper::step`], with a store for blocks that are evicted and loaded again when
+    /// they are visible, and a sink for objects that retire.
     // Never inlined, so that a step's stack can be told from its caller's.
     #[inline(never)]
     pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(

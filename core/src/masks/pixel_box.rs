@@ -40,12 +40,12 @@ impl PixelBox {
         i64::from(self.width.max(0)) * i64::from(self.height.max(0))
     }
 
-    /// Whether it holds a pixel.
+    /// Returns true if the box contains a pixel.
     pub fn contains(&self, u: i32, v: i32) -> bool {
         u >= self.left && v >= self.top && u - self.left < self.width && v - self.top < self.height
     }
 
-    /// What both hold; of width or height 0 where that is nothing.
+    /// Returns the part that both boxes cover; of width or height 0 if there is none.
     pub fn intersection(&self, other: &Self) -> Self {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
         let right = (self.left + self.width).min(other.left + other.width);
@@ -79,7 +79,7 @@ impl PixelBox {
     }
 }
 
-/// What two areas have in common, as a share of their union; 0 where that is empty.
+/// Returns the common part of two areas, as a share of their union; 0 if that is empty.
 pub(super) fn share(common: i64, a: i64, b: i64) -> f32 {
     let union = a + b - common;
     if union > 0 { common as f32 / union as f32 } else { 0.0 }

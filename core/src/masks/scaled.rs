@@ -20,12 +20,12 @@ impl<'m, 's> ScaledMask<'m, 's> {
         Self { store, mask, pixels: mask.pixels.scaled(permille) }
     }
 
-    /// The same elsewhere in the image.
+    /// Moves the mask within the image.
     pub(crate) fn moved(self, shift: [i32; 2]) -> Self {
         Self { pixels: self.pixels.moved(shift), ..self }
     }
 
-    /// Whether a pixel of the image belongs to the scaled mask.
+    /// Returns true if a pixel of the image belongs to the scaled mask.
     pub(crate) fn contains(&self, u: i32, v: i32) -> bool {
         if !self.pixels.contains(u, v) {
             return false;
@@ -116,8 +116,8 @@ fn sources(at: i32, from: i32, to: i32) -> [i32; 2] {
     [low, low + i64::from(position.rem_euclid(unit) != 0)].map(|pixel| pixel.clamp(0, last) as i32)
 }
 
-/// Where pixel `at` of a line of `from` lies in the same line resized to `to`, and how much a pixel
-/// is there.
+/// Returns the position and size of pixel `at` of a line of `from` when the line is resized to
+/// `to`.
 fn resized(at: i32, from: i32, to: i32) -> (i64, i64) {
     (i64::from(2 * at + 1) * i64::from(to) - i64::from(from), 2 * i64::from(from.max(1)))
 }

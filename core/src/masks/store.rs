@@ -37,7 +37,7 @@ impl MaskHandle {
         visitor.u32(stride);
     }
 
-    /// Whether the box stands for the mask.
+    /// Returns true if the box stands for the mask.
     pub(super) fn is_box(&self) -> bool {
         self.stride == 0
     }
@@ -138,7 +138,7 @@ impl<'s> MaskStore<'s> {
         clipped_mut(self.words, start..start + mask.stride as usize)
     }
 
-    /// Whether a pixel of the image belongs to the mask.
+    /// Returns true if a pixel of the image belongs to the mask.
     pub(crate) fn contains(&self, mask: &MaskHandle, u: i32, v: i32) -> bool {
         if !mask.pixels.contains(u, v) {
             return false;

@@ -18,19 +18,19 @@ impl<T> TwoFrames<T> {
         self.second_is_current = !self.second_is_current;
     }
 
-    /// That of the current frame.
+    /// Returns the value of the current frame.
     pub(crate) fn current(&self) -> &T {
         let [first, second] = &self.values;
         if self.second_is_current { second } else { first }
     }
 
-    /// That of the frame before.
+    /// Returns the value of the frame before.
     pub(crate) fn previous(&self) -> &T {
         let [first, second] = &self.values;
         if self.second_is_current { first } else { second }
     }
 
-    /// That of the current frame.
+    /// Returns the value of the current frame, for writing.
     pub(crate) fn current_mut(&mut self) -> &mut T {
         self.split_mut().0
     }

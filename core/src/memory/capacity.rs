@@ -54,9 +54,9 @@ pub struct Capacity {
     pub planning_length: usize,
     /// Height of the planner's window, cells; as the width.
     pub planning_height: usize,
-    /// Whether distances are kept for every cell of the window, and not for a slice of it alone.
+    /// True if distances are kept for every cell of the window, false for a slice only.
     pub planning_distance_3d: bool,
-    /// Whether voxels have colour: 3,072 bytes a block with, 1,536 without.
+    /// True if voxels have colour: 3,072 bytes a block with, 1,536 without.
     pub colour: bool,
 }
 

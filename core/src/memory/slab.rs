@@ -50,7 +50,7 @@ impl<const N: usize> DerefMut for Slab<N> {
     }
 }
 
-/// Why a slab cannot be used.
+/// Reason why a slab cannot be used.
 ///
 /// ```
 /// use dynvox_core::{Capacity, Config, Mapper, NewError, geometry::StereoRig, memory::SlabError};
@@ -120,7 +120,7 @@ pub const fn region_bytes<T>(count: usize) -> usize {
 /// ```
 #[derive(Debug)]
 pub struct Carver<'s> {
-    /// What is not allocated yet; `None` without a slab.
+    /// Bytes that are not allocated yet; `None` without a slab.
     rest: Option<&'s mut [u8]>,
     footprint: Footprint,
     /// Replaces the names of regions while a group is allocated.
@@ -156,8 +156,9 @@ impl<'s> Carver<'s> {
         items
     }
 
-    /// As [`Carver::alloc`], without clearing: for big regions whose items are cleared as they come
-    /// into use, so that a slab much larger than the map costs neither time nor resident memory.
+    /// Allocates like [`Carver::alloc`], without clearing: for big regions whose items are cleared
+    /// as they come into use, so that a slab much larger than the map costs neither time nor
+    /// resident memory.
     pub(crate) fn alloc_as_found<T: Pod>(
         &mut self,
         name: &'static str,
@@ -226,8 +227,8 @@ impl<'s> Carver<'s> {
         }
     }
 
-    /// Whether every region was allocated. After a failure nothing built from the regions may be
-    /// used.
+    /// Checks that every region was allocated. After a failure nothing built from the regions may
+    /// be used.
     ///
     /// # Errors
     /// The first failure.

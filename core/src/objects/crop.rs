@@ -29,7 +29,7 @@ pub(crate) const MAX_CROPS: usize = 128;
 /// Disparity units in a half pixel: the median is found to that, up to 256 px.
 const BIN: u16 = 128;
 
-/// What a crop is cut from.
+/// Images and masks that a crop is cut from.
 #[derive(Clone, Copy)]
 pub(super) struct CropSource<'a> {
     pub rig: &'a StereoRig,
@@ -104,7 +104,7 @@ struct LeaveOut<'a> {
 }
 
 impl Work for LeaveOut<'_> {
-    /// How many pixels are left.
+    /// Number of pixels that are left.
     type Output = u32;
 
     #[inline(always)]
@@ -147,7 +147,7 @@ pub(super) struct Crop {
     pub start: u32,
     /// Pixels.
     pub len: u32,
-    /// Whether it has colour; 0 or 1.
+    /// 1 if the crop has colour, else 0.
     pub coloured: u32,
     /// Digest of its pixels, which do not change while it is kept.
     pub digest: u64,
@@ -197,7 +197,7 @@ pub(super) struct Crops<'s> {
     entries: &'s mut [Crop],
     /// Entries in use, oldest first.
     len: usize,
-    /// Where the next crop begins.
+    /// Offset of the next crop.
     next: usize,
 }
 
@@ -233,10 +233,12 @@ impl<'s> Crops<'s> {
         if len > self.disparity_q8.len() || len == 0 {
             return None;
         }
+        // The ring wraps: a crop is never split.
         if self.next + len > self.disparity_q8.len() {
             self.next = 0;
         }
         let span = self.next..self.next + len;
+        // Crops that the new one overwrites are the oldest.
         let dropped = self.drop_where(|old, count| {
             let overlaps =
                 (old.start as usize) < span.end && (old.start + old.len) as usize > span.start;
@@ -253,6 +255,7 @@ impl<'s> Crops<'s> {
         {
             to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
+        // A profile without colour keeps grey only.
         let coloured = picture.colour.filter(|_| !self.colour.is_empty());
         if let Some(image) = coloured {
             for (to, from) in

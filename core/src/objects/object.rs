@@ -33,22 +33,22 @@ use heapless::Vec;
 /// Most object volumes a capacity can ask for.
 pub const MAX_OBJECTS: usize = 16;
 
-/// Why an object was handed over.
+/// Reason why an object retires.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Retirement {
-    /// Its track was forgotten.
+    /// Track that was forgotten.
     #[default]
     Forgotten,
-    /// Its volume was needed for another object.
+    /// Volume that was needed for another object.
     Displaced,
-    /// Its trajectory segment ended: it is reconstructed anew.
+    /// Trajectory segment that ended: the object is reconstructed anew.
     Restarted,
     /// The sequence ended.
     Finished,
 }
 
-/// What is known of an object.
+/// Class, motion state and counts of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ObjectSummary {
@@ -56,9 +56,9 @@ pub struct ObjectSummary {
     pub id: u32,
     /// Number of the track's trajectory segment, from 1.
     pub segment_id: u32,
-    /// Its class.
+    /// Class of the object.
     pub class: Class,
-    /// What was last known of its motion.
+    /// Last motion state.
     pub state: MotionState,
     /// First frame fused.
     pub first_frame: u32,
@@ -66,18 +66,18 @@ pub struct ObjectSummary {
     pub last_frame: u32,
     /// Frames fused.
     pub frames: u32,
-    /// Its last pose: its volume's frame to the world.
+    /// Last pose: the volume's frame to the world.
     pub t_world_object: Transform,
 }
 
 /// An object that retires.
 #[derive(Clone, Copy, Debug)]
 pub struct RetiredObject<'v, 's> {
-    /// What is known of it.
+    /// Summary of the object.
     pub summary: ObjectSummary,
-    /// Why it retires.
+    /// Reason why the object retires.
     pub reason: Retirement,
-    /// Its map, in its own frame.
+    /// Volume of the object, in its own frame.
     pub volume: &'v Volume<'s>,
 }
 
@@ -108,7 +108,7 @@ impl<'s> Object<'s> {
         &self.volume
     }
 
-    /// What is known of it; `None` while the volume is free.
+    /// Returns the summary of the object; `None` while the volume is free.
     pub(crate) fn summary(&self) -> Option<&ObjectSummary> {
         self.summary.as_ref()
     }

@@ -15,11 +15,11 @@ use crate::{
 /// An object with its pose.
 #[derive(Clone, Copy, Debug)]
 pub struct PosedObject<'i, 's> {
-    /// What is known of it.
+    /// Summary of the object.
     pub summary: &'i ObjectSummary,
-    /// Its map, in its own frame.
+    /// Object with its volume, in its own frame.
     pub object: &'i Object<'s>,
-    /// Its frame to the world, now.
+    /// Current pose of the object in the world.
     pub t_world_object: Transform,
 }
 

@@ -13,7 +13,7 @@ use crate::{
     volume::{DepthImage, NoStore, Observation, Viewpoint},
 };
 
-/// What objects are fused from in a frame.
+/// Images and poses from which objects are fused in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectFrame<'a> {
     /// The cameras.
@@ -22,7 +22,7 @@ pub(crate) struct ObjectFrame<'a> {
     pub t_world_camera: &'a Transform,
     /// The left picture.
     pub picture: Picture<'a>,
-    /// Its disparity, 1/256 px, 0 none.
+    /// Disparity image, 1/256 px, 0 for none.
     pub disparity_q8: View<'a, u16>,
 }
 
@@ -90,6 +90,7 @@ impl<'s> Objects<'s> {
         {
             return;
         }
+        // The box lies in the image, so its pixels fit the scratch.
         let pixels = instance.mask.pixels;
         let Some(disparity) = self.volumes.disparity_q8.get_mut(..pixels.area() as usize) else {
             debug_assert!(false, "a box lies in the image");
@@ -112,6 +113,7 @@ impl<'s> Objects<'s> {
             id: track.id,
             ..Crop::default()
         };
+        // An uncertain object is kept as crops until its poses are known, then fused at once.
         match track.motion_state.state() {
             MotionState::Uncertain => {
                 let dropped = self.crops.push(crop, disparity, &frame.picture);
@@ -137,6 +139,7 @@ impl<'s> Objects<'s> {
     ) {
         let &DetectedTrack { tracker, track, frame, .. } = detected;
         let number = tracker.frame();
+        // A track keeps its volume; a new one takes a free or a displaced volume.
         let known = self.volume_of(track, sink);
         let Some(at) = known.or_else(|| {
             self.volumes.allocate(&self.config, number, &mut self.report.retired, sink)
@@ -144,6 +147,7 @@ impl<'s> Objects<'s> {
             self.report.refused += 1;
             return;
         };
+        // Crops kept so far come first: the object begins with its past.
         if known.is_none() {
             self.begin(at, detected, executor);
         }
@@ -253,11 +257,13 @@ fn fuse_crop<E: Executor>(
     };
     let volume = object.volume.config();
     depth_from_disparity(rig, volume.near_m, volume.far_m, disparity, &mut depth);
+    // The crop's corner shifts the principal point.
     let rig = StereoRig {
         center_u_px: rig.center_u_px - f64::from(crop.pixels.left),
         center_v_px: rig.center_v_px - f64::from(crop.pixels.top),
         ..*rig
     };
+    // Fusion happens in the object's frame, in which the object stands still.
     let t_object_camera = (crop.t_world_object.inverse() * crop.t_world_camera).normalized();
     let view = Viewpoint { rig, width, height, t_world_camera: t_object_camera };
     let observation = Observation {

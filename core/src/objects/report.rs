@@ -6,7 +6,7 @@ use crate::{
     tracking::{DetectionCount, TrackCount, TrackReport, Tracker, TrackingReport},
 };
 
-/// How volumes were used in a frame.
+/// Counts of volumes in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -41,13 +41,13 @@ pub struct ObjectsReport {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct InstancesReport {
-    /// How detections were used.
+    /// Counts of detections.
     pub detections: DetectionCount,
-    /// What was found by its motion.
+    /// Counts of objects that were found by their motion.
     pub segmentation: SegmentationReport,
-    /// How they were associated with tracks.
+    /// Counts of associations with tracks.
     pub tracks: TrackCount,
-    /// How volumes were used.
+    /// Counts of volumes.
     pub objects: ObjectsReport,
     /// Matches excluded from the camera's own motion.
     pub matches_excluded: u32,
@@ -77,8 +77,8 @@ impl InstancesReport {
         }
     }
 
-    /// What should have been used and was not: detections, tracks, masks, objects, their blocks and
-    /// crops.
+    /// Returns the number of items that should have been used and were refused: detections, tracks,
+    /// masks, objects, their blocks and crops.
     pub(crate) fn refused(&self) -> u32 {
         let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
         let segmentation = self.segmentation.refused;

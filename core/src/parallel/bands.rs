@@ -27,7 +27,7 @@ impl Bands {
         self.lens(stride).map(|len| rest.split_off(..len.min(rest.len())).unwrap_or_default())
     }
 
-    /// As [`Bands::split`], to be written.
+    /// Splits like [`Bands::split`], for writing.
     pub(crate) fn split_mut<T>(self, values: &mut [T], stride: usize) -> [&mut [T]; BANDS] {
         let mut rest = values;
         self.lens(stride).map(|len| rest.split_off_mut(..len.min(rest.len())).unwrap_or_default())

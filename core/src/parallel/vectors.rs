@@ -46,13 +46,13 @@ pub(crate) enum Level {
 impl Vectors {
     /// Ordinary code alone.
     pub const PLAIN: Self = Self(Level::Plain);
-    /// What every machine of the target has.
+    /// Vectors that every machine of the target has.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     pub const BASELINE: Self = Self(Level::Sse2);
-    /// What every machine of the target has.
+    /// Vectors that every machine of the target has.
     #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
     pub const BASELINE: Self = Self(Level::Neon);
-    /// What every machine of the target has.
+    /// Vectors that every machine of the target has.
     #[cfg(not(any(
         all(target_arch = "x86_64", target_feature = "sse2"),
         all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
@@ -81,7 +81,8 @@ impl Vectors {
         all(target_arch = "x86_64", target_feature = "sse2"),
         expect(
             unsafe_code,
-            reason = "calls code compiled for what the processor has; docs/decisions/0023-vector-kernels.md"
+            reason = "calls code compiled for what the processor has; \
+                      docs/decisions/0023-vector-kernels.md"
         )
     )]
     pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
@@ -120,7 +121,7 @@ impl Vectors {
 mod x86 {
     use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
-    /// Whether processor and operating system have AVX2.
+    /// Returns true if processor and operating system have AVX2.
     pub fn has_avx2() -> bool {
         const OSXSAVE: u32 = 1 << 27;
         const AVX2: u32 = 1 << 5;

@@ -45,7 +45,7 @@ pub struct MovingBox {
 }
 
 impl MovingBox {
-    /// Where it is expected `ahead_s` seconds later, and how surely.
+    /// Predicts the box `ahead_s` seconds later, with its uncertainty.
     ///
     /// ```
     /// use dynvox_core::planning::MovingBox;
@@ -94,6 +94,7 @@ impl MovingBox {
             (of(cells.origin) as f32 + at as f32 + 0.5) * cell_m
                 - self.center_m.get(axis).copied().unwrap_or_default()
         };
+        // Each cell's centre is tested in the box's axes.
         let [columns, rows, levels] = spans;
         for y in rows[0]..rows[1] {
             for x in columns[0]..columns[1] {

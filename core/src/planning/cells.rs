@@ -37,7 +37,7 @@ pub(super) fn seen_surface(bits: u8) -> u8 {
     bits & (OCCUPIED | OBJECT | FREE)
 }
 
-/// Whether the map has a surface in the cell that is not believed any more.
+/// Returns true if the map has a surface in the cell that is not believed any more.
 pub(super) fn is_ghost(bits: u8) -> bool {
     bits & OCCUPIED != 0 && bits >> THROUGH_SHIFT >= GHOST_FRAMES
 }
@@ -53,7 +53,7 @@ const fn shortened(side: usize) -> usize {
     if side < MAX_SIDE_CELLS { side } else { MAX_SIDE_CELLS }
 }
 
-/// What a cell of the window is.
+/// State of a cell of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CellState {
@@ -87,7 +87,7 @@ pub(super) struct Cells<'s> {
     pub origin: Cell,
     /// Frames taken, less what stamps were lowered by.
     clock: u16,
-    /// When the cell was last looked at: the clock then, 0 never.
+    /// Clock value at which the cell was last observed; 0 never.
     pub observed_at: &'s mut [u16],
     pub bits: &'s mut [u8],
     /// Upward surface points of the map in the cell, and the sum of their heights above its floor,
@@ -164,14 +164,14 @@ impl<'s> Cells<'s> {
         u32::from(self.clock.saturating_sub(stamp))
     }
 
-    /// Where the cells at (x, y) begin; x and y count from the window's first cell.
+    /// Returns the offset of the cells at (x, y); x and y count from the window's first cell.
     #[inline]
     pub fn column(&self, x: usize, y: usize) -> usize {
         let [width, length, height] = self.size;
         (ring(self.origin[1], y, length) * width + ring(self.origin[0], x, width)) * height
     }
 
-    /// Where level z lies in a column.
+    /// Returns the offset of level z in a column.
     #[inline]
     pub fn level(&self, z: usize) -> usize {
         ring(self.origin[2], z, self.size[2])
@@ -245,7 +245,7 @@ fn ring(origin: i32, at: usize, size: usize) -> usize {
     if sum >= size { sum - size } else { sum }
 }
 
-/// Whether a cell was outside a window that moved by `shift`.
+/// Returns true if a cell was outside a window that moved by `shift`.
 fn is_new(shift: i64, at: usize, size: usize) -> bool {
     let before = at as i64 + shift;
     before < 0 || before >= size as i64

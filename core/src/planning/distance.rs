@@ -34,11 +34,11 @@ pub const NO_OBSTACLE: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 struct Site {
-    /// Where it lies on the line.
+    /// Position on the line.
     at: u32,
     /// Squared distance from it to the nearest cell, across the line.
     squared: u32,
-    /// That cell.
+    /// Cell of the obstacle.
     nearest: u32,
     reserved: u32,
 }
@@ -50,8 +50,8 @@ impl Site {
         along * along + u64::from(self.squared)
     }
 
-    /// Whether this one, between two others on the line, is nowhere nearer than both: by the places
-    /// where their parabolas meet.
+    /// Returns true if this parabola, between two others on the line, is nowhere below both: the
+    /// positions where they intersect tell.
     fn is_hidden(&self, before: &Self, after: &Self) -> bool {
         let [a, b] = [self.at - before.at, after.at - self.at].map(i64::from);
         let [own, first, last] = [self.squared, before.squared, after.squared].map(i64::from);
@@ -178,6 +178,7 @@ impl<'s> DistanceField<'s> {
                 (*steps, *near) = if down < *steps { (down, near_down) } else { (*steps, *near) };
             }
         }
+        // From here on distances are squares: sums of squares are exact in integers.
         for steps in squared.iter_mut().filter(|steps| **steps != NO_OBSTACLE) {
             *steps *= *steps;
         }
@@ -216,6 +217,7 @@ impl<'s> DistanceField<'s> {
             } else {
                 self.nearest.get(position).copied().unwrap_or_default()
             };
+            // A parabola that is nowhere lowest is dropped before this one is added.
             let site = Site { at: at as u32, squared, nearest, reserved: 0 };
             while let Some([before, last]) = len
                 .checked_sub(2)

@@ -18,7 +18,8 @@ pub struct Limits {
     pub low_m: f32,
     /// The upper one.
     pub high_m: f32,
-    /// Whether they are counted from the ground below the camera and not from that of each column.
+    /// True if heights are counted from the ground below the camera rather than from that of each
+    /// column.
     pub level: bool,
 }
 
@@ -120,8 +121,8 @@ impl Planning<'_> {
         self.cells.origin
     }
 
-    /// What a cell is, and the frames since it was last looked at; `None` where it never was, or
-    /// lies outside.
+    /// Returns the state of a cell, and the frames since it was last observed; `None` if it never
+    /// was, or lies outside.
     pub fn cell(&self, cell: Cell) -> (CellState, Option<u32>) {
         let Some(position) = self.cells.local(cell).and_then(|local| self.cells.position(local))
         else {
@@ -187,8 +188,8 @@ impl Planning<'_> {
         }
     }
 
-    /// How fast the slice's distance grows to the right and ahead, m per m: by central differences,
-    /// by one-sided ones at the window's edge. `None` where there is no distance.
+    /// Returns the slice's distance gradient to the right and ahead, m per m: by central
+    /// differences, by one-sided ones at the window's edge. `None` if there is no distance.
     pub fn slice_gradient(&self, [x, y, z]: Cell) -> Option<[f32; 2]> {
         let along = |dx: i32, dy: i32| {
             self.difference(|n| self.slice_distance([x + n * dx, y + n * dy, z]))
@@ -196,7 +197,8 @@ impl Planning<'_> {
         Some([along(1, 0)?, along(0, 1)?])
     }
 
-    /// As [`Planning::slice_gradient`], of the field over all cells: to the right, ahead, upwards.
+    /// Returns the gradient like [`Planning::slice_gradient`], of the field over all cells: to the
+    /// right, ahead, upwards.
     pub fn cell_gradient(&self, [x, y, z]: Cell) -> Option<[f32; 3]> {
         let along = |dx: i32, dy: i32, dz: i32| {
             self.difference(|n| self.cell_distance([x + n * dx, y + n * dy, z + n * dz]))

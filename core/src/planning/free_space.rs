@@ -33,7 +33,7 @@ const DISPARITY_ONE: f32 = 256.0;
 /// in spite of such an error.
 pub(crate) const MARGIN_PX: f32 = 0.5;
 
-/// What a frame shows, as free space needs it.
+/// Depth of a frame, with the camera, as free space needs it.
 #[derive(Clone, Copy, Debug)]
 pub struct DepthView<'a> {
     /// The cameras, of the disparity image.
@@ -129,6 +129,7 @@ impl<'a> Rays<'a> {
         let height = cells.size[2];
         let top =
             |axis: usize, at: f32| at + up.get(axis).copied().unwrap_or_default() * height as f32;
+        // A column that the camera cannot see at all is passed over.
         let depths = [at[2], top(2, at[2])];
         if depths.iter().all(|z| *z < self.near_m)
             || depths.iter().all(|z| *z > self.far_m)
@@ -144,6 +145,7 @@ impl<'a> Rays<'a> {
                 continue;
             }
             let position = column + cells.level(z);
+            // A cell seen through counts towards free; one with a surface in it keeps it.
             if let (Some(observed_at), Some(bits)) =
                 (cells.observed_at.get_mut(position), cells.bits.get_mut(position))
             {
@@ -157,7 +159,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Whether a whole column lies left or right of what the camera sees.
+    /// Returns true if a whole column lies left or right of the camera's view.
     fn is_beside(&self, at: [f32; 3], up: [f32; 3], height: usize) -> bool {
         let (width, height) = (self.disparity_q8.width() as f32, height as f32);
         // Points of the left edge have x f + z c = 0, those of the right edge x f + z (c - width) =
@@ -168,7 +170,7 @@ impl<'a> Rays<'a> {
             || (side(width, at[0], at[2]) > 0.0 && side(width, x, z) > 0.0)
     }
 
-    /// How a cell whose centre has these camera coordinates is seen.
+    /// Returns the visibility of a cell whose centre has these camera coordinates.
     #[inline]
     fn seen(&self, [x, y, z]: [f32; 3]) -> Visibility {
         // False for NaN as well.
@@ -206,7 +208,7 @@ fn span(middle_px: f32, half_px: f32, size: usize) -> Option<[usize; 2]> {
     Some([low.min(middle), high.max(middle).min(size - 1)])
 }
 
-/// How a frame sees a cell.
+/// Visibility of a cell in a frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Visibility {
     /// Outside the image, hidden, or without a disparity.

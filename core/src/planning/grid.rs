@@ -19,7 +19,7 @@ pub type Cell = [i32; 3];
 pub struct Grid {
     /// Rows: the grid's axes in the world, times 2^14.
     pub(super) turn_q14: [[i32; 3]; 3],
-    /// The same as floats.
+    /// Rotation as floats.
     turn: [[f64; 3]; 3],
     /// Voxels along a cell's side.
     pub(super) cell_voxels: i32,

@@ -150,6 +150,7 @@ impl<'s> HeightMap<'s> {
         ]
         .into_iter()
         .max();
+        // Ring by ring from the camera: each column's reference lies in the ring before.
         for ring in 0..=rings.unwrap_or(0) {
             let rows = center[1].saturating_sub(ring)..length.min(center[1] + ring + 1);
             for y in rows {
@@ -167,6 +168,7 @@ impl<'s> HeightMap<'s> {
                 }
             }
         }
+        // Slope and steps need the neighbours' heights, so they come second.
         for y in 0..length {
             for x in 0..width {
                 let described = self.describe([x, y], growth);
@@ -185,6 +187,7 @@ impl<'s> HeightMap<'s> {
         let allowed_m = config.ground_step_m
             + config.slope_max * cell_m
             + min_f32(DRIFT * gap_m, config.ground_step_m);
+        // The surface nearest to the expected height is the ground.
         let mut best: Option<(f32, f32)> = None;
         for height_m in surfaces(at, cell_m, cells) {
             let off_m = (height_m - reference_m).abs();
@@ -217,6 +220,7 @@ impl<'s> HeightMap<'s> {
             self.level.height_m
                 + (self.level.slope[0] * dx as f32 + self.level.slope[1] * dy as f32) * cell_m
         };
+        // Below the camera the ground plane is the reference.
         if ring == 0 {
             return (self.level.height_m, 0);
         }
@@ -225,6 +229,7 @@ impl<'s> HeightMap<'s> {
             |d: i32| (2 * d * (ring - 1) + d.signum() * ring).checked_div(2 * ring).unwrap_or(0);
         let side = if dx.abs() > dy.abs() { [0, 1] } else { [1, 0] };
         let mut best: Option<(Column, [i32; 2])> = None;
+        // Of equal gaps the straightest column counts.
         for beside in [0, -1, 1] {
             let inner = [towards(dx) + beside * side[0], towards(dy) + beside * side[1]];
             let ring_of =

@@ -90,7 +90,7 @@ pub struct Planning<'s> {
     height_map: HeightMap<'s>,
     /// The state of each column, x fastest.
     slice: &'s mut [u8],
-    /// Whether each column, and each cell, counts as an obstacle: 0 or 1.
+    /// Obstacle flags of each column, and of each cell: 0 or 1.
     slice_obstacle: &'s mut [u8],
     cell_obstacle: &'s mut [u8],
     slice_distance: DistanceField<'s>,
@@ -175,8 +175,8 @@ impl<'s> Planning<'s> {
         self.cells.observed_at.is_empty()
     }
 
-    /// Whether the planner needs the ground plane of each frame it observes: there is a window, and
-    /// no height of the camera is configured.
+    /// Returns true if the planner needs the ground plane of each frame it observes: there is a
+    /// window, and no height of the camera is configured.
     pub fn seeks_ground(&self) -> bool {
         !self.is_empty() && f64::from(self.config.camera_height_m) <= 0.0
     }
@@ -210,6 +210,7 @@ impl<'s> Planning<'s> {
         let in_grid = |point: [f64; 3]| {
             self.grid.of_world(sight.t_world_camera.transform_point(point)).map(|c| c * cell_m)
         };
+        // Without a plane in view, the level stays; a given camera height replaces it.
         let Some(plane) = shown else {
             if height_m > 0.0 {
                 let camera = in_grid([0.0; 3]);

@@ -79,6 +79,7 @@ pub(super) fn ray(
     if !is_usable {
         return FreePath { end: PathEnd::Unknown, free_m: 0.0 };
     }
+    // The map decides where it was observed, the window elsewhere.
     let mut sampler = volume.sampler();
     // Signed distance at the step before, if it was before a surface.
     let mut before: Option<f64> = None;
@@ -103,6 +104,7 @@ pub(super) fn ray(
             None => state_at(grid, cells, point),
         };
         before = None;
+        // Unknown is never free.
         if end == CellState::Unknown {
             return FreePath { end: PathEnd::Unknown, free_m: at_m };
         }
@@ -173,6 +175,7 @@ pub(super) fn sweep(
             }
         });
     }
+    // Cells never observed end the path as an obstacle would, when the caller asks for that.
     if robot.unknown_ends {
         let mut start_m = 0.0;
         for leg in legs() {

@@ -39,6 +39,7 @@ pub(super) fn reduce(
                 free |= state == CellState::Free;
                 occupied |= state == CellState::Occupied;
             }
+            // A column is blocked by what stands in it, or by its own slope or step.
             let is_steep = column.slope().is_some_and(|slope| slope > config.slope_max);
             let state = if occupied || is_steep || column.step_m > config.climb_m {
                 CellState::Occupied

@@ -31,13 +31,13 @@ const SIDE_ONE: i32 = 256;
 /// An edge of the lattice that the surface crosses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Crossing {
-    /// Its lower lattice point.
+    /// Lower lattice point.
     pub point: [i32; 3],
     /// The axis it runs along.
     pub axis: usize,
-    /// Where the surface crosses, in 1/256 of the step, 0 to 256.
+    /// Position of the surface's crossing, in 1/256 of the step, 0 to 256.
     pub at_q8: i32,
-    /// Whether the lower point lies inside, so that the surface is left towards the upper one.
+    /// True if the lower point lies inside, so that the surface is left towards the upper one.
     pub leaves_upwards: bool,
 }
 
@@ -67,6 +67,7 @@ pub(crate) fn crossings(
     if before.iter().all(|word| *word == 0) && behind.iter().all(|word| *word == 0) {
         return;
     }
+    // Signs as bits: 64 edges are compared at once, and most words have none.
     let origin = coord.origin();
     for axis in 0..3 {
         let mut offset = [0; 3];
@@ -90,6 +91,7 @@ pub(crate) fn crossings(
             let upper_before = after(&before, &next_before, z);
             let upper_behind = after(&behind, &next_behind, z);
             let mut crossed = (own_before & upper_behind) | (own_behind & upper_before);
+            // Each set bit is an edge that the surface crosses.
             while crossed != 0 {
                 let bit = crossed.trailing_zeros() as usize;
                 crossed &= crossed - 1;
@@ -116,7 +118,7 @@ pub(crate) fn crossings(
     }
 }
 
-/// How a surface point lies in the window, in grid units of 1/2^14 voxel from its first cell.
+/// Mapping of surface points into the window, in grid units of 1/2^14 voxel from its first cell.
 struct Window<'g> {
     grid: &'g Grid,
     origin: [i64; 3],
@@ -141,7 +143,7 @@ impl Window<'_> {
         to
     }
 
-    /// Whether a block may reach into the window.
+    /// Returns true if a block may reach into the window.
     fn meets(&self, coord: BlockCoord, size: [usize; 3]) -> bool {
         let center =
             coord.origin().map(|c| (i64::from(c) + BLOCK_SIDE as i64 / 2) * i64::from(STEP_ONE));
@@ -208,6 +210,7 @@ fn mark(window: &Window<'_>, crossing: &Crossing, cells: &mut Cells<'_>) -> bool
     if let Some(bits) = cells.bits.get_mut(position) {
         *bits |= OCCUPIED;
     }
+    // Upward faces are ground candidates: their heights are averaged by cell.
     if crossing.axis == window.up_axis && crossing.leaves_upwards == window.up_is_positive {
         let above = (at[2] - local[2] as i64 * window.cell) as i32;
         let share =

@@ -51,7 +51,7 @@ pub struct Alignment {
     pub baseline_m: f64,
 }
 
-/// Why a raw rig cannot be rectified.
+/// Reason why a raw rig cannot be rectified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -13,15 +13,16 @@ use crate::{
 /// The entry of a pixel that no raw pixel covers.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// How far outside the centres of a raw image's outermost pixels a place still counts as theirs,
-/// px: what a rectified image's sides, found from points along the raw ones, may be off by.
+/// Distance outside the centres of a raw image's outermost pixels at which a position still counts
+/// as covered, px: a rectified image's sides, found from points along the raw ones, may be off by
+/// this.
 const RIM_PX: f64 = 1.0 / 16.0;
 
 /// Pixels around an invalid one that are not to be used either: descriptors of features reach 5 px
 /// and their gradients 1 px further.
 pub const INVALID_MARGIN_PX: usize = 6;
 
-/// How an entry is made up.
+/// Layout of an entry's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Packing {
     /// Bits behind the point of the column.
@@ -139,9 +140,9 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     }
 }
 
-/// What a remap mixes.
+/// Value that a remap interpolates.
 pub(super) trait Sample: Copy + Send + Sync {
-    /// What a pixel without cover holds.
+    /// Value of a pixel without cover.
     const NONE: Self;
 
     /// The value between two pixels and the two below them, so far to the right and down.

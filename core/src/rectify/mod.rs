@@ -58,7 +58,7 @@ pub use monotonic::MAX_STEPS as MAX_RADIAL_STEPS;
 pub use rectification::{MAX_RAW_SIDE, Rectification, Sizing, TurnedCamera};
 pub use rectifier::{Pair, RectifiedImages, Rectifier, RectifierError};
 
-/// What rectification did to a pair.
+/// Report of a pair's rectification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

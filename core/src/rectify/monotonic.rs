@@ -27,10 +27,10 @@ pub(super) fn growing_until(
     last
 }
 
-/// Where a function that grows from 0 to `end` takes the value `sought`: Newton's step where it
-/// stays within the bracket and is at most half as long as the step before, else half the bracket.
-/// `with_slope` gives value and derivative. `None` when `sought` is not between 0 and the value at
-/// `end`, or after [`MAX_STEPS`].
+/// Inverts a function that grows from 0 to `end`: Newton's step where it stays within the bracket
+/// and is at most half as long as the step before, else half the bracket. `with_slope` gives value
+/// and derivative. `None` when `sought` is not between 0 and the value at `end`, or after
+/// [`MAX_STEPS`].
 pub(super) fn inverse(sought: f64, end: f64, with_slope: impl Fn(f64) -> [f64; 2]) -> Option<f64> {
     let within = sought >= 0.0 && sought <= with_slope(end)[0];
     if !within {

@@ -12,7 +12,7 @@ const WIDEST_TANGENT: f64 = 1.732_050_807_568_877_2;
 /// Points along each side of a raw image by which the common view is found.
 const SIDE_POINTS: u32 = 256;
 
-/// How large the rectified images are to be.
+/// Size of the rectified images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sizing {
     /// All that both cameras see of one rectangle, up to 120 degrees, at the scale of the raw
@@ -43,8 +43,8 @@ pub struct TurnedCamera {
     pub r_rectified_raw: Matrix3<f64>,
 }
 
-/// How raw pairs become rectified ones. Focal length and principal point of both rectified images
-/// are those of the mapper's rig.
+/// Rectification of raw pairs. Focal length and principal point of both rectified images are those
+/// of the mapper's rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectification {
     /// The left camera.

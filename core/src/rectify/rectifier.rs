@@ -45,13 +45,15 @@ impl fmt::Display for RectifierError {
             Self::RawTooLarge { width, height } => {
                 write!(
                     f,
-                    "the raw images are larger than the capacity allows: at most {width} x {height} px"
+                    "the raw images are larger than the capacity allows: at most {width} x \
+                     {height} px"
                 )
             }
             Self::RectifiedTooLarge { width, height } => {
                 write!(
                     f,
-                    "the rectified images are larger than the capacity allows: at most {width} x {height} px"
+                    "the rectified images are larger than the capacity allows: at most {width} x \
+                     {height} px"
                 )
             }
         }

@@ -141,7 +141,7 @@ fn pattern([x, y]: [f64; 2]) -> f64 {
     128.0 + 60.0 * (x * 9.0).sin() + 50.0 * (y * 7.0 + x * 3.0).cos()
 }
 
-/// What a raw camera sees of the plane: `r`, `t` map left raw coordinates to its own.
+/// Renders the plane as a raw camera sees it: `r`, `t` map left raw coordinates to its own.
 fn see_raw(camera: &RawCamera, r: &Matrix3<f64>, t: &Vector3<f64>) -> Vec<u8> {
     let origin = -(r.transpose() * t);
     let pixels = (0..camera.width * camera.height).map(|at| {

@@ -46,24 +46,24 @@ pub(crate) const NO_FEATURE: u32 = i32::MAX as u32;
 
 /// Eight features, and which of them count.
 pub(crate) struct Inside<'a> {
-    /// Their columns and rows.
+    /// Columns and rows of the eight candidates.
     pub at: &'a Eight<[u16; 2]>,
     /// The first column and row of those that count.
     pub low: [u16; 2],
-    /// How far the last ones are from there.
+    /// Distance of the last candidates from there.
     pub span: [u16; 2],
-    /// Of the first of the eight; the others' follow.
+    /// Offset of the first of the eight; the others follow.
     pub offset: u32,
-    /// Those from here on do not count.
+    /// Candidates from here on do not count.
     pub end: u32,
 }
 
-/// What there is a kernel for.
+/// Operations that have a vector kernel.
 pub(crate) trait Kernels {
     /// Sums of absolute differences of eight pairs, each at most 4,080.
     fn sums(&self, a: &Eight<Descriptor>, b: &Eight<Descriptor>) -> Eight<u32>;
 
-    /// The same with descriptors from anywhere.
+    /// Sums absolute differences with descriptors from anywhere.
     fn sums_of(&self, a: &Eight<Descriptor>, b: Eight<&Descriptor>) -> Eight<u32>;
 
     /// Sums of eight descriptors with two each, which lie side by side anywhere: those with the
@@ -89,7 +89,7 @@ pub(crate) trait Kernels {
     /// undoes.
     fn least(&self, best: Eight<u32>, pairs: [&Eight<Descriptor>; 2], base: u32) -> Eight<u32>;
 
-    /// What [`Kernels::least`] made, in the order of the pairs.
+    /// Returns the results of [`Kernels::least`] in the order of the pairs.
     fn ordered(&self, keys: Eight<u32>) -> Eight<u32>;
 
     /// Sums of absolute differences of four descriptors with those of columns, eight at a time,

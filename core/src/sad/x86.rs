@@ -219,7 +219,7 @@ fn quotients_sse2(dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
     cast([quotient(a, c), quotient(b, d)])
 }
 
-/// The same.
+/// Divides with AVX2.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn quotients_avx2(dividends: Eight<i32>, divisors: Eight<i32>) -> Eight<i32> {
@@ -258,7 +258,7 @@ fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>)
     cast([lesser(key(low, at_low, offset), best_low), lesser(key(high, at_high, next), best_high)])
 }
 
-/// The same.
+/// Takes the least keys with AVX2.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn inside_avx2(best: Eight<u32>, sums: __m256i, inside: &Inside<'_>) -> Eight<u32> {

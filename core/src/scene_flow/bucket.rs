@@ -23,6 +23,7 @@ pub(super) fn select(
     cells: &mut Cells<'_>,
     selection: &mut [u32],
 ) -> usize {
+    // Equal cells keep egomotion from following the most textured corner.
     let (start, order) = cells.sort(matches, shape);
     let mut slots = selection.iter_mut();
     let mut selected = 0;

@@ -40,7 +40,7 @@ pub(super) struct Frame<'s> {
 #[derive(Debug)]
 pub(super) struct Camera<'s> {
     frames: [Frame<'s>; 2],
-    /// Which of the two is the current one.
+    /// Index of the current one of the two.
     current: bool,
     gradient: &'s mut [u16],
     blob: &'s mut [i16],
@@ -151,7 +151,7 @@ impl<'s> Camera<'s> {
         self.current = !self.current;
     }
 
-    /// Whether the current image is the previous one, bit for bit.
+    /// Returns true if the current image equals the previous one, bit for bit.
     pub(super) fn is_repeated(&self, [width, height]: [usize; 2]) -> bool {
         let ((previous, current), pixels) = (self.frames(), width * height);
         previous.pixels.get(..pixels) == current.pixels.get(..pixels)
@@ -215,17 +215,20 @@ impl Work for FindFeatures<'_, '_> {
         let Some(image) = View::new(frame.pixels, width, height) else {
             return FeatureCount::default();
         };
+        // Invalid pixels respond with nothing, so that no feature is found on a border.
         filter(image, Responses { gradient, blob, corner }, camera.sums);
         if let Some(invalid) = invalid {
             silence(invalid, width, blob);
             silence(invalid, width, corner);
         }
+        // The strongest of each part of the image are kept, bounded by the capacity.
         let wanted = config.features_max as usize;
         let mut strongest =
             Strongest::new(camera.candidates, camera.lists, [width, height], wanted);
         let response_min = config.response_min.min(i16::MAX as u16) as i16;
         let (blob, corner) = (Field { response: blob, width }, Field { response: corner, width });
         suppress(blob, corner, response_min, camera.sums, |candidate| strongest.add(candidate));
+        // Sparse features are the dense ones that are also peaks of a wide neighbourhood.
         let (mut dropped, kept) = strongest.finish();
         let candidates = kept.iter().map(|held| held.candidate);
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);

@@ -30,7 +30,7 @@ impl Shape {
         Self { cell_px, columns: width.div_ceil(cell_px), rows: height.div_ceil(cell_px) }
     }
 
-    /// How many cells there are.
+    /// Returns the number of cells.
     pub(super) const fn cells(self) -> usize {
         self.columns * self.rows
     }
@@ -73,17 +73,20 @@ impl<'s> Cells<'s> {
             let [column, row] = shape.cell(m);
             row * shape.columns + column
         };
+        // A counting sort: its time depends on no order of the matches.
         start.fill(0);
         for m in matches {
             if let Some(count) = start.get_mut(key(m) + 1) {
                 *count += 1;
             }
         }
+        // Counts become the first index of each cell.
         let mut sum = 0;
         for entry in start.iter_mut() {
             sum += *entry;
             *entry = sum;
         }
+        // Each cell's cursor ends where the next cell begins.
         for (index, m) in (0..).zip(matches) {
             if let Some(cursor) = start.get_mut(key(m)) {
                 if let Some(slot) = order.get_mut(*cursor as usize) {
@@ -92,6 +95,7 @@ impl<'s> Cells<'s> {
                 *cursor += 1;
             }
         }
+        // Undo the cursors' advance: each cell's end becomes the next one's start.
         start.copy_within(..cells, 1);
         if let Some(first) = start.first_mut() {
             *first = 0;

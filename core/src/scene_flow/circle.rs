@@ -16,8 +16,8 @@ use bytemuck::{Pod, Zeroable};
 /// One side of the circle has no partner.
 const NONE: [u32; 3] = [u32::MAX; 3];
 
-/// Where a circle's four sides may lead, relative to where each begins: smallest and largest step
-/// in u, then in v, px.
+/// Range of a circle's four sides, relative to where each begins: smallest and largest step in u,
+/// then in v, px.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Reach {
@@ -28,7 +28,7 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// As far as the configuration allows.
+    /// Returns the widest reach that the configuration allows.
     pub(super) fn widest(config: &SceneFlowConfig) -> Self {
         let (far, rows) = (config.search_radius_px as i16, i16::from(config.stereo_tolerance_px));
         Self {

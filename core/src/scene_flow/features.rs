@@ -20,8 +20,8 @@ pub(super) const CELL_V: usize = 8;
 /// Bytes of a descriptor: 16 positions, two Sobel responses each.
 const DESCRIPTOR: usize = 32;
 
-/// Where a descriptor samples the gradients, relative to the feature: 16 positions within 11 x 11
-/// px, finer towards the middle.
+/// Positions at which a descriptor samples the gradients, relative to the feature: 16 within 11 x
+/// 11 px, finer towards the middle.
 const SAMPLES: [(isize, isize); DESCRIPTOR / 2] = [
     (-2, -5),
     (2, -5),
@@ -95,6 +95,7 @@ impl<'s> Features<'s> {
         width: usize,
         height: usize,
     ) -> usize {
+        // Keys are class, band and cell: a search reads whole runs of one band.
         self.bands = height.div_ceil(CELL_V);
         self.cells = width.div_ceil(CELL_U);
         let accepted = candidates.clone().take(self.at.len());
@@ -138,6 +139,7 @@ impl<'s> Features<'s> {
                 );
             }
         }
+        // Undo the cursors' advance.
         start.copy_within(..keys, 1);
         if let Some(first) = start.first_mut() {
             *first = 0;
@@ -178,6 +180,7 @@ impl<'s> Features<'s> {
         {
             return None;
         }
+        // Clip the window to the image's cells.
         let [u_min, u_max, v_min, v_max] =
             [window.u_min, window.u_max, window.v_min, window.v_max].map(|x| x.max(0) as usize);
         let (first_band, last_band) = (v_min / CELL_V, (v_max / CELL_V).min(self.bands - 1));
@@ -185,6 +188,7 @@ impl<'s> Features<'s> {
         if first_cell > last_cell {
             return None;
         }
+        // Positions are compared in 16 bits: one subtraction tests both ends of the window.
         let low = [u_min, v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
         let span = [u_max - u_min, v_max - v_min].map(|x| x.min(usize::from(u16::MAX)) as u16);
         let mut best = Best::default();
@@ -240,7 +244,7 @@ impl<'s> Features<'s> {
 #[derive(Default)]
 struct Best {
     index: Option<usize>,
-    /// Its key without the offset; what else there is counts if it is less.
+    /// Key without the offset; a candidate counts if its own is less.
     difference: u32,
 }
 

@@ -16,7 +16,8 @@ pub(super) const FILTER_MARGIN: usize = 2;
 /// Rows of column sums that [`filter`] works on.
 pub(super) const COLUMN_SUMS: usize = 5;
 
-/// Where one image's filter results go; each as long as the image has pixels, rows `width` apart.
+/// Buffers for one image's filter results; each as long as the image has pixels, rows `width`
+/// apart.
 pub(super) struct Responses<'a> {
     /// Sobel u in the low byte, Sobel v in the high byte.
     pub gradient: &'a mut [u16],
@@ -86,7 +87,8 @@ fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
 #[inline(always)]
 #[expect(
     clippy::indexing_slicing,
-    reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length first"
+    reason = "the outputs are 4 shorter than a row of sums; all slices are cut to their length \
+              first"
 )]
 fn sum_rows(
     sums: &[i16],

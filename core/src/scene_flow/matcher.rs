@@ -305,6 +305,7 @@ impl<'s> FlowMatcher<'s> {
             self.last = None;
             return FlowReport { status: FlowStatus::Refused, ..FlowReport::default() };
         }
+        // The two cameras' features are found at the same time.
         let [invalid_left, invalid_right] =
             [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
         let vectors = executor.vectors();
@@ -313,21 +314,25 @@ impl<'s> FlowMatcher<'s> {
             || self.right.take(right, invalid_right, config, vectors),
         );
         let mut report = FlowReport { left, right, ..FlowReport::default() };
+        // A first frame has nothing to be matched with.
         if self.last.replace(size) != Some(size) {
             return FlowReport { status: FlowStatus::First, ..report };
         }
+        // An image that repeats the last one means a frozen camera, or one that stands.
         match [self.left.is_repeated(size), self.right.is_repeated(size)] {
             [false, false] => {}
             [true, true] => report.status = FlowStatus::Repeated,
             _ => return FlowReport { status: FlowStatus::Frozen, ..report },
         }
         self.matched = true;
+        // Few wide searches teach where many narrow ones have to look.
         report.sparse = self.sparse_pass(config, size, executor);
         let closed;
         (report.dense, closed) = self.dense_pass(config, size, executor);
         self.refine_supported(config, size, closed, executor);
         report.refined = self.refined_len as u32;
         report.unrefined = closed as u32 - report.dense.unsupported - report.refined;
+        // Egomotion gets the best of each cell.
         let shape = Shape::new(size[0], size[1], BUCKET_PX);
         let (refined, score) = (clipped(self.refined, ..self.refined_len), &*self.score);
         self.selection_len = select(

@@ -29,7 +29,7 @@ impl Match {
         self.current_left[0] - self.current_right[0]
     }
 
-    /// The same with the positions in both right images moved.
+    /// Moves the positions in both right images.
     pub(crate) fn with_right(&self, moved: impl Fn([f32; 2]) -> [f32; 2]) -> Self {
         Self {
             previous_right: moved(self.previous_right),
@@ -38,8 +38,8 @@ impl Match {
         }
     }
 
-    /// Where the right image has it in the current frame, and how far below that the left one has
-    /// it, px.
+    /// Returns the position in the current right image, and the distance, px, by which the left
+    /// image has the match lower.
     pub(crate) fn row_difference(&self) -> ([f64; 2], f64) {
         (self.current_right.map(f64::from), f64::from(self.current_left[1] - self.current_right[1]))
     }

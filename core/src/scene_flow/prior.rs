@@ -36,7 +36,7 @@ const fn bins(capacity: &Capacity) -> usize {
 pub(super) struct Prior<'s> {
     /// Extremes over matches.
     learned: &'s mut [Reach],
-    /// Where to look.
+    /// Reach of the search in each bin.
     reach: &'s mut [Reach],
     columns: usize,
     rows: usize,
@@ -56,7 +56,7 @@ impl<'s> Prior<'s> {
         }
     }
 
-    /// Where to look for the partners of a previous-left feature at (u, v).
+    /// Returns the reach of the search for partners of a previous-left feature at (u, v).
     pub(super) fn reach(&self, [u, v]: [u16; 2]) -> Option<Reach> {
         self.reach.get(usize::from(v) / BIN_PX * self.columns + usize::from(u) / BIN_PX).copied()
     }
@@ -71,6 +71,7 @@ impl<'s> Prior<'s> {
     ) {
         (self.columns, self.rows) = (width.div_ceil(BIN_PX), height.div_ceil(BIN_PX));
         self.learned.fill(NOTHING);
+        // A match teaches its own bin and the eight around it.
         for m in matches {
             // Previous left positions are inside the image, so the casts are exact.
             let (column, row) =
@@ -91,6 +92,7 @@ impl<'s> Prior<'s> {
                 }
             }
         }
+        // Each bin's reach is widened, and never beyond what the configuration allows.
         let widest = Reach::widest(config);
         for row in 0..self.rows {
             for column in 0..self.columns {
@@ -110,7 +112,8 @@ impl<'s> Prior<'s> {
         }
     }
 
-    /// What a bin learned itself, or else the nearest bins in the four directions.
+    /// Returns the reach that a bin learned itself, or else that of the nearest bins in the four
+    /// directions.
     fn near(&self, column: usize, row: usize) -> Reach {
         let taught = |column: usize, row: usize| {
             self.learned

@@ -19,8 +19,8 @@ const STEPS: usize = 8;
 const FARTHEST_PX: f64 = 1.75;
 /// A step below this is the last one, px.
 pub(super) const SMALL_STEP_PX: f64 = 0.06;
-/// The same where a motion was supposed: what is left of the way errs towards that motion in every
-/// patch alike, and would confirm it.
+/// Largest last step if a motion was supposed, px: the rest of the way errs towards that motion in
+/// every patch alike, and would confirm it.
 const GUESSED_STEP_PX: f64 = 0.01;
 /// Correlation with the template below which a patch that no descriptor vouches for is another.
 const ALIKE_MIN: f64 = 0.8;
@@ -49,11 +49,11 @@ pub(super) struct Template {
     down: [[i16; SIDE]; SIDE],
     /// Mean of pixel, along, down.
     mean: [f64; 3],
-    /// How much of the pixels' own pattern is in each gradient: gain must not look like movement.
+    /// Share of the pixels' own pattern in each gradient: gain must not look like movement.
     share: [f64; 2],
     /// Inverse of the structure matrix: uu, uv, vv.
     inverse: [f64; 3],
-    /// Its smaller eigenvalue.
+    /// Smaller eigenvalue of the gradients' matrix.
     texture: f64,
     /// Sum of squares of the pixels about their mean.
     pattern: f64,
@@ -73,6 +73,7 @@ impl Template {
     /// The patch centred on pixel (u, v); `None` too near the border or where nothing can be
     /// placed.
     pub(super) fn extract(image: Pixels<'_>, u: usize, v: usize) -> Option<Self> {
+        // Gradients need one more pixel around the patch.
         let (left, top) = (u.checked_sub(SIDE / 2 + 1)?, v.checked_sub(SIDE / 2 + 1)?);
         if left + SIDE + 2 > image.width {
             return None;
@@ -97,6 +98,7 @@ impl Template {
                 }
             }
         }
+        // Gain and offset between images are removed by regression on the patch's own pattern.
         let mean = [sum(&pixel), sum(&along), sum(&down)].map(|sum| f64::from(sum) / AREA);
         let spread =
             |a, b, mean_a: f64, mean_b: f64| f64::from(sum_products(a, b)) - AREA * mean_a * mean_b;
@@ -106,9 +108,11 @@ impl Template {
         }
         let with =
             [spread(&pixel, &along, mean[0], mean[1]), spread(&pixel, &down, mean[0], mean[2])];
+        // What is left of the gradients after that regression determines the shift.
         let uu = spread(&along, &along, mean[1], mean[1]) - with[0] * with[0] / pattern;
         let uv = spread(&along, &down, mean[1], mean[2]) - with[0] * with[1] / pattern;
         let vv = spread(&down, &down, mean[2], mean[2]) - with[1] * with[1] / pattern;
+        // The smaller eigenvalue is large only where both directions have texture.
         let determinant = uu * vv - uv * uv;
         let texture = 0.5 * (uu + vv - libm::sqrt((uu - vv) * (uu - vv) + 4.0 * uv * uv));
         if !(texture > TEXTURE_MIN && determinant > 0.0) {
@@ -127,7 +131,7 @@ impl Template {
         })
     }
 
-    /// Where the patch is in another image, begun at (u, v); the first step below `small_step_px`
+    /// Finds the patch in another image, beginning at (u, v); the first step below `small_step_px`
     /// is the last one.
     #[inline(always)]
     pub(super) fn find(
@@ -142,6 +146,7 @@ impl Template {
             // Sixteenths of a pixel of the patch's corner; begin is an integer inside the image and
             // `at` within 2 px of it.
             let corner = at.map(|x| libm::floor(16.0 * (x - HALF) + 0.5) as i32);
+            // One step of inverse composition: the template's gradients are reused.
             let error = self.error(image, corner)?;
             let step = self.step(&error);
             let next = [
@@ -150,6 +155,7 @@ impl Template {
             ];
             let step_squared =
                 (next[0] - at[0]) * (next[0] - at[0]) + (next[1] - at[1]) * (next[1] - at[1]);
+            // A patch that wanders off has found another one.
             let far = |i: usize| {
                 libm::fabs(
                     next.get(i).copied().unwrap_or(0.0) - begin.get(i).copied().unwrap_or(0.0),
@@ -183,8 +189,8 @@ impl Template {
         Some(found)
     }
 
-    /// Whether another image shows the patch at a position: whether its pattern there is that of
-    /// the template, independent of brightness and contrast.
+    /// Returns true if another image shows the patch at a position: its pattern there must be the
+    /// template's, independent of brightness and contrast.
     fn is_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> bool {
         let corner = at.map(|x| libm::floor(16.0 * (f64::from(x) - HALF) + 0.5) as i32);
         let Some(error) = self.error(image, corner) else { return false };
@@ -230,7 +236,7 @@ impl Template {
         Some(error)
     }
 
-    /// How far the template must move to explain the error, px.
+    /// Returns the step of the template that explains the error, px.
     #[inline(always)]
     fn step(&self, error: &[[i16; SIDE]; SIDE]) -> [f64; 2] {
         let total = f64::from(sum(error));
@@ -287,7 +293,7 @@ pub(super) struct RefineSupported<'a> {
     pub matches: &'a mut [Match],
     /// 1 where a match is supported; 0 afterwards where its patch is lost.
     pub supported: &'a mut [u8],
-    /// How well each can be placed.
+    /// Scores of the matches: how precisely each can be placed.
     pub score: &'a mut [f32],
 }
 

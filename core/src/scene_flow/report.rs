@@ -2,7 +2,7 @@
 
 use super::camera::FeatureCount;
 
-/// How a frame's scene flow went.
+/// Result of a frame's scene flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -42,7 +42,7 @@ pub struct PassCount {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct FlowReport {
-    /// How it went.
+    /// Result of the frame.
     pub status: FlowStatus,
     /// Features of the left image.
     pub left: FeatureCount,

@@ -35,7 +35,7 @@ const END: u32 = u32::MAX;
 #[repr(C)]
 pub(super) struct CandidateSlot {
     pub candidate: Candidate,
-    /// Where the one before it of its list is held.
+    /// Slot of the previous feature in the same list.
     before: u32,
 }
 
@@ -43,9 +43,9 @@ pub(super) struct CandidateSlot {
 pub(super) struct Strongest<'a> {
     slots: &'a mut [CandidateSlot],
     len: usize,
-    /// Where each list's last feature is held.
+    /// Slot of each list's last feature.
     last: &'a mut [u32],
-    /// How many a list may have.
+    /// Largest number of features in a list.
     quota: usize,
     columns: usize,
     shift: u32,
@@ -103,7 +103,7 @@ impl<'a> Strongest<'a> {
         }
     }
 
-    /// How many of those to be kept found no slot, and the others.
+    /// Returns the number of features that found no slot, and the features that were kept.
     pub(super) fn finish(self) -> (usize, &'a [CandidateSlot]) {
         let Self { slots, len, dropped, .. } = self;
         (dropped, slots.get(..len).unwrap_or_default())
@@ -118,7 +118,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [150, 70];
 
-    /// What is kept, in order of position, and how many found no slot.
+    /// Returns the features that are kept, in order of position, and the number that found no slot.
     fn keep(found: &[Candidate], slots: usize, wanted: usize) -> (Vec<Candidate>, usize) {
         let (mut slots, mut last) = (vec![CandidateSlot::default(); slots], [7; CLASSES * 5 * 3]);
         let mut strongest = Strongest::new(&mut slots, &mut last, SIZE, wanted);

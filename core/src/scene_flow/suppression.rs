@@ -67,6 +67,7 @@ pub(super) fn suppress(
     }
     let end = (blob.response.len() / width).saturating_sub(FEATURE_MARGIN);
     let inner = width - 2 * FEATURE_MARGIN;
+    // Two strips of maxima and minima, and a flag for each column, share the scratch.
     let Some((high, rest)) = scratch.split_at_mut_checked(BLOCK * width) else { return };
     let Some((low, flags)) = rest.split_at_mut_checked(BLOCK * width) else { return };
     let Some(flags) =
@@ -74,6 +75,7 @@ pub(super) fn suppress(
     else {
         return;
     };
+    // At most one maximum and one minimum of each block can be the strongest around it.
     for top in (FEATURE_MARGIN..end).step_by(BLOCK) {
         let rows = if end - top < BLOCK { end - top } else { BLOCK };
         for (class, field) in [(0, blob), (2, corner)] {
@@ -83,6 +85,7 @@ pub(super) fn suppress(
             for (left, &flagged) in
                 (FEATURE_MARGIN..).step_by(BLOCK).zip(flags.as_chunks::<BLOCK>().0)
             {
+                // Most blocks have no response above the threshold and are passed over.
                 let flagged = u32::from_le_bytes(flagged);
                 if flagged != 0 {
                     let maxima = Block::<1> { field, strongest: high, left, top, flagged }.peak();
@@ -202,13 +205,14 @@ impl<const SIGN: i16> Block<'_, SIGN> {
         self.peak_at(self.left + self.columns(row).trailing_zeros() as usize / 8, row)
     }
 
-    /// Which columns a row has flags in, a byte each.
+    /// Returns the columns in which a row has flags, a byte each.
     #[inline(always)]
     fn columns(&self, row: usize) -> u32 {
         self.flagged >> row & 0x0101_0101
     }
 
-    /// Whether no pixel within [`DENSE_RADIUS`] that is as strong comes earlier in scan order.
+    /// Returns true if no pixel within [`DENSE_RADIUS`] that is as strong comes earlier in scan
+    /// order.
     #[inline(always)]
     fn is_first(&self, u: usize, v: usize, response: i16) -> Option<bool> {
         // Eight columns of a row are one vector; those that are later, or too far, count as
@@ -272,7 +276,7 @@ impl Surroundings {
         Self { left, columns: end - left, width }
     }
 
-    /// Whether any of them is so in a row. `None` where there is no such row.
+    /// Returns true if any response of a row meets a condition. `None` if there is no such row.
     #[inline(always)]
     fn any(&self, rows: &[i16], row: usize, is_so: impl Fn(i16) -> bool) -> Option<bool> {
         let row = rows.get(row * self.width + self.left..)?.get(..self.columns)?;
@@ -281,7 +285,8 @@ impl Surroundings {
     }
 }
 
-/// Whether no response within [`SPARSE_RADIUS`] of (u, v) is stronger, nor as strong and earlier.
+/// Returns true if no response within [`SPARSE_RADIUS`] of (u, v) is stronger, nor as strong and
+/// earlier.
 #[inline(always)]
 fn is_peak<const SIGN: i16>(field: Field<'_>, u: usize, v: usize, strongest: i16) -> bool {
     let about = Surroundings::new(u, field.width);

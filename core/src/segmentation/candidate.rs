@@ -5,10 +5,10 @@ use crate::{geometry::scalar::max_f64, scene_flow::Match};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
-/// How far disparities of neighbours differ, px and as a share.
+/// Largest difference of neighbouring disparities, px and as a share.
 const DISPARITY_MIN_PX: f64 = 1.0;
 const DISPARITY_SHARE: f64 = 0.06;
-/// How far motions on one object may differ, m, and by metre of depth.
+/// Largest difference of motions on one object, m, and by metre of depth.
 const MOTION_M: f64 = 0.15;
 const MOTION_PER_DEPTH: f64 = 0.02;
 
@@ -42,27 +42,27 @@ impl Candidate {
         }
     }
 
-    /// Its pixel and disparity.
+    /// Returns pixel and disparity.
     pub fn position(&self) -> [f32; 3] {
         [self.u, self.v, self.disparity_px]
     }
 
-    /// Whether it is the first member of its group, at that position.
+    /// Returns true if the candidate is the first member of its group, at that position.
     pub fn is_first(&self, index: usize) -> bool {
         self.parent as usize == index
     }
 
-    /// Whether it belongs to the group whose first member is at `first`.
+    /// Returns true if the candidate belongs to the group whose first member is at `first`.
     pub fn is_of(&self, first: u32) -> bool {
         self.parent == first
     }
 
-    /// The same at another position.
+    /// Returns the candidate at another position.
     pub fn at(self, index: usize) -> Self {
         Self { parent: index as u32, ..self }
     }
 
-    /// Whether the other one lies next to it and moves alike.
+    /// Returns true if the other one lies next to it and moves alike.
     pub fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
         let depth_m = f64::from(self.point_m[2]);
         let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
@@ -81,7 +81,7 @@ impl Candidate {
     }
 }
 
-/// How far motions on one object may differ, along the image's axes, m.
+/// Returns the largest difference of motions on one object, along the image's axes, m.
 pub(super) fn motion_tolerance_m(depth_m: f64) -> f64 {
     MOTION_M + MOTION_PER_DEPTH * depth_m
 }

@@ -117,7 +117,7 @@ impl MotionSegmenter<'_> {
     }
 }
 
-/// Whether a match belongs to no instance.
+/// Returns true if a match belongs to no instance.
 fn is_free(match_owner: OwnerCode) -> bool {
     match_owner.get() == MatchOwner::None
 }

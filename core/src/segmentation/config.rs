@@ -2,8 +2,8 @@
 
 use crate::settings::{Problems, check};
 
-/// How moving objects are found by their motion. Off by default: it adds to detections, or stands
-/// in for them.
+/// Search for moving objects by their motion. Off by default: it adds to detections, or replaces
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -11,7 +11,7 @@ use crate::settings::{Problems, check};
     serde(default, deny_unknown_fields)
 )]
 pub struct SegmentationConfig {
-    /// Whether moving objects are searched for.
+    /// True if moving objects are searched for.
     pub enabled: bool,
     /// Farthest depth searched, m; above 0; 45.
     pub far_m: f32,

@@ -31,7 +31,7 @@ impl Extent {
         joined
     }
 
-    /// How far the other one is away, m; 0 where they overlap.
+    /// Returns the distance between two extents, m; 0 if they overlap.
     pub fn gap(&self, other: &Self) -> f64 {
         let mut squared = 0.0;
         for axis in 0..3 {

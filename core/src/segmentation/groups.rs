@@ -29,7 +29,7 @@ const MOTION_PER_SQUARED_DEPTH: f64 = 0.0008;
 /// Up to this depth groups are small as well, m: what passes the camera is blurred, cut by the
 /// image's border, and fast.
 const SPARSE_UP_TO_M: f64 = 10.0;
-/// Those are at least so wide or long, m: of bollards in a row one is taken for the next.
+/// Minimum width or length of such a group, m; in a row of bollards one is matched to the next.
 const WIDTH_MIN_M: f64 = 0.5;
 /// Largest extent of a group, m: width, height, length.
 const EXTENT_MAX_M: [f64; 3] = [8.0, 5.0, 12.0];
@@ -54,7 +54,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Whether it moves, and is not too large for an object.
+    /// Returns true if the group moves, and is not too large for an object.
     pub fn is_plausible(&self) -> bool {
         let Extent { low, high } = &self.extent;
         let is_small =
@@ -64,13 +64,13 @@ impl Group {
                 > f64::from(MOTION_MIN_M) + MOTION_PER_SQUARED_DEPTH * self.depth_m * self.depth_m
     }
 
-    /// Whether another group is on the same object: of one motion and close by.
+    /// Returns true if another group is on the same object: of one motion and close by.
     fn is_same(&self, other: &Self) -> bool {
         (other.motion_m - self.motion_m).norm() < MERGE_MOTION_M
             && other.extent.gap(&self.extent) < MERGE_DISTANCE_M
     }
 
-    /// Whether it has members enough as well.
+    /// Returns true if the group is plausible and has enough members.
     pub fn passes(&self) -> bool {
         let Extent { low: [left, _, near], high: [right, _, far] } = self.extent;
         let is_wide = max_f64(right - left, far - near) > WIDTH_MIN_M;

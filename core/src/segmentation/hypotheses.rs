@@ -13,10 +13,11 @@ use nalgebra::Vector3;
 
 /// Most groups followed over frames.
 pub(super) const MAX_HYPOTHESES: usize = 64;
-/// How far a group may lie from where the last one's motion predicts it, m, and by metre of depth.
+/// Largest distance of a group from the position that the last one's motion predicts, m, and by
+/// metre of depth.
 const DISTANCE_M: f64 = 1.5;
 const DISTANCE_PER_DEPTH: f64 = 0.06;
-/// How far the motions in two frames may differ, m, and by metre of depth.
+/// Largest difference of the motions in two frames, m, and by metre of depth.
 const MOTION_M: f64 = 0.25;
 const MOTION_PER_DEPTH: f64 = 0.02;
 /// Frames in which an object that was hidden is searched for where it must be, after those over

@@ -11,7 +11,7 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 
-/// Of the last three frames, in how many a group's motion must agree before it is an object.
+/// Number of the last three frames in which a group's motion must agree before it is an object.
 const CONFIRM_FRAMES: u8 = 2;
 /// Frames without a group over which an object's mask is predicted.
 pub(super) const PREDICT_FRAMES: u8 = 3;
@@ -34,13 +34,13 @@ pub(crate) struct Hypothesis {
     half_m: [f64; 3],
     /// Frames in which a group agreed: a bit a frame, the last one lowest.
     pub(super) history: u32,
-    /// Whether it is an object: 0 or 1.
+    /// 1 if the hypothesis is an object, else 0.
     confirmed: u32,
     /// Frames without a group.
     pub(super) missed: u32,
     /// Frames up to now in which its mask was not shown, as far as they count.
     pub(super) unmasked: u32,
-    /// Those over which what it left in the static map is to be erased, told in this frame.
+    /// Number of frames over which its trail in the static map is to be erased, set in this frame.
     pub(super) trail_frames: u32,
     /// Unused.
     padding: u32,
@@ -75,7 +75,7 @@ impl Hypothesis {
         visitor.u32s([history, confirmed, missed, unmasked, trail_frames]);
     }
 
-    /// Where it is in the camera's axes.
+    /// Returns the extent in the camera's axes.
     pub fn extent(&self, t_world_camera: &Transform) -> Extent {
         let center: [f64; 3] = t_world_camera.inverse().transform_point(self.center_m);
         let mut extent = Extent { low: center, high: center };
@@ -85,7 +85,7 @@ impl Hypothesis {
         extent
     }
 
-    /// Where it is supposed to be in the next frame's camera, and how it moves there.
+    /// Predicts extent and motion in the next frame's camera.
     pub fn predicted(&self, t_world_camera: &Transform) -> (Extent, Vector3<f64>) {
         let moved =
             Self { center_m: (self.center() + Vector3::from(self.motion_m)).into(), ..*self };
@@ -99,18 +99,18 @@ impl Hypothesis {
         self.confirmed > 0
     }
 
-    /// Whether its mask is in this frame.
+    /// Returns true if its mask is in this frame.
     pub fn is_shown(&self) -> bool {
         self.is_confirmed() && self.missed <= u32::from(PREDICT_FRAMES)
     }
 
-    /// Whether a group of this frame is its own.
+    /// Returns true if it has a group in this frame.
     pub fn is_observed(&self) -> bool {
         self.missed == 0
     }
 
-    /// Its mask is shown in this frame, or it is given up: what it left in the frames before
-    /// without one is to be erased.
+    /// Ends the frames without a mask, because the mask is shown or the hypothesis is given up: the
+    /// trail of those frames is to be erased.
     pub(super) fn end_unmasked(&mut self) {
         self.trail_frames = core::mem::take(&mut self.unmasked);
     }

@@ -21,7 +21,7 @@ pub(super) const FROM_M: f64 = 10.0;
 /// Distance in the image at which two matches are neighbours, m, and at least, px.
 const REACH_M: f64 = 0.9;
 const REACH_MIN_PX: f64 = 10.0;
-/// The same of disparities, px and as a share.
+/// Largest difference of disparities in a joint group, px and as a share.
 const DISPARITY_MIN_PX: f64 = 0.6;
 const DISPARITY_SHARE: f64 = 0.04;
 /// Residuals of neighbours differ by less, px.
@@ -46,7 +46,7 @@ pub(crate) struct FarMatch {
     depth_m: f32,
     /// Position among the matches.
     index: u32,
-    /// Whether it is a candidate by itself: 0 or 1.
+    /// 1 if the point is a candidate by itself, else 0.
     candidate: u32,
 }
 
@@ -91,7 +91,7 @@ impl<'m> FarMatches<'m> {
         }
     }
 
-    /// How many there are.
+    /// Returns the number of frames.
     pub fn len(&self) -> usize {
         self.len
     }

@@ -12,15 +12,14 @@ const GROWN: u8 = 1;
 const FILLED: u8 = 2;
 /// Side of a lattice cell, px.
 pub(super) const CELL_PX: usize = 4;
-/// How far a mask reaches beyond the extent of a group's members, m: to the side, above and below,
-/// along the depth.
+/// Margin of a mask around the extent of a group's members, m: to the side, above and below, along
+/// the depth.
 const MARGIN_M: [f64; 3] = [0.9, 0.9, 1.6];
 /// Less of it far away, m by metre of depth, and at least: there the disparities of an object reach
 /// beyond it.
 const MARGIN_PER_DEPTH: f64 = 0.02;
 const MARGIN_MIN_M: f64 = 0.45;
-/// How long an object is along the depth at least, m: of a car that comes, the members are on its
-/// front.
+/// Least length of an object along the depth, m: members on an oncoming car are on its front.
 const LENGTH_M: f64 = 4.5;
 /// An object further to the side than this share of its depth shows its side, and its members may
 /// be on either end of it.
@@ -28,17 +27,17 @@ const BESIDE: f64 = 0.25;
 /// Disparities of neighbouring cells of one object differ by less, px: those of the side of a car 2
 /// m beside the camera by 1.1.
 const STEP_PX: f64 = 0.4;
-/// The same as a share of the disparity.
+/// Largest step between neighbouring cells, as a share of the disparity.
 const STEP_SHARE: f64 = 0.04;
-/// How much wider than the disparity the part of the image is at most that the right camera does
-/// not see, px: matching needs some pixels about each.
+/// Largest excess over the disparity of the image part that the right camera does not see, px:
+/// matching needs some pixels around each.
 const BORDER_PX: f64 = 16.0;
 /// A match decides on cells whose disparity differs from its own by less, as a share and px.
 const BLOCK_SHARE: f64 = 0.06;
 const BLOCK_PX: f64 = 0.4;
 /// Beyond that, by what depth errs, m for each m^2 of squared depth.
 const DEPTH_MARGIN: f64 = 0.0012;
-/// What is lower above the ground belongs to it, m.
+/// Height above the ground below which pixels belong to the ground, m.
 const CLEARANCE_M: f64 = 0.12;
 
 /// The lattice of a frame.
@@ -66,7 +65,7 @@ impl<'a> Lattice<'a> {
         self.ground.as_ref()
     }
 
-    /// Whether a point of the camera's frame is clear of the ground.
+    /// Returns true if a point of the camera's frame is clear of the ground.
     fn is_above_ground(&self, point: [f64; 3]) -> bool {
         self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
     }
@@ -279,9 +278,9 @@ impl<'a> Lattice<'a> {
         })
     }
 
-    /// Whether a pixel belongs to the marked cells: it lies in one, has the disparity of that or of
-    /// one beside it, and is above the ground. One without a disparity belongs to the cell it lies
-    /// in.
+    /// Returns true if a pixel belongs to the marked cells: it lies in one, has the disparity of
+    /// that or of a neighbouring one, and is above the ground. One without a disparity belongs to
+    /// the cell it lies in.
     pub fn is_own(&self, cells: &[u8], u: i32, v: i32) -> bool {
         let Some(at) = usize::try_from(u).ok().zip(usize::try_from(v).ok()).map(|(u, v)| [u, v])
         else {
@@ -319,7 +318,7 @@ impl<'a> Lattice<'a> {
     }
 }
 
-/// How far disparities of neighbouring cells of one object differ at most, px.
+/// Returns the largest difference of disparities in neighbouring cells of one object, px.
 fn step_px(disparity_px: f64) -> f64 {
     STEP_PX + STEP_SHARE * disparity_px
 }

@@ -80,7 +80,7 @@ use seed::{MAX_SEEDS, Seed};
 /// Score of an instance found by its motion.
 const SCORE: f32 = 0.9;
 
-/// What a frame is segmented by.
+/// Images, matches and camera motion by which a frame is segmented.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SegmentationInput<'a, 's> {
     /// The cameras.
@@ -91,14 +91,14 @@ pub(crate) struct SegmentationInput<'a, 's> {
     pub disparity_q8: View<'a, u16>,
     /// The ground plane of the disparity image; `None` where it shows too little ground.
     pub ground: Option<GroundPlane>,
-    /// Where more matches are searched for on objects that have few.
+    /// Images in which more matches are searched for on objects that have few.
     pub search: Option<GuidedMatching<'a, 's>>,
     /// Largest error that all disparities have in common, px: everywhere, and at the left and right
     /// edge of the picture, where the lens adds to it.
     pub bias_px: [f64; 2],
 }
 
-/// What motion segmentation found in a frame.
+/// Counts of a frame's motion segmentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{geometry::Transform, masks::PixelBox};
 
-/// What contradictions to a static world are looked for in.
+/// Camera and model against which contradictions to a static world are found.
 pub(super) struct Contradictions<'a> {
     pub model: &'a StaticModel<'a>,
     pub t_world_camera: &'a Transform,

@@ -32,7 +32,7 @@ const MAX_SEARCHES: usize = 384;
 
 /// Least share of moving patches on an object that was found before.
 const KNOWN_SHARE_MIN: f64 = 0.7;
-/// What a motion to the side errs by, one sigma, by metre of depth.
+/// Error of a sideways motion, one sigma, by metre of depth.
 const SIDE_PER_DEPTH: f64 = 0.002;
 
 /// The square of a motion, by what it errs by along the depth and to the side.
@@ -42,13 +42,13 @@ fn scaled(motion_m: &Vector3<f64>, residual: &Residual) -> f64 {
     (motion_m.x * motion_m.x + motion_m.y * motion_m.y) / (side * side) + along * along
 }
 
-/// What a patch shows.
+/// Content of a patch.
 enum Patch {
     Moving(Candidate),
     Static,
 }
 
-/// What patches are searched for with in a frame.
+/// Images and motion with which patches are searched for in a frame.
 pub(super) struct PatchSearch<'a, 's> {
     images: GuidedMatching<'a, 's>,
     t_previous_current: Transform,
@@ -159,7 +159,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
         self.is_static_at(model, pixel, disparity_px).then_some(Patch::Static)
     }
 
-    /// Whether a patch is found where a static point would be.
+    /// Returns true if a patch is found where a static point would be.
     fn is_static_at(&self, model: &StaticModel<'_>, pixel: [i32; 2], disparity_px: f64) -> bool {
         let expected = expected(model.rig, pixel, disparity_px, &self.t_previous_current);
         let found = expected
@@ -168,8 +168,8 @@ impl<'a, 's> PatchSearch<'a, 's> {
         found.is_some_and(|residual| residual.chi_square <= f64::from(CANDIDATE_CHI_SQUARE))
     }
 
-    /// Whether a near group is one of a row of posts or the like, each taken for the next: more
-    /// than a third of its members are found where static points would be.
+    /// Returns true if a near group is one of a row of posts or the like, each taken for the next:
+    /// more than a third of its members are found where static points would be.
     pub fn is_repeated(
         &mut self,
         model: &StaticModel<'_>,

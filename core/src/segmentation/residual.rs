@@ -33,7 +33,7 @@ const DISPARITY_MIN_PX: f64 = 1.0;
 /// Nearest depth a point is predicted at, m.
 const DEPTH_MIN_M: f64 = 1.0;
 
-/// What residuals are computed with in a frame.
+/// Camera, rig and settings with which residuals are computed in a frame.
 pub(super) struct StaticModel<'a> {
     pub config: &'a SegmentationConfig,
     pub rig: &'a StereoRig,
@@ -52,11 +52,11 @@ pub(super) struct Residual {
     /// Squared Mahalanobis distance from the static prediction; an upper bound of it where the
     /// bound suffices.
     pub chi_square: f64,
-    /// How far it is from the prediction: u, v and disparity, px.
+    /// Difference from the prediction: u, v and disparity, px.
     pub residual_px: Vector3<f64>,
-    /// Where the point is, in the current camera, m.
+    /// Position of the point in the current camera, m.
     pub point_m: Vector3<f64>,
-    /// How it moved against the static prediction, m.
+    /// Motion of the point relative to the static prediction, m.
     pub motion_m: Vector3<f64>,
     /// Error of that along the depth, one sigma, m.
     pub depth_sigma_m: f64,
@@ -97,7 +97,7 @@ impl<'a> StaticModel<'a> {
         Vector3::new(at.x, at.y, self.rig.focal_px) * (self.rig.baseline_m / at.z)
     }
 
-    /// Where a match's point is now, m.
+    /// Returns the current position of a match's point, m.
     pub fn current_point(&self, m: &Match) -> Option<Vector3<f64>> {
         Some(self.point(&self.centered(m.current_left, m.current_right)?))
     }
@@ -142,7 +142,8 @@ impl<'a> StaticModel<'a> {
         Some((self.residual(m)?, shared))
     }
 
-    /// Where a point of the frame before is now, if it is in front of the camera.
+    /// Predicts the current position of a point of the frame before, if it is in front of the
+    /// camera.
     fn predicted(&self, previous: &Vector3<f64>) -> Option<Vector3<f64>> {
         let predicted = self.rotation * previous + self.translation;
         (predicted.z > DEPTH_MIN_M).then_some(predicted)

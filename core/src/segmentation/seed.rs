@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 
 /// Most supposed objects of a frame.
 pub(super) const MAX_SEEDS: usize = 32;
-/// How far an object reaches beyond a few members, m.
+/// Reach of an object beyond a few members, m.
 const REACH_M: f64 = 0.3;
-/// The same along the depth, m for each m^2 of squared depth.
+/// Reach along the depth, m for each m² of squared depth.
 const REACH_PER_SQUARED_DEPTH: f64 = 0.001;
 
 /// An object that is supposed to be there: its extent in the current camera, and its motion against
@@ -19,7 +19,7 @@ pub(crate) struct Seed {
     low_m: [f64; 3],
     high_m: [f64; 3],
     motion_m: [f64; 3],
-    /// Whether it was an object before: 0 or 1.
+    /// 1 if it was an object before, else 0.
     known: u64,
 }
 
@@ -33,17 +33,17 @@ impl Seed {
         Self { known: u64::from(known), ..self }
     }
 
-    /// Whether it was an object before.
+    /// Returns true if it was an object before.
     pub fn is_known(&self) -> bool {
         self.known > 0
     }
 
-    /// Its motion against the static prediction, m.
+    /// Returns the motion relative to the static prediction, m.
     pub fn motion_m(&self) -> Vector3<f64> {
         Vector3::from(self.motion_m)
     }
 
-    /// Its extent and a little more.
+    /// Returns the extent with a margin.
     pub fn extent(&self) -> Extent {
         let mut extent = Extent { low: self.low_m, high: self.high_m };
         let depth_m = extent.center().z;
@@ -54,7 +54,7 @@ impl Seed {
         extent
     }
 
-    /// Whether a group lies where it is.
+    /// Returns true if a group lies at the patch's position.
     pub fn is_at(&self, group: &Group) -> bool {
         Extent { low: self.low_m, high: self.high_m }.gap(&group.extent) < REACH_M
     }

@@ -43,7 +43,7 @@ fn project([x, y, z]: [f64; 3]) -> [[f32; 2]; 2] {
     [[u as f32, v as f32], [(u - RIG.baseline_m * per_m) as f32, v as f32]]
 }
 
-/// What a tracker is given of a world.
+/// Input of a tracker in a world.
 struct WorldInput<'i, 's> {
     /// Matches on each car, at most.
     matches_on_car: usize,
@@ -82,7 +82,7 @@ impl World {
         self.cast_from(0.0, frame, [u as f64, v as f64])
     }
 
-    /// The same from so far to the right.
+    /// Casts a ray from a camera moved to the right.
     fn cast_from(&self, right_m: f64, frame: u32, [u, v]: [f64; 2]) -> (f64, usize) {
         let [x, y] = [(u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px];
         let mut best = (40.0, 0);

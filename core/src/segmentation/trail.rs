@@ -5,23 +5,24 @@ use super::extent::Extent;
 use crate::geometry::{OrientedBox, Transform};
 use nalgebra::Vector3;
 
-/// How far what an object left may lie outside its extent: sideways, upwards and along the line of
-/// sight, m, and of the last by squared depth.
+/// Margin around an object's extent within which its trail lies: sideways, upwards and along the
+/// line of sight, m, and of the last by squared depth.
 const MARGIN_M: [f64; 3] = [0.3, 0.3, 0.6];
 const DEPTH_MARGIN: f64 = 0.002;
 
-/// Where an object was in frames in which its depth was not kept out of the static map.
+/// Boxes of an object in frames in which its depth was not kept out of the static map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trail {
-    /// Where it is now.
+    /// Box in the current frame.
     now: OrientedBox,
-    /// Its motion in a frame, in the box's axes, m.
+    /// Motion in a frame, in the box's axes, m.
     motion_m: [f64; 3],
     frames: u32,
 }
 
 impl Trail {
-    /// That of an object with an extent in the camera's axes and a motion in the world's.
+    /// Makes the trail of an object with an extent in the camera's axes and a motion in the
+    /// world's.
     pub(super) fn new(
         extent: &Extent,
         t_world_camera: &Transform,
@@ -43,12 +44,12 @@ impl Trail {
         Self { now, motion_m: t_camera_world.rotate(motion_m).into(), frames }
     }
 
-    /// How many frames it reaches back.
+    /// Returns the number of frames that the trail reaches back.
     pub fn frames(&self) -> u32 {
         self.frames
     }
 
-    /// Where the object was in each of them, the last frame first.
+    /// Returns the object's box in each of them, the last frame first.
     pub fn boxes(&self) -> impl Iterator<Item = OrientedBox> {
         (1..=self.frames).map(|frame| {
             let mut before = self.now;

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// What the multiplier is undone by: each round doubles the bits that are right.
+    /// Returns the multiplier's inverse: each round doubles the number of right bits.
     fn inverse() -> u64 {
         (0..6).fold(MULTIPLIER, |inverse, _| {
             inverse.wrapping_mul(2u64.wrapping_sub(MULTIPLIER.wrapping_mul(inverse)))

@@ -2,7 +2,7 @@
 
 use super::{Visitor, checksum::Checksum};
 
-/// Why a reading failed.
+/// Reason why a reading failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ReadError<E> {
     /// The source ended too early or failed.
@@ -23,7 +23,7 @@ impl<'f, F: FnMut(&mut [u8]) -> Result<(), E>, E> Reader<'f, F, E> {
         Self { source, checksum: Checksum::new(), failure: None }
     }
 
-    /// Whether all went well so far.
+    /// Checks that everything was read without an error.
     ///
     /// # Errors
     /// The first failure.

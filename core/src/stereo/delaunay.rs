@@ -102,8 +102,8 @@ fn orientation(a: SupportPoint, b: SupportPoint, c: SupportPoint) -> i64 {
     Offset::new(b, a).cross(Offset::new(c, a))
 }
 
-/// Whether the point from which a, b and c are seen lies strictly within the circle through them,
-/// whose orientation is positive.
+/// Returns true if the point from which a, b and c are seen lies strictly within the circle through
+/// them, whose orientation is positive.
 #[inline(always)]
 fn in_circle([a, b, c]: [Offset; 3]) -> bool {
     a.square * b.cross(c) - b.square * a.cross(c) + c.square * a.cross(b) > 0
@@ -285,7 +285,7 @@ impl<'s> Triangulation<'s> {
         self.link(3 * t + 2, 3 * other + 1);
     }
 
-    /// Whether p lies strictly outside the hull edge that begins at a.
+    /// Returns true if p lies strictly outside the hull edge that begins at a.
     fn sees(&self, p: u32, a: u32) -> bool {
         let at = |i: u32| self.point(i);
         orientation(at(a), at(self.hull_next.get(a)), at(p)) < 0

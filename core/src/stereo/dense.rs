@@ -47,7 +47,7 @@ pub(super) struct DenseMatching<'a> {
     pub cost: PlaneCost,
 }
 
-/// What one band writes and needs.
+/// Buffers that one band writes.
 pub(super) struct DenseBand<'a> {
     /// First image row.
     pub first: usize,
@@ -63,9 +63,9 @@ pub(super) struct DenseBand<'a> {
 
 /// The matching of a band, as work that compares descriptors.
 pub(super) struct MatchBand<'m, 'b, 'a> {
-    /// What is read.
+    /// Input of the matching.
     pub matching: &'m DenseMatching<'a>,
-    /// What is written.
+    /// Output of the matching.
     pub band: &'m mut DenseBand<'b>,
 }
 

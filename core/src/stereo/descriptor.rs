@@ -26,7 +26,7 @@ pub(super) use crate::sad::Descriptor;
 ///
 /// Neighbours lie together so that few loads fetch them all.
 impl Descriptor {
-    /// That of a pixel amid no gradients.
+    /// Descriptor of a pixel without gradients around it.
     pub const UNTEXTURED: Self = Self([FLAT; 16]);
 }
 

@@ -13,7 +13,7 @@ use super::{StereoConfig, support::NO_MATCH};
 
 /// Candidates looked at together.
 const BLOCK: usize = 64;
-/// Those, and the widest window to both sides of them.
+/// Width of a block of candidates with the widest window to both sides.
 const AROUND: usize = BLOCK + 2 * PLAUSIBLE_WINDOW;
 /// Half the window in which a support point needs company, candidates, as published.
 const PLAUSIBLE_WINDOW: usize = 5;
@@ -30,7 +30,7 @@ pub(super) struct FilterSupport<'a> {
     pub config: &'a StereoConfig,
     pub grid: &'a mut [i16],
     pub columns: usize,
-    /// As long as the grid, at least.
+    /// Buffer at least as long as the grid.
     pub scratch: &'a mut [i16],
 }
 
@@ -54,6 +54,7 @@ impl Work for FilterSupport<'_> {
 fn remove_implausible(grid: &mut [i16], width: usize, before: &mut [i16]) -> u32 {
     let (window, threshold) = (PLAUSIBLE_WINDOW, PLAUSIBLE_THRESHOLD);
     let width = width.max(1);
+    // Company is counted in the grid as it was, so that order does not matter.
     before.iter_mut().zip(&*grid).for_each(|(to, from)| *to = *from);
     let mut removed = 0;
     for (v, row) in grid.chunks_exact_mut(width).enumerate() {
@@ -148,7 +149,7 @@ fn any_alike<'r>(
     any
 }
 
-/// Whether a candidate has a match, and its disparity is that of a point within the threshold.
+/// Returns true if a candidate has a match whose disparity is within the threshold of a point's.
 #[inline(always)]
 fn are_alike(other: i16, point: i16, threshold: u16) -> bool {
     (other != NO_MATCH) & (other.abs_diff(point) <= threshold)

@@ -15,19 +15,19 @@ use crate::{
 };
 use core::ops::Range;
 
-/// What fills a gap.
+/// Rules for filling a gap.
 #[derive(Clone, Copy)]
 pub(super) struct Filling {
     /// Widest gap, px.
     pub width: usize,
     /// Ends that differ by less are one surface, in the unit of the pixels.
     pub discontinuity: u16,
-    /// What fills a gap between two surfaces.
+    /// Content of a gap between two surfaces.
     pub ends: GapEnds,
 }
 
 impl Filling {
-    /// What fills a gap between two ends; `None` leaves it.
+    /// Returns the disparity that fills a gap between two ends; `None` leaves it.
     #[inline(always)]
     fn value(self, a: i16, b: i16) -> Option<i16> {
         // A gap along a column may end at what was filled along a row.
@@ -124,6 +124,7 @@ impl Work for FillColumns<'_> {
         else {
             return 0;
         };
+        // Rows are walked once: each column remembers its last row with a disparity.
         last_row.fill(NEVER);
         let mut filled = 0;
         let (width, widest) = (width.max(1), filling.width as u16);
@@ -150,6 +151,7 @@ impl Work for FillColumns<'_> {
                     filled += 1;
                 }
             });
+            // This row becomes the upper end of the gaps below it.
             for (last, &here) in last_row.iter_mut().zip(&*here) {
                 *last = if here == NONE { *last } else { v as u16 };
             }

@@ -181,8 +181,8 @@ impl<'s> StereoMatcher<'s> {
         self.compute_observed(config, [left, right], executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], for a pair with invalid pixels: they get no disparity, nor do
-    /// those whose partner in the right image is one of them.
+    /// Computes disparities like [`StereoMatcher::compute`], for a pair with invalid pixels: they
+    /// get no disparity, nor do pixels whose partner in the right image is one of them.
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
@@ -192,8 +192,9 @@ impl<'s> StereoMatcher<'s> {
         self.compute_steps(config, pair, executor, |_| ())
     }
 
-    /// As [`StereoMatcher::compute`], of a left and a right image, calling `done` after each step: no clock enters the core, so
-    /// a caller that times the steps does it there.
+    /// Computes disparities like [`StereoMatcher::compute`], from a left and a right image, calling
+    /// `done` after each step: no clock enters the core, so a caller that times the steps does it
+    /// there.
     pub fn compute_observed<E: Executor>(
         &mut self,
         config: &StereoConfig,
@@ -213,6 +214,7 @@ impl<'s> StereoMatcher<'s> {
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let &RectifiedPair { left, right, invalid } = pair;
+        // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
         let mut report = StereoReport {
             status,
@@ -231,6 +233,7 @@ impl<'s> StereoMatcher<'s> {
         done(StereoStep::FilterSupport);
         self.triangulate(config, executor, &mut report);
         done(StereoStep::Triangulation);
+        // Without a triangle there is no plane to search around.
         if report.triangles_left == 0 || report.triangles_right == 0 {
             report.status = StereoStatus::TooFewSupportPoints;
             self.disparity.fill(0);

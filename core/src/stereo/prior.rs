@@ -55,10 +55,12 @@ fn rasterise_planes(
     let slope_max = (slope_max * ONE as f32) as i64;
     for mut corners in mesh.triangles() {
         let [a, b, c] = corners.map(|point| usize::from(point.v));
+        // Rows of the triangle that lie in this band.
         let (from, to) = (a.min(b).min(c).max(first), (a.max(b).max(c) + 1).min(first + rows));
         if from >= to {
             continue;
         }
+        // Top to bottom: the long edge spans all rows, the others a part each.
         corners.sort_unstable_by_key(|point| (point.v, point.u));
         let [top, middle, bottom] = corners;
         let Some(plane) = Plane::through(corners, slope_max) else { continue };
@@ -70,6 +72,7 @@ fn rasterise_planes(
                 long.column(at),
                 if v < usize::from(middle.v) { upper.column(at) } else { lower.column(at) },
             );
+            // Pixels whose centre lies between the edges, one column wider to leave no seam.
             let (left, right) = ((a.min(b) >> SHIFT) as usize, (a.max(b) >> SHIFT) as usize + 1);
             let count = width.min(right + 1).saturating_sub(left);
             plane.rasterise(
@@ -174,7 +177,7 @@ impl Plane {
         }
     }
 
-    /// The same for fewer than eight pixels, the last ones.
+    /// Fills the last pixels, fewer than eight.
     #[cold]
     #[inline(never)]
     fn fill_last(&self, pixels: &mut [i16], first: usize, start: i32, own: &[i16; LANES]) {
@@ -229,12 +232,12 @@ pub(super) fn mark_cells(
 /// Weight of the descriptor distance against the prior (beta), as published.
 const BETA: f32 = 0.02;
 
-/// What disagreeing with the plane costs, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 /
-/// 2 sigma^2)) / beta at k px from it, lowered so that k = 0 costs nothing.
+/// Cost of disagreeing with the plane, in 1/16 of a descriptor distance: -ln(gamma + exp(-k^2 / 2
+/// sigma^2)) / beta at k px from it, lowered so that k = 0 costs nothing.
 pub(super) struct PlaneCost {
     /// At -radius..=radius px from the plane.
     pub about_plane: [u32; PLANE_WIDTH],
-    /// The same about a steep plane, which is not preferred.
+    /// Costs about a steep plane, which is not preferred.
     pub about_steep: [u32; PLANE_WIDTH],
     /// Farther off.
     pub elsewhere: u32,

@@ -1,6 +1,6 @@
 //! What one stereo frame came to.
 
-/// How a frame ended.
+/// Result of a frame's stereo matching.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -28,7 +28,7 @@ pub enum StereoStatus {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct StereoReport {
-    /// How it ended.
+    /// Result of the frame.
     pub status: StereoStatus,
     /// Candidates on the grid.
     pub candidates: u32,

@@ -60,7 +60,7 @@ fn mean(centre: &[i16], taps: Taps<'_>, to: &mut [i16]) {
     }
 }
 
-/// Which pixels make a window.
+/// Direction of a window's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Along {
     Rows,

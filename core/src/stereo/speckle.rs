@@ -118,6 +118,7 @@ impl Work for RemoveSpeckles<'_> {
         for (row, ends) in disparity.chunks_exact_mut(width).zip(ends.chunks_exact(width)) {
             let mut start = 0;
             for &end in ends {
+                // A small segment is a mismatch more often than a surface.
                 let is_small = runs.size_of_next(run) < smallest;
                 run += 1;
                 if let Some(pixels) = row.get_mut(start..usize::from(end))
@@ -146,8 +147,8 @@ struct Segmented<'a> {
     similarity: u16,
 }
 
-/// How far apart two pixels are, whether filled or not. NONE is far from every disparity with its
-/// bit of filled pixels taken, too.
+/// Returns the difference of two disparities, filled or not. NONE differs from every disparity even
+/// with its bit of filled pixels cleared.
 #[inline(always)]
 fn difference(a: i16, b: i16) -> u16 {
     (a & !FILLED).abs_diff(b & !FILLED)
@@ -168,6 +169,7 @@ fn find_segments(image: &Segmented<'_>, runs: &mut Runs<'_>, ends: &mut [u16], f
     let mut above: &[i16] = &[];
     let (mut above_run, mut here_run) = (0, 0);
     for (here, ends) in disparity.chunks_exact(width).zip(ends.chunks_exact_mut(width)) {
+        // A run ends where the next pixel differs.
         break_up(here, similarity, breaks);
         let mut next_run = here_run;
         let mut start = 0;
@@ -181,6 +183,7 @@ fn find_segments(image: &Segmented<'_>, runs: &mut Runs<'_>, ends: &mut [u16], f
             start = end;
             next_run += 1;
         });
+        // Runs that touch a similar pixel in the row above are one segment.
         if !above.is_empty() {
             for (touch, (&up, &here)) in touches.iter_mut().zip(above.iter().zip(here)) {
                 *touch = u8::from(difference(up, here) <= similarity) & u8::from(here != NONE);
@@ -189,6 +192,7 @@ fn find_segments(image: &Segmented<'_>, runs: &mut Runs<'_>, ends: &mut [u16], f
                 runs.unite(above_run + a, here_run + b)
             });
         }
+        // The row's breaks become those above the next row.
         (above, above_run, here_run) = (here, here_run, next_run);
         core::mem::swap(&mut breaks_above, &mut breaks);
     }

@@ -40,7 +40,7 @@ pub(super) const fn candidates(length: usize, step: usize) -> usize {
 /// Costs looked through at once. As many as disparities are whole blocks.
 const BLOCK: usize = 16;
 
-/// What is needed to match rows of candidates: the gradients of both images.
+/// Gradients of both images, from which rows of candidates are matched.
 #[derive(Clone, Copy)]
 pub(super) struct SupportMatching<'a> {
     /// Parameters.
@@ -69,8 +69,8 @@ impl Rows<'_> {
         ])
     }
 
-    /// What each column from `first` on costs, eight at a time. Those beyond the row, which have no
-    /// descriptors, mean nothing.
+    /// Returns the costs of eight columns from `first` on. Those beyond the row, which have no
+    /// descriptors, are meaningless.
     #[inline(always)]
     fn costs(
         &self,
@@ -105,7 +105,7 @@ impl Rows<'_> {
 
 /// The matching of rows of candidates, as work that compares descriptors.
 pub(super) struct MatchRows<'m, 'a> {
-    /// What is read.
+    /// Input of the matching.
     pub matching: SupportMatching<'a>,
     /// The first row of candidates.
     pub first: usize,
@@ -139,6 +139,7 @@ impl SupportMatching<'_> {
         else {
             return;
         };
+        // Descriptors of the two rows a support point is seen in, above and below it.
         for (j, out) in grid.chunks_exact_mut(candidates(width, step).max(1)).enumerate() {
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };

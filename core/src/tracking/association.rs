@@ -29,7 +29,7 @@ use crate::{
     state::Visitor,
 };
 
-/// How a frame's detections were associated with tracks.
+/// Counts of a frame's associations of detections with tracks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -257,7 +257,8 @@ impl<'s> TrackTable<'s> {
         self.len = kept;
     }
 
-    /// Whether another track fits, if need be in place of the one undetected for longest.
+    /// Returns the index of a free entry for another track, if need be that of the track undetected
+    /// for longest.
     fn free_entry(
         &mut self,
         frame: u32,
@@ -313,7 +314,7 @@ impl<'s> TrackTable<'s> {
     }
 }
 
-/// How well an instance continues a track; 0 where it does not.
+/// Returns the affinity of an instance to a track; 0 if it does not continue it.
 fn affinity(
     config: &TrackingConfig,
     frame: u32,

@@ -30,11 +30,11 @@ pub enum Class {
     Motorcycle,
     /// Any animal.
     Animal,
-    /// What moves, found by its motion.
+    /// Moving object, found by its motion.
     MovingObject,
 }
 
-/// What the mapper does with a class.
+/// Treatment of a class by the mapper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Treatment {
     /// Rigid and possibly moving: tracked and reconstructed in a volume of its own.
@@ -152,7 +152,7 @@ impl Class {
         }
     }
 
-    /// What is done with it.
+    /// Returns the treatment of the class.
     pub const fn treatment(self) -> Treatment {
         match self {
             Self::Car | Self::Bus | Self::Truck | Self::Van | Self::MovingObject => {
@@ -168,8 +168,8 @@ impl Class {
         }
     }
 
-    /// Whether a detector may give one object both classes from frame to frame: four-wheelers
-    /// flicker among each other, and so do people and what they ride.
+    /// Returns true if a detector may give one object both classes from frame to frame:
+    /// four-wheelers flicker among each other, and so do people and what they ride.
     pub fn agrees_with(self, other: Self) -> bool {
         let group = |class: Self| match class {
             Self::Car | Self::Bus | Self::Truck | Self::Van => 1,

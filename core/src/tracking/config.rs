@@ -16,7 +16,7 @@ const INLIER_PX: f32 = 2.0;
 /// Image width to which areas in px refer.
 const REFERENCE_WIDTH: u64 = 1242;
 
-/// How a detection is compared with a track.
+/// Overlap by which a detection is compared with a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -27,11 +27,11 @@ pub enum Overlap {
     /// Intersection over union of the masks.
     #[default]
     Mask,
-    /// The same of the boxes (the original).
+    /// Overlap of the boxes (the original).
     Box,
 }
 
-/// How detections are accepted and tracked. Defaults are the original's published ones unless said
+/// Acceptance and tracking of detections. Defaults are the original's published ones unless said
 /// otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
@@ -40,7 +40,7 @@ pub enum Overlap {
     serde(default, deny_unknown_fields)
 )]
 pub struct TrackingConfig {
-    /// Whether objects that may move are kept out of the static map. Without, everything goes into
+    /// True if objects that may move are kept out of the static map. False fuses everything into
     /// one map (the paper's robust odometry baseline).
     pub dynamic: bool,
     /// Time between two frames, s; above 0; 0.1.
@@ -55,7 +55,7 @@ pub struct TrackingConfig {
     /// to move; 900: the 18 matches a first motion takes, 7 px apart. The original: as
     /// `area_min_px`.
     pub track_area_min_px: u32,
-    /// What is compared in associating a detection with a track. The original: boxes.
+    /// Overlap by which a detection is associated with a track. The original: boxes.
     pub overlap: Overlap,
     /// Overlap times the geometric mean of both scores times the discount for frames missed must be
     /// above this; 0 to 1; 0.1.
@@ -68,9 +68,9 @@ pub struct TrackingConfig {
     /// Share of the image beyond which an object of unknown state is kept out of the camera's
     /// egomotion; 0 to 1; 0.05. The original: 1.
     pub large_share: f32,
-    /// How motions are estimated.
+    /// Estimation of motions.
     pub motion: MotionConfig,
-    /// What is classified as moving.
+    /// Classification as moving or static.
     pub state: StateConfig,
 }
 
@@ -94,18 +94,18 @@ impl Default for TrackingConfig {
 }
 
 impl TrackingConfig {
-    /// Whether a box of `area_px` in an image of that width can be reconstructed: strictly larger
-    /// than the least area.
+    /// Returns true if a box of `area_px` in an image of that width can be reconstructed: strictly
+    /// larger than the least area.
     pub fn is_reconstructable(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.area_min_px, width)
     }
 
-    /// Whether so many pixels are enough to be tracked.
+    /// Returns true if so many pixels are enough to be tracked.
     pub fn is_trackable(&self, area_px: i64, width: usize) -> bool {
         area_px as u64 * REFERENCE_WIDTH * REFERENCE_WIDTH > least(self.track_area_min_px, width)
     }
 
-    /// How much the delete mask of a box is scaled, 1/1000.
+    /// Returns the scale of a box's delete mask, 1/1000.
     pub(crate) fn delete_permille(&self, area_px: i64, width: usize) -> u32 {
         let least = least(self.area_min_px, width);
         let is_small =
@@ -125,7 +125,7 @@ fn least(area_px: u32, width: usize) -> u64 {
     u64::from(area_px) * (width as u64) * (width as u64)
 }
 
-/// How an object's motion is estimated and filtered. The original: no filter.
+/// Estimation and filtering of an object's motion. The original: no filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -139,14 +139,14 @@ pub struct MotionConfig {
     pub matches_again: u16,
     /// Most hypotheses; 1 to 10000; 200 (the original: 500).
     pub samples: u16,
-    /// How fast it may be when first detected, one sigma, m/s; above 0.
+    /// Initial speed, one sigma, m/s; above 0.
     pub speed_m_s: f32,
     /// By how much all disparities may be too small, px; at least 0. To a moving camera a static
     /// object then seems to move, by twice this share of its disparity of the speed it passes by.
     pub bias_px: f32,
-    /// The same, by the residual lens distortion after rectification, at the left and right edge of
-    /// the picture, px; at least 0. Grows with the fourth power of the distance from the middle.
-    /// KITTI's colour cameras: 3, as parked cars 30 m away show.
+    /// Bias of a match's disparity by the lens distortion that rectification left, at the left and
+    /// right edge of the picture, px; at least 0. Grows with the fourth power of the distance from
+    /// the middle. KITTI's colour cameras: 3, as parked cars 30 m away show.
     pub lens_px: f32,
     /// Error of the camera's own rotation per frame, one sigma, rad: at a distance it looks like
     /// speed; at least 0.
@@ -183,7 +183,7 @@ impl MotionConfig {
     }
 }
 
-/// When an object is classified as dynamic or static.
+/// Classification of an object as dynamic or static.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -197,19 +197,19 @@ pub struct StateConfig {
     /// Possibly slower than this and likely slower than `slow_m_s`: static, m/s; above 0. The
     /// published code: 0.3.
     pub static_m_s: f32,
-    /// What is not known to move is static only if it is likely slower than this, m/s; at least
-    /// `static_m_s`; 1.2, slower than a pedestrian. A dynamic object becomes static only if it is
-    /// likely slower than `dynamic_m_s`.
+    /// Speed below which an object that is not known to move is likely to be, to become static,
+    /// m/s; at least `static_m_s`; 1.2, slower than a pedestrian. A dynamic object becomes static
+    /// only if it is likely slower than `dynamic_m_s`.
     pub slow_m_s: f32,
-    /// How many sigmas are "certainly"; at least 0. The published code: 0.
+    /// Number of sigmas that count as "certainly"; at least 0. The published code: 0.
     pub sigmas: f32,
-    /// How many sigmas are "likely"; at least 0. The published code: 0.
+    /// Number of sigmas that count as "likely"; at least 0. The published code: 0.
     pub static_sigmas: f32,
     /// Consecutive frames that confirm an uncertain object as dynamic; 1 to 100. The published
     /// code: 1.
     pub confirm_frames: u8,
-    /// The same for static; 1 to 100; 2: the filter has averaged over several frames by then. The
-    /// published code: 1.
+    /// Frames in a row that must be classified as static to confirm it; 1 to 100; 2: the filter has
+    /// averaged over several frames by then. The published code: 1.
     pub confirm_static_frames: u8,
     /// Consecutive frames that change a dynamic object to static, or the other way round; 1 to 100.
     /// The published code has no such change.

@@ -19,7 +19,7 @@ pub const MAX_DETECTIONS: usize = 64;
 pub struct Detection<'a> {
     /// The class the detector gives it.
     pub class: Class,
-    /// How sure the detector is; 0 to 1.
+    /// Confidence of the detector; 0 to 1.
     pub score: f32,
     /// First column of the box, px; may lie outside the image.
     pub left: i32,
@@ -45,7 +45,7 @@ impl Detection<'_> {
     }
 }
 
-/// How a frame's detections were used. Each detection is counted once.
+/// Counts of a frame's detections. Each detection is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -65,7 +65,7 @@ pub struct DetectionCount {
     /// Box not larger than the least area to be reconstructed, even if its mask is unusable or does
     /// not fit.
     pub too_small: u32,
-    /// How many of these are tracked.
+    /// Number of these that are tracked only.
     pub tracked_only: u32,
     /// More than the capacity: lowest scores.
     pub over_capacity: u32,

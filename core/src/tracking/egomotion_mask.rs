@@ -12,7 +12,7 @@ use crate::{
 };
 use heapless::Vec;
 
-/// What the camera did in a frame.
+/// Motion of the camera in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraMotion {
     /// Camera to world, now.
@@ -41,7 +41,7 @@ pub struct EgomotionMask<'t, 's> {
 }
 
 impl EgomotionMask<'_, '_> {
-    /// Whether the refined match at that position may be used.
+    /// Returns true if egomotion may use the refined match at that position.
     pub fn includes(&self, index: u32) -> bool {
         match self.owner_codes.get(index as usize).map(|code| code.get()) {
             Some(MatchOwner::Ambiguous) => self.excluded == 0,
@@ -51,7 +51,7 @@ impl EgomotionMask<'_, '_> {
         }
     }
 
-    /// Whether the match was under the last mask of an object that was found by its motion.
+    /// Returns true if the match was under the last mask of an object that was found by its motion.
     fn is_on_moving(&self, index: u32) -> bool {
         let at = self
             .refined

@@ -27,7 +27,7 @@ const MAX_LINES: i32 = 4096;
 /// shows what is behind.
 const RIM_PX: i32 = 5;
 
-/// Where more matches are searched for.
+/// Images and features in which more matches are searched for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GuidedMatching<'a, 's> {
     /// The images of this pair and the last.
@@ -44,8 +44,8 @@ pub(super) struct ObjectMasks<'a, 's> {
 }
 
 impl ObjectMasks<'_, '_> {
-    /// Whether the patch around a pixel lies under the mask, by its middle, its corners and the
-    /// middles of its sides.
+    /// Returns true if the patch around a pixel lies under the mask, by its middle, its corners and
+    /// the middles of its sides.
     fn contains_patch(&self, u: i32, v: i32) -> bool {
         let ((store, mask), steps) = (&self.current, [0, -RIM_PX, RIM_PX]);
         steps.iter().all(|dv| steps.iter().all(|du| store.contains(mask, u + du, v + dv)))
@@ -113,7 +113,7 @@ pub(crate) fn step_px(width: i32, height: i32) -> i32 {
     if step > STEP_MIN_PX { step } else { STEP_MIN_PX }
 }
 
-/// Where a pixel of the current left image is in all four.
+/// Predicts the position in all four images of a pixel of the current left one.
 pub(crate) fn expected(
     rig: &StereoRig,
     [u, v]: [i32; 2],

@@ -27,7 +27,7 @@ impl OptionalIndex {
         self.0.is_some()
     }
 
-    /// As snapshots and digests have it: the position plus 1, 0 for none.
+    /// Returns the value in snapshots and digests: the position plus 1, 0 for none.
     pub fn to_bits(self) -> u32 {
         self.0.map_or(0, NonZeroU32::get)
     }
@@ -48,7 +48,7 @@ impl Flag {
         self.0 != 0
     }
 
-    /// As snapshots and digests have it.
+    /// Returns the value in snapshots and digests, for writing.
     pub fn bits_mut(&mut self) -> &mut u32 {
         &mut self.0
     }

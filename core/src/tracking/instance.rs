@@ -34,15 +34,15 @@ const MAX_SIDE: u32 = 1 << 15;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Instance {
-    /// Its copy mask: the pixels that show it.
+    /// Copy mask: the pixels that show the instance.
     pub mask: MaskHandle,
     pub score: f32,
     pub class: u32,
-    /// How much its delete mask is scaled, in 1/1000.
+    /// Scale of the delete mask, in 1/1000.
     pub delete_permille: u32,
     /// Position of its track.
     pub track: OptionalIndex,
-    /// Whether it is tracked, but too small to be reconstructed.
+    /// Set if the instance is tracked, but too small to be reconstructed.
     pub tracked_only: Flag,
 }
 
@@ -69,7 +69,8 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// What may be reconstructed first, then by score downwards.
+    /// Returns the order of instances: those that may be reconstructed first, then by score
+    /// downwards.
     fn rank(&self) -> (bool, u32) {
         (self.tracked_only, u32::MAX - self.score_bits)
     }
@@ -233,7 +234,7 @@ fn select_best(
     best
 }
 
-/// Whether a detection can be used, and what its order depends on.
+/// Checks whether a detection can be used, and returns the values that its order depends on.
 fn validate(
     config: &TrackingConfig,
     detection: &Detection<'_>,

@@ -5,11 +5,11 @@ use super::{Class, MotionState, Tracker};
 /// A detected instance, as a pixel shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceAt {
-    /// What the detector calls it.
+    /// Class that the detector gives.
     pub class: Class,
     /// Number of its track; `None` where the table of tracks was full.
     pub track: Option<u32>,
-    /// What is known of its motion.
+    /// Motion state of the object.
     pub state: MotionState,
 }
 

@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 /// Half the width of a feature's descriptor, px.
 const FEATURE_PX: i32 = 5;
 
-/// What a match is assigned to.
+/// Owner of a match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MatchOwner {
     /// The background.
@@ -38,7 +38,7 @@ impl OwnerCode {
         }
     }
 
-    /// Whether it is that instance.
+    /// Returns true if the owner is that instance.
     pub fn is_instance(self, index: usize) -> bool {
         usize::from(self.0) == index + 1
     }
@@ -111,9 +111,9 @@ impl Tracker<'_> {
     }
 }
 
-/// Whether a pixel of instance `at` lies next to the copy mask of another: what is seen there may
-/// belong to either, for a feature is several pixels wide, and the silhouette of an object in front
-/// moves with that object. Only others that are `distinct` count.
+/// Returns true if a pixel of instance `at` lies next to the copy mask of another: the pixel may
+/// belong to either, because a feature is several pixels wide, and the silhouette of an object in
+/// front moves with that object. Only others that are `distinct` count.
 fn is_between(
     instances: &[Instance],
     distinct: impl Fn(&Instance) -> bool,
@@ -139,7 +139,7 @@ fn is_between(
     )
 }
 
-/// Whether two keypoints are one.
+/// Returns true if two keypoints are one.
 pub(super) fn is_same_keypoint(a: [f32; 2], b: [f32; 2]) -> bool {
     let [u, v] = [a[0] - b[0], a[1] - b[1]];
     u * u + v * v < 2.0

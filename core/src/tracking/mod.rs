@@ -109,7 +109,7 @@ pub(crate) struct Tracker<'s> {
     masks: TwoFrames<MaskStore<'s>>,
     instances: Instances<'s>,
     tracks: TrackTable<'s>,
-    /// What each refined match is assigned to; and each sparse one.
+    /// Owner of each refined match, and of each sparse one.
     refined_owner: &'s mut [OwnerCode],
     sparse_owner: &'s mut [OwnerCode],
     /// Matches found by guided matching on one object.

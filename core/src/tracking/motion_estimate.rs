@@ -22,7 +22,7 @@ const NOISE_PX: f64 = 0.3_f32 as f64;
 /// Largest distance of a match from the median depth to be on the object, m; its error comes on top.
 const EXTENT_M: f64 = 5.0;
 
-/// What a frame's motions are measured by.
+/// Camera and matches by which a frame's motions are measured.
 pub(super) struct MotionFrame<'a> {
     pub rig: &'a StereoRig,
     pub t_world_camera: &'a Transform,
@@ -32,12 +32,12 @@ pub(super) struct MotionFrame<'a> {
     pub seed: u64,
 }
 
-/// How more matches are found where there are few.
+/// Search for more matches if there are few.
 pub(super) struct GuidedSearch<'m, F> {
     /// Searches where a motion from the previous camera to the current one projects them; returns
     /// how many it wrote.
     pub find: F,
-    /// Where it writes them.
+    /// Buffer for the matches that are found.
     pub found: &'m mut [Match],
 }
 
@@ -57,7 +57,8 @@ struct DisparityRange {
 }
 
 impl DisparityRange {
-    /// Those no more than [`EXTENT_M`] and three sigmas nearer or farther than the median.
+    /// Keeps the matches no more than [`EXTENT_M`] and three sigmas nearer or farther than the
+    /// median.
     fn of<'m>(rig: &StereoRig, matches: impl Iterator<Item = &'m Match> + Clone) -> Self {
         let mut disparities = Histogram::new();
         for m in matches {

@@ -70,7 +70,7 @@ impl MotionFilter {
         visitor.u32(contradictions);
     }
 
-    /// Whether a motion was ever measured.
+    /// Returns true if a motion was ever measured.
     pub fn is_known(&self) -> bool {
         self.frames > 0
     }
@@ -177,7 +177,7 @@ impl MotionFilter {
         updated
     }
 
-    /// As [`MotionFilter::update`], without a contradiction in the frame before.
+    /// Updates like [`MotionFilter::update`], without a contradiction in the frame before.
     fn correct(
         &mut self,
         rig: &StereoRig,
@@ -303,7 +303,7 @@ impl NormalEquations {
         }
     }
 
-    /// The same by rates in world axes.
+    /// Returns the motion by rates in world axes.
     fn in_world(
         &self,
         world_camera: &Rotation3<f64>,

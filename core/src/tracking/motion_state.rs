@@ -24,7 +24,7 @@ use super::config::StateConfig;
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
-/// What is known about an object's motion.
+/// Motion state of an object: uncertain, static or dynamic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u8)]
@@ -64,14 +64,15 @@ impl MotionState {
     }
 }
 
-/// What a frame measures of an object's speed.
+/// Measurement of an object's speed in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MotionEvidence {
     /// Speed over ground, m/s.
     pub speed_m_s: f32,
-    /// Its error along the direction of motion, one sigma, m/s.
+    /// Standard deviation along the direction of motion, m/s.
     pub sigma_m_s: f32,
-    /// Its error in all directions together, m/s: of what seems static the direction means nothing.
+    /// Standard deviation in all directions together, m/s: the direction of an apparently static
+    /// object is meaningless.
     pub spread_m_s: f32,
     /// By how much the cameras' own errors may make it too high, m/s: they can make a static object
     /// seem to move.
@@ -100,7 +101,7 @@ impl MotionEvidence {
 #[repr(C)]
 pub(crate) struct MotionHysteresis {
     state: u32,
-    /// What the last frames were classified as, and how many in a row were.
+    /// Classification of the last frames, and the number of them in a row.
     classified: u32,
     consecutive: u32,
     /// Frames since a motion was measured.

@@ -19,7 +19,7 @@ const MATCHES_ENOUGH: usize = 60;
 /// Seed of the objects' random samples.
 const SEED: u64 = 0x006F_626A_6563_7473;
 
-/// What motions are estimated from in a frame.
+/// Matches and camera motion from which a frame's motions are estimated.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionInput<'a, 's> {
     /// The cameras.
@@ -28,7 +28,7 @@ pub struct MotionInput<'a, 's> {
     pub camera: CameraMotion,
     /// The matches that were assigned.
     pub matches: FrameMatches<'a>,
-    /// Where more matches are searched for, if they are.
+    /// Images in which more matches are searched for, if any.
     pub search: Option<GuidedMatching<'a, 's>>,
 }
 

@@ -17,8 +17,8 @@ const WITHIN_TENTHS: i64 = 8;
 /// Most by which the tops, or the bottoms, may differ, as a part of the extent's height.
 const EDGE_PART: i32 = 6;
 
-/// How well an instance continues a track that was cut, or is cut now, by its extent: the overlap
-/// of both; 0 where it does not.
+/// Returns the affinity by extent of an instance to a track that was cut, or is cut now: the
+/// overlap of both; 0 if it does not continue it.
 pub(super) fn extent_affinity(
     config: &TrackingConfig,
     frame: u32,

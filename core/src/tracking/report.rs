@@ -7,15 +7,15 @@ use crate::{geometry::Transform, masks::PixelBox};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackReport {
-    /// Its number, from 1, never used again.
+    /// Id of the track, from 1, never used again.
     pub id: u32,
-    /// Its class, by majority of its sightings.
+    /// Class, by majority of the sightings.
     pub class: Class,
-    /// Whether it moves.
+    /// Motion state of the track.
     pub state: MotionState,
     /// Score of its last detection.
     pub score: f32,
-    /// Whether it was detected in this frame.
+    /// True if the track was detected in this frame.
     pub detected: bool,
     /// First frame it was detected in.
     pub first_frame: u32,
@@ -29,13 +29,13 @@ pub struct TrackReport {
     /// and once the last one is too old to tell a state. For a static object it is what was
     /// measured, although its motion is taken to be the identity.
     pub speed_m_s: Option<[f32; 2]>,
-    /// Whether the motion was measured in this frame; if not it is extrapolated.
+    /// True if the motion was measured in this frame, false if it is extrapolated.
     pub measured: bool,
     /// Centre of its matches in the world, before this frame's motion, m.
     pub center_world_m: [f64; 3],
     /// Motion over ground within this frame, see [`crate::tracking`]; identity for a static object.
     pub motion_world: Transform,
-    /// Its frame to the world; `None` outside a trajectory segment.
+    /// Pose of the object in the world; `None` outside a trajectory segment.
     pub t_world_object: Option<Transform>,
     /// Matches assigned to it in this frame.
     pub matches: u32,
@@ -51,9 +51,9 @@ pub struct TrackReport {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct TrackingReport {
-    /// How detections were used.
+    /// Counts of detections.
     pub detections: DetectionCount,
-    /// How they were associated with tracks.
+    /// Counts of associations with tracks.
     pub tracks: TrackCount,
     /// Pixels whose depth was kept out of the static map.
     pub pixels_masked: u32,

@@ -38,7 +38,7 @@ impl<'t, 'm, 's> Detected<'t, 'm, 's> {
     }
 }
 
-/// Its matches are assigned to instances as well.
+/// Tracker whose matches are assigned to instances.
 #[derive(Debug)]
 #[must_use]
 pub(crate) struct Assigned<'t, 'm, 's> {
@@ -57,7 +57,7 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
         self.matches
     }
 
-    /// What the refined and the sparse matches are assigned to.
+    /// Returns the owners of the refined and of the sparse matches.
     pub(crate) fn match_owners(&self) -> [&[OwnerCode]; 2] {
         [self.tracker.refined_owner, self.tracker.sparse_owner]
     }
@@ -136,7 +136,7 @@ pub(crate) enum Added {
     Full,
 }
 
-/// Its tracks have their motions, states and poses.
+/// Tracker whose tracks have their motions, states and poses.
 #[derive(Debug)]
 #[must_use]
 pub struct Tracked<'t, 's> {

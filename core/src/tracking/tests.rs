@@ -46,7 +46,7 @@ impl<'s> Tracker<'s> {
         self.report
     }
 
-    /// Whether egomotion may use the refined match at that position.
+    /// Returns true if egomotion may use the refined match at that position.
     pub(crate) fn test_egomotion_includes(&self, index: u32) -> bool {
         self.egomotion_mask(&[]).includes(index)
     }
@@ -63,7 +63,7 @@ impl<'s> Tracker<'s> {
         self.tracks.all_mut()
     }
 
-    /// What the refined match at that position is assigned to.
+    /// Returns the owner of the refined match at that position.
     pub(crate) fn test_match_owner(&self, index: usize) -> MatchOwner {
         self.refined_owner[index].get()
     }

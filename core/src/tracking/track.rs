@@ -21,15 +21,15 @@ const CUT_TENTHS: i64 = 7;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Track {
-    /// Its motion over ground.
+    /// Filter of the motion over ground.
     pub filter: MotionFilter,
-    /// Its frame to the world; that of a trajectory segment's first pose is the camera then.
+    /// Pose of the object in the world; a trajectory segment begins with the camera's pose.
     pub t_world_object: Transform,
-    /// The same at the segment's first pose.
+    /// Pose of the object at the segment's first pose.
     pub t_world_origin: Transform,
-    /// Its last mask.
+    /// Last mask of the object.
     pub mask: MaskHandle,
-    /// How far it reached in the image when it was last seen whole, moved since with its velocity.
+    /// Box in the image when the object was last seen whole, moved since with its velocity.
     pub extent: PixelBox,
     /// Velocity in the image between the last two sightings, px a frame: of its matches or, where
     /// these are few, of its box's centre unless that is cut.
@@ -55,13 +55,13 @@ pub(crate) struct Track {
     /// Matches assigned to it in this frame, and their inliers.
     pub matches: u32,
     pub inliers: u32,
-    /// Whether this frame's motion was measured.
+    /// Set if this frame's motion was measured.
     pub measured: Flag,
     /// Error of the speed, m/s.
     pub sigma_m_s: f32,
-    /// Whether its last instance was too small to be reconstructed.
+    /// Set if the last instance was too small to be reconstructed.
     pub tracked_only: Flag,
-    /// Whether its matches say its velocity in this frame.
+    /// Set if the matches determine the velocity in this frame.
     pub velocity_measured: Flag,
 }
 
@@ -110,30 +110,30 @@ impl Track {
         Class::from_code(self.class)
     }
 
-    /// Whether it is too small to be reconstructed and no motion of it was ever measured: it is not
-    /// reported then.
+    /// Returns true if the track is too small to be reconstructed and no motion was ever measured:
+    /// it is not reported then.
     pub fn is_tentative(&self) -> bool {
         self.tracked_only.get() && !self.filter.is_known()
     }
 
-    /// Whether its speed is known: measured in this frame, or lately enough for a state.
+    /// Returns true if the speed is known: measured in this frame, or lately enough for a state.
     pub fn has_speed(&self) -> bool {
         self.filter.is_known()
             && (self.measured.get() || self.motion_state.state() != MotionState::Uncertain)
     }
 
-    /// How far its velocity moves its mask within `gap` frames, px.
+    /// Predicts the shift of the mask within `gap` frames by its velocity, px.
     pub fn predicted_shift_px(&self, gap: u32) -> [i32; 2] {
         let frames = gap.min(4) as i32;
         self.velocity_px.map(|px| px.clamp(-4096, 4096) * frames)
     }
 
-    /// Its extent where its velocity takes it within a frame.
+    /// Predicts the extent in the next frame by its velocity.
     pub fn expected_extent(&self) -> PixelBox {
         self.extent.moved(self.predicted_shift_px(1))
     }
 
-    /// Whether it is known to move.
+    /// Returns true if the object is known to move.
     pub fn moves(&self) -> bool {
         self.motion_state.state() == MotionState::Dynamic
     }
@@ -204,7 +204,7 @@ impl Track {
     }
 }
 
-/// Whether a box shows less of the object than was expected.
+/// Returns true if a box shows less of the object than was expected.
 pub(super) fn is_cut(seen: &PixelBox, expected: &PixelBox) -> bool {
     10 * seen.area() < CUT_TENTHS * expected.area()
 }

@@ -28,7 +28,7 @@ use crate::{
 };
 use nalgebra::Vector3;
 
-/// What one frame's allocation did. Requests refused repeat when several rays ask for the same
+/// Counts of one frame's allocation. Requests refused repeat when several rays ask for the same
 /// block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -104,12 +104,14 @@ impl Volume<'_> {
             report.beyond += 1;
             return;
         };
+        // Asking again for a block that exists costs one probe.
         let (found, probes) = self.index.probe(coord, |slot| self.blocks.coord(slot));
         if probes > report.probes_most {
             report.probes_most = probes;
         }
         let slot = match found {
             Some(slot) => slot,
+            // A full pool evicts the block unseen for longest, or refuses.
             None => {
                 if self.pool.is_full() && !self.evict(store, &mut report.eviction) {
                     report.refused += 1;

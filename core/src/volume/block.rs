@@ -88,7 +88,7 @@ pub(super) fn colour_layer_mut(colour: &mut Colour, z: usize) -> Option<[&mut La
 /// Red, green and blue planes of a block; all three 0 is no colour yet.
 pub(crate) type Colour = [[u8; BLOCK_VOXELS]; 3];
 
-/// What is kept of a block beside its voxels.
+/// Record of a block besides its voxels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Header {
@@ -102,12 +102,12 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// That of an empty block.
+    /// Returns the header of an empty block.
     pub fn new(coord: BlockCoord) -> Self {
         Self { coord: [coord.x, coord.y, coord.z], ..Self::default() }
     }
 
-    /// Where the block lies.
+    /// Returns the block's coordinates.
     #[inline]
     pub fn coord(&self) -> BlockCoord {
         let [x, y, z] = self.coord;
@@ -178,7 +178,7 @@ impl<'s> Blocks<'s> {
         }
     }
 
-    /// Where the block in a slot lies.
+    /// Returns the coordinates of the block in a slot.
     #[inline]
     pub fn coord(&self, slot: Slot) -> Option<BlockCoord> {
         self.header.get(slot.index()).map(Header::coord)

@@ -9,7 +9,7 @@ use crate::settings::{
 /// Semantic classes that can carry a weight of their own.
 pub const CLASS_COUNT: usize = 32;
 
-/// What one observation of a voxel weighs.
+/// Weight of one observation of a voxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -27,9 +27,9 @@ pub enum ObservationWeight {
     /// `100 / depth_m`, held within 1 and 10: near observations are more precise (the original's
     /// option).
     Depth,
-    /// As `Depth` within a band of four voxels before the surface, a quarter of that in the free
-    /// space farther before it: what one view takes for free does not erase a surface that another
-    /// one measures.
+    /// Weight as for `Depth` within a band of four voxels before the surface, a quarter of that in
+    /// the free space farther before it: free space seen in one view does not erase a surface that
+    /// another view measured.
     Band,
 }
 
@@ -79,7 +79,7 @@ pub enum DistanceAlong {
     Normal,
 }
 
-/// What happens when a block is to be made and the pool is full.
+/// Reaction to a new block when the pool is full.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

@@ -19,6 +19,7 @@ impl Volume<'_> {
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
         let [low, high] =
             within.bounds_m().map(|corner| corner.map(|c| libm::floor(c / block_m) as i32));
+        // A box larger than the map visits the map's blocks instead of the box's.
         let sides = low
             .iter()
             .zip(&high)
@@ -45,6 +46,7 @@ impl Volume<'_> {
     }
 
     fn erase_block(&mut self, slot: Slot, within: &OrientedBox, weight_most: u8) -> u32 {
+        // A block whose least weight is above the limit has nothing to erase.
         let at = slot.index();
         if self.blocks.header.get(at).is_some_and(|header| header.min_weight > weight_most) {
             return 0;
@@ -74,6 +76,7 @@ impl Volume<'_> {
                 reset += 1;
             }
         }
+        // An emptied block goes back to the pool.
         if reset > 0 && weight.iter().all(|weight| *weight == 0) {
             self.free_block(slot);
         } else if reset > 0 {

@@ -23,7 +23,7 @@ pub struct VisibleHistory<'s> {
     /// `frames` sets of `words` words each.
     sets: &'s mut [u64],
     words: usize,
-    /// What has been taken out of the ring and not been visited yet.
+    /// Blocks that were taken out of the ring and not visited yet.
     due: &'s mut [u64],
     /// The frame each slot's block was made in.
     allocated_at: &'s mut [u32],
@@ -69,7 +69,7 @@ impl<'s> VisibleHistory<'s> {
         self.len
     }
 
-    /// Whether no frame is in the ring.
+    /// Returns true if no frame is in the ring.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -157,7 +157,7 @@ impl<'s> VisibleHistory<'s> {
         (self.len > 0).then_some(self.oldest)
     }
 
-    /// Whether a frame is still in the ring.
+    /// Returns true if a frame is still in the ring.
     pub(super) fn covers(&self, frame: u32) -> bool {
         (frame.wrapping_sub(self.oldest) as usize) < self.len
     }

@@ -64,7 +64,7 @@ impl<'s> BlockIndex<'s> {
         self.table.len()
     }
 
-    /// Whether no block is indexed.
+    /// Returns true if no block is indexed.
     pub fn is_empty(&self) -> bool {
         self.table.is_empty()
     }
@@ -79,8 +79,8 @@ impl<'s> BlockIndex<'s> {
         self.table.find(hash(coord), |&slot| coord_of(slot) == Some(coord)).copied()
     }
 
-    /// As [`BlockIndex::find`], and with how many blocks' coordinates were compared: 1 where
-    /// nothing collides.
+    /// Finds a block like [`BlockIndex::find`], and counts the blocks whose coordinates were
+    /// compared: 1 if nothing collides.
     #[inline]
     pub fn probe(
         &self,

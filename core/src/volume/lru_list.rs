@@ -19,7 +19,7 @@ pub(crate) struct LruList<'s> {
     ends: [u32; 2],
 }
 
-/// What stands for a slot in the list.
+/// Returns the list's value for a slot.
 fn link(slot: Slot) -> u32 {
     slot.get() + 1
 }

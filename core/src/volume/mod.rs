@@ -111,7 +111,7 @@ impl<'s> Volume<'s> {
         &self.visible
     }
 
-    /// Which blocks were visible in the frames of the window.
+    /// Returns the blocks that were visible in the frames of the window.
     pub fn history(&self) -> &VisibleHistory<'s> {
         &self.history
     }

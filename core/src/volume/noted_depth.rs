@@ -52,7 +52,7 @@ impl NotedDepth {
         ((self.0.to_bits() & (LEVELS - 1)) + 1) as i32 as f32 * (1.0 / LEVELS as f32)
     }
 
-    /// Whether the colour seen here may be that of a surface behind, or of the sky.
+    /// Returns true if the colour may be that of a surface behind, or of the sky.
     #[inline(always)]
     pub const fn has_unreliable_colour(self) -> bool {
         self.0.to_bits() & UNRELIABLE_COLOUR != 0
@@ -77,7 +77,7 @@ impl<'a> DepthImage<'a> {
         }
     }
 
-    /// Whether depths have notes.
+    /// Returns true if depths have notes.
     pub(super) fn is_noted(self) -> bool {
         matches!(self, Self::Noted(_))
     }

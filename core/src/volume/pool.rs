@@ -91,12 +91,12 @@ impl<'s> SlotPool<'s> {
         self.fresh - self.freed_len
     }
 
-    /// Whether no slot is taken.
+    /// Returns true if no slot is taken.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether every slot is taken.
+    /// Returns true if every slot is taken.
     pub(crate) fn is_full(&self) -> bool {
         self.len() == self.capacity()
     }
@@ -143,7 +143,7 @@ impl<'s> SlotPool<'s> {
         }
     }
 
-    /// Whether a slot is taken.
+    /// Returns true if a slot is taken.
     pub(crate) fn is_live(&self, slot: Slot) -> bool {
         self.live.get(slot.index() / 64).is_some_and(|word| word >> (slot.0 % 64) & 1 == 1)
     }

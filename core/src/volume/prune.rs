@@ -11,7 +11,7 @@
 
 use super::{BLOCK_VOXELS, Slot, Volume, block::Voxels};
 
-/// What pruning did.
+/// Counts of pruning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -92,7 +92,7 @@ impl Volume<'_> {
         report
     }
 
-    /// What goes of a block that has left the window.
+    /// Returns the rule for a block that has left the window.
     pub(super) fn rule(&self) -> PruneRule {
         PruneRule { weight: self.config.prune_weight, distance: self.config.prune_distance }
     }
@@ -160,7 +160,7 @@ impl Volume<'_> {
     }
 }
 
-/// What a block's weights say.
+/// Counts of a block's weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Census {
     /// Voxels seen, but at most `prune_weight` times.

@@ -55,7 +55,7 @@ impl Tag {
             .map(|c| c as i32)
     }
 
-    /// Where a cache keeps it.
+    /// Returns the entry of a cache.
     #[inline]
     fn entry(self) -> usize {
         (self.0.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - CACHE_BITS)) as usize
@@ -116,7 +116,7 @@ pub(super) struct Band<'b> {
 }
 
 impl Band<'_> {
-    /// Whether all rows were walked and the list is empty.
+    /// Returns true if all rows were walked and the list is empty.
     pub fn is_done(&self) -> bool {
         self.next[0] >= self.end && self.len == 0
     }
@@ -151,12 +151,12 @@ pub(super) struct Rays<'a> {
     start: Vector3<f32>,
     /// The ray of pixel (0, 0) per metre of depth, and its change per column and row.
     rays: [Vector3<f32>; 3],
-    /// How far before and behind the surface blocks are made, at least and at most.
+    /// Least and largest distance before and behind the surface within which blocks are made, m.
     reach_m: [f32; 2],
     far_m: f32,
     /// First row, and first column of it.
     offset: [usize; 2],
-    /// The same where fewer rays are walked, in steps.
+    /// Offset of the rays, in steps, if fewer are walked.
     sparse_offset: [usize; 2],
     /// Surfaces nearer than these have a half and a quarter of the rays across: blocks are wide
     /// there.
@@ -202,15 +202,15 @@ impl<'a> Rays<'a> {
         1 + usize::from(depth_m < wide_m) + 2 * usize::from(depth_m < wider_m)
     }
 
-    /// Whether so many steps from ray to ray take this one.
+    /// Returns true if a spacing of so many steps takes this ray.
     #[inline(always)]
     fn is_taken(&self, steps: usize, [row, column]: [usize; 2]) -> bool {
         ((row + self.sparse_offset[0]) | (column + self.sparse_offset[1])) & (steps - 1) == 0
     }
 
-    /// How far before and behind a surface its ray is walked: at least half of the way in depth to
-    /// the rays above and to the left, so that no block between them is missed where a road or a
-    /// wall is seen at a grazing angle. `beside_m` are the depths one step off.
+    /// Returns the distance before and behind a surface over which its ray is walked: at least half
+    /// of the way in depth to the rays above and to the left, so that no block between them is
+    /// missed on a road or wall at a grazing angle. `beside_m` are the depths one step off.
     #[inline(always)]
     fn reach_m(&self, depth_m: f32, beside_m: [f32; 2], steps: usize) -> f32 {
         let [least_m, max_m] = self.reach_m;
@@ -238,6 +238,7 @@ impl<'a> Rays<'a> {
                 if !(depth_m > 0.0 && depth_m <= self.far_m) {
                     continue;
                 }
+                // Near surfaces need fewer rays: their pixels are closer together than blocks.
                 let steps = self.steps(depth_m);
                 if !self.is_taken(steps, [row, first + i]) {
                     continue;
@@ -248,6 +249,7 @@ impl<'a> Rays<'a> {
                 }
                 let ray = ray + per_column * (first_u + PIXEL_STEP * i) as f32;
                 let reach_m = self.reach_m(depth_m, beside_m, steps);
+                // Blocks along the ray before and behind the surface.
                 let from = self.start + ray * max_f32(depth_m - reach_m, 0.0);
                 let to = self.start + ray * (depth_m + reach_m);
                 walk(from, to, |block| band.meet(block));

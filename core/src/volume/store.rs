@@ -10,7 +10,7 @@ use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenF
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]
 pub struct EvictedBlock<'b> {
-    /// Its coordinates.
+    /// Coordinates of the block.
     pub coord: BlockCoord,
     /// Signed distances.
     pub sdf: &'b [i16; BLOCK_VOXELS],
@@ -23,7 +23,7 @@ pub struct EvictedBlock<'b> {
 /// A block to be filled from the store; all zero before.
 #[derive(Debug)]
 pub struct LoadedBlock<'b> {
-    /// Its coordinates.
+    /// Coordinates of the block.
     pub coord: BlockCoord,
     /// Signed distances.
     pub sdf: &'b mut [i16; BLOCK_VOXELS],
@@ -66,7 +66,7 @@ impl BlockStore for NoStore {
 pub struct EvictionReport {
     /// Blocks evicted and stored.
     pub stored: u32,
-    /// Blocks evicted and lost: the store refused them, or there is none.
+    /// Blocks evicted and lost: the store refused them, or no store is attached.
     pub lost: u32,
     /// Blocks evicted with nothing in them, or nothing that pruning would have spared.
     pub empty: u32,
@@ -101,7 +101,7 @@ impl Volume<'_> {
         true
     }
 
-    /// What a slot holds.
+    /// Returns the contents of a slot.
     fn evicted(&self, slot: Slot) -> Option<EvictedBlock<'_>> {
         Some(EvictedBlock {
             coord: self.blocks.coord(slot)?,

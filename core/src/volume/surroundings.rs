@@ -8,10 +8,10 @@ use crate::{image::View, slices::padded};
 
 /// Columns worked on at once: a word of a mask.
 pub(crate) const BLOCK: usize = 64;
-/// What differs by more than this is across an edge, 1/256 px: 1.5 px. Within a few pixels a
+/// Difference above which neighbours are across an edge, 1/256 px: 1.5 px. Within a few pixels a
 /// surface has no such step unless it is viewed edge-on.
 pub(crate) const EDGE_Q8: u16 = 384;
-/// How far an edge spoils colours, and what is behind it, px.
+/// Reach of an edge within which colours, and the depths behind it, are unreliable, px.
 pub(crate) const EDGE_REACH_PX: usize = 3;
 
 /// A disparity image, 1/256 px, 0 none, to be compared with itself.

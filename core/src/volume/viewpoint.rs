@@ -18,9 +18,9 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// The same camera, of whose pixels every so many columns and rows are kept, from the first on;
-    /// `None` for 0. Rays through the pixels kept stay what they were, to the last bit where
-    /// `every` is a power of two.
+    /// Returns the camera with only every so many columns and rows of pixels, from the first on;
+    /// `None` for 0. Rays through the pixels kept stay unchanged, to the last bit if `every` is a
+    /// power of two.
     #[inline(always)]
     pub(crate) fn thinned(mut self, every: usize) -> Option<Self> {
         let kept = NonZeroUsize::new(every)?;

@@ -73,7 +73,7 @@ impl<'s> VisibleList<'s> {
         Ok(())
     }
 
-    /// Whether a slot is entered for this frame.
+    /// Returns true if a slot is entered for this frame.
     pub(super) fn is_marked(&self, slot: Slot) -> bool {
         self.last_visible.get(slot.index()) == Some(&self.frame)
     }
@@ -83,7 +83,7 @@ impl<'s> VisibleList<'s> {
         self.last_visible.get(slot.index()).copied().unwrap_or(0)
     }
 
-    /// Whether a slot was entered in this frame or the last.
+    /// Returns true if a slot was entered in this frame or the last.
     pub(super) fn was_lately(&self, slot: Slot) -> bool {
         self.frame.wrapping_sub(self.last_visible(slot)) <= 1
     }

@@ -10,7 +10,7 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use tempfile::TempPath;
 
-/// Where evicted blocks go.
+/// Destination of evicted blocks.
 #[derive(Clone, Debug)]
 pub enum BlocksChoice {
     /// To a temporary file, as in `dynvox run`.
@@ -34,7 +34,8 @@ impl Blocks {
             BlocksChoice::Lost if records.is_empty() => return Ok(Self::Lost),
             BlocksChoice::Lost => {
                 return Err(refuse(
-                    "the snapshot has evicted blocks, and this mapper loses them. Make it with stream=True",
+                    "the snapshot has evicted blocks, and this mapper loses them. Make it with \
+                     stream=True",
                 ));
             }
             BlocksChoice::Temporary => {

@@ -53,12 +53,13 @@ impl<'py> BorrowedDetection<'py> {
         Ok(Self { of, mask })
     }
 
-    /// As the core takes it.
+    /// Returns the detection as the core takes it.
     pub fn detection(&self) -> PyResult<CoreDetection<'_>> {
         let view = self.mask.view()?;
         if view.pixels().is_empty() {
             return Err(refuse(
-                "mask has rows that do not lie one behind the other. Pass numpy.ascontiguousarray(mask)",
+                "mask has rows that do not lie one behind the other. Pass \
+                 numpy.ascontiguousarray(mask)",
             ));
         }
         Ok(CoreDetection {
@@ -92,7 +93,8 @@ impl Detection {
         let mask = if is_bool { mask.call_method1("view", ("uint8",))? } else { mask };
         Borrowed::<u8>::new("mask", &mask)?.view()?;
         let class = Class::from_name(class_name).ok_or_else(|| {
-            refuse(format!("there is no class {class_name:?}. Give a name of COCO, Cityscapes or KITTI, as car, person or truck"))
+            refuse(format!("there is no class {class_name:?}. Give a name of COCO, Cityscapes or \
+                            KITTI, as car, person or truck"))
         })?;
         Ok(Self { class, class_name: class_name.to_owned(), score, left, top, mask: mask.unbind() })
     }

@@ -10,7 +10,7 @@ use std::slice;
 /// An array that is read for as long as this lives.
 pub struct Borrowed<'py, T: Element> {
     array: PyReadonlyArrayDyn<'py, T>,
-    /// What it is called in sentences.
+    /// Name of the argument in messages.
     name: &'static str,
 }
 
@@ -20,16 +20,18 @@ impl<'py, T: Element> Borrowed<'py, T> {
         let wanted = T::get_dtype(array.py());
         let untyped = array.cast::<PyUntypedArray>().map_err(|_| {
             let found = array.get_type();
-            refuse(format!("{name} is no numpy array, but {found}. Pass numpy.asarray(...): it copies nothing that has a buffer"))
+            refuse(format!("{name} is no numpy array, but {found}. Pass numpy.asarray(...): it \
+                            copies nothing that has a buffer"))
         })?;
         let array = array.extract::<PyReadonlyArrayDyn<'py, T>>().map_err(|_| {
             let found = untyped.dtype();
-            refuse(format!("{name} has values of {found}, and {wanted} is needed. Scale and convert it: array.astype(numpy.{wanted})"))
+            refuse(format!("{name} has values of {found}, and {wanted} is needed. Scale and \
+                            convert it: array.astype(numpy.{wanted})"))
         })?;
         Ok(Self { array, name })
     }
 
-    /// Whether there are three values for each pixel.
+    /// Returns true if there are three values for each pixel.
     pub fn is_colour(&self) -> bool {
         self.array.shape().len() == 3
     }
@@ -67,7 +69,8 @@ impl<'py, T: Element> Borrowed<'py, T> {
             && strides.get(2).is_none_or(|&channel| channel == value);
         if !dense || (height > 1 && (row < size * width as isize || row % size != 0)) {
             return Err(refuse(format!(
-                "{name} has pixels that do not lie side by side in its rows. Pass numpy.ascontiguousarray({name})"
+                "{name} has pixels that do not lie side by side in its rows. Pass \
+                 numpy.ascontiguousarray({name})"
             )));
         }
         let stride = if height > 1 { (row / size) as usize } else { width };

@@ -85,7 +85,7 @@ fn plain(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     Ok(text.into())
 }
 
-/// Where evicted blocks go.
+/// Returns the destination of evicted blocks.
 pub fn blocks(stream: Option<&Bound<'_, PyAny>>) -> PyResult<BlocksChoice> {
     let Some(stream) = stream else { return Ok(BlocksChoice::Temporary) };
     match stream.cast::<PyBool>() {

@@ -11,7 +11,8 @@ use pyo3::types::PyDict;
 pub fn given(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Transform> {
     let refused = || {
         refuse(format!(
-            "{name} cannot be read as a pose. Pass a matrix of 4 x 4 or 3 x 4 numbers, or a dictionary with rotation and translation_m"
+            "{name} cannot be read as a pose. Pass a matrix of 4 x 4 or 3 x 4 numbers, or a \
+             dictionary with rotation and translation_m"
         ))
     };
     if let Ok(parts) = value.cast::<PyDict>() {

@@ -83,7 +83,8 @@ impl Rig {
     fn __repr__(&self) -> String {
         let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
         format!(
-            "Rig(focal_px={focal_px}, center_u_px={center_u_px}, center_v_px={center_v_px}, baseline_m={baseline_m})"
+            "Rig(focal_px={focal_px}, center_u_px={center_u_px}, center_v_px={center_v_px}, \
+             baseline_m={baseline_m})"
         )
     }
 }

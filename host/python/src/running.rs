@@ -23,8 +23,8 @@ self_cell!(
     }
 );
 
-/// What a snapshot begins with. Then follow, of 8 bytes each, width and height of the mapped
-/// pictures and the length of the core's snapshot; that, and the file of evicted blocks.
+/// First bytes of a snapshot. Then follow, of 8 bytes each, width and height of the mapped pictures
+/// and the length of the core's snapshot; then the core's snapshot, and the file of evicted blocks.
 const MAGIC: [u8; 8] = *b"DVXPYTHN";
 const HEAD: usize = 32;
 
@@ -34,7 +34,7 @@ pub struct Running {
     pub mapper: SlabMapper,
     pub threads: Threads,
     pub blocks: Blocks,
-    /// Of the last step.
+    /// Report of the last step.
     pub report: Option<Report>,
     /// Wall time of the core's part of it.
     pub step_time: Option<Duration>,
@@ -44,13 +44,13 @@ pub struct Running {
     next_frame: u32,
 }
 
-/// What a mapper is made of when its pictures' size is known.
+/// Everything a mapper is made of once its pictures' size is known.
 pub struct Recipe {
     pub rig: Rig,
-    /// What is asked of it.
+    /// Request that the mapper was made of.
     pub request: Request,
     pub interval_s: Option<f64>,
-    /// Of a data set's run, whose plan is made already.
+    /// Plan of a data set's run, if it is made already.
     pub plan: Option<MapperPlan>,
     pub blocks: BlocksChoice,
 }
@@ -102,14 +102,15 @@ impl Running {
         })
     }
 
-    /// As it was when the snapshot was taken.
+    /// Restores the mapper to its state when the snapshot was taken.
     fn restore(plan: MapperPlan, snapshot: &Snapshot<'_>, blocks: &BlocksChoice) -> PyResult<Self> {
         let slab = slab_of(&plan)?;
         let mut source = snapshot.core;
         let mapper = SlabMapper::try_new(slab, |slab| {
             let mut read = |piece: &mut [u8]| source.read_exact(piece);
             Mapper::restore(&plan.capacity, &plan.config, slab.borrow_mut().bytes_mut(), &mut read)
-                .map_err(|error| refuse(format!("{error}. Restore it with the rig, the bounds and the settings it was made with")))
+                .map_err(|error| refuse(format!("{error}. Restore it with the rig, the bounds and \
+                    the settings it was made with")))
         })?;
         Ok(Self {
             blocks: Blocks::begin(blocks, &plan.config, snapshot.blocks)?,
@@ -195,7 +196,8 @@ impl State {
     pub fn running(&mut self) -> PyResult<&mut Running> {
         let absent = || {
             refuse(
-                "the mapper has no picture yet, and so no size. Give it one with step, or its size with image=(width, height)",
+                "the mapper has no picture yet, and so no size. Give it one with step, or its size \
+                 with image=(width, height)",
             )
         };
         self.running.as_mut().ok_or_else(absent)
@@ -206,7 +208,8 @@ impl State {
     pub fn restore(&mut self, bytes: &[u8]) -> PyResult<()> {
         let foreign = || {
             refuse(
-                "the bytes are not a snapshot of a mapper of Python. Pass those that Mapper.snapshot() returned",
+                "the bytes are not a snapshot of a mapper of Python. Pass those that \
+                 Mapper.snapshot() returned",
             )
         };
         let snapshot = Snapshot::parse(bytes).ok_or_else(foreign)?;

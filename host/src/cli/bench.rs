@@ -3,7 +3,7 @@
 use crate::run::{self, Bench};
 use dynvox_core::parallel::Vectors;
 
-/// What `dynvox bench` is told.
+/// Arguments of `dynvox bench`.
 #[derive(Debug, clap::Args)]
 pub struct BenchArgs {
     /// Write the figures to standard output as JSON, and nothing else

@@ -102,7 +102,8 @@ fn solved(args: &BudgetArgs, memory: Bytes, capacity: &Capacity) -> anyhow::Resu
     }
     outln!("{} of {} bytes ({memory})", grouped(capacity.bytes() as u64), grouped(memory.0 as u64));
     outln!(
-        "  distance before blocks are evicted: about {path_m:.0} m, by the synthetic street's blocks a metre"
+        "  distance before blocks are evicted: about {path_m:.0} m, by the synthetic street's \
+         blocks a metre"
     );
     outln!("  pruning window: {} frames", capacity.history_frames);
     outln!(
@@ -133,7 +134,8 @@ fn to_c(capacity: &Capacity) -> anyhow::Result<String> {
 fn overview() {
     out!("{}", table(&VolumeConfig::default()));
     outln!(
-        "\n`dynvox budget --profile NAME` shows a profile region by region; `dynvox budget --memory 48MiB --image 752x480` finds bounds for other cases."
+        "\n`dynvox budget --profile NAME` shows a profile region by region; `dynvox budget \
+         --memory 48MiB --image 752x480` finds bounds for other cases."
     );
 }
 
@@ -176,7 +178,8 @@ pub fn table(volume: &VolumeConfig) -> String {
     let _ = writeln!(
         table,
         "\nimage: the largest; m3: blocks of {block_m:.2} m a side; window: frames `volume.prune_lag` can span; path: seconds at {SPEED_M_S} m/s until \
-         the pool is full and blocks are evicted to disk,\nby the {BLOCKS_PER_M} blocks a metre of the synthetic street at its default size, noise pruned, with \
+         the pool is full and blocks are evicted to disk,\nby the {BLOCKS_PER_M} blocks a metre \
+         of the synthetic street at its default size, noise pruned, with \
          voxels of 0.05 m (another street or voxel: another figure)"
     );
     table

@@ -36,7 +36,10 @@ pub fn run(args: &CalibrationArgs) -> anyhow::Result<()> {
     })?;
     let shown = args.files.first().map(|path| path.display().to_string()).unwrap_or_default();
     let (rectification, rig) = calibration.rectify(sizing).map_err(|problem| {
-        anyhow::anyhow!("{shown} cannot be rectified: {problem}. Give another --rectified size, or check the calibration's numbers")
+        anyhow::anyhow!(
+            "{shown} cannot be rectified: {problem}. Give another --rectified size, or \
+                         check the calibration's numbers"
+        )
     })?;
     print(&calibration, &rectification, &rig);
     if let Some(out) = &args.out {

@@ -84,7 +84,8 @@ fn sentences(comparison: &Comparison, names: [&Path; 2]) -> String {
             let [short, long] = if which == 0 { [&a, &b] } else { [&b, &a] };
             let more = comparison.frames[1 - which][2] - shared;
             format!(
-                "{short} is a prefix of {long}: equal in all its {shared} frames, {more} more follow\n"
+                "{short} is a prefix of {long}: equal in all its {shared} frames, {more} more \
+                 follow\n"
             )
         }
         (None, None) if comparison.equal() => format!("equal in all {shared} frames\n"),

@@ -38,7 +38,7 @@ enum Action {
         /// A fixture, or a folder of fixtures
         #[arg(default_value = "fixtures", value_name = "DIR")]
         path: PathBuf,
-        /// Why the digests are meant to change
+        /// Reason why the digests are meant to change
         #[arg(long, value_name = "TEXT", required_unless_present = "dry_run")]
         reason: Option<String>,
         /// Say what would be blessed, and write nothing
@@ -62,7 +62,7 @@ enum Action {
     },
 }
 
-/// What `dynvox fixtures new` is told. Options are those of `dynvox run`.
+/// Arguments of `dynvox fixtures new`. The options are those of `dynvox run`.
 #[derive(Debug, clap::Args)]
 struct NewArgs {
     /// Folder to write
@@ -106,7 +106,7 @@ struct NewArgs {
 }
 
 impl NewArgs {
-    /// What they ask of a run.
+    /// Makes the request of a run from the arguments.
     fn request(&self) -> Result<Request, RequestError> {
         let memory = self.memory.or(self.profile.is_none().then_some(DEFAULT_MEMORY));
         let options = Options {
@@ -142,7 +142,8 @@ fn new(args: &NewArgs) -> anyhow::Result<()> {
     }
     let (shown, mib) = (args.folder.display(), plan.capacity.bytes() as f64 / f64::from(1 << 20));
     outln!(
-        "{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: dynvox fixtures verify {shown}"
+        "{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: \
+         dynvox fixtures verify {shown}"
     );
     Ok(())
 }

@@ -47,10 +47,10 @@ enum Action {
     Align {
         /// Folder of the jobs
         folder: PathBuf,
-        /// How far given positions may be off, one standard deviation
+        /// Uncertainty of given positions, one standard deviation
         #[arg(long, default_value_t = 0.3, value_name = "M")]
         uncertainty_m: f64,
-        /// How far given rotations may be off, one standard deviation
+        /// Uncertainty of given rotations, one standard deviation
         #[arg(long, default_value_t = 1.5, value_name = "DEGREES")]
         uncertainty_deg: f64,
     },
@@ -73,7 +73,7 @@ enum Action {
     },
     /// Add maps: folders of sums, or folders of jobs whose maps are all resampled
     Merge {
-        /// What to add, in any order
+        /// Maps to add, in any order
         #[arg(required = true)]
         maps: Vec<PathBuf>,
         /// Folder to write
@@ -99,7 +99,7 @@ enum Action {
     Report {
         /// Folder of the jobs
         folder: PathBuf,
-        /// Their merged map
+        /// Merged map of the jobs
         map: PathBuf,
         /// Folder to write
         #[arg(long, value_name = "DIR")]

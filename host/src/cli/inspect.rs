@@ -144,7 +144,7 @@ impl SequenceFound {
     }
 }
 
-/// What a sequence has, and what can be made of it.
+/// Contents of a sequence, and what can be made of them.
 #[derive(Serialize)]
 struct Description {
     pairs: usize,
@@ -153,16 +153,16 @@ struct Description {
     seconds: f64,
     #[serde(serialize_with = "rig_numbers")]
     rig: StereoRig,
-    /// Whether images have colour; absent where the first cannot be read.
+    /// True if images have colour; absent if the first cannot be read.
     colour: Option<bool>,
     true_poses: bool,
     object_labels: bool,
     masks: &'static str,
     frames_with_masks: usize,
     frames_with_lidar: usize,
-    /// What is doubtful about the images.
+    /// Doubts about the images.
     findings: Vec<Doubt>,
-    /// What cannot be read of what is there.
+    /// Files that exist and cannot be read.
     unreadable: Vec<String>,
     notes: Vec<String>,
     /// Least bytes of memory; absent where images of this size cannot be mapped.
@@ -252,7 +252,8 @@ impl Description {
         );
         let StereoRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
         outln!(
-            "  focal length {focal_px:.2} px, principal point ({center_u_px:.2}, {center_v_px:.2}) px, baseline {baseline_m:.4} m"
+            "  focal length {focal_px:.2} px, principal point ({center_u_px:.2}, {center_v_px:.2}) \
+             px, baseline {baseline_m:.4} m"
         );
         match self.colour {
             Some(true) => outln!("  colour images: the map has colours"),
@@ -268,7 +269,8 @@ impl Description {
         match self.frames_with_lidar {
             0 => outln!("  no LiDAR scans (velodyne/): accuracy and completeness stay unknown"),
             frames => outln!(
-                "  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and completeness"
+                "  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and \
+                 completeness"
             ),
         }
         self.unreadable.iter().for_each(|what| outln!("  {what}"));
@@ -290,7 +292,7 @@ fn least_memory(width: usize, height: usize) -> Result<usize, BudgetError> {
     }
 }
 
-/// Which masks there are, for how many frames, and that as a sentence.
+/// Returns the kind of masks, the number of frames that have them, and both as a sentence.
 fn masks(dataset: &dyn FrameSource) -> (&'static str, usize, String) {
     match dataset.masks() {
         AvailableMasks::Folder(folder) => {
@@ -310,7 +312,8 @@ fn masks(dataset: &dyn FrameSource) -> (&'static str, usize, String) {
                     folder.display()
                 ),
                 there => format!(
-                    "masks in {} for {there} of {} frames: in the others objects are found only while they move",
+                    "masks in {} for {there} of {} frames: in the others objects are found only \
+                     while they move",
                     folder.display(),
                     dataset.len()
                 ),

@@ -56,15 +56,18 @@ Examples:
   dynvox evaluate masks masks/motion ~/tracking/instances/0003   IoU of masks that a run saved
   dynvox sweep street ~/kitti:06 --out sweep    prune weights, frame rates and scales on one page
   dynvox synth --out street --set street.frames=50
-  dynvox bench ~/kitti --sequence 06 --frames 60    CPU time of every stage, on one thread and on two
+  dynvox bench ~/kitti --sequence 06 --frames 60    CPU time of every stage, on one thread and on \
+  two
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
   dynvox fleet plan recordings.toml --out fleet   jobs for many recordings, whose maps become one
   dynvox view out/street-001                    its map in the browser
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 
-A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open the last in a browser.
+A run leaves a folder with map.ply, trajectories, frames.csv, summary.json and report.html: open \
+the last in a browser.
 
-Exit codes: 0 done; 1 failed; 2 wrong command line; 3 images refused; 4 the run ended early or lacks a file: what was mapped is in its folder,
+Exit codes: 0 done; 1 failed; 2 wrong command line; 3 images refused; 4 the run ended early or \
+lacks a file: what was mapped is in its folder,
 and summary.json says why under `incomplete`.";
 
 /// Dense stereo mapping of dynamic scenes, within a fixed byte budget and bit-exact on every

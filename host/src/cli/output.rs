@@ -18,7 +18,7 @@ pub fn print(text: Arguments<'_>) {
     }
 }
 
-/// Whether all was printed.
+/// Flushes the output, and returns the failure if not all was printed.
 ///
 /// # Errors
 /// What stopped the printing.

@@ -11,7 +11,7 @@ use crate::run::RunFolder;
 use finish::{finish, print_header};
 use std::path::{Path, PathBuf};
 
-/// Where run folders go unless `--out` says otherwise.
+/// Folder in which run folders are made unless `--out` says otherwise.
 const DEFAULT_PARENT: &str = "out";
 
 #[derive(Debug, Default, clap::Args)]

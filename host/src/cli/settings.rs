@@ -15,10 +15,14 @@ use std::fmt::Write;
 const HEAD: &str = "\
 # Settings
 
-Everything that can be configured besides the rig's calibration. `dynvox run --set KEY=VALUE` sets one, `--config FILE` takes a
-TOML file with some or all of them; the `config.toml` of a run has all. Unknown keys are refused. `dynvox settings KEY` prints one.
-C: `dynvox_config_set`; Python: `set={\"KEY\": VALUE}`. Units are in the names. *Published* is the value of the original or of the
-paper behind a stage, where it differs from the default. A key without a default is unset. Settings marked *user* are those that
+Everything that can be configured besides the rig's calibration. `dynvox run --set KEY=VALUE` \
+sets one, `--config FILE` takes a
+TOML file with some or all of them; the `config.toml` of a run has all. Unknown keys are refused. \
+`dynvox settings KEY` prints one.
+C: `dynvox_config_set`; Python: `set={\"KEY\": VALUE}`. Units are in the names. *Published* is \
+the value of the original or of the
+paper behind a stage, where it differs from the default. A key without a default is unset. \
+Settings marked *user* are those that
 another camera, scene, machine or robot asks for; the others are for who studies a stage.
 
 `dynvox settings --markdown > docs/settings.md` writes this page.
@@ -103,7 +107,7 @@ fn default(value: Option<&toml::Value>) -> String {
     }
 }
 
-/// What the value must be, with its unit.
+/// Returns the rule that the value must follow, with its unit.
 fn rule(about: &About) -> String {
     let range = match about.range {
         Range::Any => String::new(),

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub struct SweepArgs {
     /// Data sets: street, PATH or PATH:SEQUENCE [default: street]
     data: Vec<Data>,
-    /// What to vary
+    /// Settings to vary
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale])]
     sweeps: Vec<Kind>,
     /// Prune weights
@@ -172,7 +172,7 @@ fn reference(data: &Data) -> anyhow::Result<Option<Reference>> {
     Ok(has_lidar.then_some(Reference::Lidar))
 }
 
-/// Which data set a run is of.
+/// Finds the data set that a run belongs to.
 fn data_of(plan: &Plan, key: &str, labels: &[String]) -> Option<usize> {
     let point = plan.points.iter().find(|point| point.run == key)?;
     labels.iter().position(|label| *label == point.data)

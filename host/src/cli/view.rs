@@ -30,7 +30,8 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
     let folder = &args.run;
     let Ok(summary) = std::fs::read_to_string(folder.join(SUMMARY_FILE)) else {
         bail!(
-            "{} is not a run folder (it has no summary.json). Give the folder that `dynvox run` printed as its results",
+            "{} is not a run folder (it has no summary.json). Give the folder that `dynvox run` \
+             printed as its results",
             folder.display()
         );
     };

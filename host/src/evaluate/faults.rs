@@ -10,24 +10,24 @@ pub const WRONG_M: f64 = 0.3;
 /// A pose turned further than this from the true one is wrong, degrees.
 pub const WRONG_DEG: f64 = 2.0;
 
-/// What a frame with a known true pose came to.
+/// Estimated and true pose of a frame, with what the report says of it.
 #[derive(Clone, Copy, Debug)]
 pub struct EvaluatedFrame {
     /// The estimate, camera to world.
     pub t_world_camera: Transform,
     /// The truth, camera to world.
     pub true_t_world_camera: Transform,
-    /// How the pose came about.
+    /// Source of the pose: measured, extrapolated, or given.
     pub pose: PoseOrigin,
     /// The worst event that was reported.
     pub severity: Severity,
-    /// Whether it was fused.
+    /// True if the frame was fused into the map.
     pub fused: bool,
     /// Segment of the map.
     pub segment: u32,
 }
 
-/// What a fault came to.
+/// Consequences of a planted fault: unreported errors, wrong fusions, and recovery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FaultOutcome {
     /// Largest distance from the true pose among frames that nothing is reported of, m.
@@ -48,9 +48,9 @@ pub struct FaultOutcome {
 }
 
 impl FaultOutcome {
-    /// Of frames; `first` is the first that a fault may have touched. Poses are compared from the
-    /// frame before it on, so that drift until then does not count, and within a segment of the map
-    /// from its first frame on.
+    /// Evaluates frames; `first` is the first that a fault may have touched. Poses are compared
+    /// from the frame before it on, so that drift until then does not count, and within a segment
+    /// of the map from its first frame on.
     pub fn from_frames(frames: &[EvaluatedFrame], first: usize) -> Self {
         let Some(mut before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
         let mut outcome = Self { recovered_after: Some(0), ..Self::default() };

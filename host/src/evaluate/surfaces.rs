@@ -17,9 +17,9 @@ use std::collections::HashMap;
 
 /// Side of the cells samples are made of, m.
 const CELL_M: f64 = 0.03;
-/// How far outside the true object's box its surface may lie, m.
+/// Distance outside the true object's box within which its surface may lie, m.
 const MARGIN_M: f64 = 0.03;
-/// How far above its foot a true object begins, m: what is lower is road.
+/// Height above its foot at which a true object begins, m: what is lower is road.
 const FOOT_M: f64 = 0.05;
 /// Largest distance measured, voxels: a sample this near to the mesh counts as reconstructed.
 pub const REACH_VOXELS: f64 = 2.0;
@@ -37,7 +37,7 @@ pub struct TrueView<'a> {
     pub far_m: f64,
 }
 
-/// What was seen of a true object while it was fused.
+/// Surface of a true object that was visible while it was fused.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SeenSide {
     /// Sum of the points in a cell, and their number.

@@ -13,9 +13,10 @@ use std::collections::HashMap;
 use std::io;
 use std::path::Path;
 
-/// How far above its foot a box begins: the road is mapped, and not flat to the millimetre, m.
+/// Height above its foot at which a box begins, m: the road is mapped, and not flat to the
+/// millimetre.
 const FOOT_M: f64 = 0.3;
-/// How far its sides lie inside, m.
+/// Distance by which the box's sides are moved inwards, m.
 const SIDE_M: f64 = 0.1;
 
 /// Side of the squares of ground by which boxes are found, m.
@@ -76,13 +77,13 @@ impl Swept {
         }
     }
 
-    /// Whether a point of the map lies in it.
+    /// Returns true if a point of the map lies in a swept box.
     pub fn contains(&self, point: &Point3<f64>) -> bool {
         let near = self.squares.get(&square(point.x, point.z)).into_iter().flatten();
         near.filter_map(|&number| self.boxes.get(number as usize)).any(|one| one.contains(point))
     }
 
-    /// How many triangles of a static map have all their corners in it.
+    /// Counts the triangles of a static map that have all their corners in a swept box.
     ///
     /// # Errors
     /// The file is no mesh of this program.

@@ -23,14 +23,14 @@ pub const ALIGNMENT_FILE: &str = "alignment.json";
 const MAX_POINTS: usize = 200_000;
 /// Weight of a voxel that takes part.
 const MIN_WEIGHT: u8 = 3;
-/// How much surer the first recording is than the others: its given pose is the world's, so that
-/// what is known of the world, a map or a plan, goes on to fit. Were it as unsure as the others,
-/// all would move by the mean of their errors.
+/// Factor on the uncertainty of the first recording's pose. The first pose defines the world, so
+/// that maps and plans made earlier still fit. With an equal share, all recordings would move by
+/// the mean of their errors.
 const FIRST_SHARE: f64 = 1e-4;
 /// Registrations of all pairs, each from the poses that the last one gave.
 const ROUNDS: usize = 3;
 
-/// Where recordings lie.
+/// Poses of all recordings after alignment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
     /// In the order of the jobs.
@@ -39,34 +39,34 @@ pub struct Alignment {
     pub pairs: Vec<AlignedPair>,
 }
 
-/// Where a recording lies.
+/// Pose of a recording before and after alignment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlignedRecording {
-    /// Its name.
+    /// Name in tables and charts.
     pub name: String,
-    /// Its job.
+    /// Id of the recording's job.
     pub id: String,
-    /// As it was given: the rows of a 3 x 4 matrix.
+    /// Given pose: the rows of a 3 x 4 matrix.
     pub given: [f64; 12],
-    /// As it is.
+    /// Aligned pose: the rows of a 3 x 4 matrix.
     pub t_world_camera: [f64; 12],
-    /// How far the map's centre was moved, m.
+    /// Distance by which the map's centre was moved, m.
     pub moved_m: f64,
-    /// How far the map was turned, degrees.
+    /// Angle by which the map was rotated, degrees.
     pub turned_deg: f64,
 }
 
-/// How two recordings fit.
+/// Fit of two recordings that overlap.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlignedPair {
     /// Names of the recordings.
     pub recordings: [String; 2],
-    /// How well they fit, aligned.
+    /// Quality of the fit after alignment.
     #[serde(flatten)]
     pub fit: Fit,
 }
 
-/// What is kept of a recording while others are registered.
+/// Samples of a recording's map that are kept while others are registered.
 struct Sampled {
     points: Vec<SurfacePoint>,
     centre_m: [f64; 3],
@@ -83,6 +83,7 @@ impl Alignment {
         folder: &Path,
         uncertainty: &Uncertainty,
     ) -> Result<Self, FleetError> {
+        // Poses as given, with what is known of their errors.
         let priors =
             manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
         let sampled = manifest
@@ -103,6 +104,7 @@ impl Alignment {
             priors.iter().map(|prior| prior.uncertainty.unwrap_or(*uncertainty)).collect();
         let mut poses: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
+        // Registration begins from the poses of the round before.
         for _ in 0..ROUNDS {
             let found = register_all(manifest, folder, (&sampled, &nodes, &poses, &allowed))?;
             let edges: Vec<Edge> = found
@@ -140,8 +142,8 @@ impl Alignment {
     }
 }
 
-/// Where the maps of jobs lie in the world: as aligned, or as given where nothing was aligned. With
-/// fixes that is known of a map that is there.
+/// Returns the poses of jobs' maps in the world: aligned, or as given if nothing was aligned. A job
+/// with fixes needs its map.
 ///
 /// # Errors
 /// The alignment is not of these jobs.
@@ -150,6 +152,7 @@ pub fn poses(
     folder: &Path,
 ) -> Result<Vec<Result<Transform, FleetError>>, FleetError> {
     let path = folder.join(ALIGNMENT_FILE);
+    // Poses as given hold until an alignment of these jobs replaces them.
     let given: Vec<_> =
         manifest.jobs.iter().map(|job| Ok(prior(job, folder)?.t_world_map)).collect();
     if !path.is_file() {
@@ -221,6 +224,7 @@ fn register_all(
         let mut map_b = None;
         for a in b + 1..sampled.len() {
             let t_b_a = poses[b].inverse() * poses[a];
+            // Maps that lie too far apart share no surface.
             let to_a = t_b_a.transform_point(sampled[a].centre_m);
             if distance_m(&to_a, &sampled[b].centre_m) > sampled[a].radius_m + sampled[b].radius_m {
                 continue;

@@ -16,9 +16,9 @@ use std::path::Path;
 pub struct Averages {
     /// The blocks that have a surface.
     pub store: BlockFile<File>,
-    /// Their voxels.
+    /// Lattice of the voxels.
     pub lattice: Lattice,
-    /// Their number.
+    /// Number of blocks.
     pub blocks: u64,
     /// Voxels that were seen too often for their sums.
     pub overflowed: u64,
@@ -26,7 +26,7 @@ pub struct Averages {
 }
 
 impl Averages {
-    /// Of the map in `folder`, in a file beside `out` meanwhile.
+    /// Averages the map in `folder` into a temporary file next to `out`.
     ///
     /// # Errors
     /// The folder has no tile, a tile is damaged or of other voxels, or the disk refuses.

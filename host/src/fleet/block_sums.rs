@@ -33,7 +33,7 @@ pub struct BlockAverage {
 }
 
 impl BlockSums {
-    /// Of nothing.
+    /// Makes sums without observations.
     pub fn zero(colour: bool) -> Self {
         Self {
             distance: Box::new([0; BLOCK_VOXELS]),
@@ -42,7 +42,7 @@ impl BlockSums {
         }
     }
 
-    /// Whether no voxel was seen.
+    /// Returns true if no voxel was observed.
     pub fn is_empty(&self) -> bool {
         self.weight.iter().all(|weight| *weight == 0)
     }

@@ -11,7 +11,7 @@ use dynvox_core::volume::{BLOCK_SIDE, BlockCoord};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Whether a surface came or went.
+/// Direction of a change: a surface appeared or disappeared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ChangeKind {
@@ -34,7 +34,7 @@ impl ChangeKind {
 /// A place in the world that has changed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// What happened.
+    /// Direction of the change.
     pub kind: ChangeKind,
     /// The epoch before.
     pub from_epoch: u32,
@@ -185,7 +185,7 @@ mod tests {
         (blocks, changes(&map.changes, &map.lattice, 0.05))
     }
 
-    /// Whether the map has a surface in the middle of the box's top.
+    /// Returns true if the map has a surface in the middle of the box's top.
     fn shows_box(blocks: &[ResolvedBlock]) -> bool {
         let block =
             blocks.iter().find(|block| block.coord == BlockCoord { x: 1, y: 1, z: 1 }).unwrap();

@@ -10,19 +10,19 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Which blocks how many recordings saw.
+/// Numbers of recordings that observed each block.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Coverage {
     /// Blocks with a surface by the number of recordings that saw one there, from one on.
     pub blocks_by_recordings: Vec<u64>,
-    /// The same by tile.
+    /// Coverage of each tile.
     pub tiles: Vec<TileCoverage>,
     /// The most recordings that saw a surface in a column of blocks, by x and z.
     #[serde(skip)]
     pub columns: BTreeMap<[i16; 2], u16>,
 }
 
-/// How a tile is covered.
+/// Coverage of one tile.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TileCoverage {
     /// Coordinates in the world, in tiles.
@@ -33,7 +33,7 @@ pub struct TileCoverage {
     pub blocks_by_recordings: Vec<u64>,
 }
 
-/// How recordings, each a folder of sums, cover the world.
+/// Counts how recordings, each a folder of sums, cover the world.
 ///
 /// # Errors
 /// A tile is damaged or of other voxels.
@@ -42,6 +42,7 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
     for (nth, folder) in recordings.iter().enumerate() {
         files.extend(tiles(folder)?.into_iter().map(|(tile, path)| (tile, nth, path)));
     }
+    // Tiles in order, so that files of one tile come together.
     files.sort();
     let (mut coverage, mut lattice) = (Coverage::default(), None);
     for of_tile in files.chunk_by(|a, b| a.0.sides == b.0.sides) {
@@ -55,6 +56,7 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
             blocks_by_recordings: Vec::new(),
         };
         let mut saw = vec![false; heads.len()];
+        // Blocks are merged in order, one read from each file at a time.
         while let Some(coord) = least(&heads) {
             let mut count = 0;
             for (head, saw) in heads.iter_mut().zip(&mut saw) {
@@ -76,7 +78,7 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
     Ok(coverage)
 }
 
-/// Whether a voxel lies nearer to a surface than the truncation.
+/// Returns true if a voxel lies nearer to a surface than the truncation.
 fn has_surface(sums: &BlockSums) -> bool {
     let is_near = |(distance, weight): (&i32, &u32)| {
         *weight > 0 && i64::from(*distance) < i64::from(*weight) * 32_767

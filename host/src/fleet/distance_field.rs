@@ -26,7 +26,7 @@ pub struct DistanceField {
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
-    /// Where, m.
+    /// Position, m.
     pub at_m: [f64; 3],
     /// Direction of free space, of length 1.
     pub normal: [f64; 3],
@@ -57,7 +57,7 @@ impl DistanceField {
         field
     }
 
-    /// Whether a block was seen.
+    /// Returns true if a block was observed.
     pub fn holds(&self, coord: BlockCoord) -> bool {
         self.blocks.contains_key(&coord)
     }
@@ -122,8 +122,8 @@ impl DistanceField {
         points
     }
 
-    /// Where the distance changes its sign between a lattice point and the next along an axis, in
-    /// voxels.
+    /// Finds the zero crossing of the distance between a lattice point and the next along an axis,
+    /// in voxels.
     fn crossing(&self, at: [i32; 3], axis: usize) -> Option<[f64; 3]> {
         let mut next = at;
         next[axis] += 1;

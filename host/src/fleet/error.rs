@@ -3,7 +3,7 @@
 use super::tile_file::Lattice;
 use std::path::{Path, PathBuf};
 
-/// Why maps cannot be merged.
+/// Reason why maps cannot be merged.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
     /// The system refuses.
@@ -19,17 +19,18 @@ pub enum FleetError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Reason, and what to do.
         reason: String,
     },
     /// Maps of different voxels.
     #[error(
-        "{path} has {found}, the maps before it {expected}. Map all recordings with the same volume.voxel_size_m, volume.truncation_m and colour"
+        "{path} has {found}, the maps before it {expected}. Map all recordings with the same \
+         volume.voxel_size_m, volume.truncation_m and colour"
     )]
     OtherLattice {
         /// The file that differs.
         path: PathBuf,
-        /// Its lattice.
+        /// Lattice that was found.
         found: Lattice,
         /// The lattice of those before it.
         expected: Lattice,

@@ -35,11 +35,11 @@ pub struct Camera {
     pub rig: StereoRig,
     /// Image width and height, px.
     pub size: (usize, usize),
-    /// Its frames.
+    /// Poses of the camera in the frames.
     pub poses: Vec<CameraPose>,
 }
 
-/// Where a camera was.
+/// Pose of the camera in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraPose {
     /// Number of the frame in the data set.
@@ -109,7 +109,7 @@ impl Depths {
         Self { width, height, depth_m }
     }
 
-    /// Whether all rays through a block end behind it.
+    /// Returns true if all rays through a block end behind it.
     fn show_free(
         &self,
         Camera { rig, .. }: &Camera,
@@ -137,6 +137,7 @@ impl Depths {
                 (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]))
             });
         }
+        // The block's outline must lie in the image as a whole.
         let [left, top, right, bottom] =
             [low[0].floor(), low[1].floor(), high[0].ceil(), high[1].ceil()];
         if left < 0.0 || top < 0.0 || right >= self.width as f64 || bottom >= self.height as f64 {

@@ -22,8 +22,8 @@ use std::path::Path;
 const FIXES_MIN: usize = 10;
 /// Largest standard deviation of the turn about any axis, rad: a registration does not find more.
 const TURN_MAX_RAD: f64 = 0.052;
-/// How well the axes of the inertial system are those of the camera, and how well it measures them,
-/// rad.
+/// Standard deviation of the angles between the inertial system's axes and the camera's, including
+/// measurement noise, rad.
 const ANGLES_SIGMA_RAD: f64 = 0.0175;
 /// Angles may contradict positions by no more, rad.
 const CONTRADICTION_MAX_RAD: f64 = 0.175;
@@ -41,7 +41,7 @@ const MAX_ROUNDS: usize = 50;
 /// A round that changes no number of the motion by more ends them, m and rad.
 const STEP_MIN: f64 = 1e-9;
 
-/// Where a recording's map lies as given, and how far that may be off where it is known.
+/// Given pose of a recording's map, with its uncertainty where that is known.
 #[derive(Clone, Copy, Debug)]
 pub struct Prior {
     /// The map in the world.
@@ -56,15 +56,15 @@ type PointPair = (Vector3<f64>, Vector3<f64>);
 /// A frame with a fix.
 #[derive(Clone, Copy, Debug)]
 struct Observation {
-    /// Its camera in the map.
+    /// Pose of the camera in the map.
     t_map_camera: Transform,
     /// The antenna in the world, m.
     at_m: Vector3<f64>,
-    /// Its camera's axes in the world, where angles were measured.
+    /// Axes of the camera in the world, if angles were measured.
     axes: Option<Matrix3<f64>>,
 }
 
-/// Where the map of a job lies as given. With fixes its map must be there.
+/// Returns the given pose of a job's map. A job with fixes needs its map.
 ///
 /// # Errors
 /// The map or the fixes cannot be read, or the fixes do not say where the map lies.
@@ -80,7 +80,8 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
         Given::Figures(_) => {
             return Err(FleetError::content(
                 folder,
-                "has the jobs of a sweep, which keep no maps. Draw them with `dynvox sweep --merge`",
+                "has the jobs of a sweep, which keep no maps. Draw them with `dynvox sweep \
+                 --merge`",
             ));
         }
     };
@@ -207,7 +208,7 @@ impl Estimate {
     }
 }
 
-/// What a fix's square is divided by.
+/// Returns the divisor of a fix's squared error.
 fn information_of(sigma_m: f64) -> f64 {
     sigma_m * sigma_m * CORRELATED_FIXES
 }
@@ -228,7 +229,7 @@ fn centres(points: &[PointPair], weights: &[f64]) -> PointPair {
     (sum(|point| point.0), sum(|point| point.1))
 }
 
-/// Where the map lies, or why the frames do not say.
+/// Estimates the map's pose from fixes, or says why they do not determine it.
 fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, String> {
     if frames.len() < FIXES_MIN {
         return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
@@ -237,6 +238,7 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
         .iter()
         .map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m))
         .collect();
+    // Angles, where given, fix the rotation that positions leave free.
     let turned = frames
         .iter()
         .filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
@@ -250,15 +252,18 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD
     {
         return Err(format!(
-            "its angles contradict its positions by {:.0} degrees. The camera must look along the vehicle",
+            "its angles contradict its positions by {:.0} degrees. The camera must look along the \
+             vehicle",
             off_rad.to_degrees()
         ));
     }
     let (position_m, rotation_rad) =
         (estimate.sigma_m, estimate.turn_sigma_rad(&points, axes.is_some()));
+    // Fixes of another recording do not fit the path.
     if position_m > SIGMA_MAX_M {
         return Err(format!(
-            "its fixes are {position_m:.0} m off its path (one standard deviation; at most {SIGMA_MAX_M}). Give those of this recording"
+            "its fixes are {position_m:.0} m off its path (one standard deviation; at most \
+             {SIGMA_MAX_M}). Give those of this recording"
         ));
     }
     if rotation_rad > TURN_MAX_RAD {

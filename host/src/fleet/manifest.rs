@@ -22,7 +22,7 @@ pub struct Job {
     pub id: String,
     /// Request of its run.
     pub request: Request,
-    /// Where it lies in the world.
+    /// Given pose in the world.
     #[serde(flatten)]
     pub given: Given,
     /// The epoch it belongs to.
@@ -31,7 +31,7 @@ pub struct Job {
     pub bytes: u64,
 }
 
-/// Where a recording lies in the world.
+/// Source of a recording's pose in the world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Given {
@@ -51,10 +51,10 @@ pub enum Given {
     Figures(PathBuf),
 }
 
-/// What became of a job.
+/// State of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobState {
-    /// Its map or its figures are there.
+    /// Finished: the map or its figures exist.
     Done,
     /// A run was started: it goes on, or ended early.
     Started,
@@ -62,14 +62,14 @@ pub enum JobState {
     Open,
 }
 
-/// What identifies the run of a request, and what it needs.
+/// Fingerprint of a request's run and the facts needed to plan it.
 #[derive(Clone, Copy, Debug)]
 pub struct Identity {
     /// Hash of settings and images.
     pub digest: u64,
     /// Most memory of the run, bytes.
     pub bytes: u64,
-    /// Its first camera, where poses come from a file.
+    /// Pose of the first camera, if poses come from a file.
     pub first_pose: Option<Transform>,
 }
 
@@ -183,12 +183,12 @@ impl Job {
         }
     }
 
-    /// Whether settings and images are those it was planned with.
+    /// Returns true if settings and images are those the job was planned with.
     pub fn is_of(&self, digest: u64) -> bool {
         self.id == id(&self.request, digest)
     }
 
-    /// Where its map is in the world's lattice, when it lies at a pose: the name is a hash of both.
+    /// Returns the folder of the map in the world's lattice at a pose; the name is a hash of both.
     pub fn sums(&self, folder: &Path, t_world_map: &Transform) -> PathBuf {
         let mut digest = Digest::default();
         digest.bytes(self.id.as_bytes());
@@ -197,17 +197,17 @@ impl Job {
         folder.join("sums").join(format!("{:016x}", digest.finish()))
     }
 
-    /// Where its map is in its own lattice, below the folder of the jobs.
+    /// Returns the folder of the map in its own lattice, below the folder of the jobs.
     pub fn submap(&self, folder: &Path) -> PathBuf {
         folder.join("submaps").join(&self.id)
     }
 
-    /// Where its run is.
+    /// Returns the run folder of the job.
     pub fn run_folder(&self, folder: &Path) -> PathBuf {
         folder.join("runs").join(&self.id)
     }
 
-    /// What became of it.
+    /// Returns the state of the job, read from its folders.
     pub fn state(&self, folder: &Path) -> JobState {
         let run = self.run_folder(folder);
         let started = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();

@@ -10,7 +10,7 @@ use dynvox_core::volume::BlockCoord;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// What was merged.
+/// Counts of a merge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Merged {
     /// Tiles written.

@@ -24,15 +24,15 @@ const STEP_MIN: f64 = 1e-10;
 /// A recording.
 #[derive(Clone, Debug)]
 pub struct Node {
-    /// Its map in the world, as given.
+    /// Given pose of the map in the world.
     pub given: Transform,
-    /// How far that may be off.
+    /// Uncertainty of the given pose.
     pub uncertainty: Uncertainty,
     /// The map's centre, in the map: what is not known about its rotation is about it.
     pub centre_m: [f64; 3],
 }
 
-/// How two maps lie to one another.
+/// Measured relative pose of two maps.
 #[derive(Clone, Debug)]
 pub struct Edge {
     /// First and second recording.
@@ -45,14 +45,14 @@ pub struct Edge {
     pub centre_m: [f64; 3],
 }
 
-/// What a registration says of maps whose centres are some way off.
+/// Adds to a registration's information the drift between maps whose centres are some way apart.
 pub fn with_drift(information: &Matrix6<f64>, way_m: f64) -> Matrix6<f64> {
     let (turn, shift) = ((DRIFT_RAD_PER_M * way_m).powi(2), (DRIFT_SHARE * way_m).powi(2));
     let drift = Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift));
     information.try_inverse().and_then(|own| (own + drift).try_inverse()).unwrap_or(*information)
 }
 
-/// Where the maps lie in the world, from `start` on.
+/// Solves for the maps' poses in the world, beginning at `start`.
 pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transform> {
     let mut poses = start.to_vec();
     for _ in 0..MAX_ITERATIONS {
@@ -69,6 +69,7 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
                 &(information * step_about(&centre_m, &(node.given * poses[at].inverse()))),
             );
         }
+        // An edge pulls both maps towards their registered relative pose.
         for edge in edges {
             let [a, b] = edge.nodes;
             let centre_m = Vector3::from(poses[b].transform_point(edge.centre_m));
@@ -85,6 +86,7 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
             add_vector(&mut vector, a, &shared);
             add_vector(&mut vector, b, &-shared);
         }
+        // Without a solution the poses of the last step stay.
         let Some(solver) = matrix.cholesky() else { break };
         let step = solver.solve(&vector);
         for (at, pose) in poses.iter_mut().enumerate() {

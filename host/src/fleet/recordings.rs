@@ -18,9 +18,11 @@ arguments = [\"recordings/monday\", \"--instances\", \"none\"]
 [[recording]]
 name = \"tuesday\"
 arguments = [\"recordings/tuesday\"]
-t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a row of KITTI
+t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a \
+row of KITTI
 epoch = 1   # where it contradicts recordings of epoch 0, a rule decides
-# or where it lies by a receiver of satellites, a line of latitude, longitude, altitude for each frame: gnss = \"gnss.txt\"
+# or where it lies by a receiver of satellites, a line of latitude, longitude, altitude for each \
+frame: gnss = \"gnss.txt\"
 ";
 
 /// The recordings to map.
@@ -43,15 +45,15 @@ pub struct Recordings {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recording {
-    /// Its name in tables.
+    /// Name of the recording in tables.
     pub name: String,
     /// Arguments of `dynvox run`.
     pub arguments: Vec<String>,
-    /// Its first camera in the world, camera to world; the world's origin where it is absent.
+    /// Pose of the first camera, camera to world; the world's origin if absent.
     #[serde(default)]
     pub t_world_camera: Option<[f64; 12]>,
-    /// Its poses, `--egomotion file:POSES`, are in the world: its first camera is the first of
-    /// them.
+    /// True if the poses of `--egomotion file:POSES` are in the world: the first of them is the
+    /// first camera's.
     #[serde(default)]
     pub poses_in_world: bool,
     /// Fixes of a receiver of satellites: a file with a line a frame of the data set, or a
@@ -105,8 +107,8 @@ impl Recordings {
 }
 
 impl Recording {
-    /// Where it lies; `first_pose` is that of its file of poses. In the error's place why that is
-    /// not said.
+    /// Returns the given pose; `first_pose` is the first of the recording's file of poses. The
+    /// error says why there is none.
     pub(super) fn given(
         &self,
         origin: Option<[f64; 3]>,
@@ -114,16 +116,31 @@ impl Recording {
     ) -> Result<Given, String> {
         let Self { name, t_world_camera, poses_in_world, gnss, antenna_m, .. } = self;
         match (t_world_camera, poses_in_world, gnss, origin) {
-            (None, false, Some(file), Some(origin)) => Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin }),
-            (None, true, None, _) => first_pose.map(|pose| Given::TWorldCamera(rows_of(pose))).ok_or_else(|| {
-                format!("has poses_in_world for {name}, whose poses are not given. Give `--egomotion`, `file:POSES` among its arguments")
-            }),
+            (None, false, Some(file), Some(origin)) => {
+                Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin })
+            }
+            (None, true, None, _) => {
+                first_pose.map(|pose| Given::TWorldCamera(rows_of(pose))).ok_or_else(|| {
+                    format!(
+                        "has poses_in_world for {name}, whose poses are not given. Give \
+                         `--egomotion`, `file:POSES` among its arguments"
+                    )
+                })
+            }
             (given, false, None, _) => {
                 let rows = given.unwrap_or_else(|| rows_of(&Transform::IDENTITY));
-                transform(&rows).ok_or_else(|| format!("has no rigid motion as t_world_camera of {name}"))?;
+                transform(&rows).ok_or_else(|| {
+                    format!(
+                        "has no rigid motion as t_world_camera of \
+                    {name}"
+                    )
+                })?;
                 Ok(Given::TWorldCamera(rows))
             }
-            _ => Err(format!("says more than once where {name} lies. Keep one of t_world_camera, poses_in_world and gnss")),
+            _ => Err(format!(
+                "says more than once where {name} lies. Keep one of t_world_camera, \
+                              poses_in_world and gnss"
+            )),
         }
     }
 }

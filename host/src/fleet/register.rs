@@ -43,7 +43,7 @@ pub struct RegisteredMap {
     pub points: Vec<SurfacePoint>,
 }
 
-/// How far given poses may be off, one standard deviation.
+/// Uncertainty of a given pose, one standard deviation.
 #[derive(Clone, Copy, Debug)]
 pub struct Uncertainty {
     /// Position, m.
@@ -58,7 +58,7 @@ impl Uncertainty {
         Self { position_m: factor * self.position_m, rotation_rad: factor * self.rotation_rad }
     }
 
-    /// How far two poses may be off to one another.
+    /// Combines the uncertainties of two poses into that of their relative pose.
     pub fn and(&self, other: &Self) -> Self {
         Self {
             position_m: self.position_m.hypot(other.position_m),
@@ -67,7 +67,7 @@ impl Uncertainty {
     }
 }
 
-/// How well two maps fit.
+/// Quality of the fit of two maps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Points that lie where the other map was seen.
@@ -80,11 +80,11 @@ pub struct Fit {
     pub rms_m: f64,
     /// Share of the weakest degree of freedom in the strongest.
     pub min_eigen_share: f64,
-    /// Why it is not believed.
+    /// Reason why the registration is not believed.
     pub refused: Option<String>,
 }
 
-/// How two maps lie to one another.
+/// Relative pose of two maps, found by registration.
 #[derive(Clone, Debug)]
 pub struct Registration {
     /// The first map in the second.
@@ -93,7 +93,7 @@ pub struct Registration {
     pub information: Matrix6<f64>,
     /// Mean of the points, in the second map.
     pub centre_m: [f64; 3],
-    /// How well they fit.
+    /// Quality of the fit.
     pub fit: Fit,
 }
 
@@ -157,6 +157,7 @@ pub fn register(
         .collect();
     let rms_before_m = pair.equations(guess, limits_m[0]).rms_m();
     let mut t_b_a = *guess;
+    // Coarse to fine: outliers are cut at ever smaller distances.
     for &limit_m in &limits_m {
         for _ in 0..MAX_STEPS {
             let equations = pair.equations(&t_b_a, limit_m);
@@ -170,6 +171,7 @@ pub fn register(
             }
         }
     }
+    // The fit is measured at the finest limit.
     let last = pair.equations(&t_b_a, near_m);
     let variance = last.rms_m().max(1e-6).powi(2);
     let mut fit = Fit {

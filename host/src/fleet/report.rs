@@ -16,10 +16,10 @@ use std::path::{Path, PathBuf};
 /// Larger side of the picture, px, at most.
 const PICTURE_PX: i32 = 1_600;
 const BACKGROUND: Rgb<u8> = Rgb([255, 255, 255]);
-/// Of columns that one, two, and three or more recordings saw.
+/// Colours of columns that one, two, and three or more recordings observed.
 const COVERED: [Rgb<u8>; 3] = [Rgb([205, 205, 205]), Rgb([150, 195, 150]), Rgb([120, 160, 215])];
 const CHANGED: Rgb<u8> = Rgb([220, 20, 20]);
-/// Of paths, in turn.
+/// Colours of paths, in turn.
 const PATHS: [Rgb<u8>; 6] = [
     Rgb([0, 0, 0]),
     Rgb([215, 95, 0]),
@@ -29,7 +29,7 @@ const PATHS: [Rgb<u8>; 6] = [
     Rgb([150, 110, 0]),
 ];
 
-/// What a merged map is made of.
+/// Contents of a merged map, for the report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The recordings.
@@ -40,20 +40,20 @@ pub struct Report {
     pub free_blocks: u64,
     /// Voxels that were seen too often for their sums.
     pub overflowed_voxels: u64,
-    /// How the recordings cover the world.
+    /// Coverage of the world by the recordings.
     pub coverage: Coverage,
-    /// What has changed, the largest first.
+    /// Changes, the largest first.
     pub changes: Vec<Change>,
     #[serde(skip)]
     block_m: f64,
 }
 
-/// Where a recording went.
+/// Path of a recording's camera.
 #[derive(Clone, Debug, Serialize)]
 pub struct RecordingPath {
-    /// Its name.
+    /// Name in tables and charts.
     pub name: String,
-    /// Its epoch.
+    /// Epoch of the recording.
     pub epoch: u32,
     /// Frames.
     pub frames: usize,
@@ -64,8 +64,8 @@ pub struct RecordingPath {
 }
 
 impl Report {
-    /// Of jobs that are all in the world and their merged map; changes below `least_change_m3` are
-    /// left out.
+    /// Reports on jobs that are all in the world and on their merged map; changes below
+    /// `least_change_m3` are left out.
     ///
     /// # Errors
     /// A file is damaged or missing.
@@ -172,6 +172,7 @@ impl Report {
         let size =
             |axis: usize| ((f64::from(high[axis] - low[axis] + 1) * scale).ceil() as u32).max(1);
         let mut picture = RgbImage::from_pixel(size(0), size(1), BACKGROUND);
+        // North is up: rows run against z.
         let pixel = |x: f64, z: f64| {
             [
                 ((x - f64::from(low[0])) * scale) as i32,
@@ -197,6 +198,7 @@ impl Report {
                 .collect();
             points.windows(2).for_each(|ends| line(&mut picture, ends[0], ends[1], *colour));
         }
+        // A circle around each change.
         for change in &self.changes {
             let centre =
                 pixel(change.centre_m[0] / self.block_m, change.centre_m[2] / self.block_m);

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-9;
 /// Share of a cell, as interpolation counts its corners, that must have been seen.
 const SEEN_MIN: f64 = 0.5;
 
-/// What became of a run's map.
+/// Counts of a resampled map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resampled {
     /// Tiles written.
@@ -56,6 +56,7 @@ pub fn resample(
     let mut source = SourceMap::new(&mut map.store, lattice.colour);
     let way = LatticeWay::new(t_world_map, lattice);
     let (targets, beyond) = targets(source.store, &way, lattice, epoch);
+    // The folder appears under its name only when it is whole.
     let draft = DraftFolder::of(out);
     std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
     let mut resampled = Resampled { tiles: 0, blocks: 0, beyond };
@@ -75,6 +76,7 @@ pub fn resample(
             ..resampled
         };
     }
+    // A damaged block would leave a hole that looks like unknown space.
     let unreadable = source.store.unreadable();
     if unreadable > 0 {
         return Err(FleetError::content(
@@ -263,7 +265,7 @@ impl<'s> SourceMap<'s> {
     }
 }
 
-/// What a corner of a cell counts.
+/// Returns the trilinear weight of a cell's corner.
 fn factor(share: &[f64; 3], corner: usize) -> f64 {
     (0..3).fold(1.0, |product, axis| {
         product * if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] }

@@ -33,7 +33,7 @@ const CLEAR_MIN: f64 = 0.95;
 /// The value of a truncation.
 const TRUNCATION: f64 = 32_767.0;
 
-/// How a block has changed between two epochs.
+/// Change of a block between two epochs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockChange {
     /// The block.
@@ -46,7 +46,8 @@ pub struct BlockChange {
     pub believed: u32,
     /// Voxels that contradict.
     pub voxels: u32,
-    /// Those of them where the epoch with free space has no surface within its truncation.
+    /// Number of these voxels for which the epoch with free space has no surface within its
+    /// truncation.
     pub clear: u32,
 }
 
@@ -56,11 +57,11 @@ pub struct ResolvedBlock {
     pub coord: BlockCoord,
     /// Averages over the epochs that are believed.
     pub average: BlockAverage,
-    /// Whether a voxel lies on or near a surface: the others are known to be free.
+    /// True if the voxel lies on or near a surface; other voxels are known to be free.
     pub has_surface: bool,
 }
 
-/// What one epoch says of a voxel.
+/// Observation of a voxel in one epoch.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Statement {
     Nothing,
@@ -69,9 +70,9 @@ enum Statement {
     Behind,
 }
 
-/// What the blocks of a map come to.
+/// Counts and lattice of a resolved map.
 pub struct ResolvedMap {
-    /// Their voxels.
+    /// Lattice of the voxels.
     pub lattice: Lattice,
     /// Blocks that have a surface.
     pub blocks: u64,
@@ -142,6 +143,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
     for later in (1..blocks.len()).rev() {
         for earlier in (0..later).rev() {
             for (surface, free) in [(earlier, later), (later, earlier)] {
+                // One epoch sees a surface where the other sees through.
                 let differs = |voxel: &usize| {
                     statements[surface][*voxel] == Statement::Surface
                         && statements[free][*voxel] == Statement::Free
@@ -157,6 +159,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                 let weight = |of: usize| {
                     voxels.iter().map(|&voxel| u64::from(blocks[of].1.weight[voxel])).sum::<u64>()
                 };
+                // The later epoch is believed unless it saw far less.
                 let is_later = weight(later) >= SEEN_OFTEN * voxels.len() as u64
                     || weight(later) >= weight(earlier);
                 let (believed, other) = if is_later { (later, earlier) } else { (earlier, later) };

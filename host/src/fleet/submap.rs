@@ -29,7 +29,7 @@ pub const VERSION: u32 = 2;
 /// Name of what is known of a map.
 const HEAD_FILE: &str = "submap.json";
 
-/// What is known of a map.
+/// Header of a submap's file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct SubmapHeader {
     voxel_size_m: f32,
@@ -44,9 +44,9 @@ struct SubmapHeader {
 
 /// A run's map in its own lattice.
 pub struct Submap {
-    /// Its voxels.
+    /// Lattice of the map's voxels.
     pub lattice: Lattice,
-    /// Its blocks.
+    /// File of the map's blocks.
     pub store: BlockFile<File>,
 }
 
@@ -141,7 +141,11 @@ pub fn keep(
     let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
     let apart = FirstSegment::of(camera, f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64);
     let FirstSegment { camera, left_out_frames, top } = apart.ok_or_else(|| {
-        FleetError::content(out, "is not made: the camera was lost, and climbed where the map went on. End the run before, with --frames")
+        FleetError::content(
+            out,
+            "is not made: the camera was lost, and climbed where the map went \
+                                  on. End the run before, with --frames",
+        )
     })?;
     for coord in blocks(store).into_iter().filter(|coord| coord.y >= top) {
         let source = Source::load(store, coord, lattice.colour).ok_or_else(|| {
@@ -191,7 +195,7 @@ pub fn keep(
     Ok(kept.records())
 }
 
-/// Why a store took no block.
+/// Explains why a store took no block.
 pub fn not_stored(store: &BlockFile<File>, path: &Path) -> FleetError {
     let source = store.failure().map_or_else(
         || std::io::ErrorKind::Other.into(),
@@ -216,7 +220,7 @@ impl Submap {
         Ok(Self { lattice: Lattice { voxel_size_m, truncation_m, colour }, store })
     }
 
-    /// Where the camera of the map in a folder was, in frames of its segment.
+    /// Reads the camera's poses of a run folder, each in its segment.
     ///
     /// # Errors
     /// The folder is no map.

@@ -26,14 +26,14 @@ const HEAD: usize = 28;
 const HEAD_CHECKED: usize = 24;
 const BLOCK_HEAD: usize = 16;
 
-/// What maps must share to be added.
+/// Properties that maps must share to be added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// Side of a voxel, m.
     pub voxel_size_m: f32,
     /// Truncation, m.
     pub truncation_m: f32,
-    /// Whether voxels have colour.
+    /// True if voxels have colour.
     pub colour: bool,
 }
 
@@ -176,7 +176,7 @@ impl TileReader {
         })
     }
 
-    /// Its lattice.
+    /// Returns the lattice of the tile.
     pub fn lattice(&self) -> Lattice {
         self.lattice
     }

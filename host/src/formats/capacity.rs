@@ -53,7 +53,7 @@ impl CapacityFile {
         Self { capacity: CapacityTable(*capacity) }
     }
 
-    /// Its text.
+    /// Returns the table as text.
     ///
     /// # Errors
     /// A bound is beyond TOML's integers.

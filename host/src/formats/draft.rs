@@ -13,7 +13,7 @@ impl DraftFolder {
         Self(folder.with_file_name(format!(".{name}.partial-{}", std::process::id())))
     }
 
-    /// Where it is written.
+    /// Returns the path at which the draft is written.
     pub fn path(&self) -> &Path {
         &self.0
     }

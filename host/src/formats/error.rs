@@ -11,7 +11,7 @@ pub enum FormatError {
     Read {
         /// The file or folder.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// It does not hold what its format demands.
@@ -19,9 +19,9 @@ pub enum FormatError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong, without a full stop.
+        /// Reason, without a full stop.
         reason: String,
-        /// What to do, as a sentence without a full stop.
+        /// Next action, as a sentence without a full stop.
         action: String,
     },
 }

@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 
 /// Equatorial radius of WGS 84, m.
 const RADIUS_M: f64 = 6_378_137.0;
-/// Its first eccentricity, squared.
+/// First eccentricity of the ellipsoid, squared.
 const ECCENTRICITY_SQUARED: f64 = 0.006_694_379_990_141_316;
 /// Folders of KITTI raw with a file a frame, below that of the recording.
 const FOLDERS: [&str; 3] = ["oxts/data", "data", "."];
 
-/// Where the receiver was.
+/// Position of the receiver at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fix {
     /// Latitude and longitude, degrees, and altitude, m.
@@ -117,7 +117,8 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
         is_on_earth
             .then_some(Fix { geodetic: [latitude_deg, longitude_deg, altitude_m], angles_rad })
     });
-    let action = "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw (6), KITTI's 30, or - where there was no fix";
+    let action = "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw \
+                  (6), KITTI's 30, or - where there was no fix";
     fix.map(Some)
         .ok_or_else(|| FormatError::content(path, format!("line {line} is no fix"), action))
 }

@@ -45,7 +45,7 @@ impl<T> Image<T> {
         View::new(&self.pixels, self.width, self.height)
     }
 
-    /// The same image with every pixel mapped.
+    /// Returns the image with every pixel mapped.
     pub fn map<U>(&self, each: impl FnMut(&T) -> U) -> Image<U> {
         Image {
             width: self.width,

@@ -8,7 +8,7 @@ use std::path::Path;
 const MATRIX: &str = "depth-frame";
 const MM: f32 = 1e-3;
 
-/// What to do about a file that is not one.
+/// Next action for a file that is not of this format.
 const ACTION: &str = "Write it anew with OpenCV's FileStorage, of the images' size";
 
 /// Reads the depth in m.

@@ -4,7 +4,7 @@
 use super::{FormatError, Image};
 use std::path::Path;
 
-/// What to do about a file that is not one.
+/// Next action for a file that is not of this format.
 const ACTION: &str = "Write it anew, as a grey PFM of the images' size";
 
 /// Reads a grey PFM of `size`. The scale's magnitude says nothing of the values and is left aside,

@@ -19,7 +19,7 @@ use std::path::Path;
 pub const ENDINGS: [&str; 9] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "tif", "tiff", "bmp"];
 /// Bits a camera's samples may have. What falls between is taken as the next of them.
 pub const SAMPLE_BITS: [u32; 5] = [8, 10, 12, 14, 16];
-/// What to do about a picture that cannot be decoded.
+/// Next action for a picture that cannot be decoded.
 const FETCH_ANEW: &str = "Fetch or convert this image anew";
 
 /// An 8-bit picture: grey always, colour where the file has it.

@@ -5,7 +5,7 @@ use super::{FormatError, Image};
 use image::{DynamicImage, ExtendedColorType, ImageReader};
 use std::path::Path;
 
-/// What to do about a file that cannot be decoded.
+/// Next action for a file that cannot be decoded.
 const FETCH_ANEW: &str = "Fetch or convert this image anew";
 
 /// Reads a grey PNG of 8 or 16 bit as numbers.

@@ -30,7 +30,8 @@ pub fn read_poses(path: &Path) -> Result<Trajectory, FormatError> {
             FormatError::content(
                 path,
                 format!("line {line} {reason}"),
-                "A line holds 12 numbers (KITTI: the rows of t_world_camera) or 8 (TUM: time x y z qx qy qz qw), the same in every line",
+                "A line holds 12 numbers (KITTI: the rows of t_world_camera) or 8 (TUM: time x y z \
+                 qx qy qz qw), the same in every line",
             )
         };
         let (time_s, pose) = numbers_of(row)

@@ -12,7 +12,7 @@ pub fn runs(text: &str, width: usize, height: usize) -> Result<Vec<(usize, usize
     runs_of_counts(&counts(text)?, width, height)
 }
 
-/// The same of counts that are not in characters.
+/// Decodes runs from counts that are not in characters.
 ///
 /// # Errors
 /// What is wrong, as the rest of a sentence.

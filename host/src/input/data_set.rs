@@ -90,14 +90,14 @@ pub struct OpenOptions {
     pub cameras: CameraPair,
     /// Significant bits of 16-bit images; told from the data where they are not said.
     pub bits: Option<u32>,
-    /// How both images of a pair lie in one file; told from the calibration where it is not said.
+    /// Arrangement of both images in one file; told from the calibration if absent.
     pub stacking: Option<Stacking>,
     /// Topics of the left and the right camera in a recording of ROS; told by their names where
     /// they are not said.
     pub topics: Option<Topics>,
     /// Files of a calibration to use instead of the recording's own; empty for its own.
     pub calibration: Vec<PathBuf>,
-    /// How large raw pairs are rectified.
+    /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
 }
 
@@ -118,7 +118,7 @@ impl OpenOptions {
     }
 }
 
-/// Which camera pair of KITTI odometry to use.
+/// Camera pair of KITTI odometry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum CameraPair {

@@ -6,7 +6,7 @@ use dynvox_core::memory::Region;
 use dynvox_core::volume::EvictionReport;
 use serde::{Deserialize, Serialize};
 
-/// What the block store held at the end.
+/// Contents of the block store after the last frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct StoreStats {
     /// Records written, replaced ones included.
@@ -17,7 +17,7 @@ pub struct StoreStats {
     pub unreadable: u64,
     /// Blocks evicted at the end of the run.
     pub end: EvictionReport,
-    /// Why nothing more was stored, if the disk failed.
+    /// Reason why nothing more was stored, if the disk failed.
     pub failure: Option<String>,
 }
 

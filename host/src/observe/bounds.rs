@@ -6,13 +6,13 @@ use dynvox_core::scene_flow::FlowReport;
 use dynvox_core::{Capacity, Mapper};
 use serde::{Deserialize, Serialize};
 
-/// What a run needed of a bound.
+/// Use of a bound over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BoundUse {
     /// The most needed at once. Where something was refused it is what was in use and what was
     /// refused in that frame: with so much, more may be needed.
     pub needed: usize,
-    /// What was refused, evicted or shortened because of the bound, over the run.
+    /// Number of items refused, evicted or shortened because of the bound, over the run.
     pub refused: u64,
 }
 
@@ -148,7 +148,7 @@ impl BoundUses {
     }
 }
 
-/// What a run needed of its capacity.
+/// Use of the capacity over a run.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundsSection {
     /// Bound by bound.

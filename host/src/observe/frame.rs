@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Stages whose time is taken.
 pub const STAGES: usize = Stage::ALL.len();
 
-/// What one stage took.
+/// Time of one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
     /// Wall time, ms.
@@ -19,7 +19,7 @@ pub struct StageTime {
     pub cpu_ms: f64,
 }
 
-/// What a step took.
+/// Times of a step's stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepTimes {
     /// CPU time of all threads together, ms: of the stages, and of what is between them.
@@ -33,11 +33,11 @@ pub struct StepTimes {
 pub struct FrameRow {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// When it was taken, ns, where that is known.
+    /// Time stamp, ns, if the source has one.
     pub stamp_ns: Option<u64>,
-    /// Its time, s: by its stamp, else by an assumed rate.
+    /// Time of the frame, s: by its stamp, else by an assumed rate.
     pub time_s: f64,
-    /// What the core reports.
+    /// Report of the core.
     pub report: Report,
     /// Frames in the pruning window's history.
     pub history_frames: usize,
@@ -58,12 +58,12 @@ pub struct FrameRow {
 }
 
 impl FrameRow {
-    /// Its time, ns: by its stamp, else by an assumed rate.
+    /// Returns the frame's time, ns: by its stamp, else by an assumed rate.
     pub fn time_ns(&self) -> u64 {
         self.stamp_ns.unwrap_or((self.time_s * 1e9).round() as u64)
     }
 
-    /// How the camera's motion was found, in one word.
+    /// Returns how the camera's motion was found, in one word.
     pub fn motion(&self) -> &'static str {
         if let Some(icp) = &self.report.icp {
             return match icp.status {
@@ -90,7 +90,8 @@ impl FrameRow {
         }
     }
 
-    /// Whether the pose was extrapolated at constant velocity for want of an estimate.
+    /// Returns true if the pose was extrapolated at constant velocity because there was no
+    /// estimate.
     pub fn is_extrapolated(&self) -> bool {
         self.report.pose == PoseOrigin::Extrapolated
     }
@@ -130,7 +131,7 @@ impl FrameRow {
         self.report.severity().max(of_sources)
     }
 
-    /// What affected the map in this frame, in words.
+    /// Describes what affected the map in this frame.
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) =
             (&self.report.allocate, self.motion(), &self.mask_refusals);

@@ -88,12 +88,12 @@ impl FrameLog {
         Ok(())
     }
 
-    /// How many there are.
+    /// Returns the number of frames.
     pub fn len(&self) -> usize {
         self.frames
     }
 
-    /// Whether no frame was added yet.
+    /// Returns true if no frame was added yet.
     pub fn is_empty(&self) -> bool {
         self.frames == 0
     }
@@ -103,12 +103,12 @@ impl FrameLog {
         self.last.as_ref()
     }
 
-    /// What charts show of them.
+    /// Returns the values that charts show.
     pub fn charts(&self) -> &ChartValues {
         &self.charts
     }
 
-    /// Their table.
+    /// Returns the file of the table.
     pub fn file(&mut self) -> &mut GrowingFile {
         &mut self.file
     }

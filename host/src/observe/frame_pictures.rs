@@ -4,7 +4,7 @@ use super::{FrameContext, pictures};
 use crate::formats::Image;
 use image::RgbImage;
 
-/// What a picture of a frame shows.
+/// Contents of a picture of a frame.
 #[derive(Clone, Copy)]
 pub(super) enum Shown {
     /// The left image: in colour where that lies on the image that was matched.
@@ -13,7 +13,7 @@ pub(super) enum Shown {
     Disparity,
     /// The static map from the camera's pose.
     Map,
-    /// The same with every object in its place; none without objects.
+    /// Raycast of the map with every object at its pose; none without objects.
     Composed,
 }
 

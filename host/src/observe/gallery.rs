@@ -17,7 +17,7 @@ const FRAMES: usize = 40;
 pub struct GalleryObserver {
     /// Position and number of the frames that have pictures.
     taken: Vec<(usize, usize)>,
-    /// Of a stream, whose end is unknown: every so many frames have pictures.
+    /// Interval of pictures for a stream, whose end is unknown: one every so many frames.
     every: usize,
     failure: Option<String>,
 }
@@ -29,7 +29,7 @@ impl Default for GalleryObserver {
 }
 
 impl Observer for GalleryObserver {
-    /// Why the pictures could not be written, if so.
+    /// Reason why the pictures could not be written, if so.
     type Section = Option<String>;
 
     /// Removes pictures of frames after the checkpoint: they will be taken again.
@@ -102,7 +102,7 @@ impl Observer for GalleryObserver {
 }
 
 impl GalleryObserver {
-    /// Why pictures could not be written, if so.
+    /// Returns the reason why pictures could not be written, if so.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }

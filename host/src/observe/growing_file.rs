@@ -33,12 +33,12 @@ impl GrowingFile {
         Self { name: name.to_owned(), bytes: 0, checksum: 0, pending: Vec::new(), file: None }
     }
 
-    /// Its name.
+    /// Returns the name of the file.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Whether nothing was appended yet.
+    /// Returns true if nothing was appended yet.
     pub fn is_empty(&self) -> bool {
         self.bytes == 0
     }
@@ -99,7 +99,7 @@ impl GrowingFile {
         Ok(())
     }
 
-    /// Where it is in the run folder.
+    /// Returns the path of the file in a run folder.
     pub fn path(&self, folder: &Path) -> PathBuf {
         folder.join(&self.name)
     }

@@ -6,7 +6,7 @@ use dynvox_core::Severity;
 use dynvox_core::tracking::DetectionCount;
 use serde::{Deserialize, Serialize};
 
-/// What was refused or lost.
+/// Counts of everything refused or lost.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct HealthSection {
     /// The worst event of all frames and of the end.

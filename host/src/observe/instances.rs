@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Where those found by motion lie, in the folder of those given.
+/// Folder of the masks found by motion, below that of the given masks.
 pub const MOTION_FOLDER: &str = "motion";
 
 /// Saves instances where [`ObservedRun::instances_folder`] says so.

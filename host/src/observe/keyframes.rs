@@ -20,7 +20,7 @@ pub struct Keyframe {
     pub disparity_jpeg: Vec<u8>,
     /// The static map from the camera's pose.
     pub raycast_jpeg: Vec<u8>,
-    /// The same with every object in its place; empty without objects.
+    /// Raycast with every object at its pose, as JPEG; empty without objects.
     pub composed_jpeg: Vec<u8>,
 }
 

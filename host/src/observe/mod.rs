@@ -67,7 +67,7 @@ use hashbrown::HashSet;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Why an observer cannot continue.
+/// Reason why an observer cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum ObserveError {
     /// A file of the run folder.
@@ -83,7 +83,7 @@ pub enum ObserveError {
     Changed {
         /// The file.
         path: PathBuf,
-        /// What differs.
+        /// Difference, as it completes the message's sentence.
         reason: String,
     },
     /// The data set.
@@ -93,7 +93,7 @@ pub enum ObserveError {
 
 /// A run as its observers see it: the plan, and where files go.
 pub struct ObservedRun<'p> {
-    /// What is run.
+    /// Plan of the run.
     pub plan: &'p Plan,
     /// The run folder under construction.
     pub folder: PathBuf,
@@ -101,7 +101,7 @@ pub struct ObservedRun<'p> {
     pub instances_folder: Option<PathBuf>,
     /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
     pub map_disparity_folder: Option<PathBuf>,
-    /// What the map is evaluated against, and when.
+    /// Reference against which the map is evaluated, and its frames.
     pub reference: Option<ReferencePlan>,
 }
 
@@ -113,7 +113,7 @@ pub trait MapView<'s> {
     /// The static map from a pose; `None` where the core refuses the pose.
     fn raycast(&mut self, view: RaycastView) -> Option<&Raycaster<'s>>;
 
-    /// The same with every object in its place.
+    /// Raycasts the map with every object at its pose.
     fn raycast_with_objects(&mut self, view: RaycastView) -> Option<&Raycaster<'s>>;
 
     /// Makes the planner's window, with moving objects where they will be so many seconds later.
@@ -124,15 +124,15 @@ pub trait MapView<'s> {
 pub struct RetiredVolume {
     /// The mapper's summary of it.
     pub summary: ObjectSummary,
-    /// Its blocks.
+    /// Blocks of the object's volume.
     pub volume: VolumeCopy,
 }
 
 /// A frame after its step.
 pub struct FrameContext<'a, 's> {
-    /// Its position among the frames that the run takes, those left out included.
+    /// Position of the frame among those that the run takes, skipped frames included.
     pub position: usize,
-    /// What is recorded of it.
+    /// Row that is recorded for the frame.
     pub row: &'a FrameRow,
     /// The images and ground truth of the data set.
     pub images: &'a StereoImages,
@@ -165,7 +165,7 @@ pub struct Finished {
     pub regions: Vec<Region>,
     /// Blocks of the map in memory at the end.
     pub blocks: usize,
-    /// What was pruned after the last frame.
+    /// Voxels and blocks pruned after the last frame.
     pub pruned: PruneReport,
     /// The mesh written.
     pub mesh: Mesh,
@@ -177,10 +177,10 @@ pub struct Finished {
 
 /// Sees every frame and sums up in the end. Its fields are its part of a checkpoint.
 pub trait Observer {
-    /// What it contributes to the record of the run.
+    /// Contribution of the observer to the record of the run.
     type Section;
 
-    /// Its files that grow frame by frame.
+    /// Returns the observer's files that grow frame by frame.
     fn files(&mut self) -> Vec<&mut GrowingFile> {
         Vec::new()
     }
@@ -255,16 +255,16 @@ pub struct Observers {
     planning: PlanningObserver,
 }
 
-/// What the observers found.
+/// Findings of all observers.
 #[derive(Clone, Debug)]
 pub struct Sections {
     /// Poses, and their errors against ground truth.
     pub trajectory: TrajectorySection,
     /// Pictures.
     pub keyframes: KeyframesSection,
-    /// Why the pictures for the viewer could not be written, if so.
+    /// Reason why the pictures for the viewer could not be written, if so.
     pub gallery_failure: Option<String>,
-    /// Why the recording could not be written, if so.
+    /// Reason why the recording could not be written, if so.
     pub recording_failure: Option<String>,
     /// Input and map against a reference depth; `None` where the run has none.
     pub reference: Option<ReferenceSection>,
@@ -274,14 +274,15 @@ pub struct Sections {
     pub objects: ObjectsSection,
     /// Blocks of the map: made, pruned, evicted, stored.
     pub blocks: BlocksSection,
-    /// What was needed of each bound.
+    /// Use of each bound.
     pub bounds: BoundsSection,
-    /// What was refused.
+    /// Counts of everything refused.
     pub health: HealthSection,
 }
 
 impl Observers {
-    /// Why a file of theirs could not be written, if so. They continue without it.
+    /// Returns the reason why a file of an observer could not be written, if so. The observer
+    /// continues without the file.
     pub fn failure(&self) -> Option<&str> {
         self.objects.failure().or(self.gallery.failure()).or(self.recording.failure())
     }

@@ -32,9 +32,9 @@ pub struct ReconstructedObject {
     pub segment: u32,
     /// Name of its files: the track's number; `7-2` for the second object of track 7.
     pub name: String,
-    /// Its class.
+    /// Class of the object.
     pub class: Class,
-    /// Its last motion state.
+    /// Last motion state of the object.
     pub state: MotionState,
     /// Frames fused.
     pub frames: u32,
@@ -42,9 +42,10 @@ pub struct ReconstructedObject {
     pub blocks: usize,
     /// Triangles of its mesh.
     pub triangles: u64,
-    /// Its mesh against the true surface, where that is known.
+    /// Errors of the object's mesh against the true surface, where that is known.
     pub surface: Option<SurfaceFigures>,
-    /// Its mesh from three sides, as a JPEG file; empty for objects beyond the number shown.
+    /// Views of the object's mesh from three sides, as a JPEG file; empty for objects beyond the
+    /// number shown.
     pub thumbnail_jpeg: Vec<u8>,
 }
 
@@ -65,7 +66,7 @@ pub struct ObjectsSection {
 struct PosedAt {
     /// Number of the frame.
     frame: usize,
-    /// Its time.
+    /// Time of the pose, ns.
     time_ns: u64,
     t_world_object: Transform,
 }
@@ -79,7 +80,7 @@ pub struct ObjectsObserver {
     /// The true surface seen of each, where that is known.
     sides: BTreeMap<(u32, u32), SeenSide>,
     retired: Vec<ReconstructedObject>,
-    /// Their files at the last checkpoint.
+    /// Files of the object at the last checkpoint.
     files: Vec<WrittenFile>,
     /// Names of files written since then.
     unsynced: Vec<String>,
@@ -207,7 +208,7 @@ impl ObjectsObserver {
         }
     }
 
-    /// Why an object's files could not be written, if so.
+    /// Returns the reason why an object's files could not be written, if so.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }

@@ -5,7 +5,7 @@ use dynvox_core::geometry::Transform;
 
 /// Position of the camera relative to the last camera, m: behind and above.
 const OFFSET_M: [f64; 3] = [0.0, -7.0, -15.0];
-/// How far it is tilted down, rad.
+/// Downward tilt of the overview's camera, rad.
 const PITCH_RAD: f64 = 0.33;
 
 /// The picture as a JPEG file; empty where the core refuses the pose.

@@ -27,13 +27,13 @@ const STATIC: [u8; 3] = [40, 130, 255];
 const UNCERTAIN: [u8; 3] = [190, 190, 190];
 /// Share of a tint in what is tinted.
 const TINT: f32 = 0.45;
-/// Where light comes from, in camera axes (x right, y down, z forward), length 1: behind the
+/// Direction towards the light in camera axes (x right, y down, z forward), length 1: behind the
 /// camera's left shoulder.
 const TO_LIGHT: [f32; 3] = [-0.36, -0.60, -0.714];
 
 /// Quality of JPEG files, of 100.
 const JPEG_QUALITY: u8 = 78;
-/// How much of the image a mask covers, of 255.
+/// Opacity of a mask over the image, of 255.
 const MASK_ALPHA: u8 = 120;
 
 /// A picture as a PNG file.
@@ -65,7 +65,8 @@ pub fn jpeg(picture: &RgbImage) -> Vec<u8> {
     })
 }
 
-/// What an encoder writes. A picture that cannot be encoded is left out of the report.
+/// Collects the bytes that an encoder writes. A picture that cannot be encoded is left out of the
+/// report.
 fn file(encode: impl FnOnce(&mut Vec<u8>) -> ImageResult<()>) -> Vec<u8> {
     let mut bytes = Vec::new();
     if encode(&mut bytes).is_err() {
@@ -79,7 +80,7 @@ fn step(widest_px: usize, width: usize) -> usize {
     width.div_ceil(widest_px).max(1)
 }
 
-/// That step, and the columns and rows that remain.
+/// Returns the thinning step, and the columns and rows that remain.
 fn thinned(widest_px: usize, width: usize, height: usize) -> (usize, u32, u32) {
     let step = step(widest_px, width);
     (step, width.div_ceil(step) as u32, height.div_ceil(step) as u32)
@@ -255,8 +256,7 @@ pub fn composed(
     painted(view.raycast_with_objects(looking(widest_px, view, t_world_camera))?, tint)
 }
 
-/// What a raycast shows, tinted by layer with the colours of `tint`. `None` before the first
-/// raycast.
+/// Paints a raycast, tinted by layer with the colours of `tint`. `None` before the first raycast.
 fn painted(seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option<RgbImage> {
     let (depth_m, normal, colour, layer) =
         (seen.depth_m()?, seen.normal()?, seen.colour()?, seen.layer()?);
@@ -266,7 +266,7 @@ fn painted(seen: &Raycaster<'_>, tint: impl Fn(u8) -> Option<[u8; 3]>) -> Option
     )
 }
 
-/// What a raycast shows, and how it is painted.
+/// Raycast and the way in which it is painted.
 struct Painting<'a, T> {
     /// Depth, m; 0 none.
     depth_m: View<'a, f32>,

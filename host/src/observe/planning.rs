@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// Nav2's grey level of what is unknown, in trinary mode.
 const UNKNOWN_GREY: u8 = 205;
-/// What stands for a distance of 0 in `distance.png`, whose values are centimetres.
+/// Value in `distance.png` of a distance of 0; the values are centimetres.
 const DISTANCE_ZERO: f32 = 32_768.0;
 
 /// Writes the window after the last frame, with what moves in it; of a stream, whose last frame is
@@ -20,7 +20,7 @@ pub struct PlanningObserver {
     written: bool,
 }
 
-/// What the files' numbers mean.
+/// Meaning of the numbers in the files.
 #[derive(Clone, Debug, Serialize)]
 struct Description {
     /// Number of the frame, and its camera's place in the window's axes: m to the right, ahead,
@@ -210,12 +210,13 @@ impl Columns<'_, '_> {
         bytes
     }
 
-    /// What Nav2's map server reads beside it.
+    /// Returns the YAML that Nav2's map server reads with the picture.
     fn yaml(&self) -> String {
         let (cell_m, [x, y, _]) = (self.planning.grid().cell_m(), self.planning.origin());
         let [x, y] = [x, y].map(|c| f64::from(c) * cell_m);
         format!(
-            "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{x}, {y}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+            "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{x}, {y}, 0.0]\nnegate: \
+             0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
         )
     }
 
@@ -285,7 +286,7 @@ impl Columns<'_, '_> {
     }
 }
 
-/// Whether a box stands over the middle of a column.
+/// Returns true if a box covers the middle of a column.
 fn covers(moving: &MovingBox, [x, y, _]: Cell, cell_m: f32) -> bool {
     let [dx, dy] = [
         (x as f32 + 0.5) * cell_m - moving.center_m[0],

@@ -25,7 +25,7 @@ pub struct PlanningLayers {
     pub occupancy: Vec<i8>,
     /// To the nearest obstacle of the slice, m; negative within one, NaN without any.
     pub distance_m: Vec<f32>,
-    /// Of the ground above the corner, m; NaN without ground.
+    /// Heights of the ground above the corner, m; NaN without ground.
     pub height_m: Vec<f32>,
 }
 

@@ -23,7 +23,7 @@ const PICTURES: usize = 4;
 /// Frames evaluated against exact depth, where it is there and no evaluation was asked for.
 const SAMPLED_FRAMES: usize = 24;
 
-/// What the map is evaluated against, and in which frames.
+/// Reference and the frames in which the map is evaluated.
 #[derive(Clone, Debug)]
 pub struct ReferencePlan {
     reference: Reference,
@@ -31,7 +31,7 @@ pub struct ReferencePlan {
     delay: usize,
     /// Positions of the frames evaluated, ascending.
     positions: Vec<usize>,
-    /// Those of them whose errors are drawn.
+    /// Numbers of the frames whose errors are drawn.
     drawn: Vec<usize>,
 }
 
@@ -95,9 +95,9 @@ pub struct ReferenceSection {
     pub figures: Option<ReferenceFigures>,
     /// Frame by frame.
     pub frames: Vec<EvaluatedFrame>,
-    /// What became of each point of the static map.
+    /// Outcomes of the points of the static map.
     pub outcomes: Vec<PointOutcomes>,
-    /// How far the static map is off, place by place.
+    /// Errors of the static map by place.
     pub surface_errors: SurfaceErrors,
     /// Pictures of some.
     pub pictures: Vec<ErrorPictures>,

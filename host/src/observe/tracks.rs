@@ -28,17 +28,17 @@ pub const fn state_name(state: MotionState) -> &'static str {
 /// A track seen in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackRow {
-    /// Its number.
+    /// Id of the track.
     pub id: u32,
-    /// Its class.
+    /// Class of the object.
     pub class: Class,
-    /// Its motion state.
+    /// Motion state of the track.
     pub state: MotionState,
-    /// Whether its motion was measured in this frame.
+    /// True if the motion was measured in this frame.
     pub measured: bool,
     /// Score of its detection.
     pub score: f32,
-    /// Its box in the left image.
+    /// Box in the left image, px.
     pub pixels: PixelBox,
     /// Speed over ground and its error, one sigma, m/s.
     pub speed_m_s: Option<[f32; 2]>,
@@ -76,7 +76,7 @@ pub struct TrackSpan {
     pub to: usize,
     /// The motion state.
     pub state: MotionState,
-    /// Whether the motion was measured.
+    /// True if the motion was measured.
     pub measured: bool,
     /// Speed over ground in the last of them, m/s.
     pub speed_m_s: Option<f32>,
@@ -85,9 +85,9 @@ pub struct TrackSpan {
 /// A track over the whole run.
 #[derive(Clone, Debug)]
 pub struct TrackRecord {
-    /// Its number.
+    /// Id of the track.
     pub id: u32,
-    /// Its class.
+    /// Class of the object.
     pub class: Class,
     /// First frame it was seen in, as the data set counts.
     pub first_frame: usize,
@@ -103,7 +103,7 @@ pub struct TrackRecord {
     pub speed_m_s: Option<f64>,
     /// Most blocks of its volume.
     pub blocks: u32,
-    /// Where it was seen, in stretches that look alike.
+    /// Spans of frames in which the track's state stayed the same.
     pub spans: Vec<TrackSpan>,
     /// Against ground truth, where it is known.
     pub errors: Option<TrackErrors>,

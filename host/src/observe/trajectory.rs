@@ -14,20 +14,20 @@ const MAX_POINTS: usize = 4096;
 /// Frames the depth tracker lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackingFailures {
-    /// How many.
+    /// Number of frames.
     pub frames: usize,
     /// Number of the first.
     pub first: usize,
-    /// Why it was lost there.
+    /// Reason why the camera was lost there.
     pub cause: &'static str,
 }
 
 /// The camera's path.
 #[derive(Clone, Debug)]
 pub struct TrajectorySection {
-    /// Where the motion came from: `stereo`, `icp` or `file`.
+    /// Source of the motion: `stereo`, `icp` or `file`.
     pub source: &'static str,
-    /// Where the camera was, thinned for a chart.
+    /// Positions of the camera, thinned for a chart.
     pub path: ThinnedPath,
     /// True poses of the frames, the first at the origin, where they are known.
     pub truth: Option<Vec<Transform>>,
@@ -69,7 +69,7 @@ impl ThinnedPath {
         self.frames += 1;
     }
 
-    /// Its points, m, the last frame's at the end.
+    /// Returns the points, m, with the last frame's at the end.
     pub fn points_m(&self) -> impl Iterator<Item = [f64; 3]> {
         self.points_m.iter().copied().chain(self.last_m)
     }

@@ -50,12 +50,12 @@ impl VolumeCopy {
         copy
     }
 
-    /// How the volume was made.
+    /// Returns the configuration the volume was made with.
     pub fn config(&self) -> &VolumeConfig {
         &self.config
     }
 
-    /// How many blocks it has.
+    /// Returns the number of blocks.
     pub fn blocks(&self) -> usize {
         self.blocks.len()
     }

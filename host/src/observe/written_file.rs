@@ -10,7 +10,7 @@ use std::path::Path;
 /// A file below the run folder as it was written.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WrittenFile {
-    /// Its path below the run folder.
+    /// Path of the file below the run folder.
     name: String,
     bytes: u64,
     /// CRC-32 of these bytes.
@@ -33,7 +33,7 @@ impl WrittenFile {
         Ok(Self { name, bytes, checksum })
     }
 
-    /// Whether the file is as it was.
+    /// Checks that the file is unchanged.
     ///
     /// # Errors
     /// It is missing, or a byte of it has changed.

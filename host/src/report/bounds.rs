@@ -15,7 +15,7 @@ pub struct CapacitySummary {
     least: CapacityTable,
     /// Bytes of its slab.
     least_bytes: usize,
-    /// Whether nothing was refused, so that it is enough; else more may be needed.
+    /// True if nothing was refused, so that the bound is enough; otherwise more may be needed.
     enough: bool,
 }
 
@@ -25,7 +25,7 @@ struct BoundSummary {
     bound: usize,
     /// The most needed at once.
     needed: usize,
-    /// What was refused because of it.
+    /// Number of items refused because of this bound.
     refused: u64,
 }
 
@@ -50,7 +50,7 @@ fn refusals(run: &RunRecord) -> Vec<(&'static str, u64)> {
     rows.iter().filter(|(.., of)| of.refused > 0).map(|(name, _, of)| (*name, of.refused)).collect()
 }
 
-/// What would have been enough.
+/// Writes the sentence that names the capacity that would have been enough.
 pub fn sentence(run: &RunRecord) -> String {
     let mib = run.sections.bounds.least.bytes() as f64 / MIB;
     let refused: Vec<String> =
@@ -59,7 +59,8 @@ pub fn sentence(run: &RunRecord) -> String {
         format!("{mib:.1} MiB would have held this run without a refusal: --capacity capacity.toml")
     } else {
         format!(
-            "refused for want of {}; --capacity capacity.toml has {mib:.1} MiB, and may still be too little",
+            "refused for want of {}; --capacity capacity.toml has {mib:.1} MiB, and may still be \
+             too little",
             refused.join(", ")
         )
     }
@@ -77,7 +78,8 @@ pub fn capacity_toml(run: &RunRecord) -> Result<String, toml::ser::Error> {
         "# Something was refused in that run, so more may be needed than stands here.\n"
     };
     Ok(format!(
-        "# The least that a run over {} frames of {} needed: {} bytes.\n{refused}# dynvox run PATH --capacity capacity.toml\n{}",
+        "# The least that a run over {} frames of {} needed: {} bytes.\n{refused}# dynvox run PATH \
+         --capacity capacity.toml\n{}",
         run.frames.len(),
         run.plan.dataset.name(),
         least.bytes(),

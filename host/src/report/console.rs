@@ -163,19 +163,30 @@ fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
 fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     let trajectory = &run.sections.trajectory;
     match trajectory.failures {
-        Some(failures) => vec![
+        Some(failures) => {
+            vec![
             (
                 "tracking failure",
-                format!("in {} of {} frames, first in frame {}: {}", failures.frames, run.frames.len(), failures.first, failures.cause),
+                format!("in {} of {} frames, first in frame {}: \
+                         {}", failures.frames, run.frames.len(), failures.first, failures.cause),
             ),
-            ("", "their poses are extrapolated, and they are not in the map. --egomotion stereo follows fast motion".to_owned()),
-        ],
+            ("", "their poses are extrapolated, and they are not in the map. --egomotion stereo \
+                  follows fast motion".to_owned()),
+        ]
+        }
         None if trajectory.extrapolated_frames > 0 => {
             let frames = trajectory.extrapolated_frames;
             let extrapolated =
                 ("poses extrapolated", format!("in {frames} frames: too few matches"));
-            let apart = format!("{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above the one before", trajectory.segments);
-            [extrapolated].into_iter().chain((trajectory.segments > 1).then_some(("segments of the map", apart))).collect()
+            let apart = format!(
+                "{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above \
+                                 the one before",
+                trajectory.segments
+            );
+            [extrapolated]
+                .into_iter()
+                .chain((trajectory.segments > 1).then_some(("segments of the map", apart)))
+                .collect()
         }
         None => Vec::new(),
     }

@@ -11,7 +11,7 @@ const ROWS_WORTH_A_WORD_PX: f64 = 0.1;
 /// The rig's part of `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct RigSummary {
-    /// What must be added to disparities in the middle of the image, px.
+    /// Correction that must be added to disparities in the middle of the image, px.
     disparity_offset_px: f64,
     disparity_offset_sigma_px: f64,
     /// Growth of that towards the right side, px there.
@@ -27,11 +27,11 @@ pub struct RigSummary {
     disparity_frames: u32,
     /// `sound`, `inaccurate` or `recalibrate`.
     calibration: &'static str,
-    /// Whether it was taken out of depth and motion.
+    /// True if the correction was applied to depth and motion.
     corrected: bool,
 }
 
-/// What is known after the last frame.
+/// Returns the rig's state after the last frame, if it is known.
 fn found(run: &RunRecord) -> Option<SelfCalibrationReport> {
     run.frames.last().map(|row| row.report.self_calibration).filter(|report| report.known)
 }
@@ -60,7 +60,7 @@ fn rows_apart(report: &SelfCalibrationReport) -> Option<RowCorrection> {
     Some(report.rows).filter(|rows| rows.largest_px() >= ROWS_WORTH_A_WORD_PX)
 }
 
-/// What was found and what to do about it.
+/// Writes what self-calibration found and what to do about it.
 pub fn sentence(run: &RunRecord) -> String {
     let Some(report) = found(run) else {
         return "disparity offset unknown: the camera has to move past something within about 30 m"
@@ -86,13 +86,14 @@ pub fn sentence(run: &RunRecord) -> String {
         }
         CalibrationState::Recalibrate => {
             format!(
-                "{value}, {done}. Recalibrate the cameras: more than 1 px is more than they should be off"
+                "{value}, {done}. Recalibrate the cameras: more than 1 px is more than they should \
+                 be off"
             )
         }
     }
 }
 
-/// Whether the sentence is a warning.
+/// Returns true if the sentence about the rig is a warning.
 pub fn is_warning(run: &RunRecord) -> bool {
     found(run).is_some_and(|report| report.state() > CalibrationState::Sound)
 }
@@ -105,7 +106,8 @@ pub fn calibration_toml(run: &RunRecord) -> Option<String> {
 fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
     let disparity = report.found().filter(|found| !found.is_zero()).map(|found| {
         format!(
-            "[rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = {:.4}\nrow_quadratic_px = {:.4}\n",
+            "[rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = \
+             {:.4}\nrow_quadratic_px = {:.4}\n",
             found.offset_px, found.slope_px, found.quartic_px, found.row_quadratic_px
         )
     });
@@ -119,7 +121,8 @@ fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
     (disparity.is_some() || rows.is_some()).then(|| {
         format!(
             "# What must be added to the disparities of this rig and to the rows of its right images, px, as a run over {frames} frames found it.\n\
-             # Another run of the same rig begins with it: dynvox run PATH --config calibration.toml\n{}{}",
+             # Another run of the same rig begins with it: dynvox run PATH --config \
+             calibration.toml\n{}{}",
             disparity.unwrap_or_default(),
             rows.unwrap_or_default()
         )

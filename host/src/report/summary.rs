@@ -25,7 +25,7 @@ pub struct Summary {
     seconds: f64,
     fps: f64,
     digest: String,
-    /// Why the results are incomplete, if they are.
+    /// Reason why the results are incomplete, if they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     incomplete: Option<Incomplete>,
     slab_bytes: usize,
@@ -33,7 +33,7 @@ pub struct Summary {
     rss_peak_bytes: Option<u64>,
     stages: BTreeMap<&'static str, StageSummary>,
     egomotion: EgomotionSummary,
-    /// What the run found left of the calibration's error.
+    /// Error of the calibration that the run found.
     #[serde(skip_serializing_if = "Option::is_none")]
     rig: Option<RigSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -46,7 +46,7 @@ pub struct Summary {
     /// Masks of what moves against exact ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     masks_truth: Option<MovingFigures>,
-    /// What was needed of each bound, and the least capacity that would have held the run.
+    /// Use of each bound, and the least capacity that would have held the run.
     capacity: CapacitySummary,
     map: MapSummary,
     prune: PruneSummary,

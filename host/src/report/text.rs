@@ -25,7 +25,7 @@ pub fn counted(count: usize, name: &str) -> String {
     if count == 1 { format!("1 {name}") } else { format!("{count} {name}s") }
 }
 
-/// How many tracks had the right motion state in time.
+/// Writes how many tracks had the right motion state in time.
 pub fn states_in_time(of: &LateStates) -> String {
     format!(
         "motion state correct within {SETTLING_FRAMES} frames: {} of {} tracks",
@@ -39,7 +39,7 @@ pub fn motion_error(of: &Medians) -> Option<String> {
     Some(format!("{:.1} cm, {:.2} deg", 100.0 * of.t_m?, of.r_deg?))
 }
 
-/// How many of what moves was found, and how much of it.
+/// Writes how many moving objects were found, and how much of each.
 pub fn moving_masks(masks: &MovingFigures) -> String {
     let range = |range: &RangeFigures| {
         let [begin_m, end_m] = range.distance_m;
@@ -49,13 +49,14 @@ pub fn moving_masks(masks: &MovingFigures) -> String {
     let mean_iou = masks.mean_iou.map_or_else(String::new, |iou| format!("; mean IoU {iou:.3}"));
     let false_masks = masks.false_masks;
     format!(
-        "found with an IoU of {FOUND_IOU} or more: {}{mean_iou}; {false_masks} false masks in {} frames",
+        "found with an IoU of {FOUND_IOU} or more: {}{mean_iou}; {false_masks} false masks in {} \
+         frames",
         ranges.join(", "),
         masks.frames
     )
 }
 
-/// Why blocks are lost, and what to do.
+/// Writes why blocks are lost, and what to do.
 pub fn lost_because(run: &RunRecord) -> String {
     match &run.sections.blocks.store.failure {
         Some(failure) => {

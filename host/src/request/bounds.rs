@@ -147,7 +147,8 @@ pub fn solve(
              images with --scale",
             Bytes(least).rounded_up()
         )),
-        other => RequestError::Invalid(format!("there is no capacity for images of {width} x {height} px: {other}")),
+        other => RequestError::Invalid(format!("there is no capacity for images of {width} x \
+            {height} px: {other}")),
     })
 }
 

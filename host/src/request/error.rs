@@ -25,7 +25,8 @@ pub enum RequestError {
         len: usize,
     },
     /// No reference for the evaluation.
-    #[error("--evaluate {} finds nothing in the {frames} frames: {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
+    #[error("--evaluate {} finds nothing in the {frames} frames: \
+             {}", .reference.name(), missing(*.reference, *.frames, *.delay))]
     NoReference {
         /// Reference asked for.
         reference: Reference,
@@ -36,7 +37,8 @@ pub enum RequestError {
     },
     /// The images are larger than the profile's.
     #[error(
-        "images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x {fits_height}. {action}"
+        "images of {width} x {height} px do not fit profile {profile}, which takes {fits_width} x \
+         {fits_height}. {action}"
     )]
     ImageSize {
         /// Image width, px.
@@ -67,7 +69,8 @@ pub enum RequestError {
     },
     /// The configuration.
     #[error(
-        "the configuration cannot be used: {problems}. Correct it with --set key=value or in the --config file"
+        "the configuration cannot be used: {problems}. Correct it with --set key=value or in the \
+         --config file"
     )]
     Config {
         /// All problems.
@@ -85,11 +88,17 @@ impl RequestError {
 /// Says why there is no reference, and what to do.
 fn missing(reference: Reference, frames: usize, delay: usize) -> String {
     match reference {
-        _ if delay >= frames => format!("--evaluation-delay {delay} reaches beyond the last of them. Give a smaller delay, or more --frames"),
+        _ if delay >= frames => format!(
+            "--evaluation-delay {delay} reaches beyond the last of \
+            them. Give a smaller delay, or more --frames"
+        ),
         Reference::Lidar => {
-            "there are no scans. KITTI keeps them in velodyne/ (`dynvox inspect` shows where); download them, or choose frames that have one"
+            "there are no scans. KITTI keeps them in velodyne/ (`dynvox inspect` shows where); \
+             download them, or choose frames that have one"
                 .to_owned()
         }
-        Reference::Exact => "only the synthetic street has exact depth. Give --evaluate lidar".to_owned(),
+        Reference::Exact => "only the synthetic street has exact depth. Give --evaluate \
+                             lidar"
+            .to_owned(),
     }
 }

@@ -140,8 +140,8 @@ pub struct Options {
     /// motion go to DIR/motion
     #[arg(long, value_name = "DIR", conflicts_with = "scale", help_heading = "Mapping")]
     pub save_instances: Option<PathBuf>,
-    /// Whether objects are masked out of the static map and reconstructed separately; off fuses
-    /// everything into one map [default: on]
+    /// Mask objects out of the static map and reconstruct them separately; off fuses everything
+    /// into one map [default: on]
     #[arg(long, value_name = "on|off", value_parser = words::on_or_off, help_heading = "Mapping")]
     pub dynamic: Option<bool>,
     /// Source of the camera's motion: stereo (matches over two pairs), icp (depth against the map,

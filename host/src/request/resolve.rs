@@ -82,7 +82,8 @@ impl Request {
             .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from).min(4));
         if threads > MAX_THREADS {
             return Err(RequestError::Invalid(format!(
-                "--threads {threads} is more than {MAX_THREADS}. Give at most the number of processors"
+                "--threads {threads} is more than {MAX_THREADS}. Give at most the number of \
+                 processors"
             )));
         }
         if threads == 0 || self.frames.stride == 0 || self.frames.most == Some(0) {

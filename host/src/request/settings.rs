@@ -83,7 +83,8 @@ impl Settings {
         for set in sets {
             let Some((key, text)) = set.split_once('=') else {
                 bail!(
-                    "--set {set} has no value. Write --set key=value, as in --set volume.voxel_size_m=0.1"
+                    "--set {set} has no value. Write --set key=value, as in --set \
+                     volume.voxel_size_m=0.1"
                 );
             };
             layers

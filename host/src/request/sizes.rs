@@ -90,7 +90,8 @@ impl FromStr for WindowSize {
                 Ok(Self([width, length, height]))
             }
             _ => Err(format!(
-                "`{text}` is not a window: write 200x200x20, cells from 1 to {MAX_SIDE_CELLS} to the sides, ahead, upwards"
+                "`{text}` is not a window: write 200x200x20, cells from 1 to {MAX_SIDE_CELLS} to \
+                 the sides, ahead, upwards"
             )),
         }
     }

@@ -21,7 +21,8 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
     }
     if let Some(option) = of_recordings(request) {
         return Err(RequestError::Invalid(format!(
-            "{option} needs a recording, and a stream comes once. Leave it out, or record the stream first"
+            "{option} needs a recording, and a stream comes once. Leave it out, or record the \
+             stream first"
         )));
     }
     let options = StreamOptions {

@@ -26,7 +26,7 @@ pub struct StageBench {
     pub span_ms: f64,
 }
 
-/// What a step costs.
+/// Costs of a step, by stage.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bench {
     /// Frames stepped.

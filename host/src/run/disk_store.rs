@@ -84,12 +84,12 @@ impl DiskStore {
         self.file.as_ref().map(BlockFile::position).transpose()
     }
 
-    /// Whether the disk refused, and not the limit that was asked for.
+    /// Returns true if the disk refused, rather than the limit that was asked for.
     pub fn disk_failed(&self) -> bool {
         self.file.as_ref().is_some_and(BlockFile::disk_failed)
     }
 
-    /// Why blocks are no longer stored, if so.
+    /// Returns the reason why blocks are no longer stored, if so.
     pub fn failure(&self) -> Option<String> {
         self.file.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
     }
@@ -100,7 +100,7 @@ pub struct MeshOutput {
     /// Or why there is no file.
     ply: std::io::Result<PlyWriter>,
     store: DiskStore,
-    /// Whether blocks of the file are not in the mesh yet.
+    /// True if blocks of the file are not in the mesh yet.
     file_is_due: bool,
     /// Blocks that are in the mesh already.
     meshed: HashSet<BlockCoord>,

@@ -4,7 +4,7 @@ use super::RunError;
 use crate::observe::ObserveError;
 use serde::{Deserialize, Serialize};
 
-/// What kept a run from its complete results.
+/// Cause that kept a run from its complete results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IncompleteCause {
@@ -20,12 +20,12 @@ pub enum IncompleteCause {
     Disk,
 }
 
-/// Why the results of a run are incomplete: a section of `summary.json`.
+/// Reason why the results of a run are incomplete: a section of `summary.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Incomplete {
-    /// What kept the run from its complete results.
+    /// Cause that kept the run from its complete results.
     pub cause: IncompleteCause,
-    /// The same as a sentence.
+    /// Cause as a sentence.
     pub reason: String,
     /// Frames of the run that were not mapped; absent for a stream, whose length is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,7 +69,7 @@ impl Incomplete {
 /// Frames left out because they could not be read or mapped.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SkippedFrames {
-    /// How many.
+    /// Number of frames.
     pub count: usize,
     /// The first [`SkippedFrames::LISTED`] of them.
     pub first: Vec<SkippedFrame>,
@@ -80,7 +80,7 @@ pub struct SkippedFrames {
 pub struct SkippedFrame {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// Why.
+    /// Reason, as a sentence.
     pub reason: String,
 }
 

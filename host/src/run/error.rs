@@ -9,7 +9,7 @@ use dynvox_core::memory::SlabError;
 use dynvox_core::{NewError, StepError};
 use std::path::PathBuf;
 
-/// Why a run ended early.
+/// Reason why a run ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The data set, or a frame of it.
@@ -31,7 +31,8 @@ pub enum RunError {
     },
     /// No memory for the slab.
     #[error(
-        "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give fewer with --memory; `dynvox budget` shows what fits into them"
+        "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give \
+         fewer with --memory; `dynvox budget` shows what fits into them"
     )]
     NoMemory {
         /// Bytes of the slab.
@@ -41,7 +42,8 @@ pub enum RunError {
     },
     /// The core refuses the slab.
     #[error(
-        "the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please report it"
+        "the core refuses the slab of profile {profile}: {reason}. This is a bug of dynvox: please \
+         report it"
     )]
     Slab {
         /// Name of the profile.
@@ -51,7 +53,8 @@ pub enum RunError {
     },
     /// The core refuses a frame.
     #[error(
-        "frame {frame} was refused: {reason}. Leave such frames out with --skip-bad-frames, or end before it with --frames"
+        "frame {frame} was refused: {reason}. Leave such frames out with --skip-bad-frames, or end \
+         before it with --frames"
     )]
     Step {
         /// Number of the frame.
@@ -79,7 +82,8 @@ pub enum RunError {
         cause: String,
     },
     /// A signal asked for the end.
-    #[error("the run was stopped by {} after {frames} frames. Run it again, or map so many frames with --frames {frames}", signal_name(*.signal))]
+    #[error("the run was stopped by {} after {frames} frames. Run it again, or map so many frames \
+             with --frames {frames}", signal_name(*.signal))]
     Signal {
         /// The signal's number.
         signal: usize,
@@ -113,7 +117,7 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Whether it is about one frame, without which the run may go on.
+    /// Returns true if the error is about one frame, without which the run may go on.
     pub(super) fn is_of_one_frame(&self) -> bool {
         match self {
             Self::Dataset(error) => !error.ends_source(),

@@ -19,7 +19,7 @@ pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
 /// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become
 /// full during the run.
 const RESERVE_FILE: &str = ".reserve";
-/// Its bytes.
+/// Size of the file, bytes.
 const RESERVE_BYTES: usize = 2 << 20;
 
 /// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached
@@ -29,10 +29,10 @@ pub struct RunFolder {
     target: PathBuf,
     partial: PathBuf,
     overwrite: bool,
-    /// Whether the folder stays when this is dropped.
+    /// True if the folder stays when this is dropped.
     keep: bool,
-    /// Whether it is that of a run that ended early, and goes back to its target unless there is a
-    /// new end.
+    /// True if the folder belongs to a run that ended early; it goes back to its target unless the
+    /// run ends anew.
     reopened: bool,
     /// Locked while this exists; `None` where the system cannot lock a folder.
     _lock: Option<File>,
@@ -102,8 +102,8 @@ impl RunFolder {
         }
     }
 
-    /// Whether the results of a reopened run were in place already: it was killed while it removed
-    /// what it no longer needed.
+    /// Returns true if the results of a reopened run were in place already: it was killed while it
+    /// removed what it no longer needed.
     pub fn is_complete(&self) -> bool {
         let summary = std::fs::read(self.file(SUMMARY_FILE)).ok();
         let summary =
@@ -153,22 +153,22 @@ impl RunFolder {
         self.try_rename()
     }
 
-    /// Where the snapshot is, or will be.
+    /// Returns the path of the snapshot, whether or not it exists.
     pub fn snapshot(&self) -> PathBuf {
         self.file(SNAPSHOT_FILE)
     }
 
-    /// Whether the folder replaces earlier results.
+    /// Returns true if the folder replaces earlier results.
     pub fn overwrites(&self) -> bool {
         self.overwrite
     }
 
-    /// Whether there is one, or the one before.
+    /// Returns true if there is a snapshot, or the one before.
     pub fn has_snapshot(&self) -> bool {
         has_snapshot(&self.partial)
     }
 
-    /// Where it will be.
+    /// Returns the path that the finished run will have.
     pub fn target(&self) -> &Path {
         &self.target
     }
@@ -182,12 +182,12 @@ impl RunFolder {
             .unwrap_or_else(|| parent.join(name))
     }
 
-    /// Where it is while the run lasts.
+    /// Returns the path of the folder while the run lasts.
     pub fn path(&self) -> &Path {
         &self.partial
     }
 
-    /// Where to write a file of that name.
+    /// Returns the path of a file of that name in the partial folder.
     pub fn file(&self, name: &str) -> PathBuf {
         self.partial.join(name)
     }
@@ -318,7 +318,7 @@ fn clear(folder: &Path) -> Result<(), FolderError> {
     Ok(())
 }
 
-/// Whether a run left a snapshot in a folder.
+/// Returns true if a run left a snapshot in a folder.
 pub fn has_snapshot(folder: &Path) -> bool {
     [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].iter().any(|name| folder.join(name).is_file())
 }

@@ -9,7 +9,7 @@ const PLAIN_LINES: usize = 10;
 /// Frames from one line to the next where their number is unknown.
 const OPEN_EVERY: usize = 100;
 
-/// How progress is shown.
+/// Display of the progress.
 pub enum Progress {
     /// Not at all.
     Quiet,
@@ -19,7 +19,7 @@ pub enum Progress {
     Lines {
         /// Frames in all, where that is known.
         frames: Option<usize>,
-        /// When the run began.
+        /// Time at which the run began.
         begin: Instant,
     },
 }

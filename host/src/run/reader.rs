@@ -10,15 +10,15 @@ pub const AHEAD: usize = 2;
 
 /// A frame as the reader found it.
 pub struct ReadFrame {
-    /// Its position in the run.
+    /// Position of the frame in the run.
     pub position: usize,
-    /// Its number in the source.
+    /// Number of the frame in the source.
     pub index: usize,
-    /// When it was taken, ns, where that is known.
+    /// Time stamp, ns, if the source has one.
     pub stamp_ns: Option<u64>,
-    /// Its time, s: by its stamp, else by an assumed rate.
+    /// Time of the frame, s: by its stamp, else by an assumed rate.
     pub time_s: f64,
-    /// What was decoded, or why nothing was.
+    /// Decoded images, or the error that prevented them.
     pub images: Result<StereoImages, InputError>,
 }
 

@@ -44,7 +44,7 @@ impl RunRecord {
         self.frames.last().map_or(0, |row| row.report.digest)
     }
 
-    /// Whether the file of stored blocks is a part of the result.
+    /// Returns true if the file of stored blocks is a part of the result.
     pub fn keeps_blocks(&self) -> bool {
         self.sections.blocks.store.records > 0
             && self.plan.request.storage.streaming().is_some_and(|streaming| streaming.keep_file)

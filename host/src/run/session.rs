@@ -29,7 +29,7 @@ pub(super) struct Session<'p, 's> {
     plan: &'p Plan,
     folder: &'p RunFolder,
     observed: &'p ObservedRun<'p>,
-    /// How the run was started, where it writes checkpoints.
+    /// Manifest of the run, if it writes checkpoints.
     manifest: Option<RunManifest>,
     pub mapper: Mapper<'s>,
     threads: Threads,
@@ -167,15 +167,16 @@ impl<'p, 's> Session<'p, 's> {
         )))
     }
 
-    /// That evicted blocks were lost to the disk, where all frames were mapped.
+    /// Returns the loss of evicted blocks to a failing disk, if all frames were mapped.
     pub fn of_disk(&self) -> Option<Incomplete> {
         let failure = self.store.failure().filter(|_| self.store.disk_failed())?;
         Some(Incomplete::of_disk(format!(
-            "map.blocks could not grow ({failure}), and blocks were lost. Free disk space and run again"
+            "map.blocks could not grow ({failure}), and blocks were lost. Free disk space and run \
+             again"
         )))
     }
 
-    /// Why there is no frame at all.
+    /// Explains why no frame was mapped.
     fn no_frame(&self) -> RunError {
         let frames = self.state.taken;
         match self.state.skipped.first.first() {
@@ -272,7 +273,10 @@ impl<'p, 's> Session<'p, 's> {
         progress: &Progress,
     ) {
         if let Some(failure) = self.store.failure().filter(|_| !store_before) {
-            progress.warn(&format!("frame {index}: map.blocks cannot grow ({failure}). Blocks evicted from here on are lost"));
+            progress.warn(&format!(
+                "frame {index}: map.blocks cannot grow ({failure}). Blocks \
+                                    evicted from here on are lost"
+            ));
         }
         if let Some(failure) = self.state.observers.failure().filter(|_| !files_before) {
             progress.warn(&format!("frame {index}: {failure}. The run continues without it"));
@@ -310,7 +314,7 @@ impl<'p, 's> Session<'p, 's> {
         Ok((row, retired.0, images))
     }
 
-    /// What is recorded of a frame, but for its number and times.
+    /// Makes a frame's row, without its number and times.
     fn row(&self, images: &StereoImages, report: Report) -> FrameRow {
         let tracks_in = |state: MotionState| {
             self.mapper.tracks().filter(|track| track.detected && track.state == state).count()

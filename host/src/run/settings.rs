@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 /// A setting that differs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// Its dotted key.
+    /// Key of the setting, with its section.
     pub key: String,
-    /// Its value in either run, where it has one.
+    /// Values of the setting in both runs; `None` where a run has none.
     pub values: [Option<String>; 2],
 }
 

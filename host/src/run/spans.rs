@@ -10,7 +10,7 @@ use std::cell::Cell;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What a piece of work costs.
+/// Cost of a piece of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// CPU time of all of it.
@@ -18,18 +18,18 @@ pub struct Cost {
     /// CPU time of the longest chain in it that must run one after the other: what it takes on ever
     /// so many threads.
     pub span: Duration,
-    /// What it takes on two threads at least: where two branches may run at once, half of their
-    /// work or the span of either, whichever is most.
+    /// Least time on two threads: if two branches may run at once, half of their work or the span
+    /// of either, whichever is most.
     pub two_threads: Duration,
 }
 
 impl Cost {
-    /// Of work on one thread.
+    /// Cost of work on one thread.
     fn serial(work: Duration) -> Self {
         Self { work, span: work, two_threads: work }
     }
 
-    /// Of one after the other.
+    /// Cost of one piece of work after the other.
     fn then(self, next: Self) -> Self {
         Self {
             work: self.work + next.work,
@@ -38,7 +38,7 @@ impl Cost {
         }
     }
 
-    /// Of both at once.
+    /// Cost of two pieces of work at once.
     fn beside(self, other: Self) -> Self {
         let (work, span) = (self.work + other.work, self.span.max(other.span));
         Self { work, span, two_threads: span.max(work / 2) }
@@ -53,7 +53,7 @@ pub struct Spans {
 
 #[derive(Default)]
 struct State {
-    /// Of the work since the last fork.
+    /// Cost since the last fork.
     cost: Cost,
     stages: [Cost; Stage::ALL.len()],
 }

@@ -14,7 +14,7 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Where work of no stage is charged.
+/// Index under which work of no stage is counted.
 const OUTSIDE: usize = STAGES;
 
 /// Runs the core's work on a number of threads and takes the time.

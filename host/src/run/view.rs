@@ -10,7 +10,7 @@ use dynvox_core::{Mapper, Stage};
 pub(super) struct LiveMap<'m, 's> {
     pub mapper: &'m mut Mapper<'s>,
     pub threads: &'m Threads,
-    /// What the first raycast took.
+    /// Time of the first raycast.
     pub first_raycast: Option<StageTime>,
 }
 

@@ -82,7 +82,7 @@ impl BlockHistory {
         of(at).or_else(|| neighbourhood(at).filter_map(of).max())
     }
 
-    /// Whether no block is known.
+    /// Returns true if no block is known.
     pub fn is_empty(&self) -> bool {
         self.last_seen.is_empty()
     }

@@ -120,7 +120,7 @@ impl VertexClustering {
         self.triangles.len()
     }
 
-    /// Whether more stay than may.
+    /// Returns true if more triangles stay than may.
     pub fn is_full(&self) -> bool {
         self.triangles.len() > self.max_triangles
             || self.clusters.len() > CELLS_PER_TRIANGLE * self.max_triangles

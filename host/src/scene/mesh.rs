@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 pub struct IndexedMesh {
     /// Positions of vertices, m.
     pub positions_m: Vec<[f32; 3]>,
-    /// Their colours; all 0 where unknown.
+    /// Colours of the vertices; all 0 where unknown.
     pub colours: Vec<[u8; 3]>,
-    /// How often they were observed; all 0 where unknown.
+    /// Numbers of observations of the vertices; all 0 where unknown.
     pub weights: Vec<u8>,
     /// Numbers of each triangle's corners, counter-clockwise seen from free space.
     pub triangles: Vec<[u32; 3]>,

@@ -37,7 +37,7 @@ fn neighbourhood([x, y, z]: [i32; 3]) -> impl Iterator<Item = [i32; 3]> {
 /// A frame.
 #[derive(Clone, Debug)]
 pub struct SceneFrame {
-    /// What is known of it.
+    /// Columns of the frame in `frames.csv`.
     pub row: FrameColumns,
     /// The left camera's pose.
     pub t_world_camera: Transform,
@@ -52,9 +52,9 @@ pub struct SceneObject {
     pub name: String,
     /// Number of its track.
     pub id: u32,
-    /// Its pose in the frames it was fused in, by number of the frame.
+    /// Poses of the object in the frames it was fused in, by number of the frame.
     pub t_world_object: Vec<(usize, Transform)>,
-    /// Its mesh in its own frame.
+    /// Mesh in the object's own frame.
     pub mesh: IndexedMesh,
 }
 
@@ -69,14 +69,14 @@ pub struct Scene {
     pub static_map: IndexedMesh,
     /// Triangles of the static map on disk.
     pub static_triangles: u64,
-    /// When its blocks were last seen, and which of them pruning took.
+    /// Frames in which blocks were last seen, and the blocks that pruning removed.
     pub blocks: BlockHistory,
-    /// How far it is off, where it was compared with a reference.
+    /// Errors of the map's surface, where it was compared with a reference.
     pub errors: SurfaceErrorMap,
     /// The planner's window.
     pub planning: PlanningWindow,
     /// The objects, by track.
     pub objects: Vec<SceneObject>,
-    /// Which frames have pictures.
+    /// Index of the frames that have pictures.
     pub pictures: PictureIndex,
 }

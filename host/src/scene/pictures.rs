@@ -9,7 +9,7 @@ pub const PICTURES_INDEX: &str = "index.json";
 /// Name of the picture of the finished map in it.
 pub const OVERVIEW: &str = "overview.jpg";
 
-/// What a picture of a frame shows.
+/// Contents of a picture of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureKind {
     /// The left image.
@@ -32,7 +32,7 @@ impl PictureKind {
         format!("{frame:06}_{}", self.ending())
     }
 
-    /// What it shows, and the format.
+    /// Returns the end of a picture's file name, which tells its contents and format.
     const fn ending(self) -> &'static str {
         match self {
             Self::Left => "left.jpg",
@@ -48,7 +48,7 @@ impl PictureKind {
 pub struct PictureIndex {
     /// Width of the images that boxes of tracks are measured in, px.
     pub width: usize,
-    /// Their height, px.
+    /// Height of the pictures, px.
     pub height: usize,
     /// Numbers of the frames that have pictures.
     pub frames: Vec<usize>,

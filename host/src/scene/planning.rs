@@ -8,10 +8,10 @@ use std::path::Path;
 pub const PLANNING_FOLDER: &str = "planning";
 /// Grey level of what is free in `map.pgm`, as Nav2's map server has it in trinary mode.
 pub const FREE_GREY: u8 = 254;
-/// Of an obstacle.
+/// Grey value of an obstacle.
 pub const OCCUPIED_GREY: u8 = 0;
 
-/// What `window.json` says of the other files.
+/// Scales of the other files, as `window.json` has them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowScales {
     /// Side of a cell, and where the first one begins, m.
@@ -39,7 +39,7 @@ pub struct WindowScales {
 pub struct PlanningCell {
     /// The middle of its ground, m, in world coordinates.
     pub position_m: [f32; 3],
-    /// Whether an obstacle stands there.
+    /// True if the cell holds an obstacle.
     pub occupied: bool,
     /// Distance to the nearest obstacle, below 0 inside one, m; `None` where it is not known.
     pub distance_m: Option<f32>,
@@ -52,7 +52,7 @@ pub struct PlanningWindow {
     pub cell_m: f32,
     /// Upwards, in world coordinates.
     pub up: [f32; 3],
-    /// Its columns that are free or occupied.
+    /// Columns of the window that are free or occupied.
     pub cells: Vec<PlanningCell>,
 }
 
@@ -85,6 +85,7 @@ impl PlanningWindow {
             heights.pixels().iter().filter_map(|&value| height_m(value)).collect();
         known_m.sort_unstable_by(f64::total_cmp);
         let middle_m = known_m.get(known_m.len() / 2).copied().unwrap_or(of.origin_m[2]);
+        // Unknown cells are left out: nothing is drawn there.
         let cell = |(u, v): (usize, usize)| {
             let occupied = match map.get(u, v)? {
                 FREE_GREY => false,

@@ -16,12 +16,12 @@ const LEAST_TRIANGLES: usize = 64;
 /// The share of the triangles that may stay which is aimed at: those that are counted first need
 /// not be like the others.
 const AIM: f64 = 0.9;
-/// Of a large mesh one of so many pieces is counted first, and of a small one so many pieces at
-/// least.
+/// Share of a large mesh's pieces that is counted first, one of so many; and the fewest pieces
+/// counted of a small one.
 const COUNTED_OF: u64 = 16;
 const COUNTED: u64 = 8;
-/// How often they are counted: triangles of a rough surface fall more slowly than by the square of
-/// the cells' sides, so a count far off is not enough.
+/// Number of counts: triangles of a rough surface fall more slowly than by the square of the cells'
+/// sides, so a count far off is not enough.
 const COUNTS: usize = 2;
 
 /// The triangles of a mesh, of the static map alone where that is asked for, so many at most; and
@@ -43,12 +43,12 @@ struct MeshFile {
     static_only: bool,
 }
 
-/// What came of clustering a mesh.
+/// Result of clustering a mesh.
 struct Clustered {
     clustering: VertexClustering,
     /// Triangles read, until too many stayed.
     read: u64,
-    /// Those among them that are asked for.
+    /// Number of triangles among them that the caller asked for.
     asked_for: u64,
 }
 
@@ -65,8 +65,8 @@ impl MeshFile {
         }
     }
 
-    /// How large cells have to be: of a mesh with more triangles than may stay, those that stay of
-    /// some of its pieces tell.
+    /// Finds the cells' size: if a mesh has more triangles than may stay, some of its pieces are
+    /// clustered to predict how many would.
     fn cell_m(&mut self, max_triangles: usize) -> io::Result<f32> {
         let (all, most) = (self.ply.triangles as f64, max_triangles as f64);
         if all <= most {

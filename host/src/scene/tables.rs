@@ -11,7 +11,7 @@ use std::path::Path;
 pub struct FrameColumns {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// Its time, s.
+    /// Time of the frame, s.
     pub time_s: f64,
     /// Wall time of the step, ms.
     pub step_ms: f64,
@@ -36,11 +36,11 @@ pub struct TrackColumns {
     pub frame: usize,
     /// Number of the track.
     pub id: u32,
-    /// Its class.
+    /// Class of the track.
     pub class: String,
-    /// Its motion state.
+    /// Motion state of the track.
     pub state: String,
-    /// Its speed over ground, m/s.
+    /// Speed over ground, m/s.
     pub speed_m_s: Option<f64>,
     /// Left border of its box, px.
     pub x1: i32,

@@ -94,7 +94,8 @@ fn prune(rows: &[Row<'_>]) -> Markup {
     );
     html! {
         (side_by_side([
-            figure("accuracy of the static map by prune weight", "accuracy", |sample| sample.accuracy[1], [elas.accuracy, dispnet.accuracy]),
+            figure("accuracy of the static map by prune \
+                    weight", "accuracy", |sample| sample.accuracy[1], [elas.accuracy, dispnet.accuracy]),
             figure("completeness by prune weight", "completeness", |sample| sample.completeness[1], [elas.completeness, dispnet.completeness]),
         ]))
         (side_by_side([memory, over_time(rows)]))

@@ -24,7 +24,7 @@ pub use store::{Results, SweepFolder, merge};
 use crate::run::FolderError;
 use std::path::PathBuf;
 
-/// Why a sweep cannot continue.
+/// Reason why a sweep cannot continue.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// A file cannot be read.
@@ -43,12 +43,13 @@ pub enum SweepError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// The folder belongs to another sweep.
     #[error(
-        "{path} belongs to another sweep. Repeat its arguments to continue it, or give another --out"
+        "{path} belongs to another sweep. Repeat its arguments to continue it, or give another \
+         --out"
     )]
     Other {
         /// The folder's plan.
@@ -56,7 +57,8 @@ pub enum SweepError {
     },
     /// Two machines disagree.
     #[error(
-        "{path}: run {run} has digest {theirs}, but {ours} in an earlier folder. Equal runs give equal digests: compare versions, data and paths of --depth"
+        "{path}: run {run} has digest {theirs}, but {ours} in an earlier folder. Equal runs give \
+         equal digests: compare versions, data and paths of --depth"
     )]
     Differs {
         /// The folder.

@@ -17,10 +17,14 @@ pub fn html(plan: &Plan, results: &Results) -> Markup {
     let content = html! {
         h1 { "Sweeps" }
         p.soft {
-            (done) " of " (plan.runs.len()) " runs are finished. dynvox " (env!("CARGO_PKG_VERSION")) ". Boxes: quartiles and median over evaluated "
-            "frames, whiskers to the last frame within 1.5 box heights. Accuracy is measured at the points that both input and map show: a lost "
-            "map shows few. \"Map alone\" is of all points the map shows, \"common points\" of those that the maps of all rows show: only these tell one row "
-            "from another, for a map that drops what is hard looks more accurate. Dashed lines: the original's published numbers, on other data; compare shapes, not values."
+            (done) " of " (plan.runs.len()) " runs are finished. dynvox " (env!("CARGO_PKG_VERSION")) ". Boxes: quartiles and median over \
+                evaluated "
+            "frames, whiskers to the last frame within 1.5 box heights. Accuracy is measured at \
+             the points that both input and map show: a lost "
+            "map shows few. \"Map alone\" is of all points the map shows, \"common points\" of \
+             those that the maps of all rows show: only these tell one row "
+            "from another, for a map that drops what is hard looks more accurate. Dashed lines: \
+             the original's published numbers, on other data; compare shapes, not values."
         }
         @for kind in plan.kinds() {
             section {
@@ -185,7 +189,8 @@ fn commands(plan: &Plan) -> Markup {
     html! {
         section { details {
             summary { "Commands" }
-            p.soft.small { "Each run asks for its data set, and for these values unlike the defaults." }
+            p.soft.small { "Each run asks for its data set, and for these values unlike the \
+                            defaults." }
             div.scroll { table {
                 @for (key, request) in &plan.runs { tr { td { code { (key) } } td { code { (request.words()) } } } }
             } }

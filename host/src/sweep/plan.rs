@@ -12,7 +12,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What is varied.
+/// Setting that a sweep varies.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
 )]
@@ -26,7 +26,7 @@ pub enum Kind {
     Scale,
     /// The source of depth.
     Depth,
-    /// Whether objects are separate from the static map.
+    /// Separate objects, on or off.
     Dynamic,
     /// The three methods of Table I: depth tracker, stereo egomotion, stereo egomotion and objects;
     /// and objects without a detector.
@@ -55,7 +55,7 @@ impl Kind {
 /// One data set: `street`, `PATH` or `PATH:SEQUENCE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Data {
-    /// Where it is; the synthetic street where absent.
+    /// Folder of the data set; the synthetic street if absent.
     pub path: Option<PathBuf>,
     /// Sequence within it.
     pub sequence: Option<String>,
@@ -99,7 +99,7 @@ impl Data {
     }
 }
 
-/// What to vary, and its values.
+/// Settings to vary, their values, and the data sets.
 #[derive(Clone, Debug)]
 pub struct SweepRequest {
     /// Data sets, and what each is evaluated against, if it can be.
@@ -125,7 +125,7 @@ pub struct SweepRequest {
 /// One point of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// What is varied.
+    /// Setting that is varied.
     pub kind: Kind,
     /// Name of the data set.
     pub data: String,

@@ -31,16 +31,16 @@ pub struct PruneTable {
 pub struct Pruned {
     /// Accuracy of the static map.
     pub accuracy: [f64; 7],
-    /// Its completeness.
+    /// Completeness at each weight.
     pub completeness: [f64; 7],
-    /// Its memory in the end, GiB.
+    /// Memory after the last frame, GiB.
     pub memory_gib: [f64; 7],
 }
 
 /// Fusing every k-th frame, k from 1 to 12, odometry 09, DispNet: medians of accuracy.
 pub const RATE_ACCURACY: [f64; 12] =
     [0.919, 0.916, 0.914, 0.903, 0.905, 0.908, 0.903, 0.899, 0.897, 0.895, 0.892, 0.886];
-/// The same of completeness; the first one about 1.
+/// Completeness at each frame rate, relative to the first, which is read off as 1.
 pub const RATE_COMPLETENESS: [f64; 12] =
     [1.0, 0.999, 0.997, 0.995, 0.993, 0.988, 0.984, 0.973, 0.960, 0.949, 0.936, 0.919];
 

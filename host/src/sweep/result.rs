@@ -20,17 +20,17 @@ pub struct RunResult {
     pub summary: Value,
     /// Evaluated frames.
     pub samples: Vec<FrameSample>,
-    /// What became of each point of the static map.
+    /// Outcomes of the points of the static map.
     #[serde(default)]
     pub outcomes: Vec<PointOutcomes>,
     /// Most blocks in use after each frame, or each few frames of a long run.
     pub blocks: Vec<u32>,
-    /// How many frames that are.
+    /// Number of frames between two of these values.
     #[serde(default = "one")]
     pub blocks_every: usize,
 }
 
-/// What earlier results have for `blocks_every`.
+/// Returns the value of `blocks_every` for results of earlier versions.
 const fn one() -> usize {
     1
 }

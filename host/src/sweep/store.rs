@@ -57,12 +57,12 @@ impl SweepFolder {
             .map_err(|error| SweepError::Foreign { path, reason: error.to_string() })
     }
 
-    /// Where the result of a run is or will be.
+    /// Returns the path of a run's result, whether or not it exists yet.
     pub fn result(&self, key: &str) -> PathBuf {
         self.root.join(Self::result_below(key))
     }
 
-    /// The same, below the folder.
+    /// Returns the path of a run's result below the sweep's folder.
     pub fn result_below(key: &str) -> PathBuf {
         Path::new("runs").join(format!("{key}.json"))
     }

@@ -19,12 +19,12 @@ const DRIFT_M: [(f64, f64); 2] = [(0.14, 0.06), (0.03, 0.23)];
 /// Height of the cameras above the road, m.
 pub const CAMERA_HEIGHT_M: f64 = 1.65;
 
-/// How far along the street the camera is at a time, m.
+/// Returns the camera's distance along the street at a time, m.
 pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
     config.speed_m_s * time_s
 }
 
-/// Where the camera is at a time.
+/// Returns the camera's pose on the street at a time.
 pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) -> Transform {
     let mut rng = Rng::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {

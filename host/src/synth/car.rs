@@ -9,8 +9,8 @@ use super::surface::{Kind, Surface, tone};
 /// widths there, height of the sill; m.
 type Section = (f64, f64, f64, f64, f64, f64);
 
-/// What the painter of a body needs: where glass, lamps and wheels are, m in the car's frame,
-/// heights upwards.
+/// Measures that a body's painter needs: positions of glass, lamps and wheels, m in the car's
+/// frame, heights upwards.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     /// Half length and half width of the hull.
@@ -261,6 +261,7 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
             mesh.vertices.push(vertex(point, normal));
         }
     }
+    // Two triangles for each patch between neighbouring rings.
     let index = |row: usize, column: usize| first + (row * columns + column) as u32;
     for row in 0..rows - 1 {
         for column in 0..columns - 1 {
@@ -274,6 +275,7 @@ fn hull(mesh: &mut Mesh, surface: u16, sections: &[Section]) {
             mesh.triangles.push(Triangle { corners: [b, d, c], surface, slight: false });
         }
     }
+    // Front and rear are closed by flat polygons.
     for (row, direction) in [(0, 1.0), (rows - 1, -1.0)] {
         let corners: Vec<_> = rings[row].iter().map(|&point| (point, as_surface(point))).collect();
         mesh.polygon(surface, Point::new(0.0, 0.0, direction), &corners);

@@ -46,6 +46,7 @@ pub fn shell(
             * above(0.6, x.abs() / shape.half_m[1], 0.1);
         tone = blend(tone, BLACK, arch);
     }
+    // Glass mirrors the sky above and the street below.
     let glass = glass(shape, &point, side, nz);
     if glass > 0.0 {
         let sky = 0.06 * (0.5 - 0.5 * ny).max(0.0)

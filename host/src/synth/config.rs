@@ -26,7 +26,7 @@ pub struct StreetConfig {
     /// Speed of the camera along the street, m/s. The camera never brakes: scripted cars in its
     /// lane must be faster or leave it.
     pub speed_m_s: f64,
-    /// Whether the street bends; straight on otherwise.
+    /// True if the street bends; it is straight otherwise.
     pub curvature: bool,
     /// Steepest rise of the street, rise over run: it goes up and down once in 60 m; 0 is
     /// level.
@@ -36,16 +36,16 @@ pub struct StreetConfig {
     /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read
     /// noise, half shot noise; 0 is off.
     pub noise_sigma: f64,
-    /// How much brighter the right camera is, as a share of the light.
+    /// Difference in brightness of the right camera, as a share of the light.
     pub gain_difference: f64,
     /// Share of parking spaces that are taken.
     pub parked_density: f64,
     /// The lens of both cameras. With one, images come raw; depth, masks and poses stay those of
     /// the ideal rig they are rectified to.
     pub lens: StreetLens,
-    /// How far the right camera is from where its calibration has it.
+    /// Misalignment of the right camera relative to its calibration.
     pub rig_error: RigError,
-    /// Who drives.
+    /// Traffic on the street.
     pub traffic: Traffic,
 }
 
@@ -74,7 +74,7 @@ impl Default for StreetConfig {
 }
 
 impl StreetConfig {
-    /// The same street without traffic: parked cars only.
+    /// Returns the street without traffic: parked cars only.
     pub fn static_street() -> Self {
         Self { traffic: Traffic::None, ..Self::default() }
     }
@@ -92,7 +92,7 @@ impl StreetConfig {
     }
 }
 
-/// Who drives on the street besides the camera.
+/// Traffic on the street besides the camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "mode", rename_all = "snake_case")]
 pub enum Traffic {
@@ -115,12 +115,20 @@ impl Traffic {
             return Some("a speed in street.traffic lies outside 0 to 60 m/s".to_owned());
         }
         moving.cars.iter().find_map(|car| match car.profile {
-            SpeedProfile::Starting { acceleration_m_s2: rate, .. } | SpeedProfile::Stopping { deceleration_m_s2: rate, .. }
+            SpeedProfile::Starting { acceleration_m_s2: rate, .. }
+            | SpeedProfile::Stopping { deceleration_m_s2: rate, .. }
                 if !(rate.is_finite() && rate > 0.0) =>
             {
-                Some(format!("an acceleration in street.traffic is {rate}; it must be a positive number of m/s²"))
+                Some(format!(
+                    "an acceleration in street.traffic is {rate}; it must be a positive \
+                              number of m/s²"
+                ))
             }
-            _ if !car.start_m.is_finite() => Some("a start_m in street.traffic is not a number".to_owned()),
+            _ if !car.start_m.is_finite() => Some(
+                "a start_m in street.traffic is not a \
+                number"
+                    .to_owned(),
+            ),
             _ => None,
         })
     }
@@ -181,17 +189,17 @@ impl Default for MovingTraffic {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScriptedCar {
-    /// Its body.
+    /// Body of the car.
     pub kind: CarKind,
-    /// Where it is at frame 0.
+    /// Lane at frame 0.
     pub lane: Lane,
-    /// Where it changes to: at once when it starts driving, just before it stands when it stops. Of
-    /// the same direction as `lane`.
+    /// Lane the car changes to: at once when it starts driving, just before it stands when it
+    /// stops. It has the direction of `lane`.
     #[serde(default)]
     pub to_lane: Option<Lane>,
-    /// How far ahead of the camera's start it is at frame 0, m along the street.
+    /// Distance ahead of the camera's start at frame 0, m along the street.
     pub start_m: f64,
-    /// How it drives.
+    /// Speed over time.
     pub profile: SpeedProfile,
 }
 
@@ -199,7 +207,7 @@ pub struct ScriptedCar {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "profile", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SpeedProfile {
-    /// The same speed for ever.
+    /// Constant speed.
     Constant {
         /// Speed, m/s.
         speed_m_s: f64,
@@ -210,7 +218,7 @@ pub enum SpeedProfile {
         frame: u32,
         /// Speed in the end, m/s.
         speed_m_s: f64,
-        /// How fast it gathers speed, m/s².
+        /// Acceleration, m/s².
         acceleration_m_s2: f64,
     },
     /// Drives until a frame, then slows to a stand.
@@ -219,7 +227,7 @@ pub enum SpeedProfile {
         frame: u32,
         /// Speed before, m/s.
         speed_m_s: f64,
-        /// How fast it slows, m/s².
+        /// Deceleration, m/s².
         deceleration_m_s2: f64,
     },
 }

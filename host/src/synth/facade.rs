@@ -106,6 +106,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
     };
     let balcony_mask = if rng.chance(0.45) { rng.seed() } else { 0 };
     let cornices = rng.chance(0.5);
+    // Floors grow upwards from the ground floor.
     for floor in 1..floors {
         let bottom = roofline;
         roofline -= floor_height;

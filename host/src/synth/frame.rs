@@ -26,7 +26,7 @@ pub struct SynthFrame {
     pub right_grey: Vec<u8>,
     /// Exact depth along z of the ray through each left pixel's centre, m; 0 where the sky is seen.
     pub depth_m: Vec<f32>,
-    /// What each left pixel's centre sees: k is `objects[k - 1]`, 0 is no car.
+    /// Instance at the centre of each left pixel: k is `objects[k - 1]`, 0 is no car.
     pub instances: Vec<u8>,
     /// Camera to world; the world is the left camera of frame 0.
     pub t_world_camera: Transform,
@@ -35,7 +35,7 @@ pub struct SynthFrame {
 }
 
 impl SynthFrame {
-    /// Whether a left pixel sees a car that moves.
+    /// Returns true if a left pixel shows a car that moves.
     pub fn is_moving(&self, pixel: usize) -> bool {
         let instance = self.instances.get(pixel).copied().unwrap_or(0);
         instance > 0
@@ -48,15 +48,15 @@ impl SynthFrame {
 pub struct ObjectTruth {
     /// The car's number for ever, over all frames.
     pub id: u32,
-    /// Its class: `car` or `van`.
+    /// Class of the object: `car` or `van`.
     pub class: &'static str,
     /// Car to world: x right, y down, z forward, origin in the middle of its footprint on the road.
     pub t_world_object: Transform,
     /// Width, height, length of the box around it: x within ±width/2, y within -height..0, z within
     /// ±length/2.
     pub dimensions_m: [f64; 3],
-    /// Whether it drives at this frame.
+    /// True if the object moves in this frame.
     pub moving: bool,
-    /// How fast, m/s.
+    /// Speed, m/s.
     pub speed_m_s: f64,
 }

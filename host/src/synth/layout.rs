@@ -44,12 +44,12 @@ pub const fn parking_m(right: bool) -> f64 {
     lateral_m(if right { Lane::ParkedRight } else { Lane::ParkedLeft })
 }
 
-/// Whether cars in a lane drive against the camera.
+/// Returns true if cars in a lane drive against the camera.
 pub const fn is_oncoming(lane: Lane) -> bool {
     matches!(lane, Lane::Oncoming | Lane::ParkedLeft)
 }
 
-/// Whether a segment has a pedestrian crossing.
+/// Returns true if a segment has a pedestrian crossing.
 pub fn crossing(seed: u64, segment: i64) -> bool {
     let candidate = |segment: i64| hash(seed ^ 0xC055, segment, 0).is_multiple_of(5);
     segment > 0 && candidate(segment) && !candidate(segment - 1)

@@ -53,22 +53,22 @@ impl<'de> Deserialize<'de> for StreetLens {
     }
 }
 
-/// What the calibration does not know: how far the right camera is from where it should be.
+/// Misalignment of the right camera that its calibration does not know.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RigError {
-    /// How far right images are shifted to the right, px: what must be added to disparities.
+    /// Shift of right images to the right, px: the correction that must be added to disparities.
     pub disparity_offset_px: f64,
-    /// How far right images are shifted down, px.
+    /// Shift of right images downwards, px.
     pub vertical_shift_px: f64,
-    /// How far right images are rotated clockwise about the principal point, degrees.
+    /// Clockwise rotation of right images about the principal point, degrees.
     pub roll_deg: f64,
-    /// How far the right camera is pitched up, degrees.
+    /// Upward pitch of the right camera, degrees.
     pub pitch_deg: f64,
 }
 
 impl RigError {
-    /// Whether the rig stands as calibrated.
+    /// Returns true if the rig stands as calibrated.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

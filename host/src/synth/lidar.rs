@@ -179,6 +179,7 @@ fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
         (first, last - first + 1)
     };
     let flat = |p: Point| libm::sqrt(p.x * p.x + p.y * p.y);
+    // The nearest edge bounds the steepest beam.
     let near = if around {
         1e-6
     } else {

@@ -48,6 +48,7 @@ impl Light {
             let around = SKY[k] * (0.25 + 0.75 * up) + BOUNCE[k] * (1.0 - up);
             *out = painted.tone[k] * (SUN[k] * direct * sunlit + around * open);
         }
+        // Glossy paint mirrors sky, walls and road, and the sun as a spark.
         if painted.gloss > 0.03 {
             let cosine = normal.dot(&to_eye).clamp(0.0, 1.0);
             let mirrored = normal * (2.0 * normal.dot(&to_eye)) - to_eye;

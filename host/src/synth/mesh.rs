@@ -47,7 +47,7 @@ pub struct Mesh {
     pub middle_m: Point,
     /// Radius of the bounding sphere.
     pub radius_m: f64,
-    /// Whether what is added next is slight.
+    /// True if triangles added from here on are slight.
     pub slight: bool,
 }
 

@@ -19,7 +19,7 @@ pub struct SurfacePoint {
     pub own_normal: [f32; 3],
 }
 
-/// What is seen there.
+/// Colour and brightness of a painted point.
 #[derive(Clone, Copy)]
 pub struct Painted {
     /// Linear reflectance.
@@ -82,7 +82,7 @@ pub fn times(tone: Tone, factor: f32) -> Tone {
     [tone[0] * factor, tone[1] * factor, tone[2] * factor]
 }
 
-/// How much of a detail of some size survives a footprint.
+/// Returns the share of a detail's contrast that survives a footprint.
 #[inline]
 pub fn survives(size: f32, footprint: f32) -> f32 {
     (1.5 - footprint / size).clamp(0.0, 1.0)
@@ -178,6 +178,7 @@ impl Painter {
     ) {
         let (cs, cd) = (floor(s * 0.125), floor((d + 10.2) * (1.0 / 3.5)));
         let h = cell(seed.wrapping_mul(31), cs, cd);
+        // Patches, cracks and seams come from one hash of each piece of road.
         let (ls, ld) = (s - cs as f32 * 8.0, d + 10.2 - cd as f32 * 3.5);
         if h & 3 == 0 {
             let (a, b) = (unit(h << 4), unit(h << 12));

@@ -11,7 +11,7 @@ pub const SKY: u32 = u32::MAX;
 /// Samples per pixel: the centre, which gives depth and masks, and four around it for colour at
 /// edges.
 pub const SAMPLES: usize = 5;
-/// Where they are, px from the pixel's centre.
+/// Positions of the samples, px from the pixel's centre.
 pub const OFFSETS_PX: [(f64, f64); SAMPLES] =
     [(0.0, 0.0), (-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)];
 const NEAR_M: f64 = 0.05;
@@ -34,9 +34,9 @@ pub struct Pinhole {
 pub struct Setup {
     /// Barycentric weight of each corner over depth.
     pub weights: [[f64; 3]; 3],
-    /// Which object of the scene.
+    /// Number of the object in the scene.
     pub object: u32,
-    /// Which triangle of it.
+    /// Number of the triangle in its object.
     pub triangle: u32,
     /// Surface group: samples of one group share one colour.
     pub group: u32,
@@ -44,7 +44,7 @@ pub struct Setup {
     pub columns: (i32, i32),
     /// Rows it may touch, first and last.
     pub rows: (i32, i32),
-    /// Its exact extent over rows, px.
+    /// Exact extent over rows, px.
     pub extent_px: (f64, f64),
 }
 
@@ -108,7 +108,7 @@ fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<Reach> {
     Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1), (low.1 - 1e-9, high.1 + 1e-9)))
 }
 
-/// What a band of rows sees: for each sample an inverse depth and a setup's number.
+/// Visible surfaces in a band of rows: for each sample an inverse depth and a setup's number.
 pub struct Band {
     /// First row.
     pub first_row: usize,

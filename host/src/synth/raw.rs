@@ -24,7 +24,7 @@ use crate::formats::calibration::{Placement, StereoCalibration};
 const ROTATIONS_RAD: [[f64; 3]; 2] = [[0.006, -0.008, 0.010], [-0.007, 0.009, -0.006]];
 /// Pixels of the rendering for one of the image, along one axis.
 const FINENESS: f64 = 2.0;
-/// Where a pixel is sampled, px from its centre.
+/// Positions of a pixel's samples, px from its centre.
 const SAMPLES_PX: [[f64; 2]; 4] = [[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]];
 /// Pixels of the rendering beyond the outermost sample.
 const MARGIN_PX: f64 = 2.0;
@@ -51,12 +51,17 @@ pub fn calibration(
     };
     // The middle at the scale of the ideal images.
     let plain = lens(rig.focal_px, [0.0; 2])?;
+    // The focal length is chosen so that the middle keeps the ideal images' scale.
     let focal_px = rig.focal_px * rig.focal_px / middle_focal_px(&plain);
     let plain = lens(focal_px, [0.0; 2])?;
     let rotations = ROTATIONS_RAD.map(rotation);
     let extents = rotations.map(|r| extent(&plain, &r, config, rig));
     let [Some(left), Some(right)] = extents else {
-        return Err(refused("it does not show all of the ideal image. Choose other parameters, or a longer street.focal_px".to_owned()));
+        return Err(refused(
+            "it does not show all of the ideal image. Choose other parameters, or a \
+                            longer street.focal_px"
+                .to_owned(),
+        ));
     };
     let side = |axis: usize| {
         let span = |extent: &[[f64; 2]; 2]| extent[1][axis] - extent[0][axis];
@@ -126,13 +131,13 @@ fn extent(
     Some([low, high])
 }
 
-/// How one camera's image is sampled from a rendering.
+/// Sampling of one camera's image from a rendering.
 pub struct CameraView {
-    /// What is rendered.
+    /// Camera of the rendering.
     pub pinhole: Pinhole,
     /// Width and height of the image.
     pub size: [usize; 2],
-    /// Where in the rendering the samples of each pixel lie, px; NaN where nothing is seen.
+    /// Positions in the rendering of each pixel's samples, px; NaN where nothing is seen.
     samples_px: Vec<[[f32; 2]; 4]>,
 }
 
@@ -164,7 +169,7 @@ pub fn views(
     ])
 }
 
-/// How raw images are rectified.
+/// Returns the rectification of raw images by a calibration.
 pub fn rectification(calibration: &StereoCalibration) -> Option<Rectification> {
     let Placement::Rectified { r_rectified_left, r_rectified_right, size, .. } =
         calibration.placement
@@ -204,6 +209,7 @@ impl CameraView {
         };
         let tangents: Vec<[[f64; 2]; 4]> =
             (0..width * height).into_par_iter().map(of_pixel).collect();
+        // The rendering covers every sample of every raw pixel.
         let (mut low, mut high) = ([0.0f64; 2], [0.0f64; 2]);
         for [x, y] in tangents.iter().flatten() {
             // The smaller of a number and NaN is the number.
@@ -257,7 +263,7 @@ fn bilinear(picture: &Picture, width: usize, [u, v]: [f32; 2]) -> Option<[f32; 3
     Some([mix(0), mix(1), mix(2)])
 }
 
-/// Where a camera that is off sees what the calibrated one would see elsewhere.
+/// Mapping from a calibrated camera's view to that of one which is misaligned.
 struct Misalignment {
     /// Rays of the camera as it is calibrated to rays of the camera as it stands.
     rotation: Matrix3<f64>,

@@ -73,7 +73,7 @@ fn moved(a: &[u8], b: &[u8], [near_u, near_v]: [i32; 2]) -> [f64; 2] {
     [f64::from(near_u) + u, f64::from(near_v) + v]
 }
 
-/// Whether a displacement is what it should be.
+/// Returns true if a displacement is within 0.1 px of the expected one.
 fn is_near([u, v]: [f64; 2], [expected_u, expected_v]: [f64; 2]) -> bool {
     (u - expected_u).abs() < 0.1 && (v - expected_v).abs() < 0.1
 }

@@ -22,7 +22,7 @@ const SLIGHT_PER_PX: f64 = 0.25;
 /// Group of the sky.
 const NO_GROUP: u32 = u32::MAX;
 
-/// What the pictures are made with.
+/// Scene, cameras and light from which pictures are rendered.
 pub struct Renderer<'a> {
     /// Painter.
     pub painter: &'a Painter,
@@ -56,6 +56,7 @@ impl Renderer<'_> {
         let setups: Vec<Setup> = parts.into_iter().flatten().collect();
         let (width, height) = (self.pinhole.width, self.pinhole.height);
         let bands = height.div_ceil(BAND_ROWS);
+        // Each band lists the triangles that reach it, so that bands are independent.
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
         for (number, setup) in setups.iter().enumerate() {
             let (first, last) =

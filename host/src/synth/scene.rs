@@ -24,7 +24,7 @@ pub struct MatrixPose {
 }
 
 impl MatrixPose {
-    /// The same motion as a matrix.
+    /// Takes the motion as a matrix.
     pub fn new(motion: &Transform) -> Self {
         Self {
             rotation: Matrix3::from(motion.rotation_matrix()).transpose(),
@@ -38,7 +38,7 @@ impl MatrixPose {
     }
 }
 
-/// Where a mesh comes from.
+/// Origin of a mesh.
 #[derive(Clone)]
 pub enum Source {
     /// Mesh `1` of a segment.

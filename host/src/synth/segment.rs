@@ -14,7 +14,7 @@ use super::shadow::{ShadowTile, SunAxes};
 use super::surface::{Kind, Surface, Tone, tone};
 use super::{facade, layout};
 
-/// What is generated together and kept while the camera is near.
+/// Part of the street that is generated together and kept while the camera is near.
 pub struct Segment {
     /// Static meshes, in the street's frame moved to the segment's start.
     pub meshes: Vec<Mesh>,
@@ -22,19 +22,19 @@ pub struct Segment {
     pub t_street_segment: Transform,
     /// Parked cars.
     pub parked: Vec<ParkedCar>,
-    /// What its meshes hold up against the sun.
+    /// Shadow that its meshes cast.
     pub shadow: ShadowTile,
 }
 
 /// A parked car.
 pub struct ParkedCar {
-    /// Its number for ever.
+    /// Number that stays the car's for ever.
     pub id: u32,
-    /// Its body.
+    /// Body of the car.
     pub kind: CarKind,
-    /// Its paint.
+    /// Paint of the car.
     pub paint: Tone,
-    /// Where it stands.
+    /// Pose of the parked car on the street.
     pub t_street_car: Transform,
 }
 

@@ -11,7 +11,7 @@ const SIDE: usize = 1024;
 const TEXEL_M: f64 = 0.10;
 /// Depth where nothing stands.
 const FAR_M: f32 = -1e6;
-/// How far a surface is moved towards the light before it is compared, m.
+/// Distance by which a surface is moved towards the light before it is compared, m.
 const BIAS_M: f32 = 0.07;
 
 /// The sun's view of the street: two axes across the light and one towards it.
@@ -35,8 +35,8 @@ impl SunAxes {
     }
 }
 
-/// What a segment of street or a car holds up against the sun, on the texels of the whole street.
-/// Depths count from `base_m`.
+/// Occluders of the sun in a segment of street or a car, on the texels of the whole street. Depths
+/// count from `base_m`.
 pub struct ShadowTile {
     corner: [i64; 2],
     size: [usize; 2],
@@ -195,7 +195,7 @@ impl ShadowMap {
 const GROUND_SIDE: usize = 640;
 const GROUND_TEXEL_M: f64 = 0.2;
 
-/// How much sky the ground sees: dark under cars.
+/// Share of the sky that the ground sees: dark under cars.
 pub struct GroundLight {
     offset: [f64; 2],
     open: Vec<f32>,

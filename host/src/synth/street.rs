@@ -28,14 +28,14 @@ use super::surface::Tone;
 use super::traffic::{self, Road};
 use crate::formats::calibration::StereoCalibration;
 
-/// How far behind and ahead of the camera the street exists, m.
+/// Distances behind and ahead of the camera up to which the street exists, m.
 const REACH_M: (f64, f64) = (70.0, 180.0);
 /// Segments cached: more than one frame needs.
 const CACHED_SEGMENTS: usize = 16;
 /// Slower than this a car stands, m/s.
 const STANDS_M_S: f64 = 1e-9;
 
-/// Why a street or its files cannot be made.
+/// Reason why a street or its files cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthError {
     /// A figure of the configuration is out of range.
@@ -47,9 +47,9 @@ pub enum SynthError {
     /// A file could not be written.
     #[error("cannot write {path}: {source}")]
     Write {
-        /// Which file.
+        /// Path of the file.
         path: std::path::PathBuf,
-        /// Why.
+        /// Error of the file system.
         source: std::io::Error,
     },
 }
@@ -65,7 +65,7 @@ pub struct Street {
     segments: Mutex<VecDeque<(i64, Arc<Segment>)>>,
     t_camera0_street: Transform,
     calibration: Option<StereoCalibration>,
-    /// How images are sampled, where the rig is not ideal.
+    /// Sampling of both images, if the rig is not ideal.
     views: Option<[CameraView; 2]>,
 }
 
@@ -137,7 +137,8 @@ impl Street {
         self.calibration.as_ref()
     }
 
-    /// How raw images are rectified to the ideal rig's; `None` where they come so.
+    /// Returns the rectification of raw images to the ideal rig; `None` if images are rendered
+    /// rectified.
     pub fn rectification(&self) -> Option<Rectification> {
         self.calibration.as_ref().and_then(raw::rectification)
     }

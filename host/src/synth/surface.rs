@@ -16,7 +16,7 @@ pub fn scaled(tone: Tone, factor: f64) -> Tone {
     tone.map(|value| value * factor as f32)
 }
 
-/// How a surface is painted.
+/// Kind of paint on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Asphalt with markings; coordinates are arc length within the segment and lateral position.
@@ -62,7 +62,7 @@ pub enum Kind {
 /// A material.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// How it is painted.
+    /// Kind of paint.
     pub kind: Kind,
     /// Main tone.
     pub tone: Tone,

@@ -26,7 +26,7 @@ fn seen(street: &Street, frame: &SynthFrame, u: usize, v: usize) -> Option<Point
     (depth > 0.0).then(|| Point3::new(x * depth, y * depth, depth))
 }
 
-/// Where a point of a camera appears, px.
+/// Projects a point of a camera into its image, px.
 fn projected(street: &Street, point: &Point3<f64>) -> (f64, f64) {
     let rig = street.rig();
     (
@@ -50,7 +50,8 @@ fn grey_at(picture: &[u8], size: (usize, usize), at: (f64, f64)) -> Option<f64> 
     )
 }
 
-/// Whether depth around a pixel changes little: no edge, so no occlusion and no mixed pixel.
+/// Returns true if depth around a pixel changes little: no edge, so no occlusion and no mixed
+/// pixel.
 fn flat(frame: &SynthFrame, u: usize, v: usize) -> bool {
     let at = |u: usize, v: usize| frame.depth_m[v * frame.width + u];
     let here = at(u, v);

@@ -14,7 +14,7 @@ const ONE: f32 = 4096.0;
 pub struct Ripmap {
     /// All levels one after the other, rows of the picture outermost.
     texels: Vec<i16>,
-    /// Where each level starts.
+    /// Start of each level in the pixels.
     starts: [u32; (LOG + 1) * (LOG + 1)],
     /// Texels a metre.
     texels_per_m: f32,

@@ -59,7 +59,8 @@ fn travelled(profile: &SpeedProfile, time_s: f64, rate_hz: f64) -> (f64, f64) {
     }
 }
 
-/// Where a scripted car begins and, if it stops, ends along the street, m.
+/// Returns the positions along the street, m, at which a scripted car begins and, if it stops,
+/// ends.
 pub fn ends_m(car: &ScriptedCar, rate_hz: f64) -> (f64, f64) {
     let sign = if layout::is_oncoming(car.lane) { -1.0 } else { 1.0 };
     let way = match car.profile {

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// What [`rig`] writes as its calibration.
+/// Calibration that [`rig`] writes.
 pub const CALIB: &str = "focal_px 90\ncenter_u_px 79.5\ncenter_v_px 31.5\nbaseline_m 0.5\n";
 
 /// Runs the binary in `folder`.
@@ -14,7 +14,7 @@ pub fn dynvox(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dynvox")).args(args).current_dir(folder).output().unwrap()
 }
 
-/// What a command wrote to standard error.
+/// Returns what a command wrote to standard error.
 pub fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

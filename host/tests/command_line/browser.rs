@@ -100,7 +100,7 @@ impl Visit<'_> {
     }
 }
 
-/// Whether a line of the log is the page's: what the driver remarks about speed is not.
+/// Returns true if a line of the log comes from the page: remarks of the driver about speed do not.
 fn is_of_the_page(line: &str) -> bool {
     line.contains(":CONSOLE:") && !line.contains("GL Driver Message")
 }

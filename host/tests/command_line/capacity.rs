@@ -31,7 +31,7 @@ fn run(root: &Path, out: &str, more: &[&str]) -> Value {
     serde_json::from_slice(&fs::read(root.join(out).join("summary.json")).unwrap()).unwrap()
 }
 
-/// What was refused, by bound.
+/// Returns the refusals of each bound.
 fn refused(summary: &Value) -> Vec<(String, u64)> {
     let bounds = summary["capacity"]["bounds"].as_object().unwrap();
     bounds

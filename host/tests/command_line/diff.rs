@@ -50,8 +50,8 @@ fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     );
 }
 
-/// What one bit of a voxel, a match, a pose or a track does to a stage's digest is in the core's
-/// tests; here, that the stage is named.
+/// Changes one digest of a stage and expects `diff` to name the stage. The core's tests show that
+/// one bit of a voxel, a match, a pose or a track changes the stage's digest.
 #[test]
 fn one_bit_of_a_stages_digest_names_the_stage() {
     let root = prepared();

@@ -53,7 +53,7 @@ fn section<'d>(document: &'d str, heading: &str) -> &'d str {
         .unwrap_or_else(|| panic!("no section {heading}"))
 }
 
-/// What stands between backticks, `a.{b, c}` as `a.b` and `a.c`, words one by one.
+/// Returns the words between backticks; `a.{b, c}` becomes `a.b` and `a.c`.
 fn names(text: &str) -> BTreeSet<String> {
     text.split('`')
         .skip(1)
@@ -70,7 +70,7 @@ fn expanded(name: &str) -> Vec<String> {
     within.split(',').flat_map(|part| expanded(&[before, part.trim(), after].concat())).collect()
 }
 
-/// Whether a documented name stands for `name`.
+/// Returns true if a documented name stands for `name`.
 fn stands_for(documented: &str, name: &str) -> bool {
     match PLACEHOLDERS.iter().find_map(|word| documented.split_once(word)) {
         None => documented == name,

@@ -3,7 +3,7 @@
 use super::binary::{dynvox, output_text};
 use tempfile::TempDir;
 
-/// What the report says of one fault from frame 8 on, in 18 frames of a small street.
+/// Returns the report on one fault from frame 8 on, in 18 frames of a small street.
 fn outcome(fault: &str) -> serde_json::Value {
     let root = TempDir::new().unwrap();
     let of_faults =
@@ -63,7 +63,7 @@ fn a_camera_a_frame_late_is_noticed() {
     );
 }
 
-/// As docs/faults.md has it.
+/// Holds the statement of docs/faults.md on late cameras.
 #[dynvox_needs::long]
 #[test]
 fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {

@@ -167,7 +167,10 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     let root = TempDir::new().unwrap();
     let root = root.path();
     let parts = ["0", "4"].map(|start| {
-        format!("[[recording]]\nname = \"from-{start}\"\nepoch = {start}\narguments = [\"--start\", \"{start}\", \"--frames\", \"6\"]\n")
+        format!(
+            "[[recording]]\nname = \"from-{start}\"\nepoch = {start}\narguments = \
+                 [\"--start\", \"{start}\", \"--frames\", \"6\"]\n"
+        )
     });
     let shared = RECORDINGS
         .split("[[recording]]")
@@ -241,7 +244,8 @@ fn georeferenced(root: &Path) {
         .collect();
     fs::write(root.join("poses.txt"), poses).unwrap();
     let list = "[[recording]]\nname = \"fixed\"\narguments = []\ngnss = \"fixes.txt\"\n\n[[recording]]\nname = \"posed\"\nposes_in_world = true\n\
-                arguments = [\"--start\", \"5\", \"--frames\", \"3\", \"--egomotion\", \"file:poses.txt\"]\n";
+                arguments = [\"--start\", \"5\", \"--frames\", \"3\", \"--egomotion\", \
+                \"file:poses.txt\"]\n";
     fs::write(root.join("recordings.toml"), format!("origin = [0, 8, 92]\n{shared}{list}"))
         .unwrap();
 }

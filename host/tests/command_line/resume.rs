@@ -199,7 +199,7 @@ fn assert_refused(root: &TempDir, sentence: &str) {
     assert!(fs::read(&snapshot).unwrap() == before);
 }
 
-/// As [`assert_refused`], while the file `name` holds `bytes`.
+/// Asserts a refusal like [`assert_refused`], while the file `name` holds `bytes`.
 fn assert_refused_with(root: &TempDir, name: &str, bytes: &[u8], sentence: &str) {
     let path = root.path().join(name);
     let whole = fs::read(&path).unwrap();

@@ -16,7 +16,7 @@ pub struct FakeRun {
     pub objects: usize,
     /// Squares along each side of the floor.
     pub squares: usize,
-    /// Whether there are pictures.
+    /// True if there are pictures.
     pub pictures: bool,
 }
 
@@ -58,7 +58,7 @@ impl FakeRun {
         }
     }
 
-    /// Where the camera is in a frame, m.
+    /// Returns the camera's position along the street in a frame, m.
     fn z_m(&self, at: usize) -> f64 {
         6.0 * at as f64 / self.frames as f64
     }

@@ -4,7 +4,7 @@ use super::binary::{dynvox, names};
 use std::fs;
 use std::path::Path;
 
-/// Whether a column of frames.csv depends on the machine and not on the run.
+/// Returns true if a column of frames.csv depends on the machine rather than on the run.
 fn of_the_machine(column: &str) -> bool {
     column.ends_with("_ms") || column == "rss_bytes" || column == "probes_most"
 }

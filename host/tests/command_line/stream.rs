@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 const FRAMES: usize = 6;
 const SMALL: [&str; 4] = ["--set", "street.width=160", "--set", "street.height=64"];
-/// How it is mapped: what is asked here is not in the map.
+/// Settings of a coarse map, for tests that do not look at the map.
 const COARSE: [&str; 6] =
     ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
 

@@ -85,7 +85,7 @@ fn kill_after_results(root: &Path, args: &[&str], out: &str, count: usize) {
     child.wait().unwrap();
 }
 
-/// What tells whether a result was made anew.
+/// Returns the content and time of a file, which tell whether a result was made anew.
 fn made(path: impl AsRef<Path>) -> (Vec<u8>, SystemTime) {
     (fs::read(&path).unwrap(), fs::metadata(path).unwrap().modified().unwrap())
 }

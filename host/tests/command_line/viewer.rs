@@ -37,7 +37,7 @@ fn viewer(folder: &Path) -> PathBuf {
     folder.join("viewer.html")
 }
 
-/// What a script reports on a page of a desktop's size.
+/// Runs a script on a page of a desktop's size and returns its report.
 fn visit(page: &Path, before: &str, script: &str) -> serde_json::Value {
     let script = &[HELPERS, script].concat();
     Visit { page, part: "", window: Window::DESKTOP, before, script }.report()

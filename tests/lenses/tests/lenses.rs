@@ -64,7 +64,8 @@ fn every_model_agrees_with_an_independent_one_to_a_millionth_of_a_pixel() {
     let theirs = EucmCamera::new(pinhole(), DistortionModel::EUCM { alpha: 0.6, beta: 1.1 });
     let extended_unified = worst(&unified, &theirs.unwrap());
     println!(
-        "largest difference, px: {radial_tangential:e} {equidistant:e} {double_sphere:e} {extended_unified:e}"
+        "largest difference, px: {radial_tangential:e} {equidistant:e} {double_sphere:e} \
+         {extended_unified:e}"
     );
     assert!(
         [radial_tangential, equidistant, double_sphere, extended_unified]
@@ -73,7 +74,7 @@ fn every_model_agrees_with_an_independent_one_to_a_millionth_of_a_pixel() {
     );
 }
 
-/// What OpenCV 5.0 makes of rays with z 1 (`cv2.projectPoints`, `cv2.fisheye.projectPoints`).
+/// Projections by OpenCV 5.0 of rays with z 1 (`cv2.projectPoints`, `cv2.fisheye.projectPoints`).
 const RAYS: [[f64; 2]; 6] = [
     [0.017, 0.328],
     [0.631, -0.091],

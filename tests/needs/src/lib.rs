@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 const BROWSERS: [&str; 4] =
     ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// Where the clips are for the crate that is being compiled, a folder of the repository.
+/// Returns the folder of the clips for the crate that is being compiled, a folder of the
+/// repository.
 fn data() -> PathBuf {
     let krate = || {
         PathBuf::from(
@@ -26,7 +27,7 @@ fn data() -> PathBuf {
     std::env::var_os("DYNVOX_DATA").map_or_else(|| krate().join("../../shared/data"), PathBuf::from)
 }
 
-/// Why a test that needs these paths cannot run.
+/// Explains why a test that needs these paths cannot run.
 fn missing(data: &Path, paths: &[String]) -> Option<String> {
     let missing: Vec<&str> =
         paths.iter().filter(|path| !data.join(path).exists()).map(String::as_str).collect();
@@ -78,8 +79,8 @@ pub fn browser(_: TokenStream, test: TokenStream) -> TokenStream {
     ignored(browser_found().is_none().then(|| "no Chromium is installed".to_owned()), test)
 }
 
-/// Why a long test does not run, for the values of `DYNVOX_LONG` and of variables that ask for more
-/// of it.
+/// Explains why a long test does not run, for the values of `DYNVOX_LONG` and of variables that ask
+/// for more of it.
 fn too_long(asked: &[Option<OsString>]) -> Option<String> {
     let is_asked = asked.iter().flatten().any(|value| !value.is_empty() && value != "0");
     (!is_asked).then(|| "long: .ci/run and DYNVOX_LONG=1 run it".to_owned())

@@ -215,7 +215,7 @@ extern "C" fn read(context: *mut c_void, bytes: *mut u8, len: usize) -> bool {
 
 extern "C" fn ignore(_: *mut c_void, _: *const DynvoxTriangle) {}
 
-/// What reads the mapper and leaves it as it is.
+/// Calls everything that reads the mapper and leaves it unchanged.
 fn observe(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMapper) {
     let (pose, mut count, mut triangles) = (program.pose(), 0, 0);
     let mut picture = DynvoxPicture {

@@ -52,7 +52,7 @@ impl Drop for Folder {
     }
 }
 
-/// What a writer writes.
+/// Returns the bytes that a writer writes.
 pub fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
     let folder = Folder::new();
     let path = folder.0.join(name);
@@ -137,8 +137,8 @@ pub fn depth(bytes: &[u8]) -> bool {
     read_pfm(&path, size).is_ok() | read_opencv_depth(&path, size).is_ok()
 }
 
-/// How masks are kept, by the first byte: what is chosen on the command line, and the file the
-/// bytes become.
+/// Formats of masks, by the first byte: the choice on the command line, and the file that the bytes
+/// become.
 const MASKS: [(&str, &str); 6] = [
     ("files:", "instances/000000.png"),
     ("coco:", "coco.json"),
@@ -183,7 +183,7 @@ pub fn store(bytes: &[u8]) -> bool {
     opened.records > 0
 }
 
-/// How images of a stream lie, by the first byte.
+/// Arrangements of a stream's images, by the first byte.
 const STACKINGS: [Option<Stacking>; 3] =
     [None, Some(Stacking::SideBySide), Some(Stacking::TopBottom)];
 

@@ -20,7 +20,7 @@ use dynvox_core::Capacity;
 /// A reader that takes any bytes.
 #[derive(Clone, Copy)]
 pub struct Target {
-    /// Its name, as `cargo fuzz run NAME` has it.
+    /// Name of the target, as `cargo fuzz run NAME` takes it.
     pub name: &'static str,
     /// Inputs that it takes.
     pub seeds: fn() -> Vec<Vec<u8>>,

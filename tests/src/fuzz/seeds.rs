@@ -10,7 +10,8 @@ use super::files::{SIZE, TRUNCATION_M, VOXEL_M, written};
 pub const RIG: &[u8] = b"P0: 40 0 24 0 0 40 16 0 0 0 1 0\nP1: 40 0 24 -20 0 40 16 0 0 0 1 0\n";
 /// A calibration of the tracking benchmark.
 pub const KITTI: &[u8] = b"P0: 40 0 24 0 0 40 16 0 0 0 1 0\nP1: 40 0 24 -20 0 40 16 0 0 0 1 0\nP2: 40 0 24 1 0 40 16 0 0 0 1 0\n\
-P3: 40 0 24 -20 0 40 16 0 0 0 1 0\nR_rect 1 0 0 0 1 0 0 0 1\nTr_velo_cam 0 -1 0 0 0 0 -1 0 1 0 0 -0.1\n";
+P3: 40 0 24 -20 0 40 16 0 0 0 1 0\nR_rect 1 0 0 0 1 0 0 0 1\nTr_velo_cam 0 -1 0 0 0 0 -1 0 1 0 0 \
+-0.1\n";
 /// A pose in KITTI's format.
 pub const POSE: &[u8] = b"1 0 0 0 0 1 0 0 0 0 1 0.5\n";
 /// A label of the tracking benchmark.
@@ -31,23 +32,33 @@ fn chosen(inputs: &[(u8, &[u8])]) -> Vec<Vec<u8>> {
 pub fn calibrations() -> Vec<Vec<u8>> {
     let euroc: &[u8] =
         b"sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\n\
-resolution: [48, 32]\ncamera_model: pinhole\nintrinsics: [40, 40, 24, 16]\ndistortion_model: radial-tangential\n\
+resolution: [48, 32]\ncamera_model: pinhole\nintrinsics: [40, 40, 24, 16]\ndistortion_model: \
+radial-tangential\n\
 distortion_coefficients: [-0.28, 0.07, 0.0, 0.0]\n";
     let kalibr: &[u8] = b"cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0, 0.0]\n  distortion_model: radtan\n\
-  intrinsics: [40.0, 40.0, 24.0, 16.0]\n  resolution: [48, 32]\ncam1:\n  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.5]\n  - [0.0, 1.0, 0.0, 0.0]\n\
-  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0, 0.0]\n\
+  intrinsics: [40.0, 40.0, 24.0, 16.0]\n  resolution: [48, 32]\ncam1:\n  T_cn_cnm1:\n  - [1.0, \
+  0.0, 0.0, -0.5]\n  - [0.0, 1.0, 0.0, 0.0]\n\
+  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: \
+  [-0.28, 0.07, 0.0, 0.0]\n\
   distortion_model: radtan\n  intrinsics: [40.0, 40.0, 24.0, 16.0]\n  resolution: [48, 32]\n";
     let opencv: &[u8] = b"%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\n\
-D1: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0., 0., 0. ]\nM2: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n\
-   data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\nD2: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0., 0., 0. ]\n\
-R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\nT: !!opencv-matrix\n   rows: 3\n   cols: 1\n\
+D1: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0., 0., 0. ]\nM2: \
+!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n\
+   data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\nD2: !!opencv-matrix\n   rows: 1\n   cols: \
+   5\n   dt: d\n   data: [ -0.28, 0.07, 0., 0., 0. ]\n\
+R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., \
+1. ]\nT: !!opencv-matrix\n   rows: 3\n   cols: 1\n\
    dt: d\n   data: [ -0.5, 0., 0. ]\n";
     let xml: &[u8] = b"<?xml version=\"1.0\"?>\n<opencv_storage>\n<M1 type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\
-<data>40. 0. 24. 0. 40. 16. 0. 0. 1.</data></M1>\n<M2 type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\
-<data>40. 0. 24. 0. 40. 16. 0. 0. 1.</data></M2>\n<D1 type_id=\"opencv-matrix\"><rows>1</rows><cols>4</cols><dt>d</dt><data>0. 0. 0. 0.</data></D1>\n\
+<data>40. 0. 24. 0. 40. 16. 0. 0. 1.</data></M1>\n<M2 \
+type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\
+<data>40. 0. 24. 0. 40. 16. 0. 0. 1.</data></M2>\n<D1 \
+type_id=\"opencv-matrix\"><rows>1</rows><cols>4</cols><dt>d</dt><data>0. 0. 0. 0.</data></D1>\n\
 <D2 type_id=\"opencv-matrix\"><rows>1</rows><cols>4</cols><dt>d</dt><data>0. 0. 0. 0.</data></D2>\n\
-<R type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt><data>1. 0. 0. 0. 1. 0. 0. 0. 1.</data></R>\n\
-<T type_id=\"opencv-matrix\"><rows>3</rows><cols>1</cols><dt>d</dt><data>-0.5 0. 0.</data></T>\n</opencv_storage>\n";
+<R type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt><data>1. 0. 0. 0. 1. 0. 0. 0. \
+1.</data></R>\n\
+<T type_id=\"opencv-matrix\"><rows>3</rows><cols>1</cols><dt>d</dt><data>-0.5 0. \
+0.</data></T>\n</opencv_storage>\n";
     chosen(&[
         (0, euroc),
         (0, kalibr),
@@ -94,8 +105,10 @@ pub fn depth() -> Vec<Vec<u8>> {
 
 pub fn masks() -> Vec<Vec<u8>> {
     let coco: &[u8] = b"{\"images\": [{\"id\": 1, \"file_name\": \"000000.pgm\", \"width\": 48, \"height\": 32}], \"categories\": [{\"id\": 3, \"name\": \"car\"}], \
-\"annotations\": [{\"id\": 1, \"image_id\": 1, \"category_id\": 3, \"segmentation\": [[10, 10, 30, 10, 30, 24, 10, 24]], \"bbox\": [10, 10, 20, 14], \
-\"score\": 0.9, \"iscrowd\": 0}, {\"id\": 2, \"image_id\": 1, \"category_id\": 3, \"segmentation\": {\"size\": [32, 48], \"counts\": [300, 20, 12, 20, 1184]}, \
+\"annotations\": [{\"id\": 1, \"image_id\": 1, \"category_id\": 3, \"segmentation\": [[10, 10, \
+30, 10, 30, 24, 10, 24]], \"bbox\": [10, 10, 20, 14], \
+\"score\": 0.9, \"iscrowd\": 0}, {\"id\": 2, \"image_id\": 1, \"category_id\": 3, \
+\"segmentation\": {\"size\": [32, 48], \"counts\": [300, 20, 12, 20, 1184]}, \
 \"bbox\": [9, 8, 3, 20], \"score\": 0.5}]}";
     let yolo: &[u8] = b"2 0.2 0.3 0.7 0.3 0.7 0.8 0.2 0.8\n2 0.5 0.5 0.4 0.4\n";
     let mot: &[u8] = b"1,1,10,10,20,14,0.9,-1,-1,-1\n";

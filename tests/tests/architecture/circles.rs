@@ -28,7 +28,7 @@ pub fn circles(files: &[(String, String)]) -> Vec<Vec<String>> {
     found.into_iter().collect()
 }
 
-/// Which file imports which.
+/// Files and the files that each imports.
 struct Graph {
     paths: BTreeMap<Module, String>,
     edges: BTreeMap<Module, BTreeSet<Module>>,

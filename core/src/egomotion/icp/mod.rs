@@ -163,6 +163,7 @@ pub fn track(
     memory: &mut [f32],
 ) -> IcpReport {
     let &MeasuredDepth { rig, limits_m, disparity_q8 } = measured;
+    // Coarse levels reach far, fine ones are precise.
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
     let mut t_previous_current = Transform::IDENTITY;
     let mut report = IcpReport::unpaired();
@@ -171,6 +172,7 @@ pub fn track(
         for _ in 0..config.steps {
             report.steps += 1;
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
+            // Too few pairs, or a direction that none determines: keep the motion so far.
             let Some(step) = sums.equations.solve().filter(|_| sums.pairs >= PAIRS_MIN) else {
                 break;
             };
@@ -179,6 +181,7 @@ pub fn track(
                 break;
             }
         }
+        // Only the finest level says how well the motion fits.
         if level == 0 {
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
             (report.points, report.pairs) = (sums.points, sums.pairs);
@@ -254,17 +257,21 @@ impl<'c> Pairing<'c> {
         for (v, row) in disparity_px.rows().enumerate() {
             for (u, &disparity) in row.iter().enumerate().filter(|(_, disparity)| **disparity > 0.0)
             {
+                // Each pixel is moved into the previous camera, where the map was drawn.
                 let depth = rig.focal_baseline_px_m() / f64::from(disparity);
                 let point = rig.ray(middle(u), middle(v)).map(|part| part * depth);
                 let in_previous = Vector3::from(t_previous_current.transform_point(point));
                 let Some((surface, normal)) = self.associate(&in_previous, map) else { continue };
                 sums.points += 1;
+                // A point far from the surface is another surface: noise widens the reach with
+                // depth.
                 let away = in_previous - surface;
                 let noise_m = self.noise_per_m * depth * depth;
                 let reach_m = (self.distance_m + 3.0 * noise_m) * self.widening;
                 if away.dot(&away) > reach_m * reach_m {
                     continue;
                 }
+                // Point to plane: motion along the surface is free.
                 let distance_m = normal.dot(&away);
                 let turn = in_previous.cross(&normal);
                 let weight = 1.0 / (NOISE_M * NOISE_M + noise_m * noise_m);

@@ -13,7 +13,7 @@ const SAME_PX: f32 = 1.0;
 /// Least size of a level beyond the finest, px: on smaller ones most points lie on edges, and lead
 /// astray.
 const MIN_WIDTH: usize = 64;
-/// Its least height.
+/// Least height of a level, px.
 const MIN_HEIGHT: usize = 20;
 
 /// Disparity in px of the full image, finest first; 0 where it is unknown or its depth is beyond

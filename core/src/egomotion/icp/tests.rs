@@ -26,7 +26,7 @@ const SCENE: [Plane; 4] = [
     ([0.0, 0.0, -1.0], 9.0),
 ];
 
-/// What a camera sees of the planes.
+/// Image of the planes from a camera.
 struct Picture {
     depth_m: Vec<f32>,
     normal: Vec<[i8; 3]>,

@@ -177,7 +177,8 @@ fn run(name: &str) -> Vec<Matrix4<f64>> {
 fn print_errors(what: &str, errors: &Errors) {
     let Errors { translation_percent, rotation_deg_per_m, frame_rms_m, frame_rms_deg } = errors;
     println!(
-        "{what}: t {translation_percent:.3} %, r {rotation_deg_per_m:.4} deg/m, per frame {:.2} cm {frame_rms_deg:.4} deg",
+        "{what}: t {translation_percent:.3} %, r {rotation_deg_per_m:.4} deg/m, per frame {:.2} cm \
+         {frame_rms_deg:.4} deg",
         frame_rms_m * 100.0
     );
 }

@@ -14,7 +14,8 @@ use crate::{
 use core::{error::Error, fmt::Display};
 use std::string::ToString;
 
-/// Whether all are sentences' parts of their own: without a full stop, and no two alike.
+/// Returns the texts, after checking that each is a part of a sentence without a full stop, and
+/// that no two are alike.
 fn all_differ<E: Error>(errors: &[E]) -> Vec<std::string::String> {
     let texts: Vec<_> = errors.iter().map(ToString::to_string).collect();
     for (at, text) in texts.iter().enumerate() {

@@ -19,7 +19,7 @@ pub(super) fn saved(mapper: &mut Mapper<'_>) -> Vec<u8> {
     bytes
 }
 
-/// What a source says that has no more bytes.
+/// Error of a source that has no more bytes.
 #[derive(Debug, PartialEq)]
 pub(super) struct Ended;
 

@@ -65,7 +65,8 @@ fn shifted(picture: &Grey, by_px: f64) -> Grey {
     Grey { pixels: (0..width * height).map(moved).collect(), width, height }
 }
 
-/// What is found with the right pictures moved by `by_px`, and how far the camera drove, m.
+/// Returns the report with the right pictures moved by `by_px`, and the distance that the camera
+/// drove, m.
 fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
     let capacity = Capacity::ONBOARD;
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);

@@ -30,7 +30,7 @@ fn points(count: u32, left: i32, top: i32, depth_m: f64) -> Vec<Match> {
     (0..count).map(seen).collect()
 }
 
-/// How many matches a car counts in its second frame.
+/// Returns the number of matches that a car counts in its second frame.
 fn counted(refined: &[Match], sparse: &[Match]) -> u32 {
     with(&CAPACITY, &any_size(), |instances, estimator| {
         take_frame(instances, estimator, 0, &[car(100, 0.9)], [&[], &[]]);

@@ -49,7 +49,7 @@ pub(super) const CAPACITY: Capacity = Capacity {
     ..Capacity::TINY
 };
 
-/// What a sink was handed.
+/// Objects that were handed to a sink.
 #[derive(Default)]
 pub(super) struct Retired(pub Vec<(ObjectSummary, Retirement, usize)>);
 
@@ -204,7 +204,7 @@ pub(super) struct Run<'i, 's, 't> {
     pub estimator: &'i mut Estimator<'t>,
     pub frame: u32,
     pub t_world_camera: Transform,
-    /// Whether the camera's pose is known, and not a guess.
+    /// True if the camera's pose is known rather than extrapolated.
     pub known: bool,
     pub sink: Retired,
     before: Vec<Option<Transform>>,
@@ -232,7 +232,7 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
         self.step_behind(t_world_camera, boards, &[])
     }
 
-    /// The same, with boards in front that the detector does not report.
+    /// Steps with boards in front that the detector does not report.
     pub fn step_behind(
         &mut self,
         t_world_camera: Transform,
@@ -363,7 +363,8 @@ pub(super) fn any_size() -> TrackingConfig {
     TrackingConfig { area_min_px: 0, ..TrackingConfig::default() }
 }
 
-/// The same where standing takes as long to confirm as moving: either is known in the fourth frame.
+/// Returns a configuration in which standing takes as long to confirm as moving: either is known in
+/// the fourth frame.
 pub(super) fn known_in_the_fourth_frame() -> TrackingConfig {
     let state = StateConfig { confirm_static_frames: 3, ..StateConfig::default() };
     TrackingConfig { state, ..any_size() }

@@ -5,7 +5,7 @@ use crate::objects::crop::CropSource;
 use crate::{masks::MaskHandle, parallel::Vectors, volume::BlockCoord};
 
 const SMALL: Board = Board { half_m: [0.8, 0.5], ..Board::CAR };
-/// The same as a mask twice too wide shows it.
+/// Board as a mask twice too wide shows it.
 const WIDE: Board = Board { half_m: [1.6, 0.5], ..Board::CAR };
 
 /// A volume's blocks, and the greatest weight of a voxel in it.

@@ -9,7 +9,7 @@ pub(super) const KIND: LensKind = LensKind {
     typical: LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 },
 };
 
-/// Where a ray meets the image, in units of the focal length.
+/// Projects a ray into the image, in units of the focal length.
 pub(super) fn distort(xi: f64, alpha: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let first = libm::sqrt(x * x + y * y + z * z);
     let shifted = xi * first + z;

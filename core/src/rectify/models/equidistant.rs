@@ -27,7 +27,7 @@ pub(super) fn limit(k: &[f64; 4]) -> f64 {
     monotonic::growing_until(core::f64::consts::PI, |angle| angle, |angle| polynomial(k, angle)[0])
 }
 
-/// Where a ray meets the image, in units of the focal length.
+/// Projects a ray into the image, in units of the focal length.
 pub(super) fn distort(k: &[f64; 4], limit: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let aside = libm::sqrt(x * x + y * y);
     if aside < 1e-300 {

@@ -9,7 +9,7 @@ pub(super) const KIND: LensKind = LensKind {
     typical: LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 },
 };
 
-/// Where a ray meets the image, in units of the focal length.
+/// Projects a ray into the image, in units of the focal length.
 pub(super) fn distort(alpha: f64, beta: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let distance = libm::sqrt(beta * (x * x + y * y) + z * z);
     let below = alpha * distance + (1.0 - alpha) * z;

@@ -64,7 +64,7 @@ impl LensParameter {
     }
 }
 
-/// How a lens bends rays, with the parameters as calibration tools name them.
+/// Distortion of a lens, with the parameters as calibration tools name them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LensModel {
     /// Pinhole with radial and tangential distortion (Brown 1971), rational where `radial[3..]` is
@@ -174,7 +174,7 @@ impl LensModel {
     }
 }
 
-/// Why a lens cannot be used.
+/// Reason why a lens cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

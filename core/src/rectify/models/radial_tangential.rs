@@ -52,7 +52,7 @@ fn distort_plane(k: &[f64; 6], [p1, p2]: &[f64; 2], [x, y]: [f64; 2]) -> [f64; 2
     ]
 }
 
-/// Where a ray meets the plane at distance 1 behind the lens.
+/// Projects a ray onto the plane at distance 1 behind the lens.
 pub(super) fn distort(
     k: &[f64; 6],
     p: &[f64; 2],
@@ -86,9 +86,11 @@ pub(super) fn undistort(
         let [g, slope] = factor(k, r * r);
         [r * g, g + 2.0 * r * r * slope]
     })?;
+    // Newton's steps from the radial solution: the tangential part is small.
     let (mut x, mut y) = (u / distorted * radius, v / distorted * radius);
     let [p1, p2] = *p;
     for _ in 0..MAX_STEPS {
+        // Accepted only if it maps back to the pixel.
         let [at_x, at_y] = distort_plane(k, p, [x, y]);
         let [error_x, error_y] = [at_x - u, at_y - v];
         let [g, slope] = factor(k, x * x + y * y);

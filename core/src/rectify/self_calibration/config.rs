@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// What is done with the disparity error found while driving.
+/// Use of the disparity error that is found while driving.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -86,7 +86,8 @@ impl RigConfig {
             F64(&mut c.disparity_correction.offset_px)
         })
         .range(CORRECTION)
-        .text("Added to disparities from the first frame on, as another run found it: everywhere alike."),
+        .text("Added to disparities from the first frame on, as another run found it: everywhere \
+               alike."),
         Row::expert("rig.disparity_correction.slope_px", "px", |c| {
             F64(&mut c.disparity_correction.slope_px)
         })

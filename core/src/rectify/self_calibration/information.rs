@@ -16,7 +16,7 @@ const MEMORY: f64 = 0.99;
 /// Lower half of the sums of weighted products of columns.
 pub(super) struct Sums<const C: usize>([[f64; C]; C]);
 
-/// What a frame says about the parameters: `S` and `q` of `S step = -q`.
+/// Information of a frame on the parameters: `S` and `q` of `S step = -q`.
 pub(super) struct FrameInformation<const P: usize> {
     pub matrix: [[f64; P]; P],
     pub vector: [f64; P],
@@ -34,7 +34,8 @@ impl<const P: usize> FrameInformation<P> {
         self.matrix.as_flattened().iter().chain(&self.vector).all(|value| value.is_finite())
     }
 
-    /// What the parameters should be, multiplied by the matrix, of errors that were taken at `at`.
+    /// Returns the parameters' target, multiplied by the matrix, for errors that were taken at
+    /// `at`.
     fn target(&self, at: [f64; P]) -> [f64; P] {
         core::array::from_fn(|i| {
             (0..P).fold(-self.vector[i], |sum, j| sum + self.matrix[i][j] * at[j])
@@ -100,21 +101,21 @@ impl<const C: usize> Sums<C> {
     }
 }
 
-/// What is known of the parameters: `L`, `e`.
+/// Information on the parameters: `L`, `e`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Information<const P: usize> {
     matrix: [[f64; P]; P],
     vector: [f64; P],
 }
 
-/// What stays the same of a filter, px.
+/// Prior of a filter, px.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prior<const P: usize> {
-    /// Where the parameters are before the first frame.
+    /// Parameters before the first frame.
     pub mean: [f64; P],
-    /// How far from there they may be.
+    /// Standard deviations of the parameters before the first frame.
     pub sigma: [f64; P],
-    /// How far one frame may be off in what the model does not describe.
+    /// Standard deviations of one frame's errors that the model does not describe.
     pub frame_sigma: [f64; P],
 }
 
@@ -196,7 +197,7 @@ impl<const P: usize> Information<P> {
     }
 }
 
-/// What a positive definite matrix turns into `right`; `None` where it is not positive definite.
+/// Solves a positive definite matrix for `right`; `None` if it is not positive definite.
 #[expect(
     clippy::indexing_slicing,
     clippy::needless_range_loop,

@@ -64,23 +64,24 @@ const CHANGE_MAX_PX: f64 = 0.12;
 const INFORMATION_MIN: f64 = 4.0;
 /// Share of the distance to the side at which a match weighs half, for the offset.
 const OFFSET_KNEE: f64 = 0.3;
-/// The same for the sides.
+/// Distance from the middle column, as a share, at which the error of the sides weighs as much as a
+/// match's noise.
 const SIDES_KNEE: f64 = 0.5;
 /// Sigmas before the first frame and of what one frame may be off by, px: offset, slope, fourth
 /// power, quadratic.
 const SIGMA_PX: [f64; 4] = [0.5, 0.5, 2.0, 0.5];
 const FRAME_SIGMA_PX: [f64; 4] = [0.1, 0.2, 0.5, 0.1];
 
-/// What the calibration was found to be off by.
+/// Calibration error that was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct SelfCalibrationReport {
-    /// What must be added to disparities in the middle of the image, px; the part already added
-    /// included.
+    /// Correction that must be added to disparities in the middle of the image, px; the part
+    /// already added included.
     pub offset_px: f64,
-    /// Its standard deviation, px.
+    /// Standard deviation of the offset, px.
     pub offset_sigma_px: f64,
     /// Growth towards the right side, px there.
     pub slope_px: f64,
@@ -88,20 +89,20 @@ pub struct SelfCalibrationReport {
     pub quartic_px: f64,
     /// Growth with the square of the distance from the middle row, px from there to the first row.
     pub row_quadratic_px: f64,
-    /// What must be added to the right image's rows, so that both cameras see the same in the same
-    /// row; what is already added included. All 0 while that is not known.
+    /// Correction that must be added to the right image's rows, so that both cameras see a point in
+    /// the same row; the part already added included. All 0 while it is not known.
     pub rows: RowCorrection,
     /// Offset added in this frame, px.
     pub applied_offset_px: f64,
     /// Frames that said something about it.
     pub frames: u32,
-    /// Whether enough is known to act on it.
+    /// True if enough is known to act on it.
     pub known: bool,
-    /// Whether it is taken out of depth and motion.
+    /// True if the error is corrected in depth and motion.
     pub corrected: bool,
 }
 
-/// What to make of a [`SelfCalibrationReport`].
+/// Verdict on a [`SelfCalibrationReport`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CalibrationState {
@@ -115,7 +116,7 @@ pub enum CalibrationState {
 }
 
 impl SelfCalibrationReport {
-    /// Whether the map suffers from an offset that is known and not taken out.
+    /// Returns true if the map suffers from an offset that is known and not corrected.
     pub fn is_uncorrected(&self) -> bool {
         self.state() > CalibrationState::Sound && !self.corrected
     }
@@ -136,7 +137,7 @@ impl SelfCalibrationReport {
         })
     }
 
-    /// What to make of it.
+    /// Returns the verdict.
     pub fn state(&self) -> CalibrationState {
         let offset = libm::fabs(self.offset_px);
         if !self.known || offset <= Self::WARNING_PX {
@@ -153,12 +154,12 @@ impl SelfCalibrationReport {
 #[derive(Clone, Debug)]
 pub(crate) struct SelfCalibration {
     mode: SelfCalibrationMode,
-    /// Where the search began.
+    /// Correction at which the search began.
     start: DisparityCorrection,
     offset: Information<1>,
     sides: Information<4>,
     applied: DisparityCorrection,
-    /// Whether the offset is large enough to be applied.
+    /// True if the offset is large enough to be applied.
     offset_applies: bool,
     frames: u32,
     rows: RowCalibration,
@@ -180,7 +181,7 @@ impl SelfCalibration {
         }
     }
 
-    /// What the right image is to be moved by, so that rows agree; `None` where they do.
+    /// Returns the shift of the right image's rows that makes rows agree; `None` if they do.
     pub(crate) fn row_shift(&self, rig: &StereoRig) -> Option<RowShift> {
         let error = self.rows.applied();
         (error.largest_px() > 0.0).then(|| error.for_rig(rig))
@@ -203,8 +204,8 @@ impl SelfCalibration {
         }
     }
 
-    /// What is to be added to disparities of images moved as [`SelfCalibration::row_shift`] says,
-    /// by the pixel; `None` where that is nothing.
+    /// Returns the correction by pixel for images moved as [`SelfCalibration::row_shift`] says;
+    /// `None` if it is zero.
     pub(crate) fn pixel_correction(&self, rig: &StereoRig) -> Option<PixelCorrection> {
         let roll_rad = self.rows.applied().roll_rad(rig);
         let changes = !self.applied.is_zero() || roll_rad != 0.0;
@@ -239,6 +240,7 @@ impl SelfCalibration {
             self.applied
         };
         let residuals = Residuals::new(rig, t_current_previous, &self.applied, &at);
+        // The middle of the image determines the offset, its sides the lenses' terms.
         let (mut offset, mut sides) = (Sums::<8>::ZERO, Sums::<11>::ZERO);
         for [previous, current] in observations {
             let Some(match_rows) = residuals.match_rows(&previous, &current) else { continue };
@@ -254,6 +256,7 @@ impl SelfCalibration {
         else {
             return;
         };
+        // A frame that hardly constrains the offset is left out.
         let [[information]] = offset.matrix;
         if information < INFORMATION_MIN {
             return;
@@ -293,7 +296,7 @@ impl SelfCalibration {
         };
     }
 
-    /// What is known.
+    /// Returns the report.
     pub(crate) fn report(&self) -> SelfCalibrationReport {
         if self.mode == SelfCalibrationMode::Off {
             return SelfCalibrationReport {

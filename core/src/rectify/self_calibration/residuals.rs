@@ -43,7 +43,7 @@ pub(super) struct Residuals<'r> {
     t_current_previous: &'r Transform,
     rotation: [[f64; 3]; 3],
     per_px: [f64; 2],
-    /// What is still to be added to disparities to be where errors are linearised: constant, slope,
+    /// Terms still to be added to disparities at the point of linearisation: constant, slope,
     /// fourth power, quadratic.
     ahead_px: [f64; 4],
 }
@@ -135,7 +135,7 @@ impl<'r> Residuals<'r> {
         }
     }
 
-    /// What constant, slope, fourth power and quadratic are multiplied by.
+    /// Returns the factors of constant, slope, fourth power and quadratic.
     fn basis(&self, seen: &StereoObservation) -> [f64; 4] {
         let [across, down] = self.per_px;
         let (column, row) = (seen.u_right_px * across, seen.v_px * down);

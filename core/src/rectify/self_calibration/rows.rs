@@ -32,7 +32,7 @@ const SIGMA_PX: f64 = 2.0;
 /// Finds the error of the rows, and says what of it is to be taken out.
 #[derive(Clone, Debug)]
 pub(super) struct RowCalibration {
-    /// Where the search began.
+    /// Correction at which the search began.
     start: RowCorrection,
     information: Information<TERMS>,
     applied: RowCorrection,
@@ -45,12 +45,12 @@ impl RowCalibration {
         Self { start, information: Information::NONE, applied: start, frames: 0 }
     }
 
-    /// What is taken out of the next frame's rows.
+    /// Returns the correction that is applied to the next frame's rows.
     pub(super) fn applied(&self) -> &RowCorrection {
         &self.applied
     }
 
-    /// What is known; `None` while that is too little.
+    /// Returns the correction that is known; `None` while there is too little information.
     pub(super) fn known(&self) -> Option<RowCorrection> {
         let (terms, _) = self.information.estimate(&self.prior())?;
         (self.frames >= FRAMES_MIN).then(|| RowCorrection::of_terms(terms))
@@ -73,6 +73,7 @@ impl RowCalibration {
         let [across, down] = Shares::per_px(rig);
         let shares =
             |[u, v]: [f64; 2]| [(u - rig.center_u_px) * across, (v - rig.center_v_px) * down];
+        // Robust passes: each weighs matches by the fit before it.
         let (prior, mut found) = (self.prior(), self.information);
         for scale_px in PASSES_PX {
             let Some((terms, _)) = found.estimate(&prior) else { return };
@@ -95,6 +96,7 @@ impl RowCalibration {
                 return;
             }
         }
+        // Only a frame that passed all checks is taken.
         self.information = found;
         self.frames = self.frames.saturating_add(1);
     }
@@ -129,8 +131,8 @@ mod tests {
 
     const RIG: StereoRig =
         StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
-    /// As KITTI's grey cameras have it: 1.5 px in the corners, and the other way in the ones beside
-    /// them.
+    /// Correction of KITTI's grey cameras: 1.5 px in the corners, of opposite sign in neighbouring
+    /// corners.
     const KITTI: RowCorrection = RowCorrection {
         constant_px: 0.2,
         column_px: 0.05,

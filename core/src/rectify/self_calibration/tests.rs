@@ -55,7 +55,7 @@ fn street(
         .collect()
 }
 
-/// Where the right image has it.
+/// Returns the pixel in the right image.
 fn pixel(seen: &StereoObservation) -> [f32; 2] {
     [(seen.u_right_px + RIG.center_u_px) as f32, (seen.v_px + RIG.center_v_px) as f32]
 }

@@ -27,17 +27,20 @@ impl FlowMatcher<'_> {
     ) -> PassCount {
         let ((left_before, left), (right_before, right)) =
             (self.left.frames(), self.right.frames());
+        // A match is a circle over four images that ends where it began.
         let corners = Corners {
             previous_left: &left_before.sparse,
             previous_right: &right_before.sparse,
             current_right: &right.sparse,
             current_left: &left.sparse,
         };
+        // Nothing is known of the motion yet: search everywhere.
         let widest = Reach::widest(config);
         corners.trace(|_| widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
         let matches = clipped(self.sparse, ..self.sparse_len);
+        // A match that moves like no neighbour is an outlier.
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
         support(matches, shape, config, memory, self.supported);
@@ -46,6 +49,7 @@ impl FlowMatcher<'_> {
             .zip(&*self.supported)
             .filter(|&(_, &supported)| supported == 1)
             .map(|(m, _)| *m);
+        // The supported matches bound the search of the dense pass.
         self.prior.learn(supported.clone(), width, height, config);
         PassCount {
             closed: closed as u32,
@@ -70,9 +74,11 @@ impl FlowMatcher<'_> {
             current_right: &right.dense,
             current_left: &left.dense,
         };
+        // A bin that learned nothing is searched everywhere.
         let widest = Reach::widest(config);
         let prior = &self.prior;
         corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
+        // More circles than the buffer holds are dropped and counted.
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
         let matches = clipped(self.refined, ..stored);

@@ -26,7 +26,7 @@ fn scatter<'s>(
     (features, candidates)
 }
 
-/// That the search for a feature of a class in a window finds the one expected.
+/// Check that the search for a feature of a class in a window finds the one expected.
 struct Finds<'f, 's>(&'f Features<'s>, usize, Window, [Descriptor; 2], Option<usize>);
 
 impl Comparison for Finds<'_, '_> {

@@ -17,8 +17,8 @@ fn with_matcher<R>(test: impl FnOnce(&mut FlowMatcher<'_>) -> R) -> R {
 }
 
 impl World {
-    /// What a camera so far to the right sees: textures that lie still on the background and on
-    /// each car.
+    /// Renders the image of a camera moved to the right: textures that lie still on the background
+    /// and on each car.
     fn image(&self, right_m: f64, frame: u32) -> Vec<u8> {
         let pixel = |at: usize| {
             let [u, v] = [at % WIDTH, at / WIDTH].map(|at| at as f64);

@@ -42,7 +42,7 @@ struct Group {
     points: Eight<Descriptor>,
     /// Column of the first pixel.
     u: usize,
-    /// How many of the pixels are to be matched at most.
+    /// Largest number of pixels to match.
     count: i32,
     /// Plane of each pixel; [`NOTHING`] where it is not matched.
     planes: Eight<i32>,
@@ -82,6 +82,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         row: &mut [i16],
         kernels: &impl Kernels,
     ) {
+        // Sixteen pixels share the list of disparities and read it once.
         let groups = [
             self.group(u, count, row, kernels),
             self.group(u + LANES, count.saturating_sub(LANES), row, kernels),
@@ -90,6 +91,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         if groups.iter().any(|group| !group.is_empty()) {
             best = consider::<LEFT>(&groups, self.other, listed, &mut self.spare, kernels);
         }
+        // Each pixel's own plane adds disparities that are preferred near it.
         for (group, mut best) in groups.iter().zip(best) {
             if !group.is_empty() {
                 best = lesser(
@@ -149,6 +151,7 @@ fn consider<const LEFT: bool>(
     } else {
         bases.partition_point(is_whole)
     };
+    // A key holds cost and disparity, so that the least key is the cheapest match.
     let mut keys = [[BARRED; LANES]; 2];
     let mut border = whole;
     for (i, &base) in clipped(bases, ..whole).iter().enumerate() {
@@ -163,6 +166,7 @@ fn consider<const LEFT: bool>(
             *keys = kernels.least(*keys, [&group.points, others], base);
         }
     }
+    // Near a border each disparity is tested pixel by pixel.
     for (keys, group) in keys.iter_mut().zip(groups) {
         *keys = kernels.ordered(*keys);
         if border < bases.len() {
@@ -172,7 +176,7 @@ fn consider<const LEFT: bool>(
     keys
 }
 
-/// Where in the other row the match of column `u` lies that a candidate stands for.
+/// Returns the position in the other row of the match of column `u` that a candidate stands for.
 #[inline(always)]
 fn matched<const LEFT: bool>(u: usize, base: u32) -> usize {
     let d = base as usize & 255;
@@ -180,14 +184,14 @@ fn matched<const LEFT: bool>(u: usize, base: u32) -> usize {
 }
 
 impl Group {
-    /// Whether no pixel is to be matched.
+    /// Returns true if no pixel is to be matched.
     #[inline(always)]
     fn is_empty(&self) -> bool {
         self.planes == [NOTHING; LANES]
     }
 
-    /// As [`consider`], of candidates that not all pixels can have; `best` has the least keys of
-    /// those before them.
+    /// Considers candidates like [`consider`], if not all pixels can have them; `best` has the
+    /// least keys of those before them.
     #[cold]
     #[inline(never)]
     fn consider_at_border<const LEFT: bool>(
@@ -256,6 +260,7 @@ impl Group {
     ) -> Option<Eight<u32>> {
         let planes = &self.planes;
         let radius = cost.radius as i32;
+        // The range about each plane's disparity, and whether it has to lie in the image.
         let (mut firsts, mut steep) = ([0; LANES], [0; LANES]);
         let mut outside = false;
         for lane in 0..LANES {
@@ -299,6 +304,7 @@ impl Group {
             let [one, two] = kernels.sums_of_two(&self.points, twos);
             best = lowered(lowered(best, one, step, about), two, step + 1, about_next);
         }
+        // The odd last candidate.
         let mut lasts = [&Descriptor::UNTEXTURED; LANES];
         for lane in 0..LANES {
             lasts[lane] = rows[lane].get(last)?;
@@ -334,7 +340,7 @@ impl Group {
         Some(rows)
     }
 
-    /// The same of planes wherever they are.
+    /// Returns the least keys about planes of any position.
     #[cold]
     #[inline(never)]
     fn least_about_any_planes<const LEFT: bool>(
@@ -346,6 +352,7 @@ impl Group {
     ) -> Eight<u32> {
         let mut best = [BARRED; LANES];
         let mut start = 0;
+        // Neighbouring pixels on one plane share their candidates.
         while let Some(&plane) = self.planes.get(start) {
             let run = self.planes.iter().skip(start).take_while(|other| **other == plane).count();
             if plane != NOTHING {

@@ -88,6 +88,7 @@ fn find_fractions(
         } else {
             i32::from(config.disparity_max)
         };
+        // Two lines of equal slope through the three costs.
         let (least, rise) =
             if before < after { (before, after - at) } else { (after, before - at) };
         // Below 2^17.
@@ -95,6 +96,7 @@ fn find_fractions(
         divisors[lane] = if rise > 1 { rise } else { 1 };
         counts[lane] = (d >= 1) & (d < reach) & (least >= at);
     }
+    // A parabola's vertex by integer division: the same on every machine.
     let mut fractions = kernels.quotients(dividends, divisors);
     for lane in 0..LANES {
         fractions[lane] = if counts[lane] { fractions[lane] } else { 0 };

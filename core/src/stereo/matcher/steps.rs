@@ -145,6 +145,7 @@ impl StereoMatcher<'_> {
             ],
             cost: PlaneCost::new(config),
         };
+        // Left and right image are matched band by band, each with its own scratch.
         let disparity: &mut [i16] = bytemuck::cast_slice_mut(self.disparity);
         let images = zip3(
             bands.first(),
@@ -157,6 +158,7 @@ impl StereoMatcher<'_> {
             *job = Some(DenseBand { first, left, right, scratch, counts: [0; 2] });
         }
         let (left_mesh, right_mesh) = (&self.left_mesh, &self.right_mesh);
+        // A band draws its planes first and matches along them.
         each(executor, jobs.each_mut(), |band| {
             if let Some(band) = band {
                 for (mesh, out) in [(left_mesh, &mut *band.left), (right_mesh, &mut *band.right)] {
@@ -171,6 +173,7 @@ impl StereoMatcher<'_> {
                 compare(executor.vectors(), MatchBand { matching: &matching, band });
             }
         });
+        // Sums over bands in a fixed order: threads cannot reach them.
         for [matched, inconsistent] in jobs.iter().flatten().map(|band| band.counts) {
             report.matched += matched;
             report.inconsistent += inconsistent;

@@ -51,7 +51,8 @@ fn kitti_2012(config: &StereoConfig, name: &str) -> [f64; 4] {
         let (report, estimate) = disparity(config, &left, &right, &Serial);
         let scores = score(&estimate, &truth);
         println!(
-            "{name} {pair}: {:.2} % off at {:.2} % covered, median {:.3} px, mean {:.3} px; {report:?}",
+            "{name} {pair}: {:.2} % off at {:.2} % covered, median {:.3} px, mean {:.3} px; \
+             {report:?}",
             scores[0], scores[1], scores[2], scores[3]
         );
         for (sum, score) in sums.iter_mut().zip(scores) {
@@ -92,7 +93,8 @@ fn agrees_with_the_published_implementation_where_both_see() {
         let (report, estimate) = disparity(&StereoConfig::dynslam(), &left, &right, &Serial);
         let [off, covered, median, _] = score(&estimate, &published);
         println!(
-            "06 {frame}: {off:.2} % off by more than 3 px, {covered:.1} % covered, median {median:.3} px, density {:.3}",
+            "06 {frame}: {off:.2} % off by more than 3 px, {covered:.1} % covered, median \
+             {median:.3} px, density {:.3}",
             report.density()
         );
         assert!(

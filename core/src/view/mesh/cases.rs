@@ -24,7 +24,7 @@ pub const fn edge_axis(edge: usize) -> usize {
     edge / 4
 }
 
-/// How the surface runs through a cell.
+/// Triangles of the surface in a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// Bit `e`: edge `e` is cut.
@@ -32,7 +32,7 @@ pub struct Case {
     /// Triangles, the first `count` of them, as edges, counter-clockwise seen from the outside
     /// corners.
     pub triangles: [[u8; 3]; MAX_TRIANGLES],
-    /// How many triangles there are.
+    /// Number of triangles.
     pub count: u8,
 }
 
@@ -143,7 +143,7 @@ const fn case(inside: usize) -> Case {
     case
 }
 
-/// Whether two edges lie on one face.
+/// Returns true if two edges lie on one face.
 #[expect(
     clippy::indexing_slicing,
     reason = "evaluated at compile time, where a wrong index does not compile"

@@ -72,7 +72,7 @@ struct Patch<'v, 's> {
     sdf: [i16; SIDE * SIDE * SIDE],
 }
 
-/// What is known of a lattice point.
+/// Distance and weight at a lattice point.
 struct LatticePoint {
     sdf: f32,
     weight: u8,
@@ -143,6 +143,7 @@ impl<'v, 's> Patch<'v, 's> {
                 *inside |= u16::from(sdf <= 0) << x;
             }
         }
+        // Four rows of bits give the corners of a row of cells.
         for z in 0..BLOCK_SIDE {
             for y in 0..BLOCK_SIDE {
                 let row = y + z * SIDE;
@@ -153,6 +154,7 @@ impl<'v, 's> Patch<'v, 's> {
                 let all_observed = four(&observed).iter().fold(u16::MAX, |all, bits| all & bits);
                 let any = rows.iter().fold(0, |any, bits| any | bits);
                 let all = rows.iter().fold(u16::MAX, |all, bits| all & bits);
+                // Cells with all corners observed, and corners on both sides of the surface.
                 let mut crossed =
                     all_observed & all_observed >> 1 & (any | any >> 1) & !(all & all >> 1) & 0xFF;
                 while crossed != 0 {
@@ -180,6 +182,7 @@ impl<'v, 's> Patch<'v, 's> {
         let case = &CASES[inside & 0xFF];
         // As many as an edge's four bits can say.
         let mut vertices = [Vertex::default(); 16];
+        // Vertices first: triangles of a cell share them.
         let mut left = case.edges;
         while left != 0 {
             let edge = left.trailing_zeros() as usize;
@@ -190,6 +193,7 @@ impl<'v, 's> Patch<'v, 's> {
         for edges in
             case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from))
         {
+            // A triangle whose corners coincide has no area and is left out.
             let triangle = Triangle { vertices: edges.map(|edge| vertices[edge & 15]) };
             let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
             if a != b && b != c && c != a {
@@ -225,8 +229,8 @@ impl<'v, 's> Patch<'v, 's> {
         }
     }
 
-    /// Whether the surface meets an edge at one of its ends, where other edges have the same
-    /// vertex.
+    /// Returns true if the surface meets an edge at one of its ends, where other edges have the
+    /// same vertex.
     fn is_on_point(&self, edge: CellEdge) -> bool {
         edge.ends().iter().any(|point| self.sdf(*point) == 0)
     }
@@ -237,7 +241,7 @@ impl<'v, 's> Patch<'v, 's> {
         self.sdf.get(x + SIDE * (y + SIDE * z)).copied().unwrap_or(0)
     }
 
-    /// What is known of a point of the patch.
+    /// Returns distance and weight at a point of the patch.
     // Never inlined: both ends of an edge ask for it, and two copies are 256 bytes of a Cortex-M7's
     // code.
     #[inline(never)]

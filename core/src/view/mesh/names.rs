@@ -13,7 +13,7 @@ const ENTRIES: usize = (2 * 3 * SIDE * SIDE).next_power_of_two();
 /// An edge between two lattice points of a block and of those after it.
 #[derive(Clone, Copy)]
 pub(super) struct CellEdge {
-    /// Where it begins: x, y, z, each at most 8.
+    /// Lower end: x, y, z, each at most 8.
     pub low: [usize; 3],
     /// Along which axis it runs.
     pub axis: usize,
@@ -29,7 +29,7 @@ impl CellEdge {
         }
     }
 
-    /// Where it begins and ends.
+    /// Returns both ends.
     pub fn ends(self) -> [[usize; 3]; 2] {
         let mut high = self.low;
         if let Some(along) = high.get_mut(self.axis) {
@@ -38,14 +38,14 @@ impl CellEdge {
         [self.low, high]
     }
 
-    /// Its number among those of two layers, below [`ENTRIES`].
+    /// Returns the edge's number among those of two layers, below [`ENTRIES`].
     #[inline]
     fn index(self) -> usize {
         let [x, y, z] = self.low;
         (x + SIDE * (y + SIDE * (self.axis + 3 * (z & 1)))) & (ENTRIES - 1)
     }
 
-    /// Whether cells of other blocks have it too.
+    /// Returns true if cells of other blocks have the edge too.
     pub fn is_at_border(self) -> bool {
         (0..).zip(self.low).any(|(axis, at)| axis != self.axis && at % BLOCK_SIDE == 0)
     }

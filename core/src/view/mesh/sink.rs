@@ -21,7 +21,7 @@ pub struct Triangle {
 /// Takes a mesh while it is made. A closure that takes triangles is one to which vertices have no
 /// names.
 pub trait MeshSink {
-    /// What the sink calls a vertex.
+    /// Name that the sink gives a vertex.
     type Name: Copy + Default;
 
     /// Takes a vertex before the first triangle that has it, and names it. The same vertex comes

@@ -41,7 +41,7 @@ fn key(vertex: &Vertex) -> Key {
     vertex.position_m.map(|c| (c + 0.0).to_bits())
 }
 
-/// How often each directed side is drawn.
+/// Counts how often each directed side is drawn.
 fn sides(triangles: &[Triangle]) -> BTreeMap<(Key, Key), usize> {
     let mut sides = BTreeMap::new();
     for triangle in triangles {

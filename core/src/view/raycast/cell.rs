@@ -9,7 +9,7 @@ use crate::geometry::scalar::{max_f32, min_f32};
 pub(super) struct Corners {
     /// Signed distances.
     pub sdf: [f32; 8],
-    /// Which were seen often enough, a bit per corner.
+    /// Corners that were observed often enough, a bit per corner.
     pub observed: u8,
 }
 
@@ -23,6 +23,7 @@ impl Corners {
         (0..)
             .zip(&mut known)
             .for_each(|(corner, known)| *known = f32::from(self.observed >> corner & 1));
+        // Slopes along each axis come from edges with both ends known.
         let slope = |low: [usize; 4], step: usize| {
             let (mut sum, mut edges) = (0.0, 0.0);
             for low in low {
@@ -40,6 +41,7 @@ impl Corners {
             return None;
         }
         let (x, y, z) = (x / edges_x, y / edges_y, z / edges_z);
+        // A plane through the known corners fills the unknown ones.
         let rise = [0.0, x, y, x + y, z, x + z, y + z, x + y + z];
         let (mut sum, mut count) = (0.0, 0.0);
         for ((known, sdf), rise) in known.iter().zip(self.sdf).zip(rise) {
@@ -88,9 +90,9 @@ impl Field {
     }
 }
 
-/// How far the lower (0) and the upper (1) face of a cell are from the camera along each axis, in
-/// lattice units. Cells side by side have the same figures at the face between them, so that what
-/// follows from these is the same in both.
+/// Distances of a cell's lower (0) and upper (1) face from the camera along each axis, in lattice
+/// units. Neighbouring cells have the same values at their common face, so that everything derived
+/// from them agrees.
 pub(super) type Faces = [[f32; 3]; 2];
 
 /// The depths at which a ray enters and leaves a cell, m, no nearer than `near_m`. It does not pass
@@ -107,8 +109,8 @@ pub(super) fn depths_m(ray: &Ray, [lower, upper]: &Faces, near_m: f32) -> [f32; 
     [enters_m, leaves_m]
 }
 
-/// Where a ray is at a depth, in a cell's coordinates: exactly 0 or 1 across a face that it passes
-/// there, and never outside.
+/// Returns the position of a ray at a depth, in a cell's coordinates: exactly 0 or 1 at a face that
+/// it crosses there, and never outside.
 #[inline(always)]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 pub(super) fn position(ray: &Ray, [lower, upper]: &Faces, depth_m: f32) -> [f32; 3] {

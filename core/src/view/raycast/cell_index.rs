@@ -70,7 +70,7 @@ impl CellIndex {
         self.0 as usize
     }
 
-    /// Whether all corners lie in the block: no coordinate is 7.
+    /// Returns true if all corners lie in the block: no coordinate is 7.
     #[inline(always)]
     pub fn is_inner(self) -> bool {
         self.0 & self.0 >> 1 & self.0 >> 2 & UNITS == 0
@@ -120,7 +120,7 @@ impl Point {
         Self { block: self.block | edge.block, voxel: self.voxel.wrapping_add(edge.voxel) }
     }
 
-    /// Which of the blocks it is in, below 8.
+    /// Returns the block that contains the corner, below 8.
     #[inline(always)]
     pub fn block(self) -> usize {
         self.block as usize & 7

@@ -14,7 +14,7 @@ pub(super) fn words([red, green, blue]: [u8; 3]) -> [u32; 2] {
     [u32::from(red) | u32::from(blue) << 16, u32::from(green) | is_coloured << 16]
 }
 
-/// What each corner of a cell counts at a point in it, in 256ths.
+/// Returns the weights of a cell's corners at a point in it, in 256ths.
 #[inline(always)]
 fn counts([x, y, z]: [f32; 3]) -> [u32; 8] {
     let [x, y, z] = [

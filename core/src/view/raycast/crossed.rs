@@ -22,12 +22,12 @@ pub(super) struct CrossedCells<'a, 's> {
 /// A cell and where its corners are.
 #[derive(Clone, Copy)]
 pub(super) struct CrossedCell<'a> {
-    /// Its block, relative to the camera's.
+    /// Block of the cell, relative to the camera's.
     pub block: [i32; 3],
     /// The slots of its block and of those after it.
     pub slots: &'a [Slot; 8],
     pub at: CellIndex,
-    /// Whether all corners were observed.
+    /// True if all corners were observed.
     pub fully_observed: bool,
 }
 
@@ -43,7 +43,7 @@ impl<'a> CrossedCells<'a, '_> {
         Some(CrossedCell { block: block.local, slots: block.slots, at, fully_observed })
     }
 
-    /// How far the faces of a cell are.
+    /// Returns the distances of a cell's faces.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
     pub fn faces(&self, cell: &CrossedCell<'_>) -> Faces {
@@ -66,7 +66,8 @@ impl<'a> CrossedCells<'a, '_> {
         self.corners_of_several_blocks(cell)
     }
 
-    /// As [`Self::corners`], of cells whose corners are in several blocks or not all observed.
+    /// Returns the corners like [`Self::corners`], of cells whose corners are in several blocks or
+    /// not all observed.
     #[inline(never)]
     fn corners_of_several_blocks(&self, cell: &CrossedCell<'_>) -> Option<[f32; 8]> {
         let mut corners = Corners::default();

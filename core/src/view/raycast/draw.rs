@@ -43,7 +43,7 @@ impl<'b> Band<'b> {
     }
 }
 
-/// What is drawn.
+/// Cells and camera of a raycast.
 pub(super) struct Scene<'a, 's> {
     pub cells: CrossedCells<'a, 's>,
     pub ray_camera: &'a RayCamera,
@@ -75,6 +75,7 @@ impl Scene<'_, '_> {
             .zip(band.normal.chunks_mut(width))
             .zip(band.colour.chunks_mut(width).zip(band.weight.chunks_mut(width)))
             .zip(band.layer.chunks_mut(width));
+        // A strip of rows is projected once; its pixels then meet their cells.
         let (mut count, mut hits, mut is_empty) = (0, Hits::none(), true);
         let end = band.first_row + images.len();
         for (v, (((depth_m, normal), (colour, weight)), layers)) in (band.first_row..).zip(images) {
@@ -122,7 +123,7 @@ struct Row<'r> {
 }
 
 impl Row<'_> {
-    /// Whether a depth is nearer than what a pixel shows.
+    /// Returns true if a depth is nearer than the pixel's.
     #[inline(always)]
     fn is_nearer(&self, u: usize, depth_m: f32) -> bool {
         self.depth_m.get(u).is_some_and(|&shown_m| shown_m == 0.0 || depth_m < shown_m)

@@ -18,7 +18,7 @@ pub(super) const MAX_REFINEMENTS: usize = 6;
 /// A root is good when the field is this near 0, in units of truncation / 32,767.
 pub(super) const GOOD_ENOUGH: f32 = 8.0;
 
-/// What a ray met.
+/// Surface point that a ray meets.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
     pub depth_m: f32,
@@ -71,7 +71,7 @@ impl<'a> Hits<'a> {
         self.len += 1;
     }
 
-    /// Whether all have to be taken before one more is added.
+    /// Returns true if all have to be taken before one more is added.
     pub fn is_full(&self) -> bool {
         self.len >= LANES
     }
@@ -88,6 +88,7 @@ impl<'a> Hits<'a> {
         if self.len == 0 {
             return;
         }
+        // Eight crossings are refined at once.
         let met = vectors.run(Meet { crossings: &self.crossings, rays, near_m, rotation });
         for lane in 0..self.len.min(LANES) {
             let depth_m = met.depth_m[lane];
@@ -112,8 +113,8 @@ pub(super) struct RowToHit<'a, 's> {
     pub rotation: &'a [[f32; 3]; 3],
 }
 
-/// What is seen at a point of a cell, given in which direction from there, in camera axes, the
-/// field rises.
+/// Returns the hit at a point of a cell, given the direction in which the field rises there, in
+/// camera axes.
 #[inline]
 #[expect(clippy::indexing_slicing, reason = "axes are below 3")]
 fn hit(cells: &CrossedCells<'_, '_>, cell: &CrossedCell<'_>, meeting: &Meeting) -> Hit {
@@ -133,7 +134,7 @@ fn hit(cells: &CrossedCells<'_, '_>, cell: &CrossedCell<'_>, meeting: &Meeting) 
     }
 }
 
-/// What the kernel reads: figures of one kind side by side.
+/// Input of the kernel: values of one kind next to each other.
 #[derive(Default)]
 struct Crossings {
     columns: Eight<f32>,
@@ -169,19 +170,19 @@ impl Crossings {
     }
 }
 
-/// Where the surface is met, and how it lies there.
+/// Depth and normal at which the surface is met.
 #[derive(Default)]
 struct Met {
     depth_m: Eight<f32>,
     /// In a cell's coordinates.
     point: [Eight<f32>; 3],
-    /// Where the field rises to, in camera axes.
+    /// Direction in which the field rises, in camera axes.
     direction: [Eight<f32>; 3],
     colour: [Eight<i32>; 3],
 }
 
 impl Met {
-    /// Where one lane's ray meets the surface.
+    /// Returns the point at which one lane's ray meets the surface.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
     fn meeting(&self, lane: usize) -> Meeting {
@@ -239,6 +240,7 @@ impl Work for Meet<'_> {
             set(&mut fields, lane, &Field::new(&at_lane(&crossings.corners, lane)).0);
         }
         let ends = |lane: usize| [at_lane(&from, lane), at_lane(&to, lane)];
+        // Regula falsi in the Illinois form: an end that stays twice is halved.
         let ([mut low, mut low_value], [mut high, mut high_value]) =
             ([[0.0; LANES], values[0]], [[1.0; LANES], values[1]]);
         let (mut share, mut side, mut is_open) = ([0.0; LANES], [0i32; LANES], [1i32; LANES]);
@@ -283,7 +285,7 @@ struct Passages {
 }
 
 impl Meet<'_> {
-    /// What is seen where the rays meet the surface.
+    /// Returns depth, normal and colour where the rays meet the surface.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
     fn seen(&self, passages: &Passages) -> Met {

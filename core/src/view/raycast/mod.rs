@@ -61,7 +61,7 @@ use visibility::Visibility;
 /// Units of a normal's components: ±127 is ±1.
 pub const NORMAL_ONE: f32 = 127.0;
 
-/// Why a view cannot be rendered.
+/// Reason why a view cannot be rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -86,8 +86,8 @@ impl fmt::Display for RaycastError {
 
 impl core::error::Error for RaycastError {}
 
-/// Where a picture is taken from, and how many of its pixels are wanted. A pose alone stands for
-/// all of them.
+/// Pose from which a picture is taken, and the interval of its pixels. A pose by itself takes all
+/// of them.
 #[derive(Clone, Copy, Debug)]
 pub struct RaycastView {
     /// Camera to world.
@@ -104,7 +104,7 @@ impl From<&Transform> for RaycastView {
     }
 }
 
-/// What a picture is made of.
+/// Counts of a raycast.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -113,7 +113,7 @@ pub struct RaycastReport {
     pub pixels: u32,
     /// Blocks in view, within the far limit.
     pub blocks_in_view: u32,
-    /// How many of them did not fit, so that the picture ends at `far_m`.
+    /// Number of blocks that did not fit, so that the picture ends at `far_m`.
     pub blocks_left_out: u32,
     /// The far limit, m: the configured one unless blocks were left out.
     pub far_m: f32,
@@ -221,6 +221,7 @@ impl<'s> Raycaster<'s> {
         if self.surface.len() > self.peak_blocks {
             self.peak_blocks = self.surface.len();
         }
+        // One scene for all bands; each band writes its own rows.
         let scene = Scene {
             cells: CrossedCells {
                 surface: &self.surface,
@@ -281,7 +282,8 @@ impl<'s> Raycaster<'s> {
         View::new(self.weight, self.width, self.height)
     }
 
-    /// Which map is seen: 0 for the one the picture began with, and where there is no surface.
+    /// Returns the layer of each pixel: 0 for the map that the picture began with, and where there
+    /// is no surface.
     pub fn layer(&self) -> Option<View<'_, u8>> {
         View::new(self.layer, self.width, self.height)
     }

@@ -28,7 +28,7 @@ pub(super) struct RayCamera {
     /// From lattice units to camera axes: rows for focal length times x, focal length times y, and
     /// depth, in m.
     rows: [[f32; 3]; 3],
-    /// Their magnitudes: how far a box reaches.
+    /// Magnitudes of the axes: the reach of a box.
     reaches: [[f32; 3]; 3],
     center_px: [f32; 2],
     /// Camera from world.
@@ -37,7 +37,7 @@ pub(super) struct RayCamera {
     pub height: usize,
 }
 
-/// What of the image and of depth a box can cover.
+/// Bounds in image and depth of what a box can cover.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Extent {
     /// First and last column, within the image.
@@ -49,7 +49,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Whether it covers nothing.
+    /// Returns true if the extent is empty.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         (self.columns[0] > self.columns[1])
@@ -76,6 +76,7 @@ impl RayCamera {
         let base =
             [camera.x, camera.y, camera.z].map(|c| libm::floor(c / BLOCK_SIDE as f64) as i32);
         let side = BLOCK_SIDE as i32;
+        // Coordinates relative to the camera's block keep their precision far from the origin.
         let local = |axis: f64, base: i32| (axis - f64::from(base * side)) as f32;
         let rotation = view.camera_from_world().0;
         let row = |r: usize, scale: f64| {
@@ -165,7 +166,7 @@ pub(super) const AXES: [usize; 3] = [0, 1, 2];
 pub(super) struct RowOfRays {
     /// Slope in column 0.
     first: [f32; 3],
-    /// Its change per column.
+    /// Change per column.
     column: [f32; 3],
 }
 

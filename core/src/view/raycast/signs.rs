@@ -65,9 +65,9 @@ fn with_a_corner(points: &[Layers; 8]) -> Layers {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct CellLayer {
-    /// Those the surface runs through: with a corner before it and one behind.
+    /// Cells that the surface runs through: with a corner before it and one behind.
     pub crossed: u64,
-    /// Those whose corners were all observed.
+    /// Cells whose corners were all observed.
     pub fully_observed: u64,
 }
 

@@ -36,21 +36,21 @@ pub(super) struct Surface<'s> {
     /// Keys and entries, an open-addressed hash table with linear probes.
     table: &'s mut [u64],
     len: usize,
-    /// How far a hash is shifted down to index the part of the table in use.
+    /// Shift of a hash that indexes the part of the table in use.
     shift: u32,
 }
 
 /// One of the blocks in view.
 #[derive(Clone, Copy)]
 pub(super) struct BlockInView<'a> {
-    /// Its coordinates relative to the camera's block.
+    /// Coordinates relative to the camera's block.
     pub local: [i32; 3],
-    /// Its slot and those of the blocks around its last corner.
+    /// Slots of the block and of those around its last corner.
     pub slots: &'a [Slot; 8],
     pub cells: &'a Cells,
 }
 
-/// What was in view.
+/// Counts of blocks in view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InView {
     /// Blocks.
@@ -59,7 +59,7 @@ pub(super) struct InView {
     pub far_m: f32,
 }
 
-/// What surface is looked for.
+/// Camera and limits of the search for surface blocks.
 pub(super) struct SurfaceSought<'a> {
     pub ray_camera: &'a RayCamera,
     /// Nearest and farthest depth, m.
@@ -137,6 +137,7 @@ impl<'s> Surface<'s> {
             let extent = ray_camera.extent(center, [half; 3], near_m, far_m);
             (!extent.is_empty()).then_some((slot, local, extent.rows, extent.depth_m[0]))
         });
+        // A counting sort by range: nearest first, in bounded time.
         let steps_per_m = RANGE_STEPS as f32 / far_m;
         let step_of = |depth_m: f32| ((depth_m * steps_per_m) as usize).min(RANGE_STEPS - 1);
         let mut by_range = [0usize; RANGE_STEPS];

@@ -61,7 +61,7 @@ impl<'s> Visibility<'s> {
         }
     }
 
-    /// Whether a picture of this width fits.
+    /// Returns true if a picture of this width fits.
     pub fn fits(&self, width: usize) -> bool {
         Self::stride(width)
             .checked_mul(BANDS * self.strip_rows)
@@ -82,7 +82,7 @@ impl<'s> Visibility<'s> {
 
 /// A strip of rows.
 pub(super) struct Strip<'b> {
-    /// How many it has at most.
+    /// Largest number of rows.
     pub rows: usize,
     stride: usize,
     /// The depth at which each pixel's ray enters its cell, m.
@@ -236,8 +236,8 @@ struct Extents {
     nearest_m: Eight<f32>,
 }
 
-/// What is left of a cell's nearest depth, so that no rounding takes a ray from a cell that it
-/// enters first.
+/// Factor on a cell's nearest depth, so that no rounding takes a ray from a cell that it enters
+/// first.
 const NEARER: f32 = 0.999;
 
 impl Extents {
@@ -272,7 +272,7 @@ impl Extents {
 struct Passing {
     slope: [Eight<f32>; 3],
     per_unit: [Eight<f32>; 3],
-    /// Where they enter and leave it.
+    /// Depths at which the rays enter and leave the cell.
     depths_m: [Eight<f32>; 2],
     /// All ones for those that pass it, for those of them that leave it behind the surface, and for
     /// those that meet the surface. Each has memory of its own: what is masked in place is stored
@@ -337,6 +337,7 @@ impl Target {
         cells: &mut Eight<CellId>,
     ) {
         let &EightRays { rays, first, limits_m: [near_m, far_m] } = eight;
+        // Every ray's entry into and exit from the cell.
         for lane in 0..LANES {
             let ray = rays.ray(first as f32 + lane as f32);
             let [enters_m, leaves_m] = depths_m(&ray, &self.faces, near_m);
@@ -354,6 +355,7 @@ impl Target {
             passing.leaves_behind[lane] = passing.passes[lane] & is_behind;
             any |= passing.passes[lane] & is_behind;
         }
+        // No ray leaves behind the surface: nothing is met.
         if any == 0 {
             return;
         }

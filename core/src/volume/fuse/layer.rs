@@ -53,7 +53,7 @@ pub(super) const fn share_of_one(past: i32) -> i16 {
     -rounded_i32(32_768.0 / (past as f32 + 1.0)) as i16
 }
 
-/// What is computed of a layer on the way.
+/// Intermediate values of a layer.
 pub(super) struct Scratch {
     /// Camera coordinates of each voxel, m.
     x_m: Layer<f32>,
@@ -62,23 +62,23 @@ pub(super) struct Scratch {
     /// The pixel it falls on.
     pub(super) column: Layer<i32>,
     pub(super) row: Layer<i32>,
-    /// The same as an index into the depth image, or [`OUTSIDE`].
+    /// Index of each voxel's pixel in the depth image, or [`OUTSIDE`].
     pixel: Layer<u32>,
-    /// The same in an image with padding between its rows.
+    /// Index of each voxel's pixel in an image with padding between its rows.
     padded: Layer<u32>,
     /// Depth observed there, m; 0 none.
     pub(super) observed_m: Layer<f32>,
-    /// How far the voxel lies before what is observed, m.
+    /// Distance of the voxel before the observed surface, m.
     pub(super) distance_m: Layer<f32>,
-    /// That, limited to the truncation, in its units.
+    /// Distance limited to the truncation, in its units.
     target: Layer<i16>,
     /// -1 where the voxel is observed, else 0.
     pub(super) hit: Layer<i16>,
     /// Weight of the observation.
     pub(super) gain: Layer<i16>,
-    /// What the past weighs against one observation.
+    /// Weight of the past against one observation.
     past: Layer<u8>,
-    /// Its share of the average, times -32,768.
+    /// Share of the average, times -32,768.
     share: Layer<i16>,
 }
 
@@ -113,8 +113,8 @@ impl Scratch {
         }
     }
 
-    /// The same at the voxels of these bits alone, which fall into the image: faster where a pixel
-    /// is several items.
+    /// Reads the pixels only at the voxels of these bits, which fall into the image: faster where a
+    /// pixel is several items.
     #[inline(always)]
     #[expect(
         clippy::indexing_slicing,
@@ -192,7 +192,7 @@ impl Fusion<'_> {
         true
     }
 
-    /// Where the voxels fall in the image.
+    /// Projects the voxels into the image.
     #[inline(always)]
     #[expect(
         clippy::indexing_slicing,
@@ -254,7 +254,7 @@ impl Fusion<'_> {
         any != 0
     }
 
-    /// What each observation weighs, and its share of the average.
+    /// Computes the weight of each observation, and its share of the average.
     #[inline(always)]
     fn share(&self, scratch: &mut Scratch, weight: &Layer<u8>) {
         let pasts = weight
@@ -305,7 +305,7 @@ impl Fusion<'_> {
         }
     }
 
-    /// What the past of a voxel weighs against an observation at a depth.
+    /// Returns the weight of a voxel's past against an observation at a depth.
     #[inline(always)]
     fn past(&self, weight: u8, observed_m: f32) -> i32 {
         let most = rounded_i32(min_f32(observed_m * self.past_per_m, 255.0));

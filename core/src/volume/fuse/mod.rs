@@ -47,7 +47,7 @@ pub(super) const COLOUR_BAND: f32 = 0.25;
 /// Corners of a block.
 const CORNERS: usize = 8;
 
-/// What a camera saw, as the map takes it.
+/// Depth and colour of a camera, as the map takes them.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
     /// Depths. Without padding between rows.
@@ -84,7 +84,7 @@ struct Fusion<'a> {
     free_m: f32,
     /// The depth image, without padding.
     depth_m: &'a [f32],
-    /// Whether its lowest bits are notes.
+    /// True if the lowest bits of the depths are notes.
     is_noted: bool,
     width: u32,
     height: u32,
@@ -106,6 +106,7 @@ impl<'a> Fusion<'a> {
         let (camera_from_world, camera) = view.camera_from_world();
         let (voxel_m, depth_m) = (f64::from(config.voxel_size_m), seen.depth.depth_m());
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        // Voxels are projected by adding steps along the block's axes.
         let steps = axes.map(|axis| (camera_from_world * (axis * voxel_m)).cast::<f32>());
         Self {
             seen,
@@ -212,8 +213,8 @@ impl Fusion<'_> {
         changed
     }
 
-    /// Whether no voxel of the block whose first one lies at `corner` can be observed: it is
-    /// outside the image, or behind all that is observed where it can fall.
+    /// Returns true if no voxel of the block whose first one lies at `corner` can be observed: it
+    /// is outside the image, or behind all observed surfaces where it projects.
     #[inline(always)]
     fn is_hidden(&self, corner: Vector3<f32>) -> bool {
         let Some(horizon) = self.horizon else { return false };
@@ -228,6 +229,7 @@ impl Fusion<'_> {
             *column = (corner.x + x_m) * scale + self.center_u_px;
             *row = (corner.y + y_m) * scale + self.center_v_px;
         }
+        // The block is hidden if its nearest point lies behind the farthest surface in its span.
         let nearest_m = least(&depths_m);
         // So near, what is between the corners need not be seen between them.
         if nearest_m < NEAREST_CULLED_M {

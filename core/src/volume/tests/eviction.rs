@@ -4,7 +4,7 @@ use super::*;
 use crate::random::Random;
 use std::collections::BTreeMap;
 
-/// What a block holds.
+/// Contents of a block.
 #[derive(Clone, Debug, PartialEq)]
 struct Content {
     sdf: Vec<i16>,

@@ -84,7 +84,7 @@ impl Volume<'_> {
         self.update_digest(slot);
     }
 
-    /// The same as a fault of the memory would do it.
+    /// Flips a bit as a fault of the memory would.
     pub(crate) fn flip_behind_its_back(&mut self, slot: Slot, voxel: usize, bit: u32) {
         match bit {
             0..16 => self.blocks.voxels[slot.index()].sdf[voxel] ^= 1 << bit,

@@ -48,7 +48,7 @@ pub struct StereoArgs {
     json: bool,
 }
 
-/// What was found.
+/// Figures of a benchmark.
 #[derive(Serialize)]
 struct Found {
     benchmark: &'static str,
@@ -188,7 +188,8 @@ fn write(folder: &Path, pair: &StereoPair, given: &Image<u16>, marked: bool) -> 
 
 fn print_figures(found: &Found) {
     outln!(
-        "{}: {} pairs. Percent of the pixels with an estimate; after the bar of all, holes filled as the benchmark does",
+        "{}: {} pairs. Percent of the pixels with an estimate; after the bar of all, holes filled \
+         as the benchmark does",
         found.benchmark,
         found.pairs
     );

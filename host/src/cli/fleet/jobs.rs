@@ -17,8 +17,7 @@ use dynvox_core::digest::Digest;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What identifies a run: its settings, what is known of its data set, its first and its last
-/// image.
+/// Identifies a run by its settings, the facts about its data set, and its first and last image.
 fn identify(plan: &Plan) -> anyhow::Result<Identity> {
     let mut digest = Digest::default();
     for (key, value) in run::fingerprint(plan) {
@@ -84,7 +83,8 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
             {
                 let turn_deg = of.rotation_rad.to_degrees();
                 outln!(
-                    "{} lies along its fixes, with standard deviations of {:.2} m and {turn_deg:.2} degrees",
+                    "{} lies along its fixes, with standard deviations of {:.2} m and \
+                     {turn_deg:.2} degrees",
                     job.name,
                     of.position_m
                 );
@@ -160,7 +160,7 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Where the camera of a run was in its frames.
+/// Reads the camera's poses of a run.
 fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
     let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
     let rows = read_frame_digests(&std::fs::read_to_string(run_folder.join(FRAMES_FILE))?)?;
@@ -175,7 +175,7 @@ fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
         .collect())
 }
 
-/// What became of a job, in words.
+/// Describes the state of a job.
 fn state(folder: &Path, job: &Job) -> String {
     match (job.state(folder), left_out(folder, job)) {
         (JobState::Done, frames @ 1..) => {

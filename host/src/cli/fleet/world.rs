@@ -111,7 +111,8 @@ fn sums_of(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     if !missing.is_empty() {
         let (missing, folder) = (missing.join(", "), folder.display());
         bail!(
-            "{missing} of {folder} are not in the world's lattice. Carry them there with: dynvox fleet resample {folder}"
+            "{missing} of {folder} are not in the world's lattice. Carry them there with: dynvox \
+             fleet resample {folder}"
         );
     }
     Ok(inputs)
@@ -177,7 +178,8 @@ pub fn report(
         let ([x, y, z], kind) = (change.centre_m, change.kind.name());
         let (from, to, believed) = (change.from_epoch, change.to_epoch, change.believed_epoch);
         outln!(
-            "{kind:<9} {x:>9.2}{y:>9.2}{z:>9.2} m, {:>8.3} m3, epochs {from} to {to}, shown as in {believed}",
+            "{kind:<9} {x:>9.2}{y:>9.2}{z:>9.2} m, {:>8.3} m3, epochs {from} to {to}, shown as in \
+             {believed}",
             change.volume_m3
         );
     }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub struct IncompleteRun {
     reason: String,
     folder: PathBuf,
-    /// What is missing there, and how to go on.
+    /// Sentence on what is missing in the folder, and how to go on.
     more: String,
 }
 
@@ -95,7 +95,8 @@ pub fn finish(
     let shows_map = record.plan.request.exports.map_disparity.is_some();
     if shows_map && record.sections.blocks.totals.stored > 0 {
         eprintln!(
-            "warning: a part of the map was on disk in the end, and --save-map-disparity shows what was in memory: choose a larger --profile"
+            "warning: a part of the map was on disk in the end, and --save-map-disparity shows \
+             what was in memory: choose a larger --profile"
         );
     }
     complete(&record, target)

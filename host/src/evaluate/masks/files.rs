@@ -14,9 +14,9 @@ const AREAS_PX: [u64; 2] = [400, 4_000];
 pub struct FoundMask {
     /// Name of its frame.
     pub frame: String,
-    /// Its value in the picture.
+    /// Value of the instance's pixels in the picture.
     pub id: u16,
-    /// Its pixels.
+    /// Number of pixels with this value.
     pub pixels: u64,
     /// The true mask it overlaps most, and their IoU.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -41,9 +41,9 @@ pub struct FileFigures {
 pub struct AreaFigures {
     /// Pixels they have at least.
     pub pixels_min: u64,
-    /// How many.
+    /// Number of masks compared.
     pub masks: u64,
-    /// Of these, found.
+    /// Number of them that were found.
     pub found: u64,
     /// Mean IoU of all with their best mask, 0 without one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,6 +64,7 @@ pub fn compare(found: &Path, truth: &Path) -> Result<FileFigures, InputError> {
         let (frame, [found, truth]) = pair?;
         let overlaps = Overlaps::of_images(&found, &truth);
         figures.frames += 1;
+        // A mask that matches no true one well is false.
         for (id, pixels) in overlaps.found() {
             let best = overlaps.best_for_found(id);
             figures.false_masks += usize::from(best.is_none_or(|(_, iou)| iou < FOUND_IOU));

@@ -42,7 +42,7 @@ impl Overlaps {
         counted
     }
 
-    /// Of two images of labels of one size.
+    /// Compares two images of labels of one size.
     pub fn of_images(found: &Image<u16>, truth: &Image<u16>) -> Self {
         Self::from_pairs(found.pixels().iter().copied().zip(truth.pixels().iter().copied()))
     }

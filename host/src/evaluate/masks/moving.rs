@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// Frame of an object's sight from which on it counts.
 pub const COUNTS_FROM: u32 = 4;
-/// Where ranges of distance end, m.
+/// Upper ends of the ranges of distance, m.
 const RANGES_M: [f64; 3] = [10.0, 20.0, 32.0];
 
 /// Sums over the moving objects of a range of distance.
@@ -51,9 +51,9 @@ pub struct RangeFigures {
     pub distance_m: [f64; 2],
     /// Objects.
     pub objects: u64,
-    /// Of these, found.
+    /// Number of them that were found.
     pub found: u64,
-    /// Their share.
+    /// Share of them that were found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recall: Option<f64>,
     /// Mean IoU of those found.
@@ -81,6 +81,7 @@ impl MovingErrors {
         by_motion: impl Fn(u16) -> bool,
     ) {
         self.frames += 1;
+        // An object counts once it has been in sight for some frames: motion needs time to show.
         let before = std::mem::take(&mut self.in_sight);
         for object in objects.iter().filter(|object| object.moving) {
             let label = u16::from(object.instance);
@@ -106,6 +107,7 @@ impl MovingErrors {
         let moves = |label: u16| {
             objects.iter().any(|object| object.moving && u16::from(object.instance) == label)
         };
+        // A mask is false if less than half of it covers what moves.
         let is_false = |&(found, pixels): &(u16, u64)| {
             by_motion(found) && 2 * overlaps.shared_px(found, moves) < pixels
         };

@@ -28,7 +28,7 @@ pub struct AssociationFigures {
     pub misses: u64,
     /// Tracks without an object, over all frames.
     pub false_tracks: u64,
-    /// How often an object changed its track.
+    /// Number of times an object changed its track.
     pub id_switches: u64,
 }
 
@@ -63,6 +63,7 @@ impl Association {
             candidates.filter(|pair| pair.0 >= super::OVERLAP_MIN).collect();
         // Best first; of equals the older ones.
         candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        // Greedy one-to-one association: each object has at most one track.
         let (mut paired_tracks, mut paired_objects) = (BTreeSet::new(), BTreeSet::new());
         for (_, track, object) in candidates {
             if paired_tracks.contains(&track) || paired_objects.contains(&object) {

@@ -12,7 +12,7 @@ use std::ops::Range;
 pub struct LateStates {
     /// Tracks with a frame in which the state should have been right.
     pub tracks: usize,
-    /// Those with a frame in which it was not.
+    /// Number of these tracks with a frame in which the state was still wrong.
     pub late: usize,
     /// Late ones that were late only while the image border cut the object.
     pub late_cut: usize,

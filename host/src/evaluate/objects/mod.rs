@@ -40,7 +40,7 @@ pub const FAR_M: f64 = 32.0;
 /// Width or height below which an object counts as small, px.
 pub const SMALL_PX: i32 = 30;
 
-/// How much of an object the image shows.
+/// Part of an object that the image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Visibility {
     /// It lies within the image and is not small.
@@ -81,7 +81,7 @@ pub struct TrackComparison {
     pub at: usize,
     /// Number of the true object.
     pub truth: u32,
-    /// Whether it moves.
+    /// True if the object moves.
     pub moving: bool,
     /// The track's motion state.
     pub state: MotionState,
@@ -89,7 +89,7 @@ pub struct TrackComparison {
     pub settled: u32,
     /// Distance of the true object along the camera's axis, m.
     pub distance_m: f64,
-    /// How much of the true object is in the image.
+    /// Part of the true object that is in the image.
     pub view: Visibility,
     /// Error of the motion, m and degrees; `None` where none was estimated or the object was not
     /// there before.
@@ -101,12 +101,12 @@ pub struct TrackComparison {
 }
 
 impl TrackComparison {
-    /// Whether the state should be right by now.
+    /// Returns true once enough frames have passed for the state to be right.
     fn is_due(&self) -> bool {
         self.settled >= SETTLING_FRAMES
     }
 
-    /// Whether the state should be right by now and is not.
+    /// Returns true if the state should be right by now and is wrong.
     fn is_late(&self) -> bool {
         self.is_due()
             && self.state != if self.moving { MotionState::Dynamic } else { MotionState::Static }
@@ -146,6 +146,7 @@ impl ObjectErrors {
         &TrackedFrame { tracks, t_world_camera, truth, size }: &TrackedFrame<'_>,
         large_enough: impl Fn(&PixelBox) -> bool,
     ) {
+        // Only detected tracks have a box in this frame.
         let boxes: Vec<(u32, PixelBox)> = tracks
             .iter()
             .filter(|track| track.detected)
@@ -164,6 +165,7 @@ impl ObjectErrors {
                 *known = (object.moving, frame);
             }
         }
+        // Motions are compared in the true world, so that the camera's drift does not count.
         let t_true_estimated = truth.t_world_camera * t_world_camera.inverse();
         for track in tracks.iter().filter(|track| track.detected) {
             let Some(object) = true_object(&track.pixels, truth) else { continue };

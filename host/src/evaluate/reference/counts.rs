@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When a disparity is wrong: off by more than `px` and by more than `share` of the true one.
+/// Limits beyond which a disparity is wrong: off by more than `px` and by more than `share` of the
+/// true one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// Error allowed, px.
@@ -19,10 +20,10 @@ impl Rule {
         Self { px, share: 0.0 }
     }
 
-    /// Its name in figures.
+    /// Name of the rule in figures.
     pub const KITTI_NAME: &'static str = "3 px or 5 %";
 
-    /// Whether a disparity is wrong.
+    /// Returns true if a disparity is wrong by this rule.
     pub fn is_error(&self, disparity_px: f32, true_px: f32) -> bool {
         let off_px = (disparity_px - true_px).abs();
         off_px > self.px && off_px > self.share * true_px
@@ -95,7 +96,7 @@ impl Counts {
         right(self.sources[source].errors[rule], self.total - self.missing)
     }
 
-    /// The same of the points this source has, whether or not the other has them.
+    /// Returns the accuracy over all points this source has, even where the other source has none.
     pub fn accuracy_alone(&self, source: usize, rule: usize) -> Option<f64> {
         let of = &self.sources[source];
         right(of.errors_alone[rule], self.total - of.missing_alone)

@@ -51,7 +51,7 @@ pub struct PairFigures {
 pub struct ReferenceFigures {
     /// `lidar` or `exact`.
     pub source: &'static str,
-    /// When a disparity counts as right.
+    /// Rule by which a disparity counts as right.
     pub rule: &'static str,
     /// Frames after which the map was evaluated.
     pub delay_frames: usize,

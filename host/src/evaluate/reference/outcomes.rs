@@ -21,7 +21,8 @@ pub struct PointOutcomes {
 }
 
 impl PointOutcomes {
-    /// Of a frame whose map disparities are these, px; `enlarged` as in [`PendingFrame::compare`].
+    /// Compares the map's disparities of a frame, px, with its samples; `enlarged` as in
+    /// [`PendingFrame::compare`].
     pub fn from_frame(frame: &PendingFrame, shown_px: &[f32], enlarged: f32) -> Self {
         let words = frame.samples.len().div_ceil(WORD);
         let (mut shown, mut right) = (vec![0; words], vec![0; words]);
@@ -50,6 +51,7 @@ pub fn on_common_points(runs: &[&[PointOutcomes]]) -> Option<(Vec<f64>, u64)> {
         else {
             continue;
         };
+        // Bits of points that every run shows.
         let words =
             of.iter().map(|one| one.shown.len().min(one.right.len())).min().unwrap_or_default();
         let common: Vec<u64> = (0..words)

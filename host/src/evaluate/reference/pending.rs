@@ -14,7 +14,7 @@ pub struct Sample {
     pub point: ProjectedPoint,
     /// The input's disparity, px; 0 none.
     pub input_px: f32,
-    /// Its region.
+    /// Region of the image the sample lies in: static or dynamic.
     pub region: Region,
 }
 

@@ -78,6 +78,7 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
             projected.count.out_of_range += 1;
             continue;
         }
+        // A point between pixels belongs to the nearest one.
         let (column, row) = (u.round(), v.round());
         if !((0.0..field.width as f64).contains(&column)
             && (0.0..field.height as f64).contains(&row))

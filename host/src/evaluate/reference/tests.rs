@@ -9,8 +9,8 @@ const FOCAL_PX: f64 = 700.0;
 const BASELINE_M: f64 = 0.55;
 const FIELD: Field = Field { width: 1240, height: 370, near_m: 0.5, far_m: 20.0 };
 
-/// What a scan hits, by the pixel it is seen at: column, row, true disparity, the input's and the
-/// map's (0 none).
+/// One LiDAR hit at its pixel: column, row, true disparity, the input's and the map's (0 where
+/// missing).
 type Hit = (i32, i32, f64, f32, f32);
 
 /// Two cameras whose rows differ as those of KITTI's colour pair do: by 2 px at one metre.

@@ -24,6 +24,7 @@ pub fn filled(disparity: &Image<u16>) -> Image<u16> {
             at += run + 1;
         }
     }
+    // A row without any disparity takes that of the nearest row with one.
     let empty = |pixels: &[u16], v: usize| {
         pixels[v * width..(v + 1) * width].iter().all(|&pixel| pixel == 0)
     };

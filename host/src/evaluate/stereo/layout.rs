@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Where a benchmark keeps what.
+/// Folders and file names of one benchmark.
 struct Layout {
     name: &'static str,
     /// Folders of the left and of the right images, the first that is there.
@@ -47,7 +47,7 @@ pub struct StereoPair {
     pub objects: Option<PathBuf>,
 }
 
-/// Why there is nothing to evaluate.
+/// Reason why a folder holds nothing to evaluate.
 #[derive(Debug, thiserror::Error)]
 pub enum StereoSetError {
     /// No such folder.
@@ -67,7 +67,8 @@ pub enum StereoSetError {
     },
     /// No truth for any image.
     #[error(
-        "{path} has images, but no ground truth: it should be in {truth}. The benchmarks' test halves have none"
+        "{path} has images, but no ground truth: it should be in {truth}. The benchmarks' test \
+         halves have none"
     )]
     NoTruth {
         /// The folder.
@@ -95,6 +96,7 @@ pub fn find_stereo_set(path: &Path) -> Result<StereoSet, StereoSetError> {
             else {
                 continue;
             };
+            // A pair counts only with both images and its truth.
             let there = |file: PathBuf| Some(file).filter(|file| file.is_file());
             let mut pairs: Vec<StereoPair> = left
                 .read_dir()

@@ -57,9 +57,9 @@ struct PartCounts {
 pub struct Estimate<'a> {
     /// 1/256 px, 0 none.
     pub given: &'a Image<u16>,
-    /// The same with holes filled as the benchmarks do.
+    /// Disparities with holes filled as the benchmarks do.
     pub filled: &'a Image<u16>,
-    /// Whether the core's marks tell what its matcher filled in.
+    /// True if the core's marks tell which disparities the matcher filled in.
     pub marked: bool,
 }
 
@@ -164,20 +164,20 @@ pub struct StereoFigures {
     pub coverage: f64,
     /// Share of the estimates that is wrong by 3 px and 5 %.
     pub d1: f64,
-    /// The same of all pixels, holes filled.
+    /// Share of wrong disparities over all pixels, holes filled.
     pub d1_filled: f64,
     /// Share of the estimates that is off by more than 2, 3, 4, 5 px.
     pub bad: [f64; BAD_PX.len()],
-    /// The same of all pixels, holes filled.
+    /// Shares of disparities off by each limit over all pixels, holes filled.
     pub bad_filled: [f64; BAD_PX.len()],
     /// Mean |error| of the estimates, px.
     pub mean_error_px: f64,
     /// Mean error of the estimates, px: below 0 where they are too far away.
     pub mean_signed_error_px: f64,
-    /// What the matcher measured.
+    /// Figures of the disparities that the matcher measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub measured: Option<PartFigures>,
-    /// What it filled in.
+    /// Figures of the disparities that the matcher filled in.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub filled_in: Option<PartFigures>,
 }

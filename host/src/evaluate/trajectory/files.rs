@@ -12,7 +12,7 @@ struct FrameNumber {
     frame: usize,
 }
 
-/// Why trajectories cannot be compared.
+/// Reason why trajectories cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum TrajectoryError {
     /// A file cannot be read as poses.
@@ -20,7 +20,8 @@ pub enum TrajectoryError {
     Format(#[from] FormatError),
     /// Lists of different lengths.
     #[error(
-        "the first has {first} poses, the second {second}, and they cannot be matched by time. Give TUM files, or files of the same frames"
+        "the first has {first} poses, the second {second}, and they cannot be matched by time. \
+         Give TUM files, or files of the same frames"
     )]
     Lengths {
         /// Poses of the first.
@@ -29,16 +30,18 @@ pub enum TrajectoryError {
         second: usize,
     },
     /// A run's table of frames cannot be read.
-    #[error("{path} cannot be read: {reason}. Give its trajectory_tum.txt and true poses with times", path = .path.display())]
+    #[error("{path} cannot be read: {reason}. Give its trajectory_tum.txt and true poses with \
+             times", path = .path.display())]
     Frames {
         /// The table.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// The true poses end before the run does.
     #[error(
-        "the run mapped frame {frame}, and the true poses have {rows} rows. Give those of the whole sequence, one row for each of its frames"
+        "the run mapped frame {frame}, and the true poses have {rows} rows. Give those of the \
+         whole sequence, one row for each of its frames"
     )]
     NoRow {
         /// Number of the frame.
@@ -48,7 +51,8 @@ pub enum TrajectoryError {
     },
     /// Fewer than two pairs.
     #[error(
-        "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} s; check that both use the same clock"
+        "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} \
+         s; check that both use the same clock"
     )]
     Few {
         /// Pairs found.
@@ -129,6 +133,7 @@ pub fn matched(
                 .filter_map(|(time, pose)| Some((*pose, nearest(time)?)))
                 .collect()
         }
+        // Without times the files must correspond row by row.
         _ if first.poses.len() == second.poses.len() => {
             first.poses.iter().copied().zip(second.poses.iter().copied()).collect()
         }

@@ -44,7 +44,7 @@ pub struct TrajectoryErrors {
     /// is a camera turned against that of the truth (right, down) or a wrong scale (forward).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_error_percent: Option<[f64; 3]>,
-    /// What is left of the errors where the camera's axes are turned to those of the truth.
+    /// Errors that remain after the camera's axes are turned to those of the truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub without_boresight: Option<WithoutBoresight>,
     /// Root mean square translation error from frame to frame, m.
@@ -67,6 +67,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     let travelled = travelled_m(truth);
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
+    // KITTI's metric: relative motion over segments of fixed lengths.
     let segment = |from: usize, to: usize, length_m: f64| {
         let [estimated, actual] = [estimate, truth].map(|poses| poses[from].inverse() * poses[to]);
         Segment { length_m, estimated, actual }

@@ -80,8 +80,8 @@ fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noi
     );
 }
 
-/// The same drive in Python gave the figures of the test below: numpy with a singular value
-/// decomposition for the alignment.
+/// Makes a swerving trajectory. Its expected figures in the tests below come from numpy, which
+/// aligned the same trajectory by a singular value decomposition.
 fn swerving(count: usize, noise: f64) -> Vec<Transform> {
     let step = |i: f64| {
         let turn = [

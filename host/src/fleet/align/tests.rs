@@ -21,7 +21,7 @@ fn street([x, y, z]: [f64; 3]) -> f64 {
     (-8..25).map(pillar).fold((1.6 - y).min(walls), f64::min)
 }
 
-/// What a recording at a pose sees 20 m ahead of it.
+/// Writes the map of a plane 20 m ahead of a recording's pose.
 fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
     let path = folder.join(format!("{}.blocks", job.id));
     let (mut store, _) =

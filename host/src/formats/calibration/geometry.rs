@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 /// higher ones cost time and show nothing that was not seen.
 pub const LARGEST_PX: [u32; 2] = [1_920, 1_088];
 
-/// How large raw pairs are rectified. Without a size it is the calibration's own, else all that
-/// both cameras see of one rectangle.
+/// Size to which raw pairs are rectified. Without one it is the calibration's own, else the largest
+/// rectangle that both cameras see whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RectifiedSize {
@@ -104,7 +104,7 @@ pub struct FittedGeometry {
     pub rig: StereoRig,
     /// Width and height of rectified images, px.
     pub size: (usize, usize),
-    /// How raw pairs are rectified; `None` where they come so.
+    /// Rectification of raw pairs; `None` if they come rectified.
     pub rectification: Option<Rectification>,
 }
 
@@ -133,7 +133,7 @@ impl CameraGeometry {
         }
     }
 
-    /// What is mapped of images of a size.
+    /// Returns the geometry of mapped images, for raw ones of a size.
     ///
     /// # Errors
     /// A raw calibration is for images of another size, or cannot be rectified to the size that is

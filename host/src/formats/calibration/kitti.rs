@@ -63,8 +63,10 @@ impl KittiCalibration {
                 .map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()))
                 .collect();
             let row = values.and_then(|values| Projection::try_from(values).ok()).ok_or_else(|| {
-                let action = "Compare it with a calib.txt of the benchmark: one line per camera, `P0: ` and 12 numbers";
-                unusable(path, format!("line {number} is not a projection matrix of 12 numbers"), action)
+                let action = "Compare it with a calib.txt of the benchmark: one line per camera, \
+                              `P0: ` and 12 numbers";
+                unusable(path, format!("line {number} is not a projection matrix of 12 \
+                                        numbers"), action)
             })?;
             if let Some(camera) = cameras.get_mut(slot) {
                 *camera = Some(row);
@@ -83,7 +85,8 @@ impl KittiCalibration {
             return Err(unusable(
                 path,
                 format!("P{left} and P{right} differ in focal length or principal point"),
-                "The images must be rectified to one pinhole camera: use the benchmark's rectified images and their calibration",
+                "The images must be rectified to one pinhole camera: use the benchmark's rectified \
+                 images and their calibration",
             ));
         }
         let rig = StereoRig {
@@ -95,7 +98,7 @@ impl KittiCalibration {
         checked(rig, path)
     }
 
-    /// Where camera 0 stands as seen from camera `camera`: `t` of `P = K [I | t]`, m.
+    /// Returns the position of camera 0 in camera `camera`: `t` of `P = K [I | t]`, m.
     pub fn offset_m(&self, camera: usize) -> Result<Vector3<f64>, FormatError> {
         let p = self.camera(camera)?;
         let z = p[11];

@@ -36,7 +36,8 @@ fn checked(rig: StereoRig, path: &Path) -> Result<StereoRig, FormatError> {
         ),
         Err(RigProblem::Baseline) => (
             format!("the baseline is {} m", rig.baseline_m),
-            "The right camera must stand to the right of the left one: exchange the two cameras, or correct the sign of the fourth number",
+            "The right camera must stand to the right of the left one: exchange the two cameras, \
+             or correct the sign of the fourth number",
         ),
         Err(problem) => (problem.to_string(), "Correct the calibration file"),
     };

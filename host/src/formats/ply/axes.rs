@@ -17,7 +17,7 @@ impl Axes {
     /// Both.
     pub(super) const ALL: [Self; 2] = [Self::Camera, Self::Enu];
 
-    /// What a header says of them.
+    /// Returns the header's description of the axes.
     pub(super) const fn description(self) -> &'static str {
         match self {
             Self::Camera => "x right, y down, z forward",

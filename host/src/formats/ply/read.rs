@@ -20,11 +20,11 @@ const FACES: usize = 4_096;
 pub struct PlyVertex {
     /// Number of its object; 0 for the static map.
     pub object: u32,
-    /// Where it is, in the camera's axes, and what is known of it.
+    /// Position in the camera's axes, with colour and weight.
     pub vertex: Vertex,
 }
 
-/// Where a vertex's properties lie.
+/// Offsets of a vertex's properties.
 #[derive(Debug, Default)]
 struct VertexLayout {
     bytes: usize,
@@ -78,7 +78,7 @@ pub struct PlyMesh {
     pub triangles: u64,
     corners: PlyVertices,
     faces: File,
-    /// Where the first face begins.
+    /// Offset of the first face.
     faces_at: u64,
 }
 

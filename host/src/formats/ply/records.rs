@@ -22,9 +22,9 @@ struct Chunk {
 #[derive(Debug)]
 pub(super) struct Records {
     file: File,
-    /// Where the first begins.
+    /// Offset of the first record.
     start: u64,
-    /// How many there are.
+    /// Number of records.
     len: u64,
     /// Bytes of one.
     size: usize,
@@ -38,7 +38,7 @@ impl Records {
         Self { file, start, len, size, chunks: (0..CHUNKS).map(|_| None).collect() }
     }
 
-    /// How many there are.
+    /// Returns the number of records.
     pub fn len(&self) -> u64 {
         self.len
     }

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 
 /// Vertices remembered for sharing.
 const WINDOW: usize = 1 << 19;
-/// Those of them that are looked at first, since they fit the processor's fastest memory. A divisor
-/// of [`WINDOW`].
+/// Number of the latest vertices that are searched first, since they fit the processor's fastest
+/// memory. A divisor of [`WINDOW`].
 const LATEST: usize = 1 << 10;
 /// Bytes of faces written at once.
 const FACES: usize = 1 << 17;
@@ -26,20 +26,21 @@ const DIGITS: usize = 10;
 /// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the
 /// object's number.
 const VERTEX_BYTES: usize = 32;
-/// Where its normal begins.
+/// Offset of a vertex's normal, bytes.
 const NORMAL: usize = 12;
 const PROPERTIES: &[u8] =
     b"property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar weight\nproperty int object\n";
+    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar \
+    weight\nproperty int object\n";
 
-/// What was written.
+/// Counts of a written mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mesh {
     /// Vertices in the file.
     pub vertices: u64,
     /// Triangles in the file.
     pub triangles: u64,
-    /// Those of objects among them.
+    /// Number of triangles that belong to objects.
     pub object_triangles: u64,
 }
 
@@ -84,8 +85,8 @@ impl PlyWriter {
         Self::begin_in(path, "the first camera", Axes::Camera)
     }
 
-    /// As [`PlyWriter::begin`], with the name of the frame of reference for the header. Triangles
-    /// come in the camera's axes, and are written in `axes`.
+    /// Begins a file like [`PlyWriter::begin`], with the name of the frame of reference for the
+    /// header. Triangles come in the camera's axes, and are written in `axes`.
     ///
     /// # Errors
     /// The disk refuses.
@@ -232,7 +233,7 @@ impl PlyWriter {
 }
 
 impl MeshSink for PlyWriter {
-    /// Its position in the file.
+    /// Position of a vertex in the file.
     type Name = u32;
 
     fn vertex(&mut self, vertex: &Vertex, may_recur: bool) -> u32 {

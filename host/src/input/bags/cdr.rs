@@ -67,7 +67,7 @@ impl<'m> Reader<'m> {
     }
 }
 
-/// When a message with a header was taken, ns.
+/// Returns the time stamp of a message with a header, ns.
 pub fn stamp_ns(message: &[u8]) -> Option<u64> {
     Reader::new(message)?.stamp_ns()
 }
@@ -81,7 +81,7 @@ pub struct RawImage<'m> {
     pub height: usize,
     /// `mono8`, `bgr8`, `bayer_rggb8` and so on.
     pub encoding: &'m str,
-    /// Whether samples of 16 bit are big-endian.
+    /// True if samples of 16 bit are big-endian.
     pub big_endian: bool,
     /// Bytes from one row to the next.
     pub step: usize,
@@ -146,7 +146,7 @@ impl CameraInfo {
         })
     }
 
-    /// Whether images come as a pinhole camera sees them, unturned.
+    /// Returns true if images come without distortion and rotation.
     pub fn is_undistorted(&self) -> bool {
         let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         self.distortion.iter().all(|value| *value == 0.0)
@@ -154,7 +154,7 @@ impl CameraInfo {
             && self.camera[0] == self.projection[0]
     }
 
-    /// The same as `camera_calibration` writes it to a file.
+    /// Returns the calibration as `camera_calibration` writes it to a file.
     pub fn as_yaml(&self) -> String {
         let list = |values: &[f64]| {
             values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")

@@ -36,7 +36,8 @@ impl BagFile {
             InputError::bag(
                 path,
                 format!(
-                    "it is truncated or has no index ({reason}). Repair it with `mcap recover {shown} -o repaired.mcap`"
+                    "it is truncated or has no index ({reason}). Repair it with `mcap recover \
+                     {shown} -o repaired.mcap`"
                 ),
             )
         };
@@ -50,12 +51,12 @@ impl BagFile {
         Ok(Self { path: path.to_path_buf(), summary })
     }
 
-    /// Where it is.
+    /// Returns the path of the recording.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Its topics in CDR, by name.
+    /// Returns the recording's topics in CDR, by name.
     pub fn topics(&self) -> Vec<Topic> {
         let channels =
             self.summary.channels.values().filter(|channel| channel.message_encoding == "cdr");

@@ -26,15 +26,15 @@ use dynvox_core::geometry::StereoRig;
 use file::BagFile;
 use std::path::{Path, PathBuf};
 
-/// What converts the files of other recorders.
+/// Command that converts the files of other recorders.
 const CONVERT: &str = "Convert it with `mcap convert";
 
 /// An image in the file.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    /// When it was recorded: where it is found.
+    /// Log time, ns: the position in the recording.
     log_ns: u64,
-    /// When it was taken.
+    /// Time stamp of the header, ns.
     stamp_ns: u64,
 }
 
@@ -151,7 +151,13 @@ fn cameras(
     let mut infos = Vec::new();
     for topic in topics {
         let info = topics::info_of(file, topic).ok_or_else(|| {
-            InputError::bag(file.path(), format!("there is no CameraInfo for {topic}. Give the calibration with --calibration FILE"))
+            InputError::bag(
+                file.path(),
+                format!(
+                    "there is no CameraInfo for {topic}. Give the \
+                calibration with --calibration FILE"
+                ),
+            )
         })?;
         infos.push(file.camera_info(&info)?);
         notes.push(format!("calibration of {info}"));
@@ -178,7 +184,13 @@ fn rectified(path: &Path, left: &CameraInfo, right: &CameraInfo) -> Result<Stere
         baseline_m: (left.projection[3] - right.projection[3]) / left.projection[0],
     };
     rig.validate().map(|()| rig).map_err(|_| {
-        InputError::bag(path, format!("its CameraInfo says {rig:?}, which is no stereo rig. Give the calibration with --calibration FILE"))
+        InputError::bag(
+            path,
+            format!(
+                "its CameraInfo says {rig:?}, which is no stereo rig. Give \
+                                       the calibration with --calibration FILE"
+            ),
+        )
     })
 }
 

@@ -227,7 +227,7 @@ pub(super) fn read(
 enum Source {
     Files {
         files: Vec<Option<PathBuf>>,
-        /// Where a missing file is missed.
+        /// Paths at which a missing file was expected.
         expected: Vec<PathBuf>,
         quantity: Quantity,
     },

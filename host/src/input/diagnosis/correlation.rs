@@ -9,7 +9,7 @@ pub const HALF: usize = 3;
 const SIDE: usize = 2 * HALF + 1;
 const AREA: i32 = (SIDE * SIDE) as i32;
 
-/// How similar a patch is to the one that lies so many columns and rows away.
+/// Similarity of a patch to the one that lies so many columns and rows away.
 #[derive(Clone, Copy, Debug)]
 pub struct Score {
     /// Cosine of the two patches less their means; 0 where one is flat.
@@ -46,8 +46,8 @@ impl<'i> SearchedImage<'i> {
         Self { image, sums, inverse_lengths }
     }
 
-    /// How similar the patch of another image about a pixel is to those within reach, columns and
-    /// rows to either side. None where a patch would not be within its image.
+    /// Scores the patch of another image about a pixel against those within reach, columns and rows
+    /// to either side. None where a patch would leave its image.
     pub fn scores(&self, other: &Image<u8>, center: [usize; 2], reach: [usize; 2]) -> Vec<Score> {
         let [u, v] = center;
         let (Some(patch), Some(columns), Some(rows)) = (
@@ -98,7 +98,7 @@ fn inverse_length(sum: i32, squares: i32) -> f64 {
     if spread > AREA { 1.0 / f64::from(spread).sqrt() } else { 0.0 }
 }
 
-/// Where patches within reach of one can be centred; `None` where none can.
+/// Returns the possible centres of patches within reach of one; `None` where there are none.
 fn centers(at: usize, reach: usize, side: usize) -> Option<RangeInclusive<usize>> {
     let range = at.saturating_sub(reach).max(HALF)..=(at + reach).min(side.checked_sub(HALF + 1)?);
     (!range.is_empty()).then_some(range)

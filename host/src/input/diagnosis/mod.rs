@@ -28,7 +28,7 @@ const PAIRS: usize = 10;
 const FEWEST_MATCHES: usize = 60;
 /// Median distance of matched rows that is still called rectified, px.
 const ROWS_PX: f64 = 0.5;
-/// The same above which a map is meaningless, px.
+/// Row difference above which a map is meaningless, px.
 const REFUSED_ROWS_PX: f64 = 1.0;
 /// Roll that is still called rectified, degrees.
 const ROLL_DEG: f64 = 0.15;
@@ -45,7 +45,7 @@ const SATURATED_SHARE: f64 = 0.4;
 /// Contrast over one pixel, as a share of that over four, of an image in focus.
 const FOCUS: f64 = 0.3;
 
-/// What is wrong.
+/// Kind of fault in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {
@@ -74,11 +74,11 @@ pub enum Fault {
 /// One fault, in a sentence with the next action.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// What is wrong.
+    /// Kind of the fault.
     pub fault: Fault,
     /// The sentence.
     pub message: String,
-    /// Whether a map would be meaningless.
+    /// True if a map would be meaningless.
     pub refused: bool,
 }
 
@@ -86,7 +86,7 @@ pub struct Finding {
 #[derive(Debug, thiserror::Error)]
 #[error("{}. --force maps them nevertheless", messages(.findings))]
 pub struct RefusedInput {
-    /// What is wrong.
+    /// Faults that were found.
     pub findings: Vec<Finding>,
 }
 
@@ -110,7 +110,11 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
         findings.push(finding(
             Fault::Baseline,
             true,
-            format!("the cameras are {} m apart. Is the calibration in millimetres? Give the baseline in metres", rig.baseline_m),
+            format!(
+                "the cameras are {} m apart. Is the calibration in millimetres? Give the \
+                     baseline in metres",
+                rig.baseline_m
+            ),
         ));
     }
     let mut rectified = RectifiedSource::new(source)?;
@@ -136,7 +140,7 @@ fn finding(fault: Fault, refused: bool, message: String) -> Finding {
     Finding { fault, message, refused }
 }
 
-/// What is measured of one pair.
+/// Measurements of one pair.
 struct Pair {
     width_px: f64,
     matches: Vec<PatchMatch>,
@@ -194,7 +198,9 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
         findings.push(finding(
             Fault::Black,
             true,
-            "the images are black. Check exposure, lens caps and the bits of 16-bit images (--bits)".to_owned(),
+            "the images are black. Check exposure, lens caps and the bits of 16-bit images \
+             (--bits)"
+                .to_owned(),
         ));
         return findings;
     }
@@ -216,7 +222,8 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
     for (camera, name) in ["left", "right"].into_iter().enumerate() {
         if most(&|pair| pair.focus.get(camera).is_some_and(|focus| *focus < FOCUS)) {
             let message = format!(
-                "the {name} images are out of focus or enlarged: disparities will be coarse. Focus the lens, or give --scale 0.5"
+                "the {name} images are out of focus or enlarged: disparities will be coarse. Focus \
+                 the lens, or give --scale 0.5"
             );
             findings.push(finding(Fault::Focus, false, message));
         }
@@ -234,14 +241,16 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
         matches.iter().filter(|one| holds(one)).count() as f64 / matches.len() as f64
     };
     if share(&|one| one.disparity_px < -1.0) > 0.6 {
-        let message = "left and right are exchanged: what is near lies further left in the left images. Exchange the two folders or files";
+        let message = "left and right are exchanged: what is near lies further left in the left \
+                       images. Exchange the two folders or files";
         findings.push(finding(Fault::Exchanged, true, message.to_owned()));
     }
     let RowError { shift_px, roll_deg, median_px } = RowError::of(matches, width_px);
     if median_px > ROWS_PX || shift_px.abs() > ROWS_PX || roll_deg.abs() > ROLL_DEG {
         let message = format!(
             "these images are not rectified: matches lie {median_px:.1} px apart in height (median). Right images are {:.1} px too {} in the \
-             middle and rotated by {roll_deg:+.2} degrees (clockwise). Give the raw images with their calibration: --calibration FILE",
+             middle and rotated by {roll_deg:+.2} degrees (clockwise). Give the raw images with \
+             their calibration: --calibration FILE",
             shift_px.abs(),
             if shift_px > 0.0 { "low" } else { "high" }
         );
@@ -250,7 +259,8 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     let exposure = median(matches.iter().map(|one| one.brightness).collect());
     if !(1.0 / EXPOSURE..=EXPOSURE).contains(&exposure) {
         let message = format!(
-            "the left images are {exposure:.2} times as bright as the right ones. Let both cameras expose alike"
+            "the left images are {exposure:.2} times as bright as the right ones. Let both cameras \
+             expose alike"
         );
         findings.push(finding(Fault::Exposure, false, message));
     }

@@ -45,7 +45,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / a.len().max(1) as f64
 }
 
-/// What is wrong with the order of consecutive images, the first of them frame `first`.
+/// Checks the order of consecutive images, the first of which is frame `first`.
 pub fn check(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
     let count = thumbnails.len();
     if count < FEWEST {
@@ -75,7 +75,8 @@ pub fn check(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
     let (at, longest) = steps.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
     (*longest > JUMP * usual && usual > 0.2).then(|| {
         let message = format!(
-            "the sequence jumps after frame {}: frames may be missing there. Map its parts one by one with --start and --frames",
+            "the sequence jumps after frame {}: frames may be missing there. Map its parts one by \
+             one with --start and --frames",
             first + at
         );
         finding(Fault::Jump, false, message)

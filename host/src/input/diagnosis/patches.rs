@@ -12,13 +12,13 @@ const FINE: i32 = 5;
 const COARSE: i32 = HALF as i32;
 /// Pixels of a patch at full size.
 const FINE_AREA: usize = ((2 * FINE + 1) * (2 * FINE + 1)) as usize;
-/// How far a match is looked for to either side, as a share of the width.
+/// Reach of the search for a match to either side, as a share of the width.
 const REACH: f64 = 0.12;
-/// How far above and below, px.
+/// Reach of the search above and below, px.
 const REACH_ROWS_PX: usize = 10;
 /// Least similarity of a match.
 const SIMILAR: f64 = 0.9;
-/// How much better a match must be than the second best place.
+/// Margin by which a match must be better than the second best position.
 const CLEAR: f64 = 0.05;
 /// Least contrast of a patch along rows and columns, grey levels squared.
 const TEXTURE: f64 = 60.0;
@@ -27,9 +27,9 @@ const TEXTURE: f64 = 60.0;
 pub struct PatchMatch {
     /// Column in the left image, px.
     pub u_px: f64,
-    /// How much further left it lies in the right image, px.
+    /// Distance by which the match lies further left in the right image, px.
     pub disparity_px: f64,
-    /// How much lower it lies in the right image, px.
+    /// Distance by which the match lies lower in the right image, px.
     pub rows_px: f64,
     /// Brightness in the left image over that in the right one.
     pub brightness: f64,
@@ -86,7 +86,7 @@ fn similarity(a: &Patch, b: Option<&Patch>) -> f64 {
     )
 }
 
-/// Whether a patch has edges along rows and along columns.
+/// Returns true if a patch has edges along rows and along columns.
 fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
     let at =
         |du: i32, dv: i32| f64::from(image.get((u + du) as usize, (v + dv) as usize).unwrap_or(0));

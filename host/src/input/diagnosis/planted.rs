@@ -6,7 +6,7 @@ use crate::input::source::{FrameInfo, LidarScan, SourceInfo, StereoImages, Strea
 use crate::input::{OpenOptions, StreetFrames, open};
 use crate::synth::StreetConfig;
 
-/// How a recording is spoilt.
+/// Fault that a test plants in a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Planted {
     Nothing,

@@ -15,19 +15,19 @@ const ROUNDS: usize = 8;
 /// Matches whose columns span less say nothing of a roll, px.
 const SPAN_MIN_PX: f64 = 20.0;
 
-/// What right images are off by against the left ones.
+/// Misalignment of right images relative to left ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RowError {
-    /// How much lower the right image shows a point, in the middle column, px.
+    /// Distance by which the right image shows a point lower, in the middle column, px.
     pub shift_px: f64,
-    /// How far the right image is rotated clockwise, degrees.
+    /// Clockwise rotation of the right image, degrees.
     pub roll_deg: f64,
     /// Median distance of matched rows, px.
     pub median_px: f64,
 }
 
 impl RowError {
-    /// Of matches in images `width_px` wide.
+    /// Fits the misalignment to matches in images `width_px` wide.
     pub fn of(matches: &[&PatchMatch], width_px: f64) -> Self {
         let (mut shift_px, mut slope) = through_thirds(matches, width_px);
         for _ in 0..ROUNDS {

@@ -46,7 +46,9 @@ impl FaultySource {
     /// A sentence: a stream has no frames to go back or on to.
     pub fn new(inner: Box<dyn FrameSource>, faults: Faults) -> Result<Self, String> {
         if inner.stream().is_some() {
-            return Err("--faults needs a recording, and this is a stream. Save its frames to a folder first".to_owned());
+            return Err("--faults needs a recording, and this is a stream. Save its frames to a \
+                        folder first"
+                .to_owned());
         }
         let order = deliveries(inner.len(), &faults);
         let mut info = SourceInfo { frames: order.len(), ..inner.info().clone() };

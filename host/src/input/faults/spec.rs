@@ -25,7 +25,7 @@ impl Side {
     }
 }
 
-/// What happens to a frame.
+/// Kind of a planted fault.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
@@ -58,7 +58,7 @@ pub enum FaultKind {
 /// A fault and the frames it happens in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
-    /// What happens.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// Position of the first frame.
     pub first: usize,
@@ -69,7 +69,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether a frame is among those it may happen in.
+    /// Returns true if a frame is among those the fault may affect.
     pub(super) fn covers(&self, position: usize) -> bool {
         (self.first..self.end).contains(&position)
     }
@@ -93,9 +93,10 @@ pub struct Faults {
     pub seed: u64,
 }
 
-/// What a specification looks like.
+/// Grammar of a specification, for messages.
 const GRAMMAR: &str = "NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas, with NAME one of drop, duplicate, swap, \
-                       jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, occlude=SHARE, brightness=FACTOR, masks; and seed=N";
+                       jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, \
+                       occlude=SHARE, brightness=FACTOR, masks; and seed=N";
 
 impl FromStr for Faults {
     type Err = String;

@@ -55,7 +55,8 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let names: Vec<String> = all.keys().cloned().collect();
     let name = chosen(path, options.sequence.as_deref(), &names)?;
     let folder = all.get(&name).cloned().unwrap_or_default();
-    let action = "Fetch rightImg8bit_sequence and camera of the data set: a stereo mapper needs both cameras";
+    let action = "Fetch rightImg8bit_sequence and camera of the data set: a stereo mapper needs \
+                  both cameras";
     let right = RIGHT
         .iter()
         .map(|side| path.join(side))

@@ -11,13 +11,14 @@ use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use crate::input::source::{InputError, Stacking};
 use std::path::{Path, PathBuf};
 
-/// How far a principal point lies from the middle of an image at most, as a share of its side.
+/// Largest distance of a principal point from the middle of an image, as a share of its side.
 const CENTRAL: f64 = 0.2;
 
 /// Any folder of stereo pairs.
 pub const DATA_SET: Layout = Layout::new(&DataSet {
     name: "folder",
-    summary: "Two folders of images, one with prefixes or suffixes, or images that hold both cameras; and `calib.txt`",
+    summary: "Two folders of images, one with prefixes or suffixes, or images that hold both \
+              cameras; and `calib.txt`",
     describe: describe,
     matches: is_stereo_folder,
     sequences: no_sequences,
@@ -28,7 +29,8 @@ pub const DATA_SET: Layout = Layout::new(&DataSet {
 /// [`calibration::read_rig`]); without it a calibration of raw images is looked for ([`beside`]).
 fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
-                  names, or both images in one file), and calib.txt with focal_px, center_u_px, center_v_px, baseline_m";
+                  names, or both images in one file), and calib.txt with focal_px, center_u_px, \
+                  center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
     let cameras = match (options.calibration.as_slice(), file("calib.txt"), beside(path)) {
         ([], None, Some(own)) => CameraGeometry::read(&own, None)?,
@@ -66,12 +68,12 @@ pub fn name_of(path: &Path) -> String {
         .unwrap_or("folder".into())
 }
 
-/// Whether the folder has this layout.
+/// Returns true if the folder has this layout.
 fn is_stereo_folder(path: &Path) -> bool {
     side_folders(path).is_some() || (path.join("calib.txt").is_file() && pictures_in(path).is_ok())
 }
 
-/// How the images lie there, as `inspect` says it.
+/// Describes the layout of the images, as `inspect` prints it.
 pub(super) fn describe(path: &Path) -> String {
     let name =
         |folder: &PathBuf| folder.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -58,7 +58,8 @@ fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
     let camera = |number: usize| {
         present(
             folder.join(format!("image_{number}")),
-            "A pair is image_0 and image_1 (grey) or image_2 and image_3 (colour): fetch the other half",
+            "A pair is image_0 and image_1 (grey) or image_2 and image_3 (colour): fetch the other \
+             half",
         )
     };
     let (left_folder, right_folder) = (camera(left)?, camera(right)?);
@@ -103,7 +104,11 @@ fn odometry_pair(folder: &Path, cameras: CameraPair, notes: &mut Vec<String>) ->
         CameraPair::Colour => (2, 3),
         CameraPair::Auto if grey => {
             if colour {
-                notes.push("grey and colour images are there: the grey ones are used; --images colour takes the others".to_owned());
+                notes.push(
+                    "grey and colour images are there: the grey ones are used; --images \
+                            colour takes the others"
+                        .to_owned(),
+                );
             }
             (0, 1)
         }
@@ -119,7 +124,8 @@ fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         .ok_or_else(|| InputError::Layout { path: path.to_path_buf(), below: Vec::new() })?;
     let names = tracking_sequences(&split)?;
     let name = chosen(path, options.sequence.as_deref(), &names)?;
-    let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in image_03/NNNN: fetch what is missing";
+    let action = "The tracking benchmark keeps left images in image_02/NNNN, right ones in \
+                  image_03/NNNN: fetch what is missing";
     let calibration = KittiCalibration::read(&present(
         split.join("calib").join(format!("{name}.txt")),
         "Fetch the benchmark's calibration files",
@@ -172,7 +178,7 @@ fn odometry_root(path: &Path) -> Option<PathBuf> {
     (named && path.is_dir()).then(|| path.to_path_buf())
 }
 
-/// Whether the folder is one sequence of the odometry benchmark.
+/// Returns true if the folder is one sequence of the odometry benchmark.
 fn is_odometry_sequence(path: &Path) -> bool {
     path.join("calib.txt").is_file()
         && ["image_0", "image_2"].iter().any(|camera| path.join(camera).is_dir())

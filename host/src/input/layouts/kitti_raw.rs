@@ -28,7 +28,8 @@ pub const KITTI_RAW: Layout = Layout::new(&DataSet {
 /// KITTI-360.
 pub const KITTI_360: Layout = Layout::new(&DataSet {
     name: "kitti-360",
-    summary: "KITTI-360: `data_2d_raw/DRIVE/{image_00,image_01}/data_rect`, `calibration/perspective.txt`",
+    summary: "KITTI-360: `data_2d_raw/DRIVE/{image_00,image_01}/data_rect`, \
+              `calibration/perspective.txt`",
     describe: |_| {
         "KITTI-360: image_00 and image_01 of each drive, times of timestamps.txt".to_owned()
     },
@@ -106,7 +107,7 @@ fn open_drive(
     })
 }
 
-/// Whether the folder is one drive of KITTI raw.
+/// Returns true if the folder is one drive of KITTI raw.
 fn is_drive(path: &Path) -> bool {
     ["image_00", "image_02"].iter().any(|camera| path.join(camera).join("data").is_dir())
 }
@@ -124,7 +125,7 @@ fn drives_360(path: &Path) -> Option<PathBuf> {
     Some(path.join(DRIVES_360)).filter(|drives| drives.is_dir())
 }
 
-/// Whether the folder is one drive of KITTI-360.
+/// Returns true if the folder is one drive of KITTI-360.
 fn is_drive_360(path: &Path) -> bool {
     path.join("image_00/data_rect").is_dir()
 }

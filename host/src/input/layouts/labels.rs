@@ -61,7 +61,7 @@ pub fn read_labels(
     Ok(frames)
 }
 
-/// What a row says.
+/// Contents of a row.
 enum Labelled {
     /// An object, its position still in camera 0.
     Object(TrueObject),

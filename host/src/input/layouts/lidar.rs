@@ -42,7 +42,7 @@ impl LidarFiles {
         }))
     }
 
-    /// Whether there is a scan of that name.
+    /// Returns true if there is a scan of that name.
     pub fn has(&self, stem: &str) -> bool {
         self.path(stem).is_file()
     }

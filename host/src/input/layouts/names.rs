@@ -5,7 +5,7 @@ use crate::input::source::{InputError, read_failed};
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-/// Whether a file's name ends as a picture's.
+/// Returns true if a file's name ends like a picture's.
 pub fn is_picture(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     ending.is_some_and(|ending| PICTURE_ENDINGS.contains(&ending.as_str()))

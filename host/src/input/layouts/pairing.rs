@@ -17,14 +17,14 @@ pub struct CameraFiles {
     pub stamps_ns: Option<Vec<u64>>,
 }
 
-/// Why two images are taken as one pair.
+/// Reason why two images are taken as one pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairedBy {
-    /// Their names are equal.
+    /// Equal names.
     Name,
-    /// Their names are equal but for what all names of a side share.
+    /// Equal names, apart from the part that all names of a side share.
     VaryingPart,
-    /// Their time stamps are the nearest.
+    /// Nearest time stamps.
     Stamp,
     /// They stand at the same place in their folders.
     Order,
@@ -39,7 +39,7 @@ pub struct Pairing {
     pub skipped_left: usize,
     /// Right images without a partner.
     pub skipped_right: usize,
-    /// How they were found.
+    /// Rule by which the pairs were found.
     pub by: PairedBy,
 }
 
@@ -79,7 +79,7 @@ impl Pairing {
             .then(|| found((0..counts.0).map(|at| (at, at)).collect(), PairedBy::Order))
     }
 
-    /// What a user should know of it; `None` where every image has a partner of the same name.
+    /// Returns a note for the user; `None` if every image has a partner of the same name.
     pub fn note(&self) -> Option<String> {
         let how = match self.by {
             PairedBy::Name => "",
@@ -88,7 +88,8 @@ impl Pairing {
             }
             PairedBy::Stamp => "left and right images are paired by the nearest time stamp",
             PairedBy::Order => {
-                "left and right images are paired by their order: neither names nor time stamps tell more"
+                "left and right images are paired by their order: neither names nor time stamps \
+                 tell more"
             }
         };
         let skipped = match (self.skipped_left, self.skipped_right) {

@@ -22,7 +22,7 @@ const NS_PER_S: f64 = 1e9;
 pub struct Sequence {
     info: SourceInfo,
     pairs: Vec<[PathBuf; 2]>,
-    /// How the two images lie in one file, where they do: both paths of a pair are then the same.
+    /// Arrangement of two images in one file, if so: both paths of a pair are then equal.
     stacking: Option<Stacking>,
     /// Width and height of the images in the files, px.
     image_size: (usize, usize),
@@ -64,20 +64,20 @@ pub(super) fn stamps_in_names(files: &[PathBuf]) -> Option<Vec<u64>> {
     stamps.filter(|stamps| stamps.is_sorted_by(|a, b| a < b))
 }
 
-/// What a layout's loader found, before it is checked.
+/// Contents of a recording that a layout's loader found, before they are checked.
 pub(super) struct Parts {
     pub name: String,
     pub images: ImageFiles,
-    /// Whether this is significant bits of 16-bit images; told from the data otherwise.
+    /// Number of significant bits of 16-bit images; told from the data if absent.
     pub bits: Option<u32>,
     pub cameras: CameraGeometry,
-    /// How large raw pairs are rectified.
+    /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
     /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or
     /// `None` without a file.
     pub times: Option<(PathBuf, Vec<u64>)>,
     pub poses: Option<(PathBuf, Vec<Transform>)>,
-    /// Whether file names are frame numbers, as in KITTI: row `n` of the tables then belongs to
+    /// True if file names are frame numbers, as in KITTI: row `n` of the tables then belongs to
     /// file `n`.
     pub numbered: bool,
     pub notes: Vec<String>,
@@ -168,7 +168,7 @@ impl Sequence {
     }
 }
 
-/// That images are rectified here, and to what.
+/// Returns the note that raw images are rectified, and to which size.
 fn raw_note(cameras: &CameraGeometry, geometry: &FittedGeometry) -> Option<String> {
     let CameraGeometry::Raw { calibration, path } = cameras else { return None };
     let (width, height) = geometry.size;
@@ -211,9 +211,9 @@ fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputEr
     Ok((pairs, None, left, positions))
 }
 
-/// How many bits of 16-bit images are significant, from pictures spread over the sequence; `None`
-/// where the first is of 8 bit. A picture that cannot be read is passed over: it is refused when
-/// its turn comes.
+/// Detects the number of significant bits of 16-bit images from pictures spread over the sequence;
+/// `None` if the first is of 8 bit. A picture that cannot be read is passed over: it is refused
+/// when its turn comes.
 fn detected_bits(
     pairs: &[[PathBuf; 2]],
     notes: &mut Vec<String>,
@@ -229,7 +229,10 @@ fn detected_bits(
     }
     let bits = largest.map(significant_bits);
     if let (Some(bits), Some(largest)) = (bits, largest) {
-        notes.push(format!("16-bit images: {bits} bits are taken as significant, by the largest value {largest} of {RANGE_PICTURES} images; --bits says otherwise"));
+        notes.push(format!(
+            "16-bit images: {bits} bits are taken as significant, by the largest \
+                            value {largest} of {RANGE_PICTURES} images; --bits says otherwise"
+        ));
     }
     Ok(bits)
 }

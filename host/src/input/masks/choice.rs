@@ -6,7 +6,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Where masks come from, as the command line says it.
+/// Source of masks, as the command line names it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MaskChoice {
@@ -23,12 +23,13 @@ pub enum MaskChoice {
     Networks(Vec<PathBuf>),
     /// The synthetic street's exact masks.
     Exact,
-    /// The same with a detector's faults, drawn from a seed.
+    /// Exact masks with a detector's faults, drawn from a seed.
     Noisy(u64),
 }
 
 impl MaskChoice {
-    /// Whether moving objects are searched for by their motion; `None` where the settings decide.
+    /// Returns true if moving objects are searched for by their motion; `None` if the settings
+    /// decide.
     pub fn finds_motion(&self) -> Option<bool> {
         match self {
             Self::Auto | Self::Motion => Some(true),

@@ -178,7 +178,8 @@ impl Coco {
         if size != [height, width] {
             let [found_height, found_width] = size;
             return Err(format!(
-                "a mask is {found_width} x {found_height} px, but the images are {width} x {height} px"
+                "a mask is {found_width} x {found_height} px, but the images are {width} x \
+                 {height} px"
             ));
         }
         let runs = match counts {

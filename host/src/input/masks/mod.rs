@@ -65,7 +65,7 @@ impl Frames {
         self.stems.get(index).and_then(|stem| stem.parse().ok()).unwrap_or(index)
     }
 
-    /// How many frames have a file of their name in a folder.
+    /// Counts the frames that have a file of their name in a folder.
     fn files(&self, folder: &Path, ending: &str) -> usize {
         self.stems.iter().filter(|stem| folder.join(format!("{stem}.{ending}")).is_file()).count()
     }

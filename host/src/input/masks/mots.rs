@@ -116,7 +116,8 @@ impl MotsText {
                 return Err(InputError::masks(
                     path,
                     format!(
-                        "the mask of line {line} is {width} x {height} px, but the images are {w} x {h} px"
+                        "the mask of line {line} is {width} x {height} px, but the images are {w} \
+                         x {h} px"
                     ),
                 ));
             }

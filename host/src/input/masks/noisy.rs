@@ -9,17 +9,17 @@ use dynvox_core::masks::PixelBox;
 use dynvox_core::random::Random;
 use dynvox_core::tracking::Class;
 
-/// How often a mask is missed, percent.
+/// Probability that a mask is missed, percent.
 const MISSED: u32 = 10;
-/// How often two cars that touch become one, percent.
+/// Probability that two cars that touch become one, percent.
 const MERGED: u32 = 15;
-/// How often a car is called a van or the other way round, percent.
+/// Probability that a car is called a van or the other way round, percent.
 const MISCALLED: u32 = 5;
-/// How often something is seen that is not there, percent of frames.
+/// Probability of a false detection, percent of frames.
 const FALSE: u32 = 30;
 /// Side of the patches in which a border moves alike, px.
 const PATCH_PX: i32 = 6;
-/// How far a border moves at most, px at an image width of 640.
+/// Largest shift of a border, px at an image width of 640.
 const RAGGED_PX: f64 = 2.0;
 
 /// Another source's masks, spoilt.

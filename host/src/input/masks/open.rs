@@ -34,7 +34,8 @@ pub fn attach(
 struct OpenedSource {
     source: Box<dyn MaskSource>,
     note: String,
-    /// Whether its masks have the size of the images as they are mapped, not as they are in files.
+    /// True if the masks have the size of the images as they are mapped, rather than as they are in
+    /// files.
     fits_scaled: bool,
 }
 
@@ -119,7 +120,8 @@ fn networks(_: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, Inpu
     let path = paths.first().map_or_else(PathBuf::new, Clone::clone);
     Err(InputError::network(
         &path,
-        "this dynvox has no runtime for networks. Build it with one: `cargo build --release --features onnx`",
+        "this dynvox has no runtime for networks. Build it with one: `cargo build --release \
+         --features onnx`",
     ))
 }
 
@@ -136,9 +138,9 @@ fn note(dataset: &dyn FrameSource, path: &Path, there: usize) -> String {
 /// Masks, fitted to the images.
 struct MaskOverlay {
     source: Box<dyn MaskSource>,
-    /// How much masks must be scaled to fit the images.
+    /// Factor by which masks are scaled to fit the images.
     shrink: Option<f64>,
-    /// Of how many frames one has masks.
+    /// Interval between frames with masks.
     every: NonZeroUsize,
 }
 

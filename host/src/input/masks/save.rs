@@ -21,7 +21,7 @@ pub fn save_masks(
     save(folder, stem, size, masks, &order)
 }
 
-/// As [`save_masks`]; where masks overlap, the later one is on top.
+/// Saves masks like [`save_masks`]; where masks overlap, the later one is on top.
 ///
 /// # Errors
 /// As of [`save_masks`].

@@ -104,7 +104,7 @@ fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
     polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(from, to)| [*from, *to])
 }
 
-/// Where a side crosses a row.
+/// Returns the column at which a side crosses a row.
 fn crossing([[x1, y1], [x2, y2]]: [[f64; 2]; 2], v: f64) -> Option<f64> {
     ((y1 <= v) != (y2 <= v)).then(|| x1 + (v - y1) / (y2 - y1) * (x2 - x1))
 }

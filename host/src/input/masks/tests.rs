@@ -83,9 +83,12 @@ fn refusal_of<T>(result: Result<T, InputError>) -> String {
 
 #[test]
 fn a_list_names_the_instances_of_the_picture_best_first() {
-    let masks =
-        listed(&[1, 2, 3], "# id class score x1 y1 x2 y2\n1 car 0.4 0 0 9 9\n3 person 0.9 1.5 2 3 4\n2 traffic light 0.7 0 0 1 1\n")
-            .unwrap();
+    let masks = listed(
+        &[1, 2, 3],
+        "# id class score x1 y1 x2 y2\n1 car 0.4 0 0 9 9\n3 person 0.9 1.5 2 3 \
+                            4\n2 traffic light 0.7 0 0 1 1\n",
+    )
+    .unwrap();
     let of: Vec<_> = masks.instances.iter().map(|one| (one.class, one.score, one.pixels)).collect();
     assert_eq!(
         of,

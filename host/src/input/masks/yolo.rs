@@ -100,7 +100,8 @@ impl DetectionSource for Yolo {
         };
         for (line, row) in (1..).zip(text?.lines()).filter(|(_, row)| !row.trim().is_empty()) {
             self.add(row.trim(), &mut found).ok_or_else(|| {
-                let formats = "`class cx cy w h [score]` nor `class x1 y1 x2 y2 x3 y3 ...`, in shares of the image's size";
+                let formats = "`class cx cy w h [score]` nor `class x1 y1 x2 y2 x3 y3 ...`, in \
+                               shares of the image's size";
                 InputError::masks(&path, format!("line {line} is neither {formats}"))
             })?;
         }

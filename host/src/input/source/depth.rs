@@ -12,11 +12,11 @@ const NONE_BELOW: f32 = 1e-5;
 pub struct GivenDepth {
     /// Disparity of the left pixels, 1/256 px, 0 none.
     pub disparity_q8: Image<u16>,
-    /// What could not be used of it.
+    /// Counts of values that could not be used.
     pub refused: DepthRefusals,
 }
 
-/// What the numbers of a file measure.
+/// Quantity that the numbers of a file measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Disparity, px.

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 pub enum InputError {
     /// The path does not exist.
     #[error(
-        "there is no data set at {path}. Check the path; `dynvox run` without one maps the synthetic street"
+        "there is no data set at {path}. Check the path; `dynvox run` without one maps the \
+         synthetic street"
     )]
     Absent {
         /// Path as given.
@@ -18,7 +19,9 @@ pub enum InputError {
     /// No known layout.
     #[error(
         "the layout of {path} is unknown. Known are KITTI odometry (sequences/NN/image_0), KITTI tracking \
-         (training/image_02/NNNN), KITTI raw, KITTI-360, Cityscapes, EuRoC and TUM VI (mav0/cam0), two folders of images (left/ and right/, cam0/ and cam1/, infra1/ and infra2/, ...), and one folder of images \
+         (training/image_02/NNNN), KITTI raw, KITTI-360, Cityscapes, EuRoC and TUM VI \
+         (mav0/cam0), two folders of images (left/ and right/, cam0/ and cam1/, infra1/ and \
+         infra2/, ...), and one folder of images \
          with calib.txt; --dataset says which one is meant{}",
         hint(below)
     )]
@@ -36,7 +39,8 @@ pub enum InputError {
     },
     /// A folder inside a data set.
     #[error(
-        "{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what it holds"
+        "{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what \
+         it holds"
     )]
     Within {
         /// Folder looked at.
@@ -49,7 +53,7 @@ pub enum InputError {
     Part {
         /// File or folder expected.
         path: PathBuf,
-        /// What to do.
+        /// Next action.
         action: String,
     },
     /// The sequence does not exist.
@@ -75,7 +79,8 @@ pub enum InputError {
     /// Images of two cameras that cannot be paired.
     #[error(
         "{left} and {right} cannot be paired: neither their names nor their time stamps pair the images, and there are {} left and \
-         {} right ones. Give both images of a pair one name, or one number with a prefix or suffix for the side", counts.0, counts.1
+         {} right ones. Give both images of a pair one name, or one number with a prefix or \
+         suffix for the side", counts.0, counts.1
     )]
     Pairs {
         /// The first left image.
@@ -88,7 +93,8 @@ pub enum InputError {
     /// Images as the lenses drew them.
     #[error(
         "the images of {path} are raw, and no calibration of their lenses is beside them. Put cam0/sensor.yaml and cam1/sensor.yaml there, or name \
-         the files with --calibration, once for each; if the images were rectified, their calibration as calib.txt"
+         the files with --calibration, once for each; if the images were rectified, their \
+         calibration as calib.txt"
     )]
     Unrectified {
         /// The recording.
@@ -111,14 +117,15 @@ pub enum InputError {
     },
     /// An image of another size than the first.
     #[error(
-        "{path} is {found_width} x {found_height} px, but the sequence began with {width} x {height}. All images must have one size: rectify or crop them alike"
+        "{path} is {found_width} x {found_height} px, but the sequence began with {width} x \
+         {height}. All images must have one size: rectify or crop them alike"
     )]
     Size {
         /// The image.
         path: PathBuf,
-        /// Its width, px.
+        /// Width that was found, px.
         found_width: usize,
-        /// Its height, px.
+        /// Height that was found, px.
         found_height: usize,
         /// Width of the sequence, px.
         width: usize,
@@ -127,12 +134,13 @@ pub enum InputError {
     },
     /// An image that cannot be decoded.
     #[error(
-        "{path} cannot be read: {reason}. Fetch or convert this image anew, or leave such frames out with --skip-bad-frames"
+        "{path} cannot be read: {reason}. Fetch or convert this image anew, or leave such frames \
+         out with --skip-bad-frames"
     )]
     Image {
         /// The image.
         path: PathBuf,
-        /// What the decoder says.
+        /// Message of the decoder.
         reason: String,
     },
     /// A table of numbers that does not parse or has too few rows.
@@ -140,9 +148,9 @@ pub enum InputError {
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
-        /// What to do.
+        /// Next action.
         action: String,
     },
     /// A file that is not what its format demands.
@@ -150,12 +158,13 @@ pub enum InputError {
     Format(#[from] FormatError),
     /// Masks that cannot be used.
     #[error(
-        "the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or run without: --instances none"
+        "the masks {path} cannot be used: {reason}. Correct them, give others with --instances, or \
+         run without: --instances none"
     )]
     Masks {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// A network that cannot be used.
@@ -163,17 +172,18 @@ pub enum InputError {
     Network {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Reason, and what to do.
         reason: String,
     },
     /// Depth that cannot be used.
     #[error(
-        "the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, or have it computed: --depth elas"
+        "the depth {path} cannot be used: {reason}. Correct it, give another folder with --depth, \
+         or have it computed: --depth elas"
     )]
     Depth {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// A recording of ROS that cannot be used.
@@ -181,17 +191,18 @@ pub enum InputError {
     Bag {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// Reason, and what to do.
         reason: String,
     },
     /// A stream that broke.
     #[error(
-        "image {image} of the stream cannot be used: {reason}. Let the program that writes it end after an image; with ffmpeg: -f image2pipe -c:v pgm"
+        "image {image} of the stream cannot be used: {reason}. Let the program that writes it end \
+         after an image; with ffmpeg: -f image2pipe -c:v pgm"
     )]
     Stream {
         /// Images before it.
         image: usize,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// A frame beyond the last.
@@ -202,15 +213,17 @@ pub enum InputError {
     },
     /// The synthetic street refuses its configuration.
     #[error(
-        "the synthetic street cannot be built: {reason}. Change its keys with --set street.<key>=<value>"
+        "the synthetic street cannot be built: {reason}. Change its keys with --set \
+         street.<key>=<value>"
     )]
     Street {
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// A scale outside (0, 1], or one that leaves no image.
     #[error(
-        "--scale {scale} cannot be used on {width} x {height} px. Give a number above 0 and up to 1 that leaves at least {least} x {least} px"
+        "--scale {scale} cannot be used on {width} x {height} px. Give a number above 0 and up to \
+         1 that leaves at least {least} x {least} px"
     )]
     Scale {
         /// Scale asked for.
@@ -224,7 +237,7 @@ pub enum InputError {
     },
 }
 
-/// Where to look instead.
+/// Suggests folders to look in instead.
 fn hint(below: &[PathBuf]) -> String {
     let shown: Vec<String> = below.iter().map(|path| path.display().to_string()).collect();
     if shown.is_empty() {
@@ -240,7 +253,7 @@ pub fn read_failed(path: &Path) -> impl FnOnce(std::io::Error) -> InputError + '
 }
 
 impl InputError {
-    /// Whether no later frame can be read either.
+    /// Returns true if no later frame can be read either.
     pub fn ends_source(&self) -> bool {
         matches!(self, Self::PastEnd { .. } | Self::Stream { .. })
     }
@@ -263,7 +276,7 @@ impl InputError {
         Self::Masks { path: path.to_path_buf(), reason: reason.into() }
     }
 
-    /// The same, where a file is not what its format demands.
+    /// Converts a format's error to one about masks.
     pub fn masks_format(error: FormatError) -> Self {
         match error {
             FormatError::Content { path, reason, .. } => Self::Masks { path, reason },
@@ -281,7 +294,7 @@ impl InputError {
         Self::Depth { path: path.to_path_buf(), reason: reason.into() }
     }
 
-    /// The same, where a file is not what its format demands.
+    /// Converts a format's error to one about depth.
     pub fn depth_format(error: FormatError) -> Self {
         match error {
             FormatError::Content { path, reason, .. } => Self::Depth { path, reason },

@@ -20,14 +20,12 @@ pub fn read_given_poses(
     indices: &[usize],
 ) -> Result<Vec<Transform>, InputError> {
     let Trajectory { times_s, poses } = read_poses(path)?;
-    let refuse = |reason: String| {
-        InputError::Table {
+    let refuse = |reason: String| InputError::Table {
         path: path.to_path_buf(),
         reason,
-        action:
-            "Give KITTI or TUM poses that cover every frame mapped, map fewer frames with --frames, or estimate them: --egomotion stereo"
-                .into(),
-    }
+        action: "Give KITTI or TUM poses that cover every frame mapped, map fewer frames with \
+             --frames, or estimate them: --egomotion stereo"
+            .into(),
     };
     let number = |index: usize| {
         source

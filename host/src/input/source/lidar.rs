@@ -20,8 +20,8 @@ impl LidarScan {
         Self { points_m, cameras: [camera(0.0), camera(-rig.focal_baseline_px_m())] }
     }
 
-    /// The same in images scaled by `scale`: pixel centres lie at whole numbers, areas begin half a
-    /// pixel before them.
+    /// Scales the projections to images scaled by `scale`: pixel centres lie at whole numbers,
+    /// areas begin half a pixel before them.
     pub fn scaled(mut self, scale: f64) -> Self {
         let shift = 0.5 * scale - 0.5;
         for camera in &mut self.cameras {

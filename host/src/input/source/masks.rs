@@ -15,9 +15,9 @@ pub const MAX_BYTES: usize = 64 << 20;
 /// An instance in the left image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceMask {
-    /// What it is said to be.
+    /// Class that the source gives.
     pub class: Class,
-    /// How sure the source is. The core refuses what is not in 0..=1.
+    /// Confidence of the source. The core refuses values outside 0..=1.
     pub score: f32,
     /// The box its mask fills.
     pub pixels: PixelBox,
@@ -26,7 +26,7 @@ pub struct InstanceMask {
 }
 
 impl InstanceMask {
-    /// As the core takes it.
+    /// Returns the mask as the core takes it.
     pub fn detection(&self) -> Detection<'_> {
         Detection {
             class: self.class,
@@ -39,7 +39,7 @@ impl InstanceMask {
         }
     }
 
-    /// Whether the mask holds a pixel.
+    /// Returns true if the mask contains a pixel.
     pub fn contains(&self, u: i32, v: i32) -> bool {
         let at = || {
             (v - self.pixels.top) as usize * self.pixels.width as usize
@@ -81,8 +81,8 @@ impl InstanceMask {
         Some(Self { class, score, pixels, mask })
     }
 
-    /// The same in an image scaled by `scale` to `size`: the pixel in the middle of each covered
-    /// area decides.
+    /// Scales the mask to an image scaled by `scale` to `size`: the pixel in the middle of each
+    /// covered area decides.
     pub fn scaled(&self, scale: f64, size: (usize, usize)) -> Option<Self> {
         let image = PixelBox { left: 0, top: 0, width: size.0 as i32, height: size.1 as i32 };
         let from = |at: i32| (f64::from(at) * scale).floor() as i32 - 1;
@@ -97,8 +97,8 @@ impl InstanceMask {
     }
 }
 
-/// What a source said and could not be used, or not as it was said. Nothing is dropped without
-/// being counted.
+/// Counts of masks that a source gave and that could not be used, or not as given. Nothing is
+/// dropped without being counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MaskRefusals {
     /// Frames without a file of masks: nothing is seen in them.
@@ -140,7 +140,7 @@ impl MaskRefusals {
 pub struct FrameMasks {
     /// The instances, one by one.
     pub instances: Vec<InstanceMask>,
-    /// What is not among them.
+    /// Counts of refused masks.
     pub refusals: MaskRefusals,
     bytes: usize,
 }
@@ -156,7 +156,8 @@ impl FrameMasks {
         Self { refusals, ..Self::default() }
     }
 
-    /// Whether a mask of so many bytes fits within the limits; if not it is counted.
+    /// Reserves bytes for a mask and returns true; returns false and counts the mask if it exceeds
+    /// the limits.
     pub fn reserve(&mut self, bytes: usize) -> bool {
         let fits =
             self.instances.len() < MAX_MASKS && self.bytes.saturating_add(bytes) <= MAX_BYTES;

@@ -92,15 +92,15 @@ pub(super) fn require_size(
 pub struct ExactFrame {
     /// Depth of the left pixels, m; 0 or infinite where unknown.
     pub depth_m: Image<f32>,
-    /// Whether the pixel belongs to an object that moves in this frame.
+    /// True for pixels of objects that move in this frame.
     pub moving: Image<bool>,
-    /// What each left pixel sees: k is an instance of class `classes[k - 1]`, 0 is none.
+    /// Instance at each left pixel: k is an instance of class `classes[k - 1]`, 0 is none.
     pub instances: Image<u8>,
     /// Class names of the instances.
     pub classes: Vec<&'static str>,
 }
 
-/// Which masks a data set brings along.
+/// Masks that a data set brings along.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AvailableMasks {
     /// None.
@@ -111,7 +111,7 @@ pub enum AvailableMasks {
     Exact,
 }
 
-/// What is known of a stream while it is read.
+/// Facts about a stream, known while it is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StreamState {
     /// Frames that came while the mapper was busy, and were dropped.

@@ -3,7 +3,7 @@
 use crate::formats::{Decoded, Image};
 use serde::{Deserialize, Serialize};
 
-/// How two images lie in one.
+/// Arrangement of two images in one file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stacking {
@@ -14,7 +14,7 @@ pub enum Stacking {
 }
 
 impl Stacking {
-    /// As the rest of a sentence.
+    /// Returns the arrangement as the rest of a sentence.
     pub fn name(self) -> &'static str {
         match self {
             Self::SideBySide => "side by side",

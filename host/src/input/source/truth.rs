@@ -6,19 +6,19 @@ use dynvox_core::masks::PixelBox;
 /// An object's truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueObject {
-    /// Its number, over all frames.
+    /// Number of the object, the same over all frames.
     pub id: u32,
-    /// Its value in the exact masks ([`crate::input::ExactFrame`]); 0 without them.
+    /// Value in the exact masks ([`crate::input::ExactFrame`]); 0 without them.
     pub instance: u8,
     /// The box of its visible pixels in the left image.
     pub pixels: PixelBox,
-    /// Its frame to the world.
+    /// Pose of the object in the world.
     pub t_world_object: Transform,
     /// Width, height, length: x within ±width/2, y within -height..0, z within ±length/2, m.
     pub dimensions_m: [f64; 3],
-    /// Whether it moves.
+    /// True if the object moves.
     pub moving: bool,
-    /// How fast, m/s.
+    /// Speed, m/s.
     pub speed_m_s: f64,
 }
 
@@ -34,7 +34,7 @@ pub struct ObjectsTruth {
 }
 
 impl ObjectsTruth {
-    /// The same in an image scaled by `scale`.
+    /// Scales the boxes to an image scaled by `scale`.
     pub fn scaled(mut self, scale: f64) -> Self {
         let of = |px: i32| (f64::from(px) * scale) as i32;
         for pixels in

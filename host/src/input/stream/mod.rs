@@ -29,19 +29,19 @@ pub const QUEUE: usize = 2;
 /// Left and right image of a frame.
 pub type Pair = [Decoded; 2];
 
-/// What a stream does not say of itself.
+/// Facts that a stream does not contain.
 #[derive(Clone, Debug)]
 pub struct StreamOptions {
     /// Name of the data set.
     pub name: String,
     /// The cameras.
     pub cameras: CameraGeometry,
-    /// How large raw pairs are rectified.
+    /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
     /// Frames a second, where known: frames then bear time stamps by their number. Without it
     /// [`ASSUMED_HZ`] is assumed.
     pub rate_hz: Option<f64>,
-    /// What becomes of frames that come while the mapper is busy.
+    /// Treatment of frames that come while the mapper is busy.
     pub when_late: WhenLate,
 }
 
@@ -55,7 +55,7 @@ pub struct Stream {
     cursor: Mutex<Cursor>,
 }
 
-/// How far a stream is read.
+/// Position up to which a stream is read.
 #[derive(Default)]
 struct Cursor {
     /// Frames handed out.

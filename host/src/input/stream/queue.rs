@@ -7,10 +7,10 @@ use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// How often a waiting mapper looks whether it is asked to stop.
+/// Interval at which a waiting mapper checks whether it is asked to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// What becomes of frames that come while the mapper is busy.
+/// Treatment of frames that come while the mapper is busy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum WhenLate {
@@ -23,7 +23,7 @@ pub enum WhenLate {
 
 /// A pair as it came.
 pub struct Arrived {
-    /// Its number among all that came.
+    /// Number of the frame among all that came.
     pub number: u64,
     /// The pair, or why it is missing.
     pub pair: Result<Pair, InputError>,

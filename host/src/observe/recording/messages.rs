@@ -41,7 +41,7 @@ fn pose_of(pose: &Transform) -> Value {
     json!({ "position": vector(pose.translation_m), "orientation": { "x": x, "y": y, "z": z, "w": w } })
 }
 
-/// Where the left camera is.
+/// Makes the transform of the left camera.
 pub fn transform(stamp: Stamp, t_world_camera: &Transform) -> Value {
     let pose = pose_of(t_world_camera);
     json!({
@@ -50,7 +50,7 @@ pub fn transform(stamp: Stamp, t_world_camera: &Transform) -> Value {
     })
 }
 
-/// The same as a pose.
+/// Makes the pose of the left camera.
 pub fn pose(stamp: Stamp, t_world_camera: &Transform) -> Value {
     json!({ "timestamp": stamp.json(), "frame_id": WORLD, "pose": pose_of(t_world_camera) })
 }
@@ -137,7 +137,7 @@ pub fn figures(stamp: Stamp, row: &FrameRow) -> Value {
     })
 }
 
-/// What a raycast of every [`POINT_EVERY`] pixels shows as coloured points in the camera's frame;
+/// Makes coloured points in the camera's frame from every [`POINT_EVERY`]-th pixel of a raycast;
 /// `None` before the first raycast.
 pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Value> {
     let (depth_m, colour) = (seen.depth_m()?, seen.colour()?);
@@ -190,7 +190,7 @@ pub fn planning(stamp: Stamp, layers: &PlanningLayers) -> Value {
     })
 }
 
-/// What lies where in a point or a cell.
+/// Describes the position and type of one value in a point or a cell.
 fn field(field: (&str, usize, u32)) -> Value {
     let (name, offset, kind) = field;
     json!({ "name": name, "offset": offset, "type": kind })

@@ -21,7 +21,7 @@ use std::io::BufWriter;
 
 /// Name of the file in the run folder.
 pub const RECORDING_FILE: &str = "run.mcap";
-/// What the map shows, and the planner's window, are in every so many frames.
+/// Interval at which the map and the planner's window are recorded, frames.
 const MAP_EVERY: usize = 10;
 /// Poses in the trajectory at the end, at most.
 const MAX_POSES: usize = 5_000;
@@ -141,7 +141,7 @@ impl Recording {
 }
 
 impl RecordingObserver {
-    /// Why there is no recording, if so.
+    /// Returns the reason why there is no recording, if so.
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
@@ -171,7 +171,7 @@ impl RecordingObserver {
 }
 
 impl Observer for RecordingObserver {
-    /// Why there is no recording, if so.
+    /// Reason why there is no recording, if so.
     type Section = Option<String>;
 
     fn frame(

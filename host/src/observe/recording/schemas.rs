@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 pub enum Topic {
     /// The left camera in the world.
     Transform,
-    /// The same as a pose.
+    /// Pose of a frame of reference.
     Pose,
-    /// How the left picture projects.
+    /// Projection of the left picture.
     Calibration,
     /// The left picture.
     Left,
@@ -150,7 +150,7 @@ fn pose() -> Value {
     object(&json!({ "position": vector(), "orientation": quaternion() }))
 }
 
-/// What lies where in a point or a cell.
+/// Describes the fields of a point or a cell.
 fn fields() -> Value {
     array(&object(&json!({ "name": text(), "offset": integer(), "type": integer() })))
 }

@@ -4,7 +4,7 @@ use super::csv_text;
 use serde::Serialize;
 use std::io;
 
-/// What became of a block.
+/// Last event of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BlockFate {

@@ -21,7 +21,7 @@ pub(super) struct TrackSums {
 }
 
 impl TrackSums {
-    /// Of a track first seen in a frame.
+    /// Begins the sums of a track first seen in a frame.
     pub fn begin(frame: usize) -> Self {
         Self {
             class: Class::default(),

@@ -12,7 +12,7 @@ pub struct Curve<'a> {
     pub name: &'a str,
     /// Colour.
     pub colour: &'a str,
-    /// Whether its line is dashed.
+    /// True if the line is dashed.
     pub dashed: bool,
     /// A number for each value; none where it is unknown.
     pub numbers: Vec<Option<f64>>,

@@ -20,7 +20,7 @@ pub struct Bar {
     pub to: usize,
     /// Class of its style: what it stands for.
     pub style: &'static str,
-    /// Whether it is drawn paler.
+    /// True if the bar is drawn paler.
     pub pale: bool,
     /// Text on it, where it is wide enough.
     pub text: Option<String>,
@@ -28,11 +28,11 @@ pub struct Bar {
 
 /// The bars of one track.
 pub struct Lane {
-    /// Its name.
+    /// Name in tables and charts.
     pub name: String,
-    /// What was estimated: thick bars.
+    /// Estimated intervals, drawn as thick bars.
     pub bars: Vec<Bar>,
-    /// What is true: thin bars below.
+    /// True intervals, drawn as thin bars below.
     pub truth: Vec<Bar>,
 }
 

@@ -19,7 +19,7 @@ pub struct Series<'a> {
 }
 
 impl Series<'_> {
-    /// The same line in another unit: values times `factor`.
+    /// Converts the line to another unit: values times `factor`.
     pub fn scaled(mut self, factor: f64) -> Self {
         self.values.iter_mut().for_each(|value| *value *= factor);
         self

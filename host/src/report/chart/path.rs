@@ -17,7 +17,7 @@ pub struct Path<'a> {
     pub name: &'a str,
     /// Colour.
     pub colour: &'a str,
-    /// Whether its line is dashed.
+    /// True if the line is dashed.
     pub dashed: bool,
     /// Positions, m: x (right) and z (forward).
     pub points: Vec<(f64, f64)>,

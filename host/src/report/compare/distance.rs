@@ -9,13 +9,13 @@ pub struct Outcome {
     pub pose: Option<Transform>,
     /// Share of pixels with a disparity.
     pub density: f64,
-    /// Their mean disparity, px.
+    /// Mean disparity of both runs, px.
     pub disparity_px: Option<f64>,
     /// Blocks in use.
     pub blocks: u32,
 }
 
-/// How far apart two outcomes are. All values are 0 or more.
+/// Distances between the outcomes of two runs. All values are 0 or more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distance {
     /// Between the positions, m.
@@ -59,7 +59,8 @@ impl std::fmt::Display for Distance {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "pose {:.4} m, {:.4} deg; mean disparity {:.3} px, {:.2} % of the pixels have one more or less; blocks in use {}",
+            "pose {:.4} m, {:.4} deg; mean disparity {:.3} px, {:.2} % of the pixels have one more \
+             or less; blocks in use {}",
             self.position_m,
             self.angle_deg,
             self.disparity_px,

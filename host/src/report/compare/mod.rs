@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 pub enum CompareError {
     /// It is not a run folder.
     #[error(
-        "{path} is not a run folder: its {file} cannot be read ({source}). Give a folder that `dynvox run` wrote"
+        "{path} is not a run folder: its {file} cannot be read ({source}). Give a folder that \
+         `dynvox run` wrote"
     )]
     NoRun {
         /// Path as given.
@@ -40,12 +41,13 @@ pub enum CompareError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// The runs have no frame in common.
     #[error(
-        "the runs share no frame: one has frames {a}, the other {b}. Compare runs with the same --start and --stride"
+        "the runs share no frame: one has frames {a}, the other {b}. Compare runs with the same \
+         --start and --stride"
     )]
     NothingShared {
         /// Frames of the first.
@@ -55,7 +57,7 @@ pub enum CompareError {
     },
 }
 
-/// What is compared of a frame.
+/// Values of a frame that are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Digest of all stages.
@@ -82,9 +84,9 @@ pub struct Divergence {
     pub frame: usize,
     /// The first stage that differs in it; `None` where only the digest of all does.
     pub stage: Option<Digested>,
-    /// How far apart the outcomes are there.
+    /// Distance between the outcomes in that frame.
     pub there: Distance,
-    /// How far apart they are at most, in any frame.
+    /// Largest distance between the outcomes in any frame.
     pub most: Distance,
 }
 
@@ -93,7 +95,8 @@ pub struct Divergence {
 pub struct Comparison {
     /// Settings that differ.
     pub settings: Vec<Setting>,
-    /// Where they diverge; `None` where they agree in every frame they share.
+    /// First frame and stage in which the runs diverge; `None` if they agree in every frame they
+    /// share.
     pub divergence: Option<Divergence>,
     /// Frames they share.
     pub shared: usize,
@@ -102,12 +105,12 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Whether the same frames gave the same bits.
+    /// Returns true if the same frames gave the same bits.
     pub fn equal(&self) -> bool {
         self.divergence.is_none() && self.frames.iter().all(|&[_, _, count]| count == self.shared)
     }
 
-    /// Which run, 0 or 1, is a prefix of the other, if one is.
+    /// Returns the run, 0 or 1, that is a prefix of the other, if one is.
     pub fn prefix(&self) -> Option<usize> {
         let [a, b] = self.frames;
         let begins = |short: [usize; 3], long: [usize; 3]| {

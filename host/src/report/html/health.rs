@@ -41,7 +41,8 @@ fn blocks(run: &RunRecord) -> Markup {
     let (refused, lost) = (blocks.totals.refused, blocks.lost());
     html! {
         @if refused + lost == 0 { "No block was refused or lost." }
-        @if refused > 0 { b { "Blocks refused: " (grouped(refused)) "." } " The pool was full; a larger profile maps them. " }
+        @if refused > 0 { b { "Blocks refused: " (grouped(refused)) "." } " The pool was full; a \
+            larger profile maps them. " }
         @if lost > 0 { b { "Blocks lost: " (grouped(lost)) "." } " " (lost_because(run)) "." }
     }
 }

@@ -35,7 +35,8 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Memory" }
             p.soft.small {
-                "The core uses one slab of " (grouped(plan.capacity.bytes() as u64)) " bytes, allocated before the first frame, and no other memory."
+                "The core uses one slab of " (grouped(plan.capacity.bytes() as u64)) " bytes, \
+                    allocated before the first frame, and no other memory."
             }
             div.two { div { (pool) } div { (resident) } }
             p.small { "Bounds: " (bounds::sentence(run)) "." }

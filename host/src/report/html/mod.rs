@@ -65,7 +65,8 @@ fn configuration(run: &RunRecord) -> Markup {
             summary { "Configuration" }
             p.soft.small {
                 (format!(
-                    "Rig: focal length {:.3} px, principal point ({:.2}, {:.2}) px, baseline {:.4} m.",
+                    "Rig: focal length {:.3} px, principal point ({:.2}, {:.2}) px, baseline {:.4} \
+                     m.",
                     rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m
                 ))
             }
@@ -98,7 +99,7 @@ fn series<'a>(run: &RunRecord, name: &'a str, colour: &'a str, column: &str) -> 
     Series { name, colour, values: run.frames.charts().series(column) }
 }
 
-/// The same value for all frames.
+/// Makes a series with one value for all frames.
 fn constant<'a>(run: &RunRecord, name: &'a str, colour: &'a str, value: f64) -> Series<'a> {
     Series { name, colour, values: vec![value; frames(run).len()] }
 }

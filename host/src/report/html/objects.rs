@@ -37,12 +37,14 @@ pub fn section(run: &RunRecord) -> Markup {
                 (grouped(u64::from(detections.too_small))) " too small, " (grouped(u64::from(detections.ignored)))
                 " of static classes, " (grouped(u64::from(detections.refused()))) " refused; " (tracks.tracks.len()) " tracks"
                 @if tracks.tracks.len() > shown.len() { ", the " (shown.len()) " longest are shown" }
-                ". A bar is a track, its colour the motion state in each frame, the number its speed over ground, paler where the motion was "
+                ". A bar is a track, its colour the motion state in each frame, the number its \
+                 speed over ground, paler where the motion was "
                 "not measured; the thin bar below is ground truth, where it is known."
             }
             @if !refused.is_empty() { p.soft.small { "The source of masks: " (refused.join(", ")) "." } }
             @if let Some(figures) = &tracks.figures { (truth(figures)) }
-            @if let Some(masks) = &tracks.masks { p.small { "Moving objects, masks against exact ones: " (moving_masks(masks)) "." } }
+            @if let Some(masks) = &tracks.masks { p.small { "Moving objects, masks against exact \
+                ones: " (moving_masks(masks)) "." } }
             @if let Some(count) = run.sections.objects.swept_triangles {
                 p.small { "Triangles of the static map in the volume that moving objects swept: " b { (grouped(count)) } "." }
             }
@@ -83,7 +85,8 @@ fn truth(figures: &ObjectFigures) -> Markup {
     html! {
         p.small {
             "Against ground truth: " (figures.tracks) " tracks. Within 20 m: " (late(&figures.late_near)) ". At 20 to 32 m: "
-            (late(&figures.late_far)) ". " (figures.flips) " state flips; a static object is classified as dynamic in at most "
+            (late(&figures.late_far)) ". " (figures.flips) " state flips; a static object is \
+                classified as dynamic in at most "
             (figures.false_dynamic_frames) " frames."
         }
         @if !motions.is_empty() { p.small { "Median per-frame motion error: " (motions.join("; ")) "." } }
@@ -105,7 +108,8 @@ fn association(of: &AssociationFigures) -> Markup {
     html! {
         p.small {
             (format!(
-                "Association by boxes that overlap by at least {OVERLAP_MIN}: HOTA at that threshold {:.3} (detection {:.3}, association {:.3}); ",
+                "Association by boxes that overlap by at least {OVERLAP_MIN}: HOTA at that \
+                 threshold {:.3} (detection {:.3}, association {:.3}); ",
                 of.hota, of.deta, of.assa
             ))
             (grouped(of.matched)) " matches, " (grouped(of.misses)) " misses, " (grouped(of.false_tracks)) " false tracks, "
@@ -209,7 +213,8 @@ fn gallery(objects: &[ReconstructedObject]) -> Markup {
     html! {
         h3.apart { "Reconstructed objects" }
         p.soft.small {
-            (objects.len()) " meshes in " code { "objects/" } ". Each as the camera first saw it, from its left, and from above; orthographic."
+            (objects.len()) " meshes in " code { "objects/" } ". Each as the camera first saw it, \
+                from its left, and from above; orthographic."
         }
         div.gallery {
             @for object in shown {
@@ -233,7 +238,8 @@ fn surface(figures: &SurfaceFigures) -> String {
         |median_m| format!("{:.1} cm", 100.0 * median_m),
     );
     format!(
-        "; median distance to the true surface {median}, {:.0} % of the seen surface reconstructed, nearest at {:.0} m",
+        "; median distance to the true surface {median}, {:.0} % of the seen surface \
+         reconstructed, nearest at {:.0} m",
         100.0 * figures.completeness,
         figures.nearest_m
     )

@@ -12,12 +12,14 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Input, disparity and map" }
             p.soft.small {
-                "Left image; disparity from far (blue) to near (red), dark where it is unknown; the static map from the camera's pose after "
+                "Left image; disparity from far (blue) to near (red), dark where it is unknown; \
+                 the static map from the camera's pose after "
                 "this frame."
             }
             @if composed {
                 p.soft.small {
-                    "Last: the map with every object in its current pose, from a volume of its own: static ones blue, dynamic ones orange."
+                    "Last: the map with every object in its current pose, from a volume of its \
+                     own: static ones blue, dynamic ones orange."
                 }
             }
             @for keyframe in &pictures.keyframes { (figure(keyframe)) }

@@ -34,8 +34,10 @@ fn explanation(figures: &ReferenceFigures) -> Markup {
         frames => format!("{frames} frames later"),
     };
     html! {
-        (figures.frames) " frames; the map is evaluated " (when) ". Accuracy: share of the points both input and map have that is right (off by "
-        "at most " (figures.rule) "). Completeness: share of the points each has. Means over frames. " (grouped(figures.ignored_points))
+        (figures.frames) " frames; the map is evaluated " (when) ". Accuracy: share of the points \
+            both input and map have that is right (off by "
+        "at most " (figures.rule) "). Completeness: share of the points each has. Means over \
+                                   frames. " (grouped(figures.ignored_points))
         " points on objects without a volume are in no figure; " (grouped(figures.left_out_points))
         " points lie beyond the fused depth or outside the image; " (grouped(figures.epipolar_violations))
         " violate the epipolar constraint by more than 1.2 px."
@@ -45,7 +47,8 @@ fn explanation(figures: &ReferenceFigures) -> Markup {
                 100.0 * depth.median_error_m, depth.median_depth_m
             ))
             @if let Some(surface_m) = depth.median_surface_m {
-                (format!(" Median distance of the reference's points from the surface: {:.1} cm.", 100.0 * surface_m))
+                (format!(" Median distance of the reference's points from the surface: {:.1} \
+                          cm.", 100.0 * surface_m))
             }
         }
     }

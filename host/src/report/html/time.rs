@@ -23,8 +23,10 @@ pub fn section(run: &RunRecord) -> Markup {
         section {
             h2 { "Time per stage" }
             p.soft.small {
-                "Left: wall time; stereo and scene flow run in parallel where there are two threads, and the load of the machine counts. Right: "
-                "CPU time of all threads, stacked. Raycasts are taken for this page on some frames, outside the step."
+                "Left: wall time; stereo and scene flow run in parallel where there are two \
+                 threads, and the load of the machine counts. Right: "
+                "CPU time of all threads, stacked. Raycasts are taken for this page on some \
+                 frames, outside the step."
             }
             div.two {
                 div { (lines(&frames, &wall, "ms, wall", 0.0)) }

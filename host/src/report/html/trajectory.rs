@@ -68,7 +68,8 @@ fn errors_of(errors: &TrajectoryErrors) -> Markup {
     html! {
         p.small.apart {
             (format!(
-                "Against ground truth: from frame to frame {:.2} cm and {:.4}° (RMS); {:.3} m (RMS) after rigid alignment.",
+                "Against ground truth: from frame to frame {:.2} cm and {:.4}° (RMS); {:.3} m \
+                 (RMS) after rigid alignment.",
                 100.0 * errors.rpe_t_m, errors.rpe_r_deg, errors.ate_m
             ))
         }

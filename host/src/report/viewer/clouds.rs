@@ -11,7 +11,7 @@ use std::io::{self, Write};
 const MAX_POINTS: usize = 60_000;
 /// Steps along the longest side of a cloud's box.
 const STEPS: f32 = 65_535.0;
-/// What pruning took.
+/// Colour of voxels that pruning removed.
 const PRUNED_COLOUR: [u8; 3] = [214, 51, 132];
 /// Share of a block's side that stands for one that pruning took, so that blocks beside each other
 /// are told apart.
@@ -21,20 +21,19 @@ const OBSTACLE_COLOUR: [u8; 3] = [33, 37, 41];
 /// Free ground beside an obstacle, and at [`CLEAR_M`] from the nearest.
 const FREE_COLOURS: [[u8; 3]; 2] = [[250, 82, 82], [64, 192, 87]];
 const CLEAR_M: f32 = 3.0;
-/// How far above the ground the window is drawn, m: what is measured of the ground would hide half
-/// of it.
+/// Height above the ground at which the window is drawn, m: measured ground would hide half of it.
 const LIFT_M: f32 = 0.1;
 
-/// What a cloud is, for the page's script.
+/// Description of a cloud for the page's script.
 #[derive(Debug, Serialize)]
 pub struct CloudHead {
     /// Key of its layer.
     layer: &'static str,
-    /// What it shows.
+    /// Name of the values the cloud shows.
     name: String,
     /// Least corner of its box, m.
     low_m: [f32; 3],
-    /// What 65,535 steps of a position mean, m.
+    /// Length that 65,535 steps of a position stand for, m.
     size_m: f32,
     /// Side of a point, m.
     side_m: f32,
@@ -44,9 +43,9 @@ pub struct CloudHead {
 
 /// A cloud.
 pub struct Cloud {
-    /// What it is.
+    /// Description of the cloud.
     pub head: CloudHead,
-    /// Its bytes, deflated.
+    /// Contents, deflated.
     pub bytes: Vec<u8>,
 }
 

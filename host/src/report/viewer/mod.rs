@@ -94,16 +94,19 @@ fn picture(folder: &Path, name: &str) -> Option<String> {
     std::fs::read(folder.join(PICTURES_FOLDER).join(name)).ok().map(|bytes| STANDARD.encode(bytes))
 }
 
-/// What the script fills, and what stands there without it.
+/// Builds the page's panels, with the pictures that show without the script.
 fn panels(folder: &Path) -> Markup {
     let overview = picture(folder, OVERVIEW);
     html! {
         div #dynvox-viewer .viewer {
             div.view {
-                canvas tabindex="0" aria-label="map: drag to turn, wheel to zoom, right button or two fingers to move, W A S D Q E to fly" {}
+                canvas tabindex="0" aria-label="map: drag to turn, wheel to zoom, right button or \
+                    two fingers to move, W A S D Q E to fly" {}
                 figure.still {
-                    @if let Some(jpeg) = &overview { img alt="the finished map from behind and above" src={ "data:image/jpeg;base64," (jpeg) }; }
-                    figcaption.reason { "The map as a picture: turning it needs a browser with scripts and WebGL 2." }
+                    @if let Some(jpeg) = &overview { img alt="the finished map from behind and \
+                        above" src={ "data:image/jpeg;base64," (jpeg) }; }
+                    figcaption.reason { "The map as a picture: turning it needs a browser with \
+                        scripts and WebGL 2." }
                 }
                 progress max="1" value="0" hidden {}
                 details.controls open hidden {
@@ -129,9 +132,11 @@ fn panels(folder: &Path) -> Markup {
                 div.note {}
             }
             div.side hidden {
-                figure { canvas.left aria-label="left image with masks and tracks" {} figcaption { "left image, masks and tracks" } }
+                figure { canvas.left aria-label="left image with masks and \
+                    tracks" {} figcaption { "left image, masks and tracks" } }
                 figure { img.disparity alt="disparity"; figcaption { "disparity" } }
-                figure { img.map alt="the map from the camera's pose"; figcaption { "map from the camera's pose" } }
+                figure { img.map alt="the map from the camera's \
+                                      pose"; figcaption { "map from the camera's pose" } }
             }
             div.time hidden {
                 button.play type="button" aria-label="play" { "▶" }

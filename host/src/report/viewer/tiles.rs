@@ -22,7 +22,7 @@ const TRIANGLES: usize = 16_384;
 /// crack opens between them.
 const STEPS: f32 = 65_534.0;
 
-/// What a tile is, for the page's script.
+/// Description of a tile for the page's script.
 #[derive(Debug, Serialize)]
 pub struct TileHead {
     /// Position of its object among the objects; absent for the static map.
@@ -31,7 +31,7 @@ pub struct TileHead {
     pub low_m: [f32; 3],
     /// Greatest corner of its box, m.
     pub high_m: [f32; 3],
-    /// What 65,535 steps of a position mean, m.
+    /// Length that 65,535 steps of a position stand for, m.
     pub size_m: f32,
     /// Vertices.
     pub vertices: usize,
@@ -41,9 +41,9 @@ pub struct TileHead {
 
 /// A tile.
 pub struct Tile {
-    /// What it is.
+    /// Description of the tile.
     pub head: TileHead,
-    /// Its bytes, deflated.
+    /// Contents, deflated.
     pub bytes: Vec<u8>,
 }
 
@@ -156,7 +156,7 @@ mod tests {
     /// Positions, colours with the first value, and triangles of a tile.
     type Decoded = (Vec<[f32; 3]>, Vec<[u8; 4]>, Vec<[usize; 3]>);
 
-    /// What the page's script does.
+    /// Decodes a tile as the page's script does.
     fn decoded(tile: &Tile) -> Decoded {
         let mut bytes = Vec::new();
         flate2::read::ZlibDecoder::new(&tile.bytes[..]).read_to_end(&mut bytes).unwrap();

@@ -13,7 +13,7 @@ pub type ValueBytes = [u8; VALUES];
 /// A value for the page's script.
 #[derive(Clone, Debug, Serialize)]
 pub struct ValueHead {
-    /// What it is.
+    /// Name of the value.
     name: &'static str,
     /// The least, with its unit.
     low: String,
@@ -49,7 +49,7 @@ pub struct SurfaceValues<'s> {
 }
 
 impl<'s> SurfaceValues<'s> {
-    /// What is known of a scene.
+    /// Finds the scales of a scene's values.
     pub fn new(scene: &'s Scene) -> Self {
         let mut weights = scene.static_map.weights.clone();
         weights.sort_unstable();
@@ -68,7 +68,7 @@ impl<'s> SurfaceValues<'s> {
         }
     }
 
-    /// What the bytes mean; `None` where no vertex has the value.
+    /// Describes what the bytes of each value mean; `None` where no vertex has the value.
     pub fn heads(&self) -> [Option<ValueHead>; VALUES] {
         let weight = self.weight.map(|Scale { high, .. }| ValueHead {
             name: "weight",

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Why an interrupted run cannot be resumed.
+/// Reason why an interrupted run cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum ResumeError {
     /// The system refuses.
@@ -22,24 +22,26 @@ pub enum ResumeError {
     },
     /// Another dynvox wrote it.
     #[error(
-        "{path} is a snapshot of version {found}; this dynvox takes version {taken}. Resume with the dynvox that wrote it, or start again with --overwrite"
+        "{path} is a snapshot of version {found}; this dynvox takes version {taken}. Resume with \
+         the dynvox that wrote it, or start again with --overwrite"
     )]
     Version {
         /// The snapshot.
         path: PathBuf,
-        /// Its version.
+        /// Version of the snapshot.
         found: u32,
         /// The one taken.
         taken: u32,
     },
     /// Another dynvox of the same snapshot version wrote it.
     #[error(
-        "{path} was written by another dynvox: {reason}. Resume with that one, or start the run again with --overwrite"
+        "{path} was written by another dynvox: {reason}. Resume with that one, or start the run \
+         again with --overwrite"
     )]
     Otherwise {
         /// The snapshot.
         path: PathBuf,
-        /// What differs.
+        /// Difference, as it completes the message's sentence.
         reason: String,
     },
     /// A byte of it changed, or it was cut short.
@@ -50,7 +52,8 @@ pub enum ResumeError {
     },
     /// A setting, or the data set.
     #[error(
-        "the resumed run would differ from the interrupted one: {differences}. Restore settings and data, or start it again with --overwrite"
+        "the resumed run would differ from the interrupted one: {differences}. Restore settings \
+         and data, or start it again with --overwrite"
     )]
     Different {
         /// Each with what it was and is.
@@ -58,7 +61,8 @@ pub enum ResumeError {
     },
     /// The request cannot be stored.
     #[error(
-        "a snapshot cannot store what was asked for: {reason}. Rename it, or run without --snapshot-every"
+        "a snapshot cannot store what was asked for: {reason}. Rename it, or run without \
+         --snapshot-every"
     )]
     NotStorable {
         /// The part, a path that is not Unicode.

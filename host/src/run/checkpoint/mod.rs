@@ -167,7 +167,7 @@ impl Checkpoint {
         Ok(Self { path, manifest, blocks, state, rest: file.take(mapper_len) })
     }
 
-    /// How the run was started.
+    /// Returns the manifest of the run.
     pub fn manifest(&self) -> &RunManifest {
         &self.manifest
     }

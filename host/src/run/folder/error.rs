@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a run folder cannot be written.
+/// Reason why a run folder cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// Something is there already.
@@ -11,9 +11,10 @@ pub enum FolderError {
         /// The folder asked for.
         path: PathBuf,
     },
-    /// What is there is not a run folder.
+    /// Existing file or folder that is not a run folder.
     #[error(
-        "{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give another --out"
+        "{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give \
+         another --out"
     )]
     Foreign {
         /// The folder asked for.
@@ -21,7 +22,8 @@ pub enum FolderError {
     },
     /// An interrupted run has a snapshot there.
     #[error(
-        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, or start again with --overwrite"
+        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, \
+         or start again with --overwrite"
     )]
     Interrupted {
         /// The folder asked for.
@@ -32,7 +34,7 @@ pub enum FolderError {
     NothingToResume {
         /// The folder asked for.
         path: PathBuf,
-        /// Why, and what to do.
+        /// Reason, and what to do.
         reason: &'static str,
     },
     /// Another run writes there.
@@ -59,19 +61,21 @@ pub enum FolderError {
     },
     /// The results are complete and not where they should be.
     #[error(
-        "the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the folder yourself"
+        "the results are complete in {partial}, but cannot be moved to {path}: {reason}. Move the \
+         folder yourself"
     )]
     NotMoved {
-        /// Where the results are.
+        /// Folder that holds the results.
         partial: PathBuf,
         /// The folder asked for.
         path: PathBuf,
-        /// Why.
+        /// Reason, as it completes the message's sentence.
         reason: String,
     },
     /// The system refuses.
     #[error(
-        "{path} cannot be written: {source}. Check the disk and the permissions, or give another --out"
+        "{path} cannot be written: {source}. Check the disk and the permissions, or give another \
+         --out"
     )]
     Write {
         /// The file or folder.

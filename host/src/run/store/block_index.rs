@@ -33,14 +33,14 @@ struct OpenTile {
 /// The places.
 #[derive(Debug, Default)]
 pub(super) struct BlockIndexOnDisk {
-    /// Where the newest record of each tile begins.
+    /// Offset of the newest record of each tile.
     newest: HashMap<Tile, u64>,
     open: HashMap<Tile, OpenTile>,
     uses: u64,
 }
 
 impl BlockIndexOnDisk {
-    /// Where the newest record of a tile begins, if there is one.
+    /// Returns the offset of a tile's newest record, if there is one.
     pub fn newest(&self, tile: Tile) -> Option<u64> {
         self.newest.get(&tile).copied()
     }

@@ -25,10 +25,10 @@ const MAGIC: [u8; 8] = *b"dynvoxB2";
 const PREAMBLE: usize = 16;
 /// Bytes read at once while following a tile's records backwards.
 const WINDOW: usize = 1 << 16;
-/// Why storing ends at the limit that was asked for.
+/// Reason why storing ends at the limit that was asked for.
 const LIMIT_REACHED: &str = "it has reached its size limit";
 
-/// Why a store cannot be opened.
+/// Reason why a store cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The file system refuses.
@@ -36,7 +36,7 @@ pub enum StoreError {
     Io {
         /// The store.
         path: PathBuf,
-        /// What it says.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The file is not a store.
@@ -47,7 +47,8 @@ pub enum StoreError {
     },
     /// It existed at the checkpoint.
     #[error(
-        "{path} is missing: it has the evicted blocks of the run. Restore it, or start the run again with --overwrite"
+        "{path} is missing: it has the evicted blocks of the run. Restore it, or start the run \
+         again with --overwrite"
     )]
     Missing {
         /// The store.
@@ -55,12 +56,13 @@ pub enum StoreError {
     },
     /// It was changed after the checkpoint.
     #[error(
-        "{path} is not as the run left it: its first {bytes} bytes are truncated or changed. Start the run again with --overwrite"
+        "{path} is not as the run left it: its first {bytes} bytes are truncated or changed. Start \
+         the run again with --overwrite"
     )]
     Changed {
         /// The store.
         path: PathBuf,
-        /// Its length at the checkpoint, bytes.
+        /// Length of the file at the checkpoint, bytes.
         bytes: u64,
     },
     /// The store was written with other voxels.
@@ -71,9 +73,9 @@ pub enum StoreError {
     OtherVoxels {
         /// The store.
         path: PathBuf,
-        /// Its voxel size, m.
+        /// Voxel size in the file, m.
         found_voxel_m: f32,
-        /// Its truncation, m.
+        /// Truncation in the file, m.
         found_truncation_m: f32,
         /// The run's voxel size, m.
         voxel_m: f32,
@@ -101,7 +103,7 @@ pub struct Position {
     /// CRC-32 of all records.
     checksum: u32,
     unreadable: u64,
-    /// Why storing had ended, if it had.
+    /// Reason why storing had ended, if it had.
     failure: Option<String>,
 }
 
@@ -116,7 +118,7 @@ pub struct BlockFile<F> {
     checksum: crc32fast::Hasher,
     /// Bytes the file may grow to.
     most: u64,
-    /// Why storing ended.
+    /// Error that ended storing.
     failure: Option<io::Error>,
     /// Records that cannot be read back.
     unreadable: u64,
@@ -274,12 +276,12 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.end
     }
 
-    /// Why storing ended, if it did.
+    /// Returns the error that ended storing, if one did.
     pub fn failure(&self) -> Option<&io::Error> {
         self.failure.as_ref()
     }
 
-    /// Whether the disk refused, and not the limit that was asked for.
+    /// Returns true if the disk refused, rather than the limit that was asked for.
     pub fn disk_failed(&self) -> bool {
         self.failure.as_ref().is_some_and(|error| error.to_string() != LIMIT_REACHED)
     }
@@ -289,7 +291,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.unreadable
     }
 
-    /// Whether a block is stored.
+    /// Returns true if a block is stored.
     pub fn holds(&mut self, coord: BlockCoord) -> bool {
         self.newest_record(coord).is_some()
     }
@@ -308,7 +310,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         coords
     }
 
-    /// Where the newest record of a block begins.
+    /// Returns the offset of a block's newest record.
     fn newest_record(&mut self, coord: BlockCoord) -> Option<u64> {
         let tile = tile_of(coord);
         self.load_index(tile);

@@ -20,7 +20,7 @@ pub struct PoolAndFile<'a, 's, F> {
 }
 
 impl<'a, 's, F: Read + Write + Seek> PoolAndFile<'a, 's, F> {
-    /// Of a volume, and the file that its blocks were evicted to.
+    /// Joins a volume with the file that its blocks were evicted to.
     pub fn new(volume: &'a Volume<'s>, file: &'a mut BlockFile<F>) -> Self {
         let (mut slots, mut by_tile) = (HashMap::new(), HashMap::<_, Vec<_>>::new());
         let blocks = volume.blocks();

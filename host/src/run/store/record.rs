@@ -16,11 +16,11 @@ const COLOURED: usize = BLOCK_VOXELS * 6;
 pub(super) const LONGEST: usize = lz4_flex::block::get_maximum_output_size(COLOURED);
 const HAS_COLOUR: u16 = 1;
 
-/// What a header says.
+/// Fields of a record's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub coord: BlockCoord,
-    /// Where the last record of the same tile begins; 0 none.
+    /// Offset of the previous record of the same tile; 0 if there is none.
     pub previous: u64,
     pub len: usize,
     flags: u16,
@@ -44,7 +44,7 @@ impl Header {
         (header.len <= LONGEST && header.flags <= HAS_COLOUR).then_some(header)
     }
 
-    /// Whether header and payload are as they were written.
+    /// Returns true if header and payload are as they were written.
     pub fn fits(&self, bytes: &[u8; HEADER], payload: &[u8]) -> bool {
         checksum(bytes, payload) == self.checksum
     }

@@ -41,7 +41,7 @@ fn store_block(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
     })
 }
 
-/// Whether block `number` is loaded with the content of `seed`.
+/// Returns true if block `number` is loaded with the content of `seed`.
 fn is_loaded(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
     let mut back = Content {
         sdf: [0; BLOCK_VOXELS],

@@ -158,6 +158,7 @@ impl Document {
             root["animations"] =
                 json!([{ "name": "run", "samplers": self.samplers, "channels": self.channels }]);
         }
+        // Chunks are padded to four bytes, as the format demands.
         let mut json = serde_json::to_vec(&root)?;
         json.resize(json.len().next_multiple_of(4), b' ');
         let chunks: Vec<(&[u8; 4], &[u8])> = [(b"JSON", &json[..]), (b"BIN\0", &binary.bytes[..])]

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 /// Greatest value of 16 bits.
 const MOST: f32 = 65_535.0;
-/// What has no colour: light grey.
+/// Colour of vertices without one: light grey.
 const CLAY: [u8; 3] = [205, 205, 200];
 /// Bytes from one vertex's position, normal and colour to the next one's.
 const STRIDES: [usize; 3] = [8, 4, 8];
@@ -33,6 +33,7 @@ pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32
         let shown = if colour == [0; 3] { CLAY } else { colour };
         colours.extend(shown.map(linear).into_iter().chain([0]).flat_map(u16::to_le_bytes));
     }
+    // Each attribute is a view of its own, with its stride padded to four bytes.
     let [position, normal, colour] = [&positions, &normals, &colours]
         .into_iter()
         .zip(STRIDES)

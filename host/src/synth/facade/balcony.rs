@@ -23,6 +23,7 @@ pub fn balcony(mesh: &mut Mesh, rng: &mut Rng, house: &House, middle: f64, floor
         scaled(tone(70, 72, 76), rng.between(0.5, 1.5)),
         rng.seed(),
     ));
+    // Some balconies have walls instead of bars.
     if rng.chance(0.35) {
         parapet(mesh, house.wall, middle, floor);
     } else {

@@ -53,6 +53,7 @@ pub fn home_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
             openings.push(opening);
         }
     }
+    // The wall is cut at the door and the windows.
     floor_front(mesh, house, house.wall, Storey { top: -height, bottom: 0.1 }, &openings);
     // The plinth stands out a little; it is cut at the door.
     let door = openings[door_at];

@@ -8,6 +8,7 @@ use crate::synth::surface::{Kind, Surface, Tone, scaled, tone};
 /// Closes a house above the height `top`.
 pub fn roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64, frame: Tone) {
     ledge(mesh, house, top + 0.12, 0.18, 0.3);
+    // A flat roof behind a parapet.
     if rng.chance(0.3) {
         return flat_roof(mesh, rng, house, top);
     }

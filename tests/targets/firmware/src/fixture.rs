@@ -5,5 +5,5 @@ include!(env!("DYNVOX_CONSTANTS"));
 
 /// The frames.
 pub static CLIP: &[u8] = include_bytes!(env!("DYNVOX_CLIP"));
-/// What they must give.
+/// Digests that the clip must give.
 pub static DIGESTS: &str = include_str!(env!("DYNVOX_DIGESTS"));

@@ -7,7 +7,7 @@ fn target_colour(seen: &Observation<'_>, u: usize, v: usize) -> [u8; 3] {
     seen.colour.map_or_else(|| [seen.grey.get(u, v).unwrap(); 3], |image| image.get(u, v).unwrap())
 }
 
-/// What a weight counts for against an observation at a depth.
+/// Returns what a weight counts for against an observation at a depth.
 fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
     if config.observation_weight == ObservationWeight::Nearest {
         weight.min(libm::rintf(0.5 * depth_m) as i32)
@@ -16,7 +16,7 @@ fn past(config: &VolumeConfig, weight: i32, depth_m: f32) -> i32 {
     }
 }
 
-/// What an observation of a class at a depth weighs, so far before the surface.
+/// Returns the weight of an observation of a class at a depth, so far before the surface.
 fn gain(config: &VolumeConfig, class: Option<u8>, depth_m: f32, distance_m: f32) -> i32 {
     let is_free = distance_m >= 4.0 * config.voxel_size_m;
     let at_1_m = match config.observation_weight {

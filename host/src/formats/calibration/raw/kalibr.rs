@@ -78,7 +78,11 @@ pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
         }
         other => {
             let reason = format!("the camera model {other} is not known");
-            return Err(node.refuse(&reason, "Known are pinhole, ds, eucm, and omni without distortion: calibrate again with one of them"));
+            return Err(node.refuse(
+                &reason,
+                "Known are pinhole, ds, eucm, and omni without \
+                distortion: calibrate again with one of them",
+            ));
         }
     };
     lens::camera(node, pinhole, model, size)
@@ -119,7 +123,8 @@ fn camera_keys(camera: &RawCamera) -> Option<String> {
         _ => return None,
     };
     Some(format!(
-        "  camera_model: {model}\n  distortion_coeffs: [{}]\n  distortion_model: {name}\n  intrinsics: [{}]\n  resolution: [{}, {}]\n",
+        "  camera_model: {model}\n  distortion_coeffs: [{}]\n  distortion_model: {name}\n  \
+         intrinsics: [{}]\n  resolution: [{}, {}]\n",
         list(&coefficients),
         list(&[before, vec![fx, fy, cx, cy]].concat()),
         camera.width,

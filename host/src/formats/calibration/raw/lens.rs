@@ -72,12 +72,15 @@ pub fn distortion(
     coefficients: &[f64],
 ) -> Result<LensModel, FormatError> {
     match name.to_ascii_lowercase().replace(['-', ' '], "_").as_str() {
-        "radtan" | "radial_tangential" | "plumb_bob" | "rational_polynomial" | "opencv" => radial_tangential(at, coefficients),
+        "radtan" | "radial_tangential" | "plumb_bob" | "rational_polynomial" | "opencv" => {
+            radial_tangential(at, coefficients)
+        }
         "equidistant" | "equi" | "fisheye" | "kannala_brandt" => equidistant(at, coefficients),
         "none" | "" if coefficients.iter().all(|k| *k == 0.0) => Ok(LensModel::IDEAL),
         other => Err(at.refuse(
             &format!("the distortion model {other} is not known"),
-            "Known are radtan (plumb_bob, rational_polynomial) and equidistant (fisheye): calibrate again with one of them",
+            "Known are radtan (plumb_bob, rational_polynomial) and equidistant (fisheye): \
+             calibrate again with one of them",
         )),
     }
 }

@@ -46,7 +46,7 @@ pub static CALIBRATION_FORMATS: &[&CalibrationFormat] = &[
     &opencv::FORMAT,
 ];
 
-/// How the two cameras of a pair stand.
+/// Relative pose of the two cameras of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placement {
     /// The motion between them; rectification is ours to choose.
@@ -69,14 +69,14 @@ pub enum Placement {
     },
 }
 
-/// What a calibration says of a raw pair.
+/// Calibration of a raw pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StereoCalibration {
     /// The left camera.
     pub left: RawCamera,
     /// The right camera.
     pub right: RawCamera,
-    /// How they stand.
+    /// Relative pose of the cameras.
     pub placement: Placement,
     /// Name of the format it was read from.
     pub format: &'static str,
@@ -101,8 +101,8 @@ impl StereoCalibration {
         Self::from_files(Files::read(paths, image_size)?)
     }
 
-    /// Of a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path` names
-    /// their source in errors.
+    /// Reads a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path`
+    /// names their source in errors.
     ///
     /// # Errors
     /// As [`StereoCalibration::read`].
@@ -150,7 +150,7 @@ impl StereoCalibration {
         rig.angle_rad().to_degrees()
     }
 
-    /// How pairs are rectified: as the calibration gives it, unless it gives none or another size
+    /// Returns the rectification: as the calibration gives it, unless it gives none or another size
     /// is asked for.
     ///
     /// # Errors
@@ -200,12 +200,14 @@ impl StereoCalibration {
         {
             let action = match problem {
                 RectifyProblem::NotARotation => {
-                    "A rotation has three rows of length 1 at right angles: copy it whole from the calibration tool"
+                    "A rotation has three rows of length 1 at right angles: copy it whole from the \
+                     calibration tool"
                 }
                 RectifyProblem::NoBaseline => "Give the translation between the cameras in metres",
                 RectifyProblem::Exchanged => "Exchange the two cameras: the first is the left one",
                 RectifyProblem::NotSideBySide => {
-                    "Pairs above or behind each other cannot be matched: check the order of rotation and translation"
+                    "Pairs above or behind each other cannot be matched: check the order of \
+                     rotation and translation"
                 }
                 RectifyProblem::Diverging => {
                     "Check the rotation between the cameras, and which way it maps"
@@ -231,7 +233,8 @@ impl StereoCalibration {
         Err(FormatError::content(
             path,
             format!(
-                "it is for images of {known_width} x {known_height} px, but these are {width} x {height} px"
+                "it is for images of {known_width} x {known_height} px, but these are {width} x \
+                 {height} px"
             ),
             "Give the calibration of these images, or the images as the camera delivers them",
         ))

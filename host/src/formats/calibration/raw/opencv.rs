@@ -12,7 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 /// OpenCV's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "OpenCV",
-    files: "YAML or XML: `M1 D1 M2 D2 R T`, `cameraMatrix1 distCoeffs1 ...`, or one file for each camera",
+    files: "YAML or XML: `M1 D1 M2 D2 R T`, `cameraMatrix1 distCoeffs1 ...`, or one file for each \
+            camera",
     matches: |files| is_one(&files.roots()),
     read: |files| read(&files.roots(), files.image_size, files.root()?),
     example: &[(
@@ -52,14 +53,14 @@ const PAIRS: [[[&str; 2]; 2]; 6] = [
         ["right_camera_matrix", "right_distortion_coefficients"],
     ],
 ];
-/// The same in files of one camera.
+/// Keys in files of one camera.
 const SINGLE: [[&str; 2]; 3] = [
     ["cameraMatrix", "distCoeffs"],
     ["camera_matrix", "distortion_coefficients"],
     ["Camera_Matrix", "Distortion_Coefficients"],
 ];
 
-/// Whether the files look like it.
+/// Returns true if the files look like this format.
 fn is_one(roots: &[Node<'_>]) -> bool {
     let matrices = PAIRS.iter().flatten().chain(&SINGLE).map(|[matrix, _]| *matrix);
     matrices.clone().any(|key| roots.iter().any(|root| root.get(key).is_some()))
@@ -131,7 +132,8 @@ fn size(
     {
         return list.size();
     }
-    let action = "Add image_width and image_height, or give the calibration together with the images: --calibration FILE PATH";
+    let action = "Add image_width and image_height, or give the calibration together with the \
+                  images: --calibration FILE PATH";
     image_size.ok_or_else(|| first.refuse("it does not say the size of the images", action))
 }
 

@@ -181,7 +181,8 @@ pub fn to_toml(calibration: &StereoCalibration) -> String {
         rectified,
     };
     let head = "# Calibration of a raw stereo pair, as `--calibration` takes it. Camera axes: x right, y down, z forward.\n\
-                # right_from_left maps left camera coordinates to right ones; rotation_left and _right raw coordinates to rectified ones.\n";
+                # right_from_left maps left camera coordinates to right ones; rotation_left and \
+                _right raw coordinates to rectified ones.\n";
     // Numbers and tables are always TOML.
     format!("{head}{}", toml::to_string(&file).unwrap_or_default())
 }

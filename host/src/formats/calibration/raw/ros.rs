@@ -84,9 +84,11 @@ pub fn rectified_rig(
         && near(p_left[0], p_left[5]);
     if !shared {
         let reason = "the two projection matrices differ in focal length or principal point";
-        return Err(
-            at.refuse(reason, "Rectify with zero disparity at infinity (CALIB_ZERO_DISPARITY), or give rotation and translation instead")
-        );
+        return Err(at.refuse(
+            reason,
+            "Rectify with zero disparity at infinity (CALIB_ZERO_DISPARITY), or \
+                               give rotation and translation instead",
+        ));
     }
     let rig = StereoRig {
         focal_px: p_left[0],

@@ -12,15 +12,20 @@ const KALIBR: &str = kalibr::FORMAT.example[0].1;
 fn euroc(x: f64) -> String {
     format!(
         "%YAML:1.0\n# General sensor definitions.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, {x},\n         0.0, 1.0, 0.0, 0.02,\n         \
-         0.0, 0.0, 1.0, 0.01,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, 480]\ncamera_model: pinhole\n\
-         intrinsics: [458.6, 457.2, 367.2, 248.3] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n\
+         0.0, 0.0, 1.0, 0.01,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, \
+         480]\ncamera_model: pinhole\n\
+         intrinsics: [458.6, 457.2, 367.2, 248.3] #fu, fv, cu, cv\ndistortion_model: \
+         radial-tangential\n\
          distortion_coefficients: [-0.28, 0.07, 0.0002, 0.00002]\n"
     )
 }
 
-const MATRIX: &str = "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1. ]\n";
-const COEFFICIENTS: &str = "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0.0002, 0.00002, 0. ]\n";
-const R: &str = "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]\n";
+const MATRIX: &str = "!!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 458.6, 0., \
+                      367.2, 0., 457.2, 248.3, 0., 0., 1. ]\n";
+const COEFFICIENTS: &str = "!!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, \
+                            0.07, 0.0002, 0.00002, 0. ]\n";
+const R: &str = "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 0., 0., \
+                 1., 0., 0., 0., 1. ]\n";
 const T: &str =
     "T: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ -0.11, 0., 0. ]\n";
 
@@ -33,7 +38,8 @@ fn opencv_short() -> [String; 2] {
 
 fn opencv_long() -> [String; 2] {
     let one = format!(
-        "%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncameraMatrix: {MATRIX}distCoeffs: {COEFFICIENTS}"
+        "%YAML:1.0\n---\nimage_width: 752\nimage_height: 480\ncameraMatrix: {MATRIX}distCoeffs: \
+         {COEFFICIENTS}"
     );
     [one.clone(), format!("{one}{R}{T}")]
 }
@@ -41,7 +47,8 @@ fn opencv_long() -> [String; 2] {
 fn opencv_xml() -> String {
     let matrix = |name: &str, rows: u32, data: &str| {
         format!(
-            "<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>3</cols><dt>d</dt><data>\n {data}</data></{name}>\n"
+            "<{name} type_id=\"opencv-matrix\"><rows>{rows}</rows><cols>3</cols><dt>d</dt><data>\n \
+             {data}</data></{name}>\n"
         )
     };
     let camera = |number: u32| {
@@ -50,7 +57,8 @@ fn opencv_xml() -> String {
     };
     let rest = matrix("R", 3, "1. 0. 0. 0. 1. 0. 0. 0. 1.") + &matrix("T", 3, "-0.11 0. 0.");
     format!(
-        "<?xml version=\"1.0\"?>\n<opencv_storage>\n{}{}{rest}<image_width>752</image_width><image_height>480</image_height></opencv_storage>",
+        "<?xml \
+         version=\"1.0\"?>\n<opencv_storage>\n{}{}{rest}<image_width>752</image_width><image_height>480</image_height></opencv_storage>",
         camera(1),
         camera(2)
     )

@@ -132,10 +132,12 @@ impl<'t> Node<'t> {
     /// The value of a key that must be there.
     pub fn need(&self, key: &'t str) -> Result<Node<'t>, FormatError> {
         self.get(key).ok_or_else(|| {
-            let within = if self.key.is_empty() { String::new() } else { format!(" in {}", self.key) };
+            let within =
+                if self.key.is_empty() { String::new() } else { format!(" in {}", self.key) };
             self.refuse(
                 &format!("{key} is missing{within}"),
-                "Compare it with the calibration tool's own output: the file may be cut off or of another tool",
+                "Compare it with the calibration tool's own output: the file may be cut off or of \
+                 another tool",
             )
         })
     }
@@ -224,7 +226,7 @@ impl<'t> Node<'t> {
     }
 }
 
-/// Whether an image can be so wide or high, px.
+/// Returns true if an image can be so wide or high, px.
 fn is_side(number: f64) -> bool {
     (1.0..=65_535.0).contains(&number) && number.fract() == 0.0
 }

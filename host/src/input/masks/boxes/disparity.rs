@@ -24,7 +24,8 @@ impl FrameDisparity {
         let refused = |reason: &str| InputError::masks(Path::new(dataset.name()), reason);
         if dataset.rectification().is_some() {
             return Err(refused(
-                "boxes are made masks on rectified images, and these are raw. Rectify them first, or give masks",
+                "boxes are made masks on rectified images, and these are raw. Rectify them first, \
+                 or give masks",
             ));
         }
         let (image_width, image_height) = dataset.size();

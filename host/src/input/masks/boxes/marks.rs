@@ -16,7 +16,7 @@ impl Marks {
         Self { marks: all.map(|(u, v)| holds(u, v)).collect(), pixels }
     }
 
-    /// Of a component: its box and its pixels.
+    /// Makes the marks of a component: its box and its pixels.
     pub fn of(component: &[(i32, i32)]) -> Option<Self> {
         let columns = || component.iter().map(|(u, _)| *u);
         let rows = || component.iter().map(|(_, v)| *v);
@@ -34,7 +34,7 @@ impl Marks {
         Some(marks)
     }
 
-    /// Whether a pixel is marked.
+    /// Returns true if a pixel is marked.
     pub fn holds(&self, u: i32, v: i32) -> bool {
         self.pixels.contains(u, v)
             && self.marks

@@ -14,9 +14,9 @@ use std::collections::BTreeMap;
 const SMALL_PX: i64 = 1_500;
 /// By how much at each side, as a share of width and height.
 const SHRUNK: f64 = 0.05;
-/// Where in a box its object surely is: shares of its width and height.
+/// Part of a box that its object surely covers: shares of its width and height.
 const CORE: [f64; 4] = [0.2, 0.3, 0.8, 0.85];
-/// What is lower above the ground belongs to it, m.
+/// Height above the ground below which pixels belong to the ground, m.
 const CLEARANCE_M: f64 = 0.12;
 /// Depth errs by this, m for each m^2 of squared depth.
 const DEPTH_ERROR: f64 = 0.0012;
@@ -36,7 +36,7 @@ const KNOWN_SHARE: f64 = 0.15;
 const REGION_MIN_PX: i64 = 400;
 const REGION_SCORE: f32 = 0.5;
 
-/// How long an object of a class is, m.
+/// Returns the length of an object of a class, m.
 fn length_m(class: Class) -> f64 {
     match class {
         Class::Bus => 12.0,
@@ -94,7 +94,7 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// What stands at the depth the box shows most of.
+    /// Grows the mask from the depth that most of the box has.
     fn grown(&self, one: &DetectedBox, pixels: &PixelBox) -> Option<InstanceMask> {
         let peak_px = self.peak_px(one, pixels)?;
         let (focal_m_px, length_m) = (self.rig.focal_baseline_px_m(), length_m(one.class));
@@ -140,7 +140,7 @@ impl<'a> Scene<'a> {
         whole
     }
 
-    /// Whether neighbours can be on one surface.
+    /// Returns true if neighbours can be on one surface.
     fn is_next(&self, a: (i32, i32), b: (i32, i32)) -> bool {
         let pair = self.disparity_px(a.0, a.1).zip(self.disparity_px(b.0, b.1));
         pair.is_some_and(|(a, b)| (a - b).abs() < STEP_PX)
@@ -187,8 +187,8 @@ impl<'a> Scene<'a> {
         large.filter_map(mask).collect()
     }
 
-    /// Whether the semantic map has a class at a pixel that can be the box's; true without a map,
-    /// and where it has hardly any of that class.
+    /// Returns a test for pixels whose class in the semantic map can be the box's. The test is
+    /// always true without a map, and where the map has hardly any pixel of that class.
     fn agrees<'b>(&'b self, class: Class, pixels: &PixelBox) -> impl Fn(i32, i32) -> bool + 'b {
         let at = move |u: i32, v: i32| {
             self.regions.is_none_or(|regions| {

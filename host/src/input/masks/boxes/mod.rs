@@ -65,7 +65,7 @@ impl DetectedBox {
     }
 }
 
-/// What a detector says of a frame.
+/// Output of a detector for a frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Detections {
     /// Masks, and what could not be used.
@@ -78,7 +78,7 @@ pub(super) struct Detections {
 
 /// Gives boxes and masks of a frame.
 pub(super) trait DetectionSource: Send + Sync {
-    /// What is detected in frame `index`, whose images are at hand.
+    /// Returns the detections in frame `index`, whose images are given.
     fn detections(&self, index: usize, images: &StereoImages) -> Result<Detections, InputError>;
 }
 
@@ -89,12 +89,12 @@ pub(super) struct BoxMasks<S> {
     rig: StereoRig,
     /// Size of the images as they are mapped, px.
     size: (usize, usize),
-    /// How much the detections must be scaled to fit them.
+    /// Factor by which the detections are scaled to fit the images.
     scale: f64,
 }
 
 impl<S: DetectionSource> BoxMasks<S> {
-    /// Of detections that have the size of the images in files.
+    /// Wraps a source whose detections have the size of the images in files.
     pub fn new(source: S, dataset: &dyn FrameSource) -> Result<Self, InputError> {
         let scale = dataset.size().0 as f64 / dataset.full_size().0 as f64;
         Ok(Self {
@@ -106,7 +106,7 @@ impl<S: DetectionSource> BoxMasks<S> {
         })
     }
 
-    /// Of detections in the images as they are mapped.
+    /// Wraps a source whose detections have the size of the images as they are mapped.
     #[cfg(feature = "onnx")]
     pub fn of_pictures(source: S, dataset: &dyn FrameSource) -> Result<Self, InputError> {
         Ok(Self { scale: 1.0, ..Self::new(source, dataset)? })
@@ -149,7 +149,7 @@ impl<S: DetectionSource> MaskSource for BoxMasks<S> {
     }
 }
 
-/// The same masks without the pixels that one of a better score has.
+/// Removes from each mask the pixels that a mask of a better score has.
 fn disjoint(masks: FrameMasks, (width, height): (usize, usize)) -> FrameMasks {
     let mut order: Vec<(u16, &InstanceMask)> = (1..).zip(&masks.instances).collect();
     order.sort_by(|(_, a), (_, b)| a.score.total_cmp(&b.score));

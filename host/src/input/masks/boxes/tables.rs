@@ -59,7 +59,8 @@ impl BoxTable {
         for (line, row) in numbered(&text) {
             let parsed = if row.contains(',') { mot(row) } else { kitti_tracking(row) };
             let parsed = parsed.ok_or_else(|| {
-                let formats = "`frame track type truncated occluded alpha x1 y1 x2 y2 ...` (KITTI) nor `frame,id,left,top,width,height,score,...` (MOT)";
+                let formats = "`frame track type truncated occluded alpha x1 y1 x2 y2 ...` (KITTI) \
+                               nor `frame,id,left,top,width,height,score,...` (MOT)";
                 InputError::masks(path, format!("line {line} is neither {formats}"))
             })?;
             let Some((Some(frame), ..)) = parsed else { continue };
@@ -100,7 +101,8 @@ impl DetectionSource for BoxFiles {
         let mut found = Detections::default();
         for (line, row) in numbered(&text?) {
             let parsed = own(row).or_else(|| kitti_object(row)).ok_or_else(|| {
-                let formats = "`id class score x1 y1 x2 y2` nor `type truncated occluded alpha x1 y1 x2 y2 ...` (KITTI)";
+                let formats = "`id class score x1 y1 x2 y2` nor `type truncated occluded alpha x1 \
+                               y1 x2 y2 ...` (KITTI)";
                 InputError::masks(&path, format!("line {line} is neither {formats}"))
             })?;
             add(&mut found, parsed);
@@ -198,7 +200,8 @@ mod tests {
             kitti_tracking("3 -1 DontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1000 -1000 -1000 -10"),
             Some(None)
         );
-        let object = "Pedestrian 0.00 0 -0.20 712.4 143.0 810.7 307.9 1.89 0.48 1.20 1.84 1.47 8.41 0.01 0.5";
+        let object = "Pedestrian 0.00 0 -0.20 712.4 143.0 810.7 307.9 1.89 0.48 1.20 1.84 1.47 \
+                      8.41 0.01 0.5";
         assert_eq!(
             kitti_object(object).flatten().map(|row| (row.1, row.2)),
             Some((Some(Class::Person), 0.5))

@@ -6,7 +6,7 @@ use super::settings::Settings;
 /// Strides of a detector's three grids, px.
 pub const STRIDES: [usize; 3] = [8, 16, 32];
 
-/// What the outputs are.
+/// Meaning of a network's outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// Boxes.
@@ -22,14 +22,14 @@ pub enum Layout {
 /// Boxes of one output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoxFormat {
-    /// Which output.
+    /// Number of the output.
     pub output: usize,
     pub count: usize,
-    /// Whether an attribute's values lie together: `[1, A, N]`.
+    /// True if an attribute's values lie together: `[1, A, N]`.
     pub transposed: bool,
-    /// Whether an objectness follows the box.
+    /// True if an objectness follows the box.
     pub objectness: bool,
-    /// Whether boxes are offsets in the cells of grids: YOLOX.
+    /// True if boxes are offsets in the cells of grids: YOLOX.
     pub in_grid: bool,
     pub classes: usize,
 }
@@ -39,7 +39,7 @@ pub struct BoxFormat {
 pub struct PrototypeFormat {
     /// The boxes, whose classes are followed by `prototypes` coefficients.
     pub boxes: BoxFormat,
-    /// Which output the prototypes are.
+    /// Number of the output with the prototypes.
     pub output: usize,
     pub prototypes: usize,
 }
@@ -82,26 +82,28 @@ impl Layout {
             let shapes: Vec<String> = outputs.iter().map(|output| format!("{:?}", output.shape)).collect();
             format!(
                 "its outputs have the shapes {}, which fit none that is known: boxes [1, N, 5 + C] or [1, 4 + C, N]; a map [1, H, W] or [1, C, H, W] of \
-                 the input's size, or a whole part of it; boxes and prototypes [1, 4 + C + P, N], [1, P, H, W]; boxes, labels and masks [1, N, 5], [1, N], \
-                 [1, N, H, W]. Export it with one of these; what shapes cannot tell (names, channels, boxes that are decoded) stands in MODEL.toml \
+                 the input's size, or a whole part of it; boxes and prototypes [1, 4 + C + P, N], \
+                 [1, P, H, W]; boxes, labels and masks [1, N, 5], [1, N], \
+                 [1, N, H, W]. Export it with one of these; what shapes cannot tell (names, \
+                 channels, boxes that are decoded) stands in MODEL.toml \
                  beside MODEL.onnx, see docs/inputs.md",
                 shapes.join(", ")
             )
         })
     }
 
-    /// Whether boxes alone come of it.
+    /// Returns true if the network yields boxes only.
     pub fn is_boxes(&self) -> bool {
         matches!(self, Self::Boxes(_))
     }
 
-    /// Whether boxes lie in the cells of grids: YOLOX's, whose input is in another form than those
-    /// of others.
+    /// Returns true if boxes lie in the cells of grids: YOLOX's, whose input has another form than
+    /// that of others.
     pub fn is_in_grid(&self) -> bool {
         matches!(self, Self::Boxes(format) if format.in_grid)
     }
 
-    /// How many classes there are, where shapes tell.
+    /// Returns the number of classes, if shapes tell.
     pub fn class_count(&self, outputs: &[Output]) -> Option<usize> {
         match self {
             Self::Boxes(format) => Some(format.classes),
@@ -116,7 +118,7 @@ impl Layout {
     }
 }
 
-/// Whether an output is an image of the input's size, or of a whole part of it.
+/// Returns true if an output is an image of the input's size, or of a whole fraction of it.
 fn is_map(output: &Output, (width, height): (usize, usize)) -> bool {
     let is_part = |side: usize, whole: usize| {
         [1, 2, 4, 8, 16].iter().any(|part| side == whole / part || side == whole.div_ceil(*part))

@@ -41,9 +41,9 @@ struct Network {
     model: Model,
     settings: Settings,
     layout: Layout,
-    /// What the input's values are.
+    /// Form of the input's values.
     values: InputValues,
-    /// What the classes are; `None` for those that are not kept.
+    /// Classes of the network; `None` for those that are not kept.
     classes: Vec<Option<Class>>,
 }
 
@@ -54,7 +54,7 @@ struct PicturePart<'a> {
     input: (usize, usize),
     /// Size of the picture, px.
     picture: (usize, usize),
-    /// What the network's classes are; `None` for those that are not kept.
+    /// Classes of the network; `None` for those that are not kept.
     classes: &'a [Option<Class>],
     settings: &'a Settings,
 }
@@ -149,7 +149,11 @@ impl Network {
         let fit = &Fit::new(part, input, fill);
         let outputs = self.model.run(picture, fit, &self.values).map_err(refused)?;
         if Layout::of(&outputs, input, &self.settings) != Ok(self.layout) {
-            return Err(refused("its outputs change their shapes from picture to picture. Export it with fixed shapes".to_owned()));
+            return Err(refused(
+                "its outputs change their shapes from picture to picture. Export it \
+                                with fixed shapes"
+                    .to_owned(),
+            ));
         }
         let part = PicturePart {
             fit,

@@ -7,7 +7,7 @@ use rten_tensor::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the input shows where there is no picture.
+/// Grey value of the input outside the picture.
 const GREY: f32 = 114.0;
 
 /// The input of a network: one picture.
@@ -15,13 +15,13 @@ const GREY: f32 = 114.0;
 pub struct Input {
     /// Width and height, px.
     pub size: (usize, usize),
-    /// Whether channels come last: `[1, H, W, 3]`.
+    /// True if channels come last: `[1, H, W, 3]`.
     channels_last: bool,
-    /// Whether it takes bytes.
+    /// True if the input takes bytes.
     pub bytes: bool,
 }
 
-/// What an input's values are: `(value - mean) * scale` of values from 0 to 255.
+/// Form of an input's values: `(value - mean) * scale` of values from 0 to 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputValues {
     pub blue_first: bool,
@@ -34,7 +34,7 @@ pub struct InputValues {
 pub struct Output {
     pub shape: Vec<usize>,
     pub values: Vec<f32>,
-    /// Whether they are whole numbers.
+    /// True if the values are whole numbers.
     pub integers: bool,
 }
 
@@ -144,7 +144,8 @@ impl Input {
             [None | Some(1), height, width, Some(3)] => (true, height, width),
             _ => {
                 return Err(format!(
-                    "its input has the shape [{}], not that of a picture, [1, 3, H, W] or [1, H, W, 3]",
+                    "its input has the shape [{}], not that of a picture, [1, 3, H, W] or [1, H, \
+                     W, 3]",
                     shown.join(", ")
                 ));
             }
@@ -166,7 +167,8 @@ impl Input {
                 Err(format!("its input of {width} x {height} px is too small for a picture"))
             }
             _ => Err(format!(
-                "its input has the shape [{}], which leaves the size open. Write it to the file of its settings: width = 640 and height = 640",
+                "its input has the shape [{}], which leaves the size open. Write it to the file of \
+                 its settings: width = 640 and height = 640",
                 shown.join(", ")
             )),
         }

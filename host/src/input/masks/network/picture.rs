@@ -5,7 +5,7 @@ use crate::input::source::StereoImages;
 
 /// A picture is divided into tiles when it is so many times as wide as the input's shape.
 const WIDE: f64 = 1.5;
-/// How much of a tile overlaps its neighbour, as a share of its width.
+/// Overlap of a tile with its neighbour, as a share of its width.
 const OVERLAP: f64 = 0.15;
 
 /// The left image, in colour where it is.
@@ -61,15 +61,15 @@ impl<'i> Picture<'i> {
     }
 }
 
-/// How a part of a picture lies in an input: at its upper left corner, scaled.
+/// Position of a part of a picture in an input: at its upper left corner, scaled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Where the part begins, px.
+    /// Upper left corner of the part, px.
     left: f64,
     top: f64,
     /// Input px for each px of the picture.
     scale: [f64; 2],
-    /// How much of the input the part fills, px.
+    /// Extent of the input that the part fills, px.
     filled: [f64; 2],
 }
 
@@ -86,17 +86,17 @@ impl Fit {
         }
     }
 
-    /// Where a point of the input is in the picture, px.
+    /// Maps a point of the input into the picture, px.
     pub fn picture_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.left + x / self.scale[0], self.top + y / self.scale[1]]
     }
 
-    /// Where a point of the picture is in the input, px.
+    /// Maps a point of the picture into the input, px.
     pub fn input_point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [(x - self.left) * self.scale[0], (y - self.top) * self.scale[1]]
     }
 
-    /// Whether a point of the input shows the picture.
+    /// Returns true if a point of the input shows the picture.
     pub fn is_filled(&self, [x, y]: [f64; 2]) -> bool {
         x < self.filled[0] && y < self.filled[1]
     }

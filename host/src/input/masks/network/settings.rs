@@ -31,7 +31,7 @@ const CITYSCAPES: [&str; 19] = [
     "bicycle",
 ];
 
-/// How the three channels of a picture are ordered.
+/// Order of a picture's three channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Channels {
@@ -57,10 +57,10 @@ pub struct Settings {
     pub mean: Option<[f32; 3]>,
     /// Multiplies the difference; 1 for boxes that are not decoded, else 1/255.
     pub scale: Option<[f32; 3]>,
-    /// Whether the picture fills the input; otherwise its sides keep their ratio and the rest is
-    /// grey.
+    /// True if the picture is stretched to the input; otherwise its sides keep their ratio and the
+    /// rest is grey.
     pub fill: Option<bool>,
-    /// Whether boxes of the shape that YOLOX gives are decoded already; false.
+    /// True if boxes of YOLOX's shape are decoded already; default false.
     pub decoded: bool,
     /// Names of the classes in the network's order; COCO's 80 or Cityscapes' 19 otherwise.
     pub names: Option<Vec<String>>,
@@ -126,8 +126,8 @@ impl Settings {
         }
     }
 
-    /// What each of so many classes is; `None` for those that are not kept. Without a number, as of
-    /// a map of integers, as many as are named.
+    /// Returns the class of each of so many outputs; `None` for those that are not kept. Without a
+    /// number, as for a map of integers, there are as many as are named.
     ///
     /// # Errors
     /// The number of classes has no list that is known.
@@ -142,7 +142,8 @@ impl Settings {
             (None, None | Some(19)) => Ok(CITYSCAPES.iter().map(|name| named(name)).collect()),
             (None, Some(80)) => Ok((0..80).map(|index| self.kept("", coco_class(index))).collect()),
             (None, Some(count)) => Err(format!(
-                "it has {count} classes, neither COCO's 80 nor Cityscapes' 19. Name them in the file of its settings: names = [\"car\", ...]"
+                "it has {count} classes, neither COCO's 80 nor Cityscapes' 19. Name them in the \
+                 file of its settings: names = [\"car\", ...]"
             )),
         }
     }

@@ -12,7 +12,7 @@ fn zeros(shape: &[usize], integers: bool) -> Output {
     Output { shape: shape.to_vec(), values: vec![0.0; shape.iter().product()], integers }
 }
 
-/// What the layout of some outputs of a network with an input of 64 x 64 px is called.
+/// Names the layout of some outputs of a network with an input of 64 x 64 px.
 fn layout(shapes: &[&[usize]], integers: bool, settings: &Settings) -> Result<Layout, String> {
     Layout::of(
         &shapes.iter().map(|shape| zeros(shape, integers)).collect::<Vec<_>>(),

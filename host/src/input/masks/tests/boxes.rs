@@ -14,7 +14,7 @@ fn of_file(name: &str, text: &str, format: &'static MaskFormat) -> Result<FrameM
     first(root.path(), &MaskChoice::Files(format, path))
 }
 
-/// The same of a folder with one file.
+/// Makes a source from a folder with one file.
 fn of_folder(
     name: &str,
     text: &str,
@@ -32,7 +32,7 @@ fn found(masks: &FrameMasks) -> Vec<(Class, f32, PixelBox)> {
 }
 
 const CAR: PixelBox = PixelBox { left: 4, top: 10, width: 10, height: 20 };
-/// What is left of [`CAR`] as a small box.
+/// Mask of [`CAR`] after it is shrunk to a small box.
 const SHRUNK_CAR: PixelBox = PixelBox { left: 5, top: 11, width: 9, height: 18 };
 
 #[test]
@@ -181,7 +181,7 @@ impl DetectionSource for Given {
     }
 }
 
-/// What the street's exact boxes become, and the exact masks.
+/// Makes masks from the street's exact boxes, and returns the exact masks with them.
 fn of_street() -> (FrameMasks, FrameMasks, usize) {
     let config = StreetConfig { width: 640, height: 192, frames: 2, ..StreetConfig::default() };
     let street =

@@ -2,7 +2,7 @@
 
 use core::ptr::addr_of_mut;
 
-/// How far below the caller is painted, bytes.
+/// Depth below the caller that is painted, bytes.
 const PAINTED: usize = 256 * 1024;
 /// Not painted: what the painter itself stands on.
 const MARGIN: usize = 64;
