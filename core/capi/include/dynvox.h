@@ -80,7 +80,7 @@ typedef enum {
   DYNVOX_STATUS_TIME,
 } DynvoxStatus;
 
-// How much a step's events matter.
+// Severity of a step's events.
 typedef enum {
   // Nothing to say.
   DYNVOX_SEVERITY_INFO = 0,
@@ -90,7 +90,7 @@ typedef enum {
   DYNVOX_SEVERITY_MAP_AFFECTED,
 } DynvoxSeverity;
 
-// Whether a track moves.
+// Motion state of a track.
 typedef enum {
   // Not known yet.
   DYNVOX_MOTION_STATE_UNCERTAIN = 0,
@@ -100,13 +100,13 @@ typedef enum {
   DYNVOX_MOTION_STATE_DYNAMIC,
 } DynvoxMotionState;
 
-// How a ray or a path ends.
+// End of a ray or a path.
 typedef enum {
   // It is free as far as was asked.
   DYNVOX_PATH_END_FREE = 0,
   // At a surface of the map.
   DYNVOX_PATH_END_SURFACE,
-  // Where nothing was ever seen.
+  // Cell that was never observed.
   DYNVOX_PATH_END_UNKNOWN,
 } DynvoxPathEnd;
 
@@ -140,7 +140,7 @@ typedef struct {
   double center_px[2];
   // DYNVOX_LENS_...
   DynvoxLensModel model;
-  // Its parameters; those that the model does not have are not read.
+  // Parameters of the model; those that it does not have are not read.
   double parameters[8];
 } DynvoxRawCamera;
 
@@ -158,7 +158,8 @@ typedef struct {
   uint32_t width;
   // Rows of the rectified images, px.
   uint32_t height;
-  // Their focal length, px; 0 takes the least that shows no pixel without image.
+  // Focal length of the rectified images, px; 0 takes the least that shows no pixel without
+  // image.
   double focal_px;
 } DynvoxRawRig;
 
@@ -218,9 +219,9 @@ typedef struct {
   size_t planning_length;
   // Height of the planner's window, cells.
   size_t planning_height;
-  // Whether distances are kept for every cell of the window, and not for a slice alone: 0 or 1.
+  // 1 if distances are kept for every cell of the window, 0 if for a slice only.
   uint8_t planning_distance_3d;
-  // Whether voxels have colour: 0 or 1.
+  // 1 if voxels have colour, else 0.
   uint8_t colour;
 } DynvoxCapacity;
 
@@ -260,7 +261,7 @@ typedef struct {
   // 0 other, 1 car, 2 bus, 3 truck, 4 van, 5 train, 6 person, 7 rider, 8 bicycle, 9 motorcycle,
   // 10 animal, 11 moving object.
   uint8_t class_code;
-  // How sure the detector is, 0 to 1.
+  // Confidence of the detector, 0 to 1.
   float score;
   // First column of the box, px; may lie beside the image.
   int32_t left;
@@ -287,9 +288,9 @@ typedef struct {
 // A stereo pair and what is known of it, rectified, or raw where the configuration is
 // dynvox_config_raw's. Everything is read during the call alone.
 typedef struct {
-  // Of every image, px.
+  // Width of every image, px.
   size_t width;
-  // Of every image, px.
+  // Height of every image, px.
   size_t height;
   // Left grey image.
   DynvoxImage left;
@@ -299,13 +300,12 @@ typedef struct {
   DynvoxImage colour;
   // Detections in any order; null without detections.
   const DynvoxDetection *detections;
-  // How many.
+  // Number of detections.
   size_t detection_count;
-  // Where the camera is, for those who know; null lets the mapper find out.
+  // Pose of the left camera in the world, if known; null lets the mapper estimate it.
   const DynvoxPose *t_world_camera;
-  // When the pair was taken, ns since any moment that stays the same, rising from frame to
-  // frame; null where nothing tells: then "tracking.frame_interval_s" has passed since the frame
-  // before.
+  // Time of the pair, ns since any moment that stays the same, rising from frame to frame; null
+  // if unknown: then "tracking.frame_interval_s" has passed since the frame before.
   const uint64_t *time_ns;
   // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
   // values without padding; null lets the mapper match the pair.
@@ -349,15 +349,15 @@ typedef struct {
   bool (*load)(void *context, const DynvoxLoadedBlock *block);
 } DynvoxStore;
 
-// What one step did.
+// Report of one step.
 typedef struct {
   // Number of the frame, from 0.
   uint32_t frame;
   // The worst that happened.
   DynvoxSeverity severity;
-  // Where the left camera is.
+  // Pose of the left camera in the world.
   DynvoxPose t_world_camera;
-  // Whether the frame went into the map.
+  // True if the frame was fused into the map.
   bool fused;
   // Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
   // lost and not found again.
@@ -393,9 +393,9 @@ typedef struct {
   uint32_t id;
   // Number of the trajectory segment within the track.
   uint32_t segment_id;
-  // Its class, as in DynvoxDetection.
+  // Class of the object, as in DynvoxDetection.
   uint8_t class_code;
-  // Whether it moves.
+  // Motion state of the object.
   DynvoxMotionState state;
   // First frame it was fused in.
   uint32_t first_frame;
@@ -405,7 +405,7 @@ typedef struct {
   uint32_t frames;
   // Blocks of its volume.
   uint32_t blocks;
-  // Its frame to the world, when it was fused last.
+  // Pose of the object in the world when it was fused last.
   DynvoxPose t_world_object;
   // For dynvox_retired_triangles.
   const void *volume;
@@ -431,7 +431,7 @@ typedef struct {
   int8_t *normal;
   // Three bytes a pixel: red, green, blue.
   uint8_t *colour;
-  // How often the surface was observed.
+  // Number of observations of the surface.
   uint8_t *weight;
   // Written: columns.
   size_t width;
@@ -458,17 +458,17 @@ typedef void (*DynvoxTriangleSink)(void *context, const DynvoxTriangle *triangle
 
 // A track as it stands after a frame.
 typedef struct {
-  // Its number, from 1, never used again.
+  // Id of the track, from 1, never used again.
   uint32_t id;
-  // Its class, as in DynvoxDetection.
+  // Class of the object, as in DynvoxDetection.
   uint8_t class_code;
-  // Whether it was detected in this frame: 0 or 1.
+  // 1 if the track was detected in this frame, else 0.
   uint8_t detected;
-  // Whether its motion was measured in this frame; if not it is extrapolated: 0 or 1.
+  // 1 if the motion was measured in this frame, 0 if it is extrapolated.
   uint8_t measured;
-  // Whether `t_world_object` says where it is: 0 or 1.
+  // 1 if `t_world_object` is known, else 0.
   uint8_t has_pose;
-  // Whether it moves.
+  // Motion state of the object.
   DynvoxMotionState state;
   // Score of its last detection.
   float score;
@@ -486,11 +486,11 @@ typedef struct {
   int32_t height;
   // Speed over ground, m/s; negative while no motion was ever measured.
   float speed_m_s;
-  // Its error, one sigma, m/s.
+  // Standard deviation of the speed, m/s.
   float speed_sigma_m_s;
   // Centre of its matches in the world, m.
   double center_world_m[3];
-  // Its frame to the world.
+  // Pose of the object in the world.
   DynvoxPose t_world_object;
   // Matches assigned to it in this frame.
   uint32_t matches;
@@ -508,7 +508,7 @@ typedef struct {
   size_t columns_capacity;
   // Cells that `cells` holds, unless it is null.
   size_t cells_capacity;
-  // Of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
+  // State of each column between the configured heights: 0 unknown, 1 free, 2 occupied.
   uint8_t *state;
   // Distance to the nearest obstacle, m, below 0 inside one; the largest float without an
   // obstacle.
@@ -519,7 +519,7 @@ typedef struct {
   float *slope;
   // Height of the step through the column, m.
   float *step_m;
-  // Of each cell: 0 unknown, 1 free, 2 occupied.
+  // State of each cell: 0 unknown, 1 free, 2 occupied.
   uint8_t *cells;
   // Written: cells to the right, ahead and upwards.
   size_t size[3];
@@ -562,13 +562,13 @@ typedef struct {
 
 // A robot that moves along a path: an upright cylinder.
 typedef struct {
-  // Its radius, m.
+  // Radius of the robot, m.
   double radius_m;
   // From this height over the path, m, on surfaces are in its way.
   double low_m;
   // Up to this one.
   double high_m;
-  // Whether what was never seen is in its way as well: 0 or 1.
+  // 1 if cells that were never observed end the path as well, else 0.
   uint8_t unknown_ends;
 } DynvoxRobotCylinder;
 
@@ -691,8 +691,8 @@ DynvoxStatus dynvox_step(DynvoxMapper *mapper,
                          const DynvoxStore *store,
                          DynvoxReport *report);
 
-// As dynvox_step; objects that leave the mapper within the step go to `objects`, which may be
-// null.
+// Steps like dynvox_step; objects that leave the mapper within the step go to `objects`, which may
+// be null.
 //
 // # Safety
 // As dynvox_step; `objects` is null or points to a sink.
@@ -749,8 +749,8 @@ DynvoxStatus dynvox_stream_out(DynvoxMapper *mapper,
 // uses it.
 DynvoxStatus dynvox_finish(DynvoxMapper *mapper);
 
-// As dynvox_finish; the objects that are still in the mapper leave to `objects`, which may be
-// null.
+// Finishes like dynvox_finish; the objects that are still in the mapper leave to `objects`, which
+// may be null.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
@@ -821,8 +821,8 @@ DynvoxStatus dynvox_ray(DynvoxMapper *mapper,
                         double far_m,
                         DynvoxFreePath *free_path);
 
-// How far a robot may follow a polyline of `count` world points on the ground, three numbers each,
-// before it touches a surface.
+// Measures how far a robot may follow a polyline of `count` world points on the ground, three
+// numbers each, before it touches a surface.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
@@ -861,7 +861,7 @@ DynvoxStatus dynvox_retired_triangles(const DynvoxRetired *object,
 // uses it.
 DynvoxStatus dynvox_save(DynvoxMapper *mapper, DynvoxWrite write, void *context);
 
-// As dynvox_create, and brings the mapper to where dynvox_save was called: capacity and
+// Creates a mapper like dynvox_create, in the state in which dynvox_save was called: capacity and
 // configuration must be those of the saved one. No mapper is made from a damaged snapshot
 // (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
 //
