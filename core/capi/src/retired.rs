@@ -52,12 +52,11 @@ impl DynvoxObjectSink {
     /// # Safety
     /// `sink` is null or points to a sink.
     pub(crate) unsafe fn given(sink: *const Self) -> Result<Self, DynvoxStatus> {
-        // SAFETY: the caller's promise.
         if sink.is_null() {
-            Ok(Self { context: core::ptr::null_mut(), retire: None })
-        } else {
-            unsafe { read(sink) }
+            return Ok(Self { context: core::ptr::null_mut(), retire: None });
         }
+        // SAFETY: the caller's promise.
+        unsafe { read(sink) }
     }
 }
 

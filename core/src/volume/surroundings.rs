@@ -112,8 +112,7 @@ mod tests {
         let surroundings = Surroundings { disparity_q8: image };
         let others = |u: usize, v: usize, reach: isize| -> Vec<u16> {
             let offsets = (1..=reach).flat_map(|px| [(px, 0), (-px, 0), (0, px), (0, -px)]);
-            let at =
-                |(du, dv)| Some(image.get(u.checked_add_signed(du)?, v.checked_add_signed(dv)?)?);
+            let at = |(du, dv)| image.get(u.checked_add_signed(du)?, v.checked_add_signed(dv)?);
             offsets.map(|offset| at(offset).unwrap_or(0)).collect()
         };
         for (first, v) in [(0, 0), (64, 5), (86, HEIGHT - 1)] {

@@ -25,8 +25,11 @@ pub struct DataSet {
     /// Lists the sequences at a path; none if the path is one sequence itself.
     pub sequences: fn(&Path) -> Result<Vec<String>, InputError>,
     /// Opens the sequence that the options name.
-    pub open: fn(&Path, &OpenOptions) -> Result<Box<dyn FrameSource>, InputError>,
+    pub open: OpenSequence,
 }
+
+/// Function that opens a sequence at a path.
+pub type OpenSequence = fn(&Path, &OpenOptions) -> Result<Box<dyn FrameSource>, InputError>;
 
 /// Row of the table of data sets, by which a layout is chosen. Two are equal if their names are.
 #[derive(Clone, Copy)]

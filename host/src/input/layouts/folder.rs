@@ -19,7 +19,7 @@ pub const DATA_SET: Layout = Layout::new(&DataSet {
     name: "folder",
     summary: "Two folders of images, one with prefixes or suffixes, or images that hold both \
               cameras; and `calib.txt`",
-    describe: describe,
+    describe,
     matches: is_stereo_folder,
     sequences: no_sequences,
     open: |path, options| Ok(Box::new(open(path, options)?)),

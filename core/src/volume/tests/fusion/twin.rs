@@ -175,7 +175,6 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
                 } else {
                     observation(&depth_m, &grey).depth
                 },
-                ..observation(&depth_m, &grey)
             };
             volume.allocate(&view, seen.depth.depth_m(), &mut NoStore, &Serial);
             let blocks = &volume.blocks;
