@@ -81,7 +81,7 @@ impl Names {
         let modules: BTreeSet<Module> = sources.keys().cloned().collect();
         let mut handed_on = BTreeMap::new();
         for (module, (_, source)) in sources {
-            for path in source.upward_imports() {
+            for path in source.child_imports() {
                 let (target, name) = (joined(module, &path), &path[path.len() - 1..]);
                 if modules.contains(&joined(module, &path[..1])) {
                     handed_on.insert(joined(module, name), target);

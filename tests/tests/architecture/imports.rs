@@ -53,7 +53,7 @@ impl Source {
 
     /// Names that `use` declarations bring in from children of the module: each with its path, which
     /// begins with the child.
-    pub fn upward_imports(&self) -> Vec<Vec<String>> {
+    pub fn child_imports(&self) -> Vec<Vec<String>> {
         const USE: &str = "use ";
         let is_item =
             |at: usize| self.code[..at].chars().next_back().is_none_or(|char| char.is_whitespace());
