@@ -189,7 +189,7 @@ pub struct Options {
     #[arg(long, help_heading = "Frames")]
     pub skip_bad_frames: bool,
     /// Inject faults, to see what becomes of them:
-    /// NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas; drop,
+    /// `NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT]`, separated by commas; drop,
     /// duplicate, swap, jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS,
     /// occlude=SHARE, brightness=FACTOR, masks; seed=N
     #[arg(long, value_name = "SPEC")]
