@@ -266,7 +266,7 @@ mod tests {
             assert!(text.contains(meant), "{misspelt}: {text}");
         }
         assert_eq!(distance("volume.far_m", "volume.far_m"), 0);
-        assert_eq!(distance("far", "volume.near_m"), 5);
+        assert_eq!(distance("far", "volume.near_m"), 4, "n, e, _ and m, and no f");
     }
 
     #[test]

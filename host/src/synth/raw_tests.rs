@@ -200,5 +200,5 @@ fn what_cannot_be_rendered_is_named() {
     let spheres = StreetLens::Bent(LensModel::DoubleSphere { xi: -0.2, alpha: 2.0 });
     assert!(refusal(spheres, RigError::default()).contains("street.lens cannot be used"));
     let off = RigError { roll_deg: 90.0, ..RigError::default() };
-    assert!(refusal(StreetLens::Ideal, off).contains("street.rig_error.roll_deg is 90"));
+    assert!(refusal(StreetLens::Ideal, off).contains("street.rig_error.roll_deg must be"));
 }

@@ -80,11 +80,9 @@ fn bad_input_fails_with_a_sentence_and_leaves_no_folder() {
     let fails = |args: &[&str], sentence: &str| {
         let run = dynvox(root.path(), &[&["run"], args, &["--out", "result"]].concat());
         assert_eq!(run.status.code(), Some(1), "{args:?}");
-        assert!(
-            output_text(&run).contains("error: ") && output_text(&run).contains(sentence),
-            "{args:?}: {}",
-            output_text(&run)
-        );
+        // Paths of a request are absolute; the sentences here begin at the folder of the test.
+        let refusal = output_text(&run).replace(&format!("{}/", root.path().display()), "");
+        assert!(refusal.contains("error: ") && refusal.contains(sentence), "{args:?}: {refusal}");
         assert_eq!(names(root.path()), ["rig"], "{args:?} left something behind");
     };
     let tiny = ["rig", "--profile", "tiny"];

@@ -92,7 +92,7 @@ fn a_setting_is_named_beside_the_stage_it_reaches_first() {
         "{output}"
     );
     assert!(
-        output.contains("\nfirst divergence: frame 0, background\napart in frame 0: "),
+        output.contains("\nfirst divergence: frame 0, static_map\napart in frame 0: "),
         "{output}"
     );
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);

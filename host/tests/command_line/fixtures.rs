@@ -156,7 +156,7 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
         assert!(!verified.status.success() && all.contains(sentence), "{sentence}: {all}");
     };
     fs::write(&settings, text.replace("voxel_size_m = 0.1", "voxel_size_m = 0.11")).unwrap();
-    verify("first divergence: frame 0, background");
+    verify("first divergence: frame 0, static_map");
     fs::write(&settings, text.replace("voxel_size_m", "voxel_sise_m")).unwrap();
     verify("objects.voxel_sise_m = 0.05: there is no such setting");
     fs::write(&settings, &text).unwrap();

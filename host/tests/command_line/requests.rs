@@ -125,8 +125,8 @@ fn a_job_of_a_fleet_has_the_bits_of_its_request() {
     assert_eq!(request, expected, "far about surfaces for registration");
 
     asked(root.path(), "asked", &request);
-    let words = ["run", "--quiet", "--set", "volume.allocation_m=64", "--out", "commanded"];
-    commanded(root.path(), &[&words[..], &STREET].concat());
+    let words = ["run", "--quiet", "--keep-blocks", "--set", "volume.allocation_m=64", "--out"];
+    commanded(root.path(), &[&words[..], &["commanded"], &STREET].concat());
     assert_same_bits(root.path(), "commanded", "asked");
     let of_fleet = format!("jobs/runs/{}", job["id"].as_str().unwrap());
     assert_same_bits(root.path(), "commanded", &of_fleet);
