@@ -45,7 +45,7 @@ impl PixelBox {
         u >= self.left && v >= self.top && u - self.left < self.width && v - self.top < self.height
     }
 
-    /// Returns the part that both boxes cover; of width or height 0 if there is none.
+    /// Returns the part that both boxes cover; of width or height 0 if they do not meet.
     pub fn intersection(&self, other: &Self) -> Self {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
         let right = (self.left + self.width).min(other.left + other.width);

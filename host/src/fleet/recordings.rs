@@ -108,7 +108,7 @@ impl Recordings {
 
 impl Recording {
     /// Returns the given pose; `first_pose` is the first of the recording's file of poses. The
-    /// error says why there is none.
+    /// error says why it is missing.
     pub(super) fn given(
         &self,
         origin: Option<[f64; 3]>,

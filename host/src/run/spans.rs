@@ -38,7 +38,7 @@ impl Cost {
         }
     }
 
-    /// Cost of two pieces of work at once.
+    /// Cost of two tasks at once.
     fn beside(self, other: Self) -> Self {
         let (work, span) = (self.work + other.work, self.span.max(other.span));
         Self { work, span, two_threads: span.max(work / 2) }

@@ -45,7 +45,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / a.len().max(1) as f64
 }
 
-/// Checks the order of consecutive images, the first of which is frame `first`.
+/// Checks the order of consecutive images, beginning with frame `first`.
 pub fn check(thumbnails: &[Vec<f64>], first: usize) -> Option<Finding> {
     let count = thumbnails.len();
     if count < FEWEST {

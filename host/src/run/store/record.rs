@@ -20,7 +20,7 @@ const HAS_COLOUR: u16 = 1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub coord: BlockCoord,
-    /// Offset of the previous record of the same tile; 0 if there is none.
+    /// Offset of the previous record of the same tile; 0 for the first one.
     pub previous: u64,
     pub len: usize,
     flags: u16,
