@@ -177,7 +177,7 @@ fn take(lanes: &mut [u64; LANES], stripe: &[u8; STRIPE_BYTES]) {
     }
 }
 
-/// The product of both halves, and the halves swapped. Two shifts in place of one rotation: that,
+/// The product of both halves, and the halves swapped. Two shifts instead of one rotation: that,
 /// compilers put into vectors.
 #[inline(always)]
 const fn mixed(x: u64) -> u64 {

@@ -1,5 +1,5 @@
-//! How is a run asked for by a program? A request is plain data: made here, or read from a file that
-//! another program wrote.
+//! How is a run asked for by a program? A request is plain data: made here, or read from a file
+//! that another program wrote.
 //!
 //! `cargo run -p dynvox --example run_request -- street` maps the street;
 //! `cargo run -p dynvox --example run_request -- street request.json` does what the file says.

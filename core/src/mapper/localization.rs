@@ -49,7 +49,8 @@ impl Found {
 /// about the rig.
 const ROW_DIFFERENCE_MAX_PX: f32 = 2.0;
 
-/// Observations of a match by both cameras, before and now; `None` where the rows are too far apart.
+/// Observations of a match by both cameras, before and now; `None` where the rows are too far
+/// apart.
 fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     let pairs = [(m.previous_left, m.previous_right), (m.current_left, m.current_right)];
     let aligned =

@@ -27,7 +27,8 @@ const CORRELATION_MIN: f64 = 0.25;
 const ASIDE_M: f64 = 0.5;
 /// Angle around what the map shows, to the left and to the right, at which it must, rad.
 const ASIDE_RAD: f64 = 0.04;
-/// Factor on signal to noise by which it must look less like it. Small images change little over half a metre.
+/// Factor on signal to noise by which it must look less like it. Small images change little over
+/// half a metre.
 const SIGNAL_FACTOR: f64 = 1.07;
 /// Least share of the image that the map must show.
 const SHOWN_MIN: f64 = 0.1;
@@ -126,9 +127,9 @@ impl StaticMap<'_> {
     }
 }
 
-/// Tells that one correlation says that signal to noise is larger by the factor than the other says.
-/// Two images of one scene with noise of their own correlate by S / (S + N): near 1 a small step of
-/// correlation is a large one of signal to noise.
+/// Tells that one correlation says that signal to noise is larger by the factor than the other
+/// says. Two images of one scene with noise of their own correlate by S / (S + N): near 1 a small
+/// step of correlation is a large one of signal to noise.
 fn is_clearer(correlation: f64, other: f64) -> bool {
     correlation * (1.0 - other) >= SIGNAL_FACTOR * other * (1.0 - correlation)
 }

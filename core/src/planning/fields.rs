@@ -219,8 +219,8 @@ impl Planning<'_> {
         self.boxes.get(..self.box_count).unwrap_or_default()
     }
 
-    /// Length by which a ray is free: from a point of the world, in a direction of any length, at most
-    /// `far_m`. See [`FreePath`].
+    /// Length by which a ray is free: from a point of the world, in a direction of any length, at
+    /// most `far_m`. See [`FreePath`].
     pub fn ray(
         &self,
         volume: &Volume<'_>,

@@ -281,8 +281,8 @@ impl<'s> Planning<'s> {
         self.predict(ahead_s)
     }
 
-    /// Makes the whole of it from a map alone, without objects: as [`crate::Mapper::update_planning_maps`] does
-    /// with them.
+    /// Makes the whole of it from a map alone, without objects: as
+    /// [`crate::Mapper::update_planning_maps`] does with them.
     pub fn update(&mut self, volume: &Volume<'_>) -> PlanningReport {
         self.read(volume);
         self.finish(0.0)

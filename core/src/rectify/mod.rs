@@ -1,9 +1,9 @@
 //! Raw pairs become rectified ones.
 //!
 //! Real cameras bend rays and do not stand exactly side by side. [`Lens`] says how each bends them
-//! (models: [`LENS_MODELS`]), [`RawRig`] how the two stand, [`Rectification`] how both are turned so that their
-//! rows agree, how large the result is and at which scale. A [`Rectifier`] makes one map a camera,
-//! once, in `f64` with `libm`, and remaps each pair in integers.
+//! (models: [`LENS_MODELS`]), [`RawRig`] how the two stand, [`Rectification`] how both are turned
+//! so that their rows agree, how large the result is and at which scale. A [`Rectifier`] makes one
+//! map a camera, once, in `f64` with `libm`, and remaps each pair in integers.
 //!
 //! **Invalid pixels.** A rectified pixel that no raw pixel covers is not black but invalid, and so
 //! are those within

@@ -65,7 +65,7 @@ fn beyond_the_fold_of_a_polynomial_there_is_nothing() {
         },
     );
     let lens = lens.unwrap();
-    // r (1 - .3 r^2) grows up to r = 1.054 and is back at .5 for r = 1.43.
+    // r (1 - 0.3 r^2) grows up to r = 1.054 and is back at 0.5 for r = 1.43.
     assert!(lens.project([1.0, 0.0, 1.0]).is_some());
     assert_eq!(lens.project([1.43, 0.0, 1.0]), None);
     assert_eq!(lens.unproject([320.0 + 0.8 * 500.0, 240.0]), None, "no ray leads there");

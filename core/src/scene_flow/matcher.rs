@@ -289,7 +289,8 @@ impl<'s> FlowMatcher<'s> {
         self.push_within(config, &MaskedPair { left, right, invalid: None }, executor)
     }
 
-    /// Takes in and matches, as [`FlowMatcher::push`] does, a frame with invalid pixels: no feature is found there.
+    /// Takes in and matches, as [`FlowMatcher::push`] does, a frame with invalid pixels: no feature
+    /// is found there.
     pub(crate) fn push_within<E: Executor>(
         &mut self,
         config: &SceneFlowConfig,

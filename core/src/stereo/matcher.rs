@@ -252,7 +252,7 @@ impl<'s> StereoMatcher<'s> {
         report
     }
 
-    /// Takes disparities from elsewhere (1/256 px, 0 none) in place of a pair's own. Of an image
+    /// Takes disparities from elsewhere (1/256 px, 0 none) instead of a pair's own. Of an image
     /// larger than the capacity, which the mapper refuses, what fits is taken.
     pub(crate) fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
         self.width = disparity_q8.width().min(self.image_width).max(1);

@@ -19,7 +19,8 @@ use nalgebra::Point3;
 
 /// Least error of a match coordinate, px: the single-precision number nearest to 0.3.
 const NOISE_PX: f64 = 0.3_f32 as f64;
-/// Largest distance of a match from the median depth to be on the object, m; its error comes on top.
+/// Largest distance of a match from the median depth to be on the object, m; its error comes on
+/// top.
 const EXTENT_M: f64 = 5.0;
 
 /// Camera and matches by which a frame's motions are measured.

@@ -32,8 +32,8 @@ impl NotedDepth {
     /// No depth.
     pub const NONE: Self = Self(0.0);
 
-    /// A depth, m, and its note: `level` is sixteenths of obliqueness less one, 0 to 15; higher bits
-    /// are dropped.
+    /// A depth, m, and its note: `level` is sixteenths of obliqueness less one, 0 to 15; higher
+    /// bits are dropped.
     #[inline(always)]
     pub const fn new(depth_m: f32, level: u16, has_unreliable_colour: bool) -> Self {
         let colour = if has_unreliable_colour { UNRELIABLE_COLOUR } else { 0 };

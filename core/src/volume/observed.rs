@@ -3,8 +3,8 @@
 //!
 //! *Edges.* The matcher widens what is near: beside its edge, what is behind gets its disparity.
 //! Pixels nearer than something within `edge_reach_px`, by more than [`EDGE_Q8`], are left out.
-//! What is left within [`EDGE_REACH_PX`](super::surroundings::EDGE_REACH_PX) of an edge, or of a pixel without disparity, may still show
-//! the colour of what is behind, or of the sky.
+//! What is left within [`EDGE_REACH_PX`](super::surroundings::EDGE_REACH_PX) of an edge, or of a
+//! pixel without disparity, may still show the colour of what is behind, or of the sky.
 //!
 //! *Obliqueness.* A plane's disparity is linear in the pixel. With slopes `a`, `b` of the disparity
 //! `d` and the pixel (x, y) from the principal point, the plane's normal is along

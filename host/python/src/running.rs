@@ -203,7 +203,7 @@ impl State {
         self.running.as_mut().ok_or_else(absent)
     }
 
-    /// Puts a snapshot in place of the mapper. After an error the mapper is gone, and as it was
+    /// Puts a snapshot instead of the mapper. After an error the mapper is gone, and as it was
     /// made.
     pub fn restore(&mut self, bytes: &[u8]) -> PyResult<()> {
         let foreign = || {

@@ -88,7 +88,7 @@ struct NewArgs {
     /// Sequence within the data set
     #[arg(long, value_name = "NAME")]
     sequence: Option<String>,
-    /// Calibration in place of the recording's own
+    /// Calibration instead of the recording's own
     #[arg(long, value_name = "FILE")]
     calibration: Vec<PathBuf>,
     /// Source of instance masks

@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn the_drift_of_a_chain_of_maps_does_not_add_up() {
-        // Each map is 30 m long and .1 m too short, and every other one was given .2 m beside its
+        // Each map is 30 m long and 0.1 m too short, and every other one was given 0.2 m beside its
         // place.
         let truth: Vec<Transform> = (0..24)
             .map(|nth| Transform::from_translation([0.0, 0.0, 30.0 * f64::from(nth)]))

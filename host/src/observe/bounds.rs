@@ -124,7 +124,7 @@ impl BoundUses {
         ]
     }
 
-    /// The least capacity with these uses, for images of `size`, in place of `used`.
+    /// The least capacity with these uses, for images of `size`, instead of `used`.
     fn least(&self, used: &Capacity, size: (usize, usize)) -> Capacity {
         let at_least_1 = |of: BoundUse| of.needed.max(1);
         let blocks = at_least_1(self.blocks);

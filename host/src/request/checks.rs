@@ -6,8 +6,8 @@ use dynvox_core::{Capacity, Config};
 /// Bytes the host may use in addition to the slab, by default: the synthetic street, objects'
 /// meshes, the index of the block file.
 const HOST_BYTES: u64 = 256 << 20;
-/// Bytes the host may use for each pixel of an image: frames read ahead, their depth and masks, pictures of the
-/// report.
+/// Bytes the host may use for each pixel of an image: frames read ahead, their depth and masks,
+/// pictures of the report.
 const HOST_BYTES_PER_PIXEL: u64 = 64;
 
 /// Bytes a run may take in all unless it is told otherwise.

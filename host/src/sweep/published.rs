@@ -1,4 +1,4 @@
-//! The original's numbers, for comparison: printed or digitised (to .002) from the figures of its
+//! The original's numbers, for comparison: printed or digitised (to 0.002) from the figures of its
 //! evaluation notebooks, KITTI's rule, depth up to 20 m. Other data, another machine and a decade
 //! of seconds lie between: shapes can be compared, values cannot.
 

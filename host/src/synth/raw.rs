@@ -5,7 +5,7 @@
 //! rectifying the raw images by the calibration gives their images. Each raw camera is rotated
 //! against its pinhole by a fixed small angle, so that rectification has to rotate.
 //!
-//! Memory: 16 bytes a pixel and camera. Time: four views in place of one.
+//! Memory: 16 bytes a pixel and camera. Time: four views instead of one.
 
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::{Lens, RawCamera, Rectification, TurnedCamera};

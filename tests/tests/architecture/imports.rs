@@ -51,8 +51,8 @@ impl Source {
         uses.filter(|(name, module)| !name.is_empty() && name != module).collect()
     }
 
-    /// Names that `use` declarations bring in from children of the module: each with its path, which
-    /// begins with the child.
+    /// Names that `use` declarations bring in from children of the module: each with its path,
+    /// which begins with the child.
     pub fn child_imports(&self) -> Vec<Vec<String>> {
         const USE: &str = "use ";
         let is_item =

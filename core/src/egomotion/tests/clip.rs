@@ -199,7 +199,7 @@ fn tracks_sequence_06_as_well_as_the_best_stereo_odometry_measured() {
     let trajectory = run("06");
     let errors = relative_errors(&truth("06.txt"), &trajectory);
     print_errors("06", &errors);
-    // The rig as it is: what self-calibration takes out of it is a scale of .2 % here.
+    // The rig as it is: what self-calibration takes out of it is a scale of 0.2 % here.
     assert!(errors.translation_percent <= 0.83);
     assert!(errors.rotation_deg_per_m <= 0.025);
     assert!(errors.frame_rms_m <= 0.010);

@@ -246,7 +246,7 @@ mod tests {
     fn a_frame_counts_no_more_than_what_it_may_be_off_by() {
         let prior = Prior { mean: [0.0], sigma: [0.5], frame_sigma: [0.1] };
         let mut information = Information::NONE;
-        // A frame that is certain of .4 px, were it not for what the model lacks.
+        // A frame that is certain of 0.4 px, were it not for what the model lacks.
         let frame = FrameInformation { matrix: [[1e9]], vector: [-0.4e9] };
         information.take(&prior, &frame, [0.0]).unwrap();
         let ([found], sigma) = information.estimate(&prior).unwrap();

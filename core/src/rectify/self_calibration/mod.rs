@@ -13,9 +13,9 @@
 //! 2015) correct the same error by a field learned beforehand.
 //!
 //! **What is applied.** What the lenses left once five frames have said something and the offset is
-//! known to .06 px; the offset while it is above .1 px (and until it falls below .06 px), or after
-//! two frames when it is four sigmas large. Changes are spread over frames, so that surfaces in the
-//! map do not jump.
+//! known to 0.06 px; the offset while it is above 0.1 px (and until it falls below 0.06 px), or
+//! after two frames when it is four sigmas large. Changes are spread over frames, so that surfaces
+//! in the map do not jump.
 //!
 //! **Rows.** Where both cameras see the same in different rows, the right image is moved before it
 //! is matched, by a polynomial of second degree over the image.
@@ -24,7 +24,7 @@
 //! the spot and far points say nothing; the filter waits. Cameras that expose at different times
 //! look like an offset that grows with the flow.
 //!
-//! **Memory.** 700 bytes in the mapper, 2 KiB of stack. **Time.** About .3 µs a match.
+//! **Memory.** 700 bytes in the mapper, 2 KiB of stack. **Time.** About 0.3 µs a match.
 
 mod config;
 mod information;
@@ -109,7 +109,7 @@ pub enum CalibrationState {
     /// Nothing is known yet, or what is known is small.
     #[default]
     Sound,
-    /// The offset is above .3 px: depth at 20 m is off by 2 per cent and more without correction.
+    /// The offset is above 0.3 px: depth at 20 m is off by 2 per cent and more without correction.
     Inaccurate,
     /// The offset is above 1 px: the cameras should be calibrated anew.
     Recalibrate,

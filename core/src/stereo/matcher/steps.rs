@@ -24,8 +24,8 @@ use crate::{
     },
 };
 
-/// Slope from which on a triangle bridges two surfaces, px of disparity per px: its plane is searched
-/// but not preferred. Without a limit 4.8 instead of 4.5 % are off on KITTI 2012.
+/// Slope from which on a triangle bridges two surfaces, px of disparity per px: its plane is
+/// searched but not preferred. Without a limit 4.8 instead of 4.5 % are off on KITTI 2012.
 const MAX_PLANE_SLOPE: f32 = 0.7;
 /// Difference from which on the ends of a gap are two surfaces, px, as published.
 const GAP_DISCONTINUITY: u16 = 3;

@@ -56,7 +56,7 @@ fn where_blocks_are_wide_fewer_rays_are_walked_and_each_has_its_turn() {
             Vector3::zeros(),
             frame,
         );
-        // Blocks of .4 m are 16 px wide at 2.5 m.
+        // Blocks of 0.4 m are 16 px wide at 2.5 m.
         assert_eq!([2.6, 2.4, 1.3, 1.2].map(|depth_m| rays.steps(depth_m)), [1, 2, 2, 4]);
         for (steps, walked) in [1, 2, 4].into_iter().zip(&mut walked) {
             for (row, column) in

@@ -18,7 +18,7 @@ pub struct FaultsArgs {
     /// Frames of a run
     #[arg(long, default_value_t = 44, value_name = "N")]
     frames: usize,
-    /// One fault in place of the list, as `dynvox run --faults` takes it; may be repeated
+    /// One fault instead of the list, as `dynvox run --faults` takes it; may be repeated
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
     /// Write the table to standard output as JSON

@@ -103,7 +103,7 @@ fn seen(camera: &[f64; 12], [x, y, z]: &[f64; 3]) -> [f64; 3] {
     [row(0) / depth, row(4) / depth, depth]
 }
 
-/// Takes a renderer's exact depth in place of a scan, thinned evenly to at most [`EXACT_POINTS`].
+/// Takes a renderer's exact depth instead of a scan, thinned evenly to at most [`EXACT_POINTS`].
 pub fn sample_exact_depth(depth_m: &Image<f32>, rig: &StereoRig, field: &Field) -> ProjectedScan {
     let (width, height) = (depth_m.width(), depth_m.height());
     let step = (1..)

@@ -98,7 +98,8 @@ fn inverse_length(sum: i32, squares: i32) -> f64 {
     if spread > AREA { 1.0 / f64::from(spread).sqrt() } else { 0.0 }
 }
 
-/// Returns the possible centres of patches within reach of one; `None` where a patch would leave its image.
+/// Returns the possible centres of patches within reach of one; `None` where a patch would leave
+/// its image.
 fn centers(at: usize, reach: usize, side: usize) -> Option<RangeInclusive<usize>> {
     let range = at.saturating_sub(reach).max(HALF)..=(at + reach).min(side.checked_sub(HALF + 1)?);
     (!range.is_empty()).then_some(range)

@@ -31,7 +31,7 @@ pub enum InputError {
         /// Folders in it that have a known layout.
         below: Vec<PathBuf>,
     },
-    /// A file in place of a folder.
+    /// A file instead of a folder.
     #[error("{path} is a file. Give the folder of the data set")]
     File {
         /// Path as given.

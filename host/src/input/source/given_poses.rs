@@ -1,4 +1,4 @@
-//! Poses from a file, to be used in place of egomotion.
+//! Poses from a file, to be used instead of egomotion.
 
 use super::{FrameSource, InputError};
 use crate::formats::{Trajectory, read_poses};
