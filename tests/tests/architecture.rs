@@ -289,7 +289,7 @@ fn what_is_allowed_or_no_import_is_not_a_fault() {
 }
 
 #[test]
-fn a_folder_that_the_table_does_not_know_and_a_cycle_in_the_table_are_faults() {
+fn an_unknown_folder_and_a_cycle_in_the_table_are_faults() {
     let unknown = Crate::of([("lib.rs", "mod helpers;"), ("helpers.rs", "fn help() {}")]);
     assert_eq!(faults(CORE, &unknown), ["helpers is not in the table"]);
     let cycle: Layers = &[("a", &["b"]), ("b", &["a"])];

@@ -75,7 +75,7 @@ impl Executor for Level {
 }
 
 #[test]
-fn the_fixtures_give_the_digests_on_file_at_every_level_of_vector_instructions() {
+fn the_fixtures_give_the_digests_on_file_at_every_vector_level() {
     for fixture in fixtures::all(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fixtures")))
         .expect("there are fixtures")
     {
@@ -94,7 +94,7 @@ fn the_fixtures_give_the_digests_on_file_at_every_level_of_vector_instructions()
 }
 
 #[test]
-fn a_changed_pixel_of_a_fixture_is_named_and_a_blessing_keeps_its_reason_beside_those_before() {
+fn a_changed_pixel_is_named_and_a_blessing_keeps_its_reason() {
     let root = tempfile::TempDir::new().expect("a folder");
     let copy = root.path().join("pairs");
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/pairs-317x93");

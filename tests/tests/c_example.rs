@@ -132,7 +132,7 @@ fn the_c_example_maps_the_fixture_to_the_digests_on_file() {
 }
 
 #[test]
-fn a_fixture_with_bounds_and_settings_of_its_own_has_the_same_digests_in_c() {
+fn a_fixture_with_its_own_settings_has_the_same_digests_in_c() {
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/street-320x96");
     let root = tempfile::TempDir::new().expect("a folder");
     let fixture = root.path().join("own");

@@ -66,7 +66,7 @@ fn disparities_wider_than_the_image_are_refused_and_counted() {
 }
 
 #[test]
-fn what_is_given_is_part_of_the_inputs_digest_and_motion_goes_on_without_it() {
+fn given_poses_are_part_of_the_inputs_digest() {
     let [a, b] = [0, 1]
         .map(|more| reports(3, move |u, v| if (u, v) == (100, 50) { 2_000 + more } else { 2_000 }));
     assert!(a.iter().zip(&b).all(|(a, b)| a.digests.input != b.digests.input));

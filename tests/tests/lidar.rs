@@ -58,7 +58,7 @@ fn exact_config(street: &Street) -> Config {
 }
 
 #[test]
-fn a_perfect_map_is_right_and_complete_and_a_shifted_one_loses_what_it_must() {
+fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
     let street = street();
     // Nothing is masked: parked cars are street.
     let config = exact_config(&street);

@@ -53,7 +53,7 @@ fn use_grows_with_the_map_and_never_beyond_its_regions() {
 }
 
 #[test]
-fn a_block_takes_the_bytes_promised_and_finding_and_remembering_it_little_beside_them() {
+fn a_block_takes_the_bytes_promised_and_its_index_few_more() {
     let clip = Clip::street(320, 96, 1);
     for (capacity, voxel_bytes) in
         [(Capacity::ONBOARD, 3_072), (Capacity { colour: false, ..Capacity::ONBOARD }, 1_536)]

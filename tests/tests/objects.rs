@@ -273,8 +273,7 @@ fn picture(seen: &Raycaster<'_>) -> Picture {
 
 #[dynvox_needs::long]
 #[test]
-fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_cars_where_they_are()
-{
+fn the_composed_picture_shows_the_nearest_surface_and_cars_at_their_poses() {
     let sequence = &*SEQUENCE;
     let (mut cars, mut totals) = (Vec::new(), [0u32; 3]);
     sequence.run(true, false, |index, report, mapper| {
@@ -344,7 +343,7 @@ fn the_composed_picture_shows_the_nearest_of_the_street_and_of_each_object_and_c
 
 #[dynvox_needs::long]
 #[test]
-fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
+fn one_track_and_one_object_are_used_and_the_rest_is_counted() {
     let sequence = &*SEQUENCE;
     for (tracks, objects, object_blocks) in [(1, 1, 17), (1, 1, 1), (1, 0, 0)] {
         let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
@@ -372,7 +371,7 @@ fn one_track_one_object_and_its_few_blocks_are_used_and_the_rest_is_counted() {
 
 #[dynvox_needs::long]
 #[test]
-fn the_meshes_of_near_cars_lie_on_their_true_surfaces_and_have_most_of_what_was_seen_of_them() {
+fn meshes_of_near_cars_lie_on_their_true_surfaces() {
     let sequence = &*SEQUENCE;
     let rig = sequence.street.rig();
     let mut sides: BTreeMap<u32, SeenSide> = BTreeMap::new();

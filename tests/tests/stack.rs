@@ -52,7 +52,7 @@ fn painted<R>(work: impl FnOnce() -> R) -> (R, usize) {
 }
 
 #[test]
-fn making_a_mapper_a_step_saving_and_restoring_stay_within_32_kib_of_stack() {
+fn a_mapper_and_its_step_stay_within_32_kib_of_stack() {
     let measured = || {
         let clip = Clip::street(320, 96, 12);
         let mut slab = HeapSlab::of(&Capacity::TINY);

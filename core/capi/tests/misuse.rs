@@ -358,7 +358,7 @@ extern "C" fn read(context: *mut c_void, bytes: *mut u8, len: usize) -> bool {
 }
 
 #[test]
-fn a_restored_mapper_continues_as_the_saved_one_and_a_damaged_snapshot_makes_none() {
+fn a_restored_mapper_continues_and_a_damaged_snapshot_makes_none() {
     let (mut buffer, mut other) = (Buffer::new(), Buffer::new());
     let (pixels, config, capacity) = (pixels(), config(), capacity());
     let mapper = create(&mut buffer, &config).unwrap();

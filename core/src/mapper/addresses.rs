@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bound_is_above_the_sum_and_what_it_lets_pass_can_be_counted_in_32_bits() {
+    fn the_bound_is_above_the_sum_and_fits_32_bits() {
         let (mut random, mut passed) = (Random::new(4), [0u32; 2]);
         for _ in 0..200_000 {
             let capacity = random_capacity(&mut random);

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stamps_of_the_assumed_rate_give_its_bits_and_a_frame_without_one_the_assumed_time() {
+    fn stamps_of_the_assumed_rate_give_the_bits_of_none() {
         let mut clock = Clock::new(0.1);
         let start = 1_403_636_579_763_555_584;
         assert_eq!(clock.advance(Some(start), 0.1), 0.1, "nothing is known before the first frame");

@@ -103,7 +103,7 @@ mod tests {
     use std::{vec, vec::Vec};
 
     #[test]
-    fn the_greatest_is_at_least_that_of_the_rectangle_and_at_most_that_of_one_twice_as_large() {
+    fn the_greatest_is_between_that_of_the_rectangle_and_one_twice_as_large() {
         let (width, height) = (101, 57);
         let capacity = Capacity { image_width: 128, image_height: 64, ..Capacity::TINY };
         let mut slab = vec![0u8; Pyramid::bytes(&capacity) + SLAB_ALIGN];

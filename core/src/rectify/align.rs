@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_agree_and_disparity_is_positive_for_a_rig_that_is_off_in_every_way() {
+    fn rows_agree_for_a_rig_that_is_off_in_every_way() {
         let r_right_left = turned(0.03, -0.1, 0.05);
         let raw = rig(r_right_left, Vector3::new(-0.5, 0.03, -0.02));
         let aligned = raw.align().unwrap();

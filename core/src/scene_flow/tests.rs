@@ -230,7 +230,7 @@ fn what_comes_nearer_stays_the_same_point() {
 }
 
 #[test]
-fn bins_look_where_their_matches_went_and_empty_ones_where_their_neighbours_did() {
+fn bins_search_where_their_matches_or_their_neighbours_went() {
     let mut slab = slab();
     let mut prior = Prior::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();

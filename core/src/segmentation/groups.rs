@@ -289,13 +289,13 @@ mod tests {
     }
 
     #[test]
-    fn a_near_group_may_be_small_where_it_is_wide_enough_for_more_than_a_bollard() {
+    fn a_near_group_may_be_small_if_wider_than_a_bollard() {
         assert!(group(0.0, 0.6, 5.0, 5).passes() && !group(0.0, 0.4, 5.0, 5).passes());
         assert!(group(0.0, 0.4, 5.0, 8).passes() && !group(0.0, 0.6, 15.0, 5).passes());
     }
 
     #[test]
-    fn sparse_matches_widen_a_group_and_make_a_new_one_only_where_they_are_many() {
+    fn sparse_matches_widen_a_group_and_many_make_a_new_one() {
         let mut groups = Vec::<Group, MAX_GROUPS>::new();
         assert!(groups.push(group(0.0, 1.0, 8.0, 10)).is_ok());
         assert_eq!(add(&mut groups, &[group(1.5, 1.0, 8.0, 4), group(20.0, 1.0, 8.0, 7)], 8), 0);

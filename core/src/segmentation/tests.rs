@@ -254,7 +254,7 @@ const OVERTAKING: Car = Car { at: [2.5, 9.0], motion: [0.0, 1.4] };
 const PARKED: Car = Car { at: [-3.0, 16.0], motion: [0.0, 0.0] };
 
 #[test]
-fn an_overtaking_car_is_found_by_its_motion_in_the_third_frame_and_a_parked_one_never() {
+fn an_overtaking_car_is_found_in_the_third_frame_a_parked_one_never() {
     let world = World { cars: vec![OVERTAKING, PARKED], step_m: 0.8, noise_px: 0.2 };
     let frames = world.run(10, nothing);
     for (frame, (tracks, report)) in (0..).zip(&frames) {
@@ -285,7 +285,7 @@ fn where_nothing_moves_nothing_is_found() {
 }
 
 #[test]
-fn a_car_that_keeps_its_distance_is_found_by_its_matches_together_and_a_parked_one_is_not() {
+fn joint_matches_find_a_car_that_keeps_its_distance() {
     // In the image it moves by two thirds of a pixel of disparity a frame, as much as one match
     // errs by.
     let leader = Car { at: [0.5, 18.0], motion: [0.0, 1.4] };

@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_of_the_checksum_can_be_undone_so_that_one_changed_word_is_never_lost() {
+    fn a_step_of_the_checksum_can_be_undone() {
         assert_eq!(MULTIPLIER.wrapping_mul(inverse()), 1);
         let mut random = Random::new(3);
         let mut any =

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn four_wheelers_are_reconstructed_what_else_may_move_is_kept_out_and_the_rest_is_the_street() {
+    fn four_wheelers_are_reconstructed_and_other_movers_kept_out() {
         for class in Class::ALL {
             let expected = match class {
                 Class::Car | Class::Bus | Class::Truck | Class::Van | Class::MovingObject => {
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn names_flicker_among_four_wheelers_among_people_and_among_two_wheelers_and_nowhere_else() {
+    fn names_flicker_only_within_four_wheelers_people_or_two_wheelers() {
         let kinds: [&[Class]; 5] = [
             &[Class::Car, Class::Bus, Class::Truck, Class::Van],
             &[Class::Person, Class::Rider],

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_moving_object_outlives_one_frame_without_motion_and_a_standing_one_five() {
+    fn a_mover_outlives_one_frame_without_motion_and_a_parked_one_five() {
         let gap = |first: f32, frames: usize| {
             let mut script = std::vec![seen(first)];
             script.resize(1 + frames, None);
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_a_motion_does_not_undo_what_those_before_spoke_for_but_two_do() {
+    fn one_frame_without_a_motion_does_not_undo_a_state_but_two_do() {
         let config = StateConfig { confirm_frames: 3, ..PUBLISHED };
         let last = |script: &[Option<MotionEvidence>]| *states(&config, script).last().unwrap();
         assert_eq!(last(&[seen(1.0), seen(1.0), None, seen(1.0)]), Dynamic);
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_stand_and_is_slower_than_a_walker_stands_but_what_moved_must_be_seen_to_stop() {
+    fn a_mover_must_be_seen_to_stop_before_it_is_static() {
         let config = StateConfig {
             confirm_frames: 1,
             confirm_static_frames: 1,

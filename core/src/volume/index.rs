@@ -139,7 +139,7 @@ mod tests {
     const BLOCKS: usize = 700;
 
     #[test]
-    fn agrees_with_a_tree_through_two_hundred_thousand_insertions_and_removals_in_one_allocation() {
+    fn agrees_with_a_tree_in_one_allocation_over_200_000_changes() {
         let mut slab = vec![[0u8; 64]; BlockIndex::bytes(BLOCKS) / 64 + 1];
         let start = (64 - slab.as_ptr() as usize % 64) % 64;
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
@@ -175,8 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_the_least_power_of_two_that_holds_twice_the_blocks_and_fits_its_bytes_exactly()
-    {
+    fn the_table_is_the_least_power_of_two_for_twice_the_blocks() {
         for blocks in (0..200).chain([BLOCKS, 895, 896, 897, 5_000]) {
             // hashbrown fills a table up to 7/8.
             let buckets = (4..)
@@ -233,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_beside_another_of_its_hash_is_compared_and_one_that_is_not_there_is_not_found() {
+    fn blocks_of_one_hash_are_compared_and_an_absent_one_is_not_found() {
         let mut slab = vec![[0u64; 8]; BlockIndex::bytes(8) / 64 + 1];
         let mut carver =
             Carver::new(bytemuck::cast_slice_mut(&mut slab), BlockIndex::bytes(8)).unwrap();

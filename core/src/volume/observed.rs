@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rim_of_what_is_near_is_left_out_and_colour_beside_an_edge_is_doubtful() {
+    fn a_near_rim_is_left_out_and_colour_at_an_edge_is_doubtful() {
         // Near from column 100 on, far before; nothing from column 200 on.
         let disparity = |u: usize, _: usize| [10 * 256, 20 * 256, 0][u / 100];
         let depth_m =

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn walks_over_the_slots_taken_in_order_and_finds_them_again_from_the_free_list() {
+    fn walks_over_taken_slots_in_order_and_reuses_freed_ones() {
         let (mut pool, mut model, mut random) = (pool(200), BTreeSet::new(), Random::new(4));
         for round in 0..5_000 {
             if random.below(5) < 2 && !model.is_empty() {

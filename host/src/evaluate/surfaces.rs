@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_where_the_surface_is_has_all_of_it_and_one_beside_it_the_distance_it_is_off() {
+    fn a_shifted_mesh_has_the_distance_it_is_off() {
         let side = side();
         let good = side.compare(&patch(8.0, -1.0, 1.0), 0.05).unwrap();
         assert!(

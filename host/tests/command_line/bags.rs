@@ -134,7 +134,7 @@ fn record(root: &Path, name: &str, compressed: bool) {
 }
 
 #[test]
-fn a_recorded_street_has_the_digests_of_the_folder_and_broken_ones_a_sentence() {
+fn a_recorded_street_has_the_folders_digests_and_broken_ones_a_sentence() {
     let root = TempDir::new().unwrap();
     let root = root.path();
     let size = ["--set", "street.width=320", "--set", "street.height=96"];

@@ -54,8 +54,7 @@ fn a_run_leaves_its_folder_and_json_alone_on_standard_output() {
 }
 
 #[test]
-fn the_same_frames_give_the_same_digests_on_one_thread_and_on_two_and_from_the_written_configuration()
- {
+fn digests_depend_neither_on_threads_nor_on_the_written_settings() {
     let root = TempDir::new().unwrap();
     rig(root.path(), 3);
     let digests = |name: &str| -> Vec<String> {
@@ -145,7 +144,7 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
 }
 
 #[test]
-fn a_strict_run_ends_at_the_first_frame_that_affects_the_map_and_names_the_cause() {
+fn a_strict_run_ends_at_the_first_affected_frame_and_says_why() {
     let root = TempDir::new().unwrap();
     let street = [
         "--set",
@@ -306,7 +305,7 @@ fn a_written_street_is_mapped_as_a_kitti_folder() {
 
 #[dynvox_needs::long]
 #[test]
-fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked() {
+fn an_evaluation_against_scans_is_the_same_from_disk() {
     let root = TempDir::new().unwrap();
     let small = ["--set", "street.width=320", "--set", "street.height=96"];
     assert!(
@@ -410,7 +409,7 @@ fn an_evaluation_against_scans_is_the_same_from_disk_and_reads_none_unless_asked
 
 #[dynvox_needs::long]
 #[test]
-fn what_moves_is_kept_apart_unless_no_masks_are_taken_or_all_goes_into_one_map() {
+fn movers_are_separate_unless_masks_or_objects_are_off() {
     let root = TempDir::new().unwrap();
     let street = [
         "--set",

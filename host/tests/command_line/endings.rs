@@ -147,7 +147,7 @@ fn a_signal_ends_the_run_after_its_frame() {
 
 #[cfg(unix)]
 #[test]
-fn a_run_with_snapshots_that_was_stopped_has_its_results_and_can_be_resumed() {
+fn a_stopped_run_with_snapshots_has_results_and_can_be_resumed() {
     let root = TempDir::new().unwrap();
     let (code, text) = signalled(root.path(), "-INT", &["--snapshot-every", "100000"]);
     assert_eq!(code, INCOMPLETE, "{text}");
@@ -189,7 +189,7 @@ fn a_run_with_snapshots_that_was_stopped_has_its_results_and_can_be_resumed() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_file_size_limit_in_place_of_a_full_disk_loses_the_map_and_nothing_else() {
+fn a_file_size_limit_loses_the_map_and_nothing_else() {
     let root = TempDir::new().unwrap();
     // 1 KiB blocks: the mesh outgrows the limit, what is kept for the last files does not.
     let script = format!(

@@ -232,7 +232,7 @@ fn every_lossless_format_gives_the_digest_of_the_plain_clip() {
 
 #[dynvox_needs::long]
 #[test]
-fn every_layout_and_every_lossless_format_gives_the_digest_of_the_plain_clip() {
+fn every_layout_and_lossless_format_has_the_plain_clips_digest() {
     let clip = Clip::new(FRAMES, SMALL);
     dress_data_sets(&clip);
     let folders: Vec<&str> = dress_folders(&clip).into_iter().chain(dress_formats(&clip)).collect();

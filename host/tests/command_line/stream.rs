@@ -85,7 +85,7 @@ fn summary(root: &Path, out: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_piped_street_has_the_digests_of_the_folder_however_its_images_are_arranged() {
+fn a_piped_street_has_the_folders_digests_in_any_arrangement() {
     let root = street();
     let root = root.path();
     let folder = summary(root, "folder")["digest"].clone();

@@ -203,7 +203,7 @@ report({ whole, moving, rest: Number(data.triangles), share, movingShare });
 
 #[dynvox_needs::browser]
 #[test]
-fn an_address_chooses_the_frame_and_a_phone_shows_it_without_sideways_scrolling() {
+fn an_address_chooses_the_frame_and_a_phone_shows_it_whole() {
     let root = TempDir::new().unwrap();
     FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
     let script = r#"

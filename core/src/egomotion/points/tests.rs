@@ -105,7 +105,7 @@ fn a_match_is_a_point_before_and_two_observations_now() {
 }
 
 #[test]
-fn what_cannot_be_triangulated_is_left_out_and_the_others_keep_their_numbers() {
+fn points_without_depth_are_left_out_and_the_others_keep_numbers() {
     with_points(5, |points, matches| {
         let mut some = Vec::from(matches);
         some[0].previous_right = some[0].previous_left;
@@ -151,7 +151,7 @@ fn scores_and_selections_are_the_points_within_the_distance() {
 }
 
 #[test]
-fn a_score_that_is_to_beat_another_is_exact_where_it_does_and_not_above_it_where_it_does_not() {
+fn a_score_is_exact_if_it_beats_another_and_else_not_above_it() {
     with_points(MATCHES, |points, _| {
         let whole = points.score(&motion(), &RIG, 2.0, 0);
         for to_beat in [1, 100, whole - 1] {

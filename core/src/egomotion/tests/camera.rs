@@ -41,7 +41,7 @@ fn a_dark_right_camera_repeats_the_last_motion() {
 }
 
 #[test]
-fn after_dark_frames_the_camera_is_found_again_from_the_last_frame_that_was_seen() {
+fn after_dark_frames_the_camera_is_found_from_the_last_frame_seen() {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
     let mut matcher = FlowMatcher::new_in(
         &CAPACITY,
@@ -143,7 +143,7 @@ fn a_camera_stands_at_once_where_it_could_brake() {
 }
 
 #[test]
-fn a_camera_lost_for_long_is_matched_with_its_last_frame_and_begins_a_segment_above_its_guess() {
+fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
     for frame in 1..=MAX_REFERENCE_FRAMES {

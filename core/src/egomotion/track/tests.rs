@@ -114,7 +114,7 @@ fn what_few_matches_leave_open_is_doubted_after_a_gap_alone() {
 }
 
 #[test]
-fn after_a_gap_few_inliers_do_not_vouch_for_cameras_that_may_be_out_of_step() {
+fn after_a_gap_few_inliers_do_not_prove_synchronous_cameras() {
     let doubt = |since_reference: u32, inliers: u32| {
         let camera = Egomotion {
             since_reference,

@@ -58,7 +58,7 @@ fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
 }
 
 #[test]
-fn any_question_is_answered_within_its_budget_or_refused_with_a_least_that_works() {
+fn any_budget_is_kept_or_refused_with_the_least_that_works() {
     let mut random = Random::new(5);
     let mut answered = 0;
     for at in 0..10_000 {
@@ -200,7 +200,7 @@ fn the_bytes_of_every_valid_capacity_can_be_summed_up() {
 }
 
 #[test]
-fn no_capacity_that_is_considered_for_a_budget_of_2_gib_has_bytes_beyond_32_bits() {
+fn capacities_tried_for_2_gib_have_bytes_within_32_bits() {
     let (mut random, mut largest) = (Random::new(8), 0);
     for at in 0..20_000 {
         // Small and large images; the largest first.

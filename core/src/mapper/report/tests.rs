@@ -90,7 +90,7 @@ fn what_was_made_good_within_the_frame_is_recovered() {
 }
 
 #[test]
-fn a_rig_that_is_off_is_recovered_where_it_is_corrected_and_affects_the_map_where_it_is_not() {
+fn a_rig_that_is_off_recovers_if_corrected_and_affects_the_map_if_not() {
     let severity = |known: bool, offset_px: f64, corrected: bool| {
         severity_of(|report| {
             report.self_calibration = SelfCalibrationReport {

@@ -120,7 +120,7 @@ impl Coverage {
 }
 
 #[test]
-fn a_thousand_runs_resumed_anywhere_give_the_digests_and_the_state_of_those_that_never_stopped() {
+fn a_thousand_runs_resumed_anywhere_equal_those_that_never_stopped() {
     let mut coverage = Coverage::default();
     let mut slab = vec![0u8; SMALL.bytes() + SLAB_ALIGN];
     for seed in 0..RUNS {

@@ -64,7 +64,7 @@ fn uninterrupted(
 }
 
 #[test]
-fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
+fn a_run_resumed_anywhere_has_the_digests_of_one_that_never_stopped() {
     let walk = Walk::new(FRAMES);
     for capacity in [CAPACITY, CROWDED] {
         let (reports, snapshots) = uninterrupted(&walk, &capacity, |_| true);
@@ -103,8 +103,7 @@ fn a_drive_resumed_anywhere_gives_the_digests_of_the_one_that_never_stopped() {
 }
 
 #[test]
-fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_detector_misses_it()
-{
+fn a_small_track_stays_small_when_resumed_and_missed() {
     const SEEN: usize = 3;
     let walk = Walk::new(SEEN + 2);
     let small = Detection {
@@ -148,7 +147,7 @@ fn a_track_too_small_to_be_reconstructed_stays_so_when_a_run_is_resumed_and_the_
 }
 
 #[test]
-fn a_restored_mapper_saves_the_bytes_it_was_restored_from_and_saving_changes_nothing() {
+fn a_restored_mapper_saves_the_same_bytes_and_saving_changes_nothing() {
     let walk = Walk::new(FRAMES);
     let (reports, snapshots) = uninterrupted(&walk, &CAPACITY, |at| at == 6);
     let (never, _) = uninterrupted(&walk, &CAPACITY, |_| false);

@@ -21,7 +21,7 @@ fn take(
 }
 
 #[test]
-fn a_mask_for_which_there_is_mask_store_full_is_refused_and_counted_and_a_smaller_one_still_fits() {
+fn a_mask_beyond_the_store_is_counted_and_a_smaller_one_still_fits() {
     // 60 rows of two words for the first, none for the second, 30 rows of one for the third.
     let third = detection(
         Class::Car,

@@ -30,7 +30,7 @@ fn run(
 }
 
 #[test]
-fn a_moving_car_goes_on_as_before_for_three_frames_and_a_parked_one_stands_for_five() {
+fn an_unmeasured_car_moves_on_for_three_frames_or_stands_for_five() {
     for (poses, state, most) in [
         (ahead as fn(u32) -> [Transform; 2], MotionState::Dynamic, 3),
         (parked, MotionState::Static, 5),
@@ -114,7 +114,7 @@ fn a_car_that_stops_stays_where_it_stopped() {
 }
 
 #[test]
-fn a_moving_car_is_not_fused_in_a_frame_without_a_motion_and_a_parked_one_is() {
+fn without_a_motion_a_parked_car_is_fused_and_a_moving_one_not() {
     let silent = Board { points: 0, ..Board::CAR };
     for (poses, fused) in [(ahead as fn(u32) -> [Transform; 2], [1, 0, 1]), (parked, [1, 1, 1])] {
         with(&CAPACITY, &any_size(), |instances, estimator| {
@@ -148,7 +148,7 @@ fn nothing_is_kept_for_a_volume_while_the_camera_is_lost() {
 }
 
 #[test]
-fn a_motion_that_comes_too_late_after_a_gap_restarts_the_volume_and_in_time_does_not() {
+fn a_motion_too_late_after_a_gap_restarts_the_volume() {
     let segments = |missed: u32| {
         let mut segments = 0;
         run(

@@ -74,7 +74,7 @@ fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
 }
 
 #[test]
-fn an_object_without_scene_flow_matches_is_searched_for_until_it_is_known_to_be_static() {
+fn an_object_without_matches_is_searched_for_until_static() {
     let tracks = run(3.0, true);
     for track in &tracks[1..] {
         assert!(track.measured && track.matches > 40 && track.inliers > 40, "{track:?}");

@@ -56,7 +56,7 @@ fn a_match_that_leaves_the_mask_or_enters_it_is_not_counted() {
 }
 
 #[test]
-fn sparse_matches_fill_up_where_refined_ones_are_few_and_none_is_counted_twice() {
+fn sparse_matches_fill_up_few_refined_ones_and_count_once() {
     let (few, sparse) = (points(20, 100, 35, 10.0), points(30, 100, 65, 10.0));
     assert_eq!(counted(&few, &sparse), 50);
     let again =
@@ -68,7 +68,7 @@ fn sparse_matches_fill_up_where_refined_ones_are_few_and_none_is_counted_twice()
 }
 
 #[test]
-fn what_shows_through_the_windows_and_what_stands_before_the_car_are_not_counted() {
+fn matches_through_windows_and_before_the_car_are_not_counted() {
     let own = points(20, 100, 35, 10.0);
     let behind = points(5, 100, 65, 60.0);
     let before = points(5, 100, 65, 3.0);
@@ -130,7 +130,7 @@ fn the_motion_so_far_is_found_again_where_draws_alone_would_miss_it() {
 }
 
 #[test]
-fn matches_of_one_object_share_their_error_so_four_times_as_many_do_not_halve_sigma() {
+fn four_times_as_many_matches_do_not_halve_sigma() {
     let config = TrackingConfig {
         motion: MotionConfig { camera_rad: 0.0, ..MotionConfig::default() },
         ..any_size()
@@ -145,7 +145,7 @@ fn matches_of_one_object_share_their_error_so_four_times_as_many_do_not_halve_si
 }
 
 #[test]
-fn a_slow_car_is_not_called_moving_where_the_cameras_errors_could_make_it_seem_so() {
+fn a_slow_car_within_the_cameras_errors_is_not_called_moving() {
     let state = |motion: MotionConfig| {
         with(&CAPACITY, &TrackingConfig { motion, ..any_size() }, |instances, estimator| {
             let mut run = Run::new(instances, estimator);
@@ -176,7 +176,7 @@ fn at(u: f32) -> Match {
 }
 
 #[test]
-fn a_match_under_a_copy_mask_belongs_to_it_even_where_delete_masks_overlap() {
+fn a_match_belongs_to_its_copy_mask_where_delete_masks_overlap() {
     with(&CAPACITY, &any_size(), |instances, _| {
         // The first one's mask ends at 99, its delete mask at 105; the second's begins at 101.
         instances.ingest(0, &[car(40, 0.9), car(101, 0.5)], [WIDTH, HEIGHT]);

@@ -181,7 +181,7 @@ fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
 }
 
 #[test]
-fn a_small_object_is_reported_once_its_motion_is_measured_and_masked_once_it_moves() {
+fn a_small_object_is_reported_once_measured_and_masked_once_moving() {
     let config = TrackingConfig {
         area_min_px: 1_000_000,
         track_area_min_px: 0,

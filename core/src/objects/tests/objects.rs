@@ -59,7 +59,7 @@ fn a_car_lost_for_too_long_is_handed_over_and_begun_anew() {
 }
 
 #[test]
-fn full_volumes_are_handed_over_for_new_objects_but_not_in_the_frame_they_grow() {
+fn full_volumes_are_handed_over_but_not_in_the_frame_they_grow() {
     let near = Board { half_m: [0.8, 0.5], ..Board::CAR };
     let parked = |x: f64| Some(shift(x, 0.0, 9.0));
     with(&CAPACITY, &any_size(), |instances, estimator| {
@@ -156,7 +156,7 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
 }
 
 #[test]
-fn an_object_is_where_its_track_is_and_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
+fn an_object_stays_where_it_stood_and_is_nowhere_once_it_drove_off() {
     let parked = |frame: u32| [shift(0.0, 0.0, 0.5 * f64::from(frame)), shift(1.0, 0.3, 14.0)];
     for (poses, state) in
         [(at as fn(u32) -> [Transform; 2], MotionState::Dynamic), (parked, MotionState::Static)]

@@ -158,7 +158,7 @@ fn a_movement_over_a_gap_is_shared_among_its_frames() {
 }
 
 #[test]
-fn of_equals_the_first_detection_and_the_older_track_are_joined_and_each_once() {
+fn of_equals_the_first_detection_and_the_older_track_are_joined() {
     with(&CAPACITY, &any_size(), |instances, _| {
         take(instances, 0, &[car(100)]);
         // As near on either side.
@@ -245,7 +245,7 @@ fn cleared(
 }
 
 #[test]
-fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_it_would_be() {
+fn a_missed_object_is_kept_out_of_the_static_map_for_three_frames() {
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         take(instances, 0, &[car(100)]);
         take(instances, 1, &[car(110)]);
@@ -268,7 +268,7 @@ fn what_a_detector_misses_is_kept_out_of_the_static_map_for_three_frames_where_i
 }
 
 #[test]
-fn what_was_seen_once_and_never_again_is_not_kept_out_longer_nor_what_is_too_small() {
+fn an_object_seen_once_or_too_small_is_not_kept_out_longer() {
     with(&CAPACITY, &TrackingConfig::default(), |instances, _| {
         take(instances, 0, &[car(100)]);
         assert_eq!(cleared(instances, 1, &[]), None, "a ghost");

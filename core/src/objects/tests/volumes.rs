@@ -36,7 +36,7 @@ fn parked(frames: u32, z: f64, wide: impl Fn(u32) -> bool) -> (Vec<usize>, usize
 }
 
 #[test]
-fn what_was_seen_once_goes_at_every_fourth_fused_frame_and_before_the_object_leaves() {
+fn voxels_seen_once_go_every_fourth_frame_and_at_the_end() {
     // Known to stand in frame 3: the volume's first frame; the seventh is its fourth.
     let (blocks, _) = parked(8, 15.0, |frame| frame == 5);
     let (careful, _) = parked(8, 15.0, |_| false);
@@ -202,7 +202,7 @@ fn a_crop_is_what_lies_under_the_mask_and_near_the_middle_depth() {
 }
 
 #[test]
-fn what_the_matcher_lets_run_on_behind_an_edge_is_left_out_and_a_slope_is_not() {
+fn disparities_that_run_on_behind_an_edge_are_left_out_not_slopes() {
     // 1.6 px from surface to surface, then 1.4.
     let step =
         |height_px: f64| cropped(|u| if (20..40).contains(&u) { 15.0 + height_px } else { 15.0 });

@@ -132,7 +132,7 @@ fn moving_keeps_what_stays_and_forgets_what_leaves() {
 }
 
 #[test]
-fn what_moved_on_is_no_obstacle_once_it_is_seen_through_and_a_thin_pole_stays_one() {
+fn an_object_that_left_is_no_obstacle_and_a_thin_pole_stays_one() {
     let mut scene = Scene::new(&CONFIG());
     let street = |with_car: bool| {
         move |camera: [f64; 3], ray: [f64; 3]| {

@@ -56,7 +56,7 @@ impl World {
 }
 
 #[test]
-fn a_car_with_too_few_matches_is_found_by_patches_of_its_mask_and_a_parked_one_is_not() {
+fn patches_find_a_car_with_few_matches_and_no_parked_one() {
     let world = World { cars: vec![OVERTAKING, PARKED], step_m: 0.8, noise_px: 0.1 };
     assert!(world.tracks(4, false).iter().all(Vec::is_empty), "four matches are no group");
     for matches_on_car in [4, usize::MAX] {
@@ -73,7 +73,7 @@ fn a_car_with_too_few_matches_is_found_by_patches_of_its_mask_and_a_parked_one_i
 }
 
 #[test]
-fn a_supposed_car_is_found_where_the_images_show_that_it_moves_so_and_nowhere_else() {
+fn a_supposed_car_is_found_only_where_the_images_show_its_motion() {
     let overtaking = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.1 };
     let parked = World { cars: vec![Car { motion: [0.0; 2], ..OVERTAKING }], ..overtaking };
     for (world, extent_z_m, moves) in [(overtaking, 9.6, true), (parked, 8.2, false)] {

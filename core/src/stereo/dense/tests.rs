@@ -191,7 +191,7 @@ fn prior_cells(length: usize, config: &StereoConfig) -> usize {
 }
 
 #[test]
-fn every_level_of_vector_instructions_gives_what_one_pixel_at_a_time_gives() {
+fn every_vector_level_equals_one_pixel_at_a_time() {
     let mut random = Random::new(12);
     let preset = StereoConfig { disparity_max: 70, ..StereoConfig::robotics() };
     let configs = [

@@ -97,7 +97,7 @@ fn mean_of(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn planes_are_hit_at_their_depth_at_any_angle_and_for_both_kinds_of_distance() {
+fn planes_are_hit_at_their_depth_at_any_angle() {
     let poses = [at([0.0; 3], [0.0; 3]), at([0.03, -0.2, 0.05], [0.6, -0.1, 0.3])];
     for (normal, bound) in [
         ([0.0, 0.0, -1.0], 0.01),
@@ -126,7 +126,7 @@ fn planes_are_hit_at_their_depth_at_any_angle_and_for_both_kinds_of_distance() {
 }
 
 #[test]
-fn a_ball_is_met_within_a_fraction_of_a_voxel_from_poses_that_never_saw_it() {
+fn a_ball_is_met_within_a_fraction_of_a_voxel_from_new_poses() {
     let ball = Ball { center: Vector3::new(0.2, -0.1, 3.0), radius: 0.8 };
     let volume = filled([-5, -5, 3], [5, 5, 11], true_distances(&ball));
     for view in [
@@ -204,7 +204,7 @@ fn points_never_seen_do_not_pull_the_surface_to_either_side() {
 }
 
 #[test]
-fn a_ray_that_begins_behind_a_surface_or_comes_out_of_unseen_space_at_its_back_meets_none() {
+fn a_ray_from_behind_a_surface_or_unseen_space_meets_none() {
     let wall = Plane::new([0.0, 0.0, 1.0], [0.0, 0.0, 3.0]);
     // Free space lies beyond: the camera looks at the back of the wall, from unseen space and from
     // within it.

@@ -15,7 +15,7 @@ fn a_tag_is_its_block_again() {
 }
 
 #[test]
-fn a_walk_goes_from_block_to_neighbouring_block_and_through_all_that_small_steps_find() {
+fn a_walk_visits_neighbouring_blocks_that_small_steps_find() {
     let mut random = Random::new(8);
     for _ in 0..2_000 {
         let mut point = |scale: f32| {

@@ -165,7 +165,7 @@ fn a_map_set_to_refuse_evicts_nothing() {
 }
 
 #[test]
-fn a_million_random_makings_prunings_evictions_and_returns_agree_with_a_model() {
+fn a_million_random_changes_of_blocks_agree_with_a_model() {
     const BLOCKS: usize = 60;
     let capacity = Capacity { blocks: BLOCKS, visible_blocks: BLOCKS, colour: false, ..CAPACITY };
     let config = VolumeConfig { prune_weight: 1, prune_lag: 3, ..VolumeConfig::default() };

@@ -152,7 +152,7 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
 }
 
 #[test]
-fn blocks_that_swap_their_contents_or_their_planes_change_the_sum_of_digests() {
+fn blocks_that_swap_contents_or_planes_change_the_digest() {
     let coords = [BlockCoord { x: 1, y: -2, z: 300 }, BlockCoord { x: -2, y: 1, z: 300 }];
     let contents = [(5, 3), (-5, 4)]
         .map(|(sdf, weight)| Voxels { sdf: [sdf; BLOCK_VOXELS], weight: [weight; BLOCK_VOXELS] });
@@ -216,7 +216,7 @@ fn beyond_the_map_is_refused_and_counted() {
 }
 
 #[test]
-fn near_observations_weigh_more_when_asked_and_weight_stops_at_its_maximum() {
+fn near_observations_weigh_more_up_to_the_maximum() {
     for (depth, expected) in [(10.0, 10), (15.0, 6), (19.9, 5), (5.0, 10)] {
         let config = VolumeConfig {
             observation_weight: ObservationWeight::Depth,

@@ -98,7 +98,7 @@ fn what_is_due_is_taken_once_from_a_slot_on_in_ascending_order() {
 }
 
 #[test]
-fn a_block_that_is_freed_is_not_due_and_one_made_later_in_its_slot_neither() {
+fn a_freed_block_is_not_due_nor_one_made_later_in_its_slot() {
     with_history(|history| {
         let seen = slots([3, 70, 71, 135]);
         seen.iter().for_each(|&slot| history.allocated_at(slot, 5));

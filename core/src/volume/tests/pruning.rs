@@ -256,7 +256,7 @@ struct Model {
 }
 
 #[test]
-fn yields_exactly_the_blocks_visible_lag_frames_ago_through_frees_and_reuse() {
+fn yields_the_blocks_visible_lag_frames_ago_through_reuse() {
     const LAG: u32 = 9;
     let capacity =
         Capacity { blocks: 90, visible_blocks: 90, history_frames: LAG as usize, ..CAPACITY };

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn moving_objects_count_from_their_fourth_frame_and_masks_of_nothing_are_false() {
+    fn movers_count_from_their_fourth_frame_and_empty_masks_are_false() {
         let objects = [object(1, true, 5.0), object(2, true, 25.0), object(3, false, 8.0)];
         // Mask 10 is on the first, three of four pixels; mask 11 on the parked one; the second is
         // not found.

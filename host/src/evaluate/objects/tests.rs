@@ -84,7 +84,7 @@ fn errors_of(
 }
 
 #[test]
-fn a_motion_off_by_two_centimetres_has_that_error_despite_any_drift_of_the_camera() {
+fn a_motion_off_by_two_centimetres_has_that_error_despite_drift() {
     let drift = Transform::new(Vector3::new(0.1, -0.4, 0.05), Vector3::new(30.0, -2.0, 11.0));
     let off = Transform::new(Vector3::new(0.0, 0.001, 0.0), Vector3::new(0.02, 0.0, 0.0));
     let errors =

@@ -15,7 +15,7 @@ fn holes_take_the_farther_neighbour_and_empty_rows_the_row_above() {
 }
 
 #[test]
-fn pixels_are_counted_given_and_filled_and_five_percent_is_forgiven_by_d1_alone() {
+fn pixels_count_given_and_filled_and_only_d1_forgives_five_percent() {
     let px = |value: f32| (value * 256.0) as u16;
     // Right; 3.5 px off at 90 px; 3.5 px off at 20 px; no estimate, filled by 16.5; no truth.
     let truth = image(&[&[px(10.0), px(90.0), px(20.0), px(18.0), 0]]);

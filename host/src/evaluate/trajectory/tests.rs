@@ -44,7 +44,7 @@ fn a_trajectory_turned_and_moved_as_a_whole_has_no_error() {
 }
 
 #[test]
-fn a_camera_turned_against_that_of_the_truth_and_a_wrong_scale_are_told_from_noise() {
+fn a_turned_camera_and_a_wrong_scale_are_told_from_noise() {
     let truth = swerving(120, 0.0);
     // A camera that looks 0.5 degrees to the right of the truth's, and 1 % too long: what lies
     // ahead appears at its left.

@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectification_turns_the_points_and_scaling_keeps_them_under_their_pixels() {
+    fn rectification_turns_points_and_scaling_keeps_their_pixels() {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("calib.txt");
         // The sensor looks along x; rectification turns by a right angle about z, so that an

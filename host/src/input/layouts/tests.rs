@@ -57,7 +57,7 @@ fn refusal(path: &Path, sequence: Option<&str>) -> String {
 }
 
 #[test]
-fn odometry_is_found_from_its_root_its_sequences_folder_and_the_sequence_itself() {
+fn odometry_is_found_from_its_root_its_folder_and_the_sequence() {
     let root = odometry(3);
     fs::write(root.path().join("sequences/06/times.txt"), "0\n0.1\n0.25\n0.4\n").unwrap();
     fs::create_dir_all(root.path().join("poses")).unwrap();
@@ -101,7 +101,7 @@ fn file_numbers_choose_the_row_of_times_and_poses_when_a_clip_begins_late() {
 }
 
 #[test]
-fn the_colour_pair_has_its_own_calibration_and_the_truth_moves_to_its_camera() {
+fn the_colour_pair_has_its_own_calibration_and_truth() {
     let root = odometry(2);
     for at in 0..2 {
         for camera in [2, 3] {
@@ -193,7 +193,7 @@ fn a_plain_folder_takes_key_value_lines_or_kittis() {
 }
 
 #[test]
-fn images_without_a_partner_are_skipped_and_counted_and_the_rest_keeps_its_times() {
+fn images_without_a_partner_are_counted_and_times_stay() {
     let root = odometry(6);
     fs::write(root.path().join("sequences/06/times.txt"), "0\n1\n2\n3\n4\n5\n").unwrap();
     fs::remove_file(root.path().join("sequences/06/image_1/000001.png")).unwrap();
@@ -362,7 +362,7 @@ fn half_size_averages_four_pixels_and_halves_the_rig() {
 }
 
 #[test]
-fn recordings_as_the_lenses_drew_them_are_refused_unless_a_calibration_says_otherwise() {
+fn raw_recordings_are_refused_without_a_calibration() {
     let root = TempDir::new().unwrap();
     (0..2).for_each(|at| {
         for (side, image) in ["cam0", "cam1"].iter().zip(pair(at)) {

@@ -169,7 +169,7 @@ fn masks_of_another_size_without_a_list_or_in_colour_are_refused() {
 }
 
 #[test]
-fn a_frame_without_a_file_has_no_masks_and_an_empty_folder_is_refused_only_if_given() {
+fn a_frame_without_a_file_has_no_masks_and_empty_folders_are_refused() {
     let root = rig();
     let folder = root.path().join("instances");
     fs::create_dir(&folder).unwrap();

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_car_at_the_left_edge_has_its_columns_that_the_right_camera_does_not_see() {
+    fn a_car_at_the_left_edge_keeps_columns_the_right_camera_misses() {
         // Disparity 24 px: the first 26 columns have none. Of a car inside the image, what is left
         // of it has none either: it hides that.
         let car = |first: usize| {
