@@ -97,7 +97,7 @@ fn a_setting_is_named_beside_the_stage_it_reaches_first() {
     );
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
     let (code, output) = diff(root.path(), &["clean", "sparse"]);
-    assert!(code == 1 && output.contains("\nfirst divergence: frame 1, matches\n"), "{output}");
+    assert!(code == 1 && output.contains("\nfirst divergence: frame 1, scene_flow\n"), "{output}");
 }
 
 #[test]
