@@ -93,8 +93,10 @@ impl Detection {
         let mask = if is_bool { mask.call_method1("view", ("uint8",))? } else { mask };
         Borrowed::<u8>::new("mask", &mask)?.view()?;
         let class = Class::from_name(class_name).ok_or_else(|| {
-            refuse(format!("there is no class {class_name:?}. Give a name of COCO, Cityscapes or \
-                            KITTI, as car, person or truck"))
+            refuse(format!(
+                "there is no class {class_name:?}. Give a name of COCO, Cityscapes or \
+                            KITTI, as car, person or truck"
+            ))
         })?;
         Ok(Self { class, class_name: class_name.to_owned(), score, left, top, mask: mask.unbind() })
     }

@@ -20,13 +20,17 @@ impl<'py, T: Element> Borrowed<'py, T> {
         let wanted = T::get_dtype(array.py());
         let untyped = array.cast::<PyUntypedArray>().map_err(|_| {
             let found = array.get_type();
-            refuse(format!("{name} is no numpy array, but {found}. Pass numpy.asarray(...): it \
-                            copies nothing that has a buffer"))
+            refuse(format!(
+                "{name} is no numpy array, but {found}. Pass numpy.asarray(...): it \
+                            copies nothing that has a buffer"
+            ))
         })?;
         let array = array.extract::<PyReadonlyArrayDyn<'py, T>>().map_err(|_| {
             let found = untyped.dtype();
-            refuse(format!("{name} has values of {found}, and {wanted} is needed. Scale and \
-                            convert it: array.astype(numpy.{wanted})"))
+            refuse(format!(
+                "{name} has values of {found}, and {wanted} is needed. Scale and \
+                            convert it: array.astype(numpy.{wanted})"
+            ))
         })?;
         Ok(Self { array, name })
     }

@@ -48,8 +48,12 @@ impl Mapper {
     }
 
     fn lock(&self) -> PyResult<MutexGuard<'_, State>> {
-        self.state.lock().map_err(|_| refuse("the mapper failed within a call: please report it as \
-            a bug of dynvox. Make another mapper"))
+        self.state.lock().map_err(|_| {
+            refuse(
+                "the mapper failed within a call: please report it as \
+            a bug of dynvox. Make another mapper",
+            )
+        })
     }
 
     /// Runs `work` on the mapper while other threads of Python run.
@@ -317,8 +321,10 @@ fn object_triangles(running: &mut Running, id: u32) -> PyResult<Triangles> {
         Some(triangles.moved(&posed.t_world_object))
     });
     found.ok_or_else(|| {
-        refuse(format!("track {id} has no reconstructed object now. Mapper.tracks lists tracks, \
-                        with blocks where they have one"))
+        refuse(format!(
+            "track {id} has no reconstructed object now. Mapper.tracks lists tracks, \
+                        with blocks where they have one"
+        ))
     })
 }
 

@@ -20,10 +20,7 @@ pub fn of_dataset(
 }
 
 /// The request of a mapper alone.
-pub fn of_mapper(
-    threads: Option<usize>,
-    options: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Request> {
+pub fn of_mapper(threads: Option<usize>, options: Option<&Bound<'_, PyDict>>) -> PyResult<Request> {
     request(None, threads, options)
 }
 

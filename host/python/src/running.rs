@@ -109,8 +109,12 @@ impl Running {
         let mapper = SlabMapper::try_new(slab, |slab| {
             let mut read = |piece: &mut [u8]| source.read_exact(piece);
             Mapper::restore(&plan.capacity, &plan.config, slab.borrow_mut().bytes_mut(), &mut read)
-                .map_err(|error| refuse(format!("{error}. Restore it with the rig, the bounds and \
-                    the settings it was made with")))
+                .map_err(|error| {
+                    refuse(format!(
+                        "{error}. Restore it with the rig, the bounds and \
+                    the settings it was made with"
+                    ))
+                })
         })?;
         Ok(Self {
             blocks: Blocks::begin(blocks, &plan.config, snapshot.blocks)?,
@@ -225,9 +229,7 @@ impl Recipe {
     fn plan_for(&self, size: (usize, usize)) -> PyResult<MapperPlan> {
         match &self.plan {
             Some(plan) => Ok(plan.clone()),
-            None => {
-                self.request.mapper(&self.rig.fitted(size), self.interval_s).map_err(raise)
-            }
+            None => self.request.mapper(&self.rig.fitted(size), self.interval_s).map_err(raise),
         }
     }
 }
