@@ -20,7 +20,7 @@ use crate::{
     scene_flow::{FlowReport, Match},
     segmentation::SegmentationReport,
     state::Hasher,
-    stereo::{RectifiedPair, StereoReport},
+    stereo::StereoReport,
     tracking::TrackingReport,
     volume::{AllocationReport, BlockStore, NoStore, PruneReport},
 };
@@ -163,15 +163,11 @@ impl Mapper<'_> {
     ) -> (StereoReport, FlowReport) {
         let Self { config, rectifier, stereo, scene_flow, .. } = self;
         let invalid = rectifier.invalid();
-        let (left, right, invalid) = (frame.left, frame.right, invalid.as_ref());
+        let pair = MaskedPair { left: frame.left, right: frame.right, invalid: invalid.as_ref() };
         let compute_disparity = || match frame.disparity_q8 {
             Some(given) => stereo.take(given),
-            None => {
-                let pair = RectifiedPair { left, right, invalid };
-                stereo.compute_within(&config.stereo, &pair, executor)
-            }
+            None => stereo.compute_within(&config.stereo, &pair, executor),
         };
-        let pair = MaskedPair { left, right, invalid };
         let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
         let reports = executor.join(
             || executor.stage(Stage::Stereo, compute_disparity),

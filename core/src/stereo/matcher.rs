@@ -14,7 +14,7 @@ use super::{
 use crate::{
     digest::Digest,
     geometry::PixelCorrection,
-    image::{DISPARITY_ONE_PX, InvalidPair, View},
+    image::{DISPARITY_ONE_PX, MaskedPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Executor, Work, each, zip2},
     settings::Problems,
@@ -95,13 +95,6 @@ const fn at_least_one(length: usize) -> usize {
 /// the first pair.
 const fn max_pixels(capacity: &Capacity) -> usize {
     at_least_one(capacity.image_width) * at_least_one(capacity.image_height)
-}
-
-/// A rectified pair, and the pixels of it that show nothing.
-pub(crate) struct RectifiedPair<'a> {
-    pub left: View<'a, u8>,
-    pub right: View<'a, u8>,
-    pub invalid: Option<&'a InvalidPair<'a>>,
 }
 
 impl<'s> StereoMatcher<'s> {
@@ -186,7 +179,7 @@ impl<'s> StereoMatcher<'s> {
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
-        pair: &RectifiedPair<'_>,
+        pair: &MaskedPair<'_>,
         executor: &E,
     ) -> StereoReport {
         self.compute_steps(config, pair, executor, |_| ())
@@ -202,18 +195,18 @@ impl<'s> StereoMatcher<'s> {
         executor: &E,
         done: impl FnMut(StereoStep),
     ) -> StereoReport {
-        let pair = RectifiedPair { left, right, invalid: None };
+        let pair = MaskedPair { left, right, invalid: None };
         self.compute_steps(config, &pair, executor, done)
     }
 
     fn compute_steps<E: Executor>(
         &mut self,
         config: &StereoConfig,
-        pair: &RectifiedPair<'_>,
+        pair: &MaskedPair<'_>,
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
-        let &RectifiedPair { left, right, invalid } = pair;
+        let &MaskedPair { left, right, invalid } = pair;
         // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
         let mut report = StereoReport {

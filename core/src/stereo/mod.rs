@@ -79,7 +79,6 @@ mod tests;
 pub use config::{
     CANDIDATE_STEP, DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_GRID_SIZE, StereoConfig,
 };
-pub(crate) use matcher::RectifiedPair;
 pub use matcher::StereoMatcher;
 pub use report::{StereoReport, StereoStatus, StereoStep};
 
