@@ -96,6 +96,7 @@ impl From<&Capacity> for DynvoxCapacity {
 impl DynvoxCapacity {
     /// Converts the bounds to the core's; refused if a mapper cannot work with one of them.
     pub(crate) fn checked(&self) -> Result<Capacity, DynvoxStatus> {
+        // All fields are named: a new bound does not compile until it has a field here.
         let capacity = Capacity {
             image_width: self.image_width,
             image_height: self.image_height,
@@ -199,6 +200,7 @@ pub unsafe extern "C" fn dynvox_capacity_for_budget(
         (Err(status), _) | (_, Err(status)) => return status,
     };
     match Capacity::for_budget(
+        // The handle's header lies before the mapper in the same buffer.
         budget.bytes.saturating_sub(HEAD_BYTES),
         budget.width,
         budget.height,

@@ -134,6 +134,7 @@ pub unsafe extern "C" fn dynvox_config_set(
         Err(_) => return DynvoxStatus::Value,
         Ok(()) => {}
     }
+    // Settings are stored line by line.
     if value.contains('\n') {
         return DynvoxStatus::Value;
     }
@@ -176,6 +177,7 @@ pub unsafe extern "C" fn dynvox_config_problem(
     if text.is_null() {
         return DynvoxStatus::Null;
     }
+    // One byte is for the zero at the end.
     let Some(most) = len.checked_sub(1) else { return DynvoxStatus::TooSmall };
     let mut truncated = Truncated { text, most, written: 0 };
     if let Some(problem) = config.validate().first() {

@@ -54,9 +54,11 @@ pub unsafe fn items<'a, T>(
     if !pointer.is_aligned() {
         return Err(DynvoxStatus::Misaligned);
     }
+    // No slice may be longer than isize::MAX bytes.
     let bytes =
         len.checked_mul(size_of::<T>()).filter(|&bytes| bytes <= MOST).ok_or(DynvoxStatus::Size)?;
     let start = pointer as usize;
+    // Overlapping references would be undefined behaviour, hence the comparison of addresses.
     let end = start.checked_add(bytes).ok_or(DynvoxStatus::Size)?;
     if start < forbidden.end && forbidden.start < end {
         return Err(DynvoxStatus::Overlap);

@@ -110,6 +110,7 @@ pub unsafe fn make(
     if !(buffer as usize).is_multiple_of(SLAB_ALIGN) {
         return DynvoxStatus::Misaligned;
     }
+    // All arguments are checked before the buffer is touched.
     if len < bytes(&capacity) {
         return DynvoxStatus::TooSmall;
     }
@@ -117,6 +118,7 @@ pub unsafe fn make(
     // until it is destroyed.
     let slab: &'static mut [u8] =
         unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
+    // A refused mapper leaves no header: the handle stays what it was.
     let made = match new(&capacity, &config, slab) {
         Ok(made) => made,
         Err(status) => return status,

@@ -47,6 +47,7 @@ pub unsafe extern "C" fn dynvox_raycast(
     unsafe {
         with(mapper, |mapper, buffer| {
             let pose = read(pose)?.transform()?;
+            // The caller's picture says which buffers it has and how long they are.
             let mut to = read(picture.cast_const())?;
             let seen = mapper.raycast(&pose, &Serial)?;
             let depth_m = seen.depth_m().ok_or(DynvoxStatus::NoFrame)?;
@@ -143,6 +144,7 @@ pub unsafe extern "C" fn dynvox_stream_out(
     unsafe {
         with(mapper, |mapper, _| {
             let mut store = read(store)?;
+            // Outputs are checked before blocks leave: an error evicts nothing.
             let stored = if stored.is_null() { None } else { Some(output(stored)?) };
             let lost = if lost.is_null() { None } else { Some(output(lost)?) };
             let report = mapper.stream_out(&mut store);

@@ -183,6 +183,7 @@ unsafe fn copy_window(
     };
     let columns = width * length;
     let column = |at| planning.column(at).unwrap_or_default();
+    // C has no optional numbers: the largest one stands for none.
     let none = |value: Option<f32>| value.unwrap_or(f32::MAX);
     let has_columns =
         [to.distance_m, to.height_m, to.slope, to.step_m].iter().any(|of| !of.is_null())
@@ -246,6 +247,7 @@ pub unsafe extern "C" fn dynvox_moving_boxes(
             let count = output(count)?;
             let to = items_mut(boxes, capacity, buffer)?;
             let known = mapper.planning().boxes();
+            // As many as fit; the count tells how many there were.
             to.iter_mut().zip(known).for_each(|(to, from)| *to = from.into());
             count.write(known.len());
             Ok(())

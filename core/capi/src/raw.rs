@@ -125,6 +125,7 @@ pub unsafe extern "C" fn dynvox_config_raw(
         (Ok(raw), Ok(to)) => (raw, to),
         (Err(status), _) | (_, Err(status)) => return status,
     };
+    // A rig without a width stands for pairs that come rectified, which need no raw cameras.
     let rectified = match raw.rectification() {
         Ok(Some((_, rig))) => rig,
         Ok(None) => return DynvoxStatus::Size,

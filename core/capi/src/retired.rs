@@ -119,6 +119,7 @@ pub unsafe extern "C" fn dynvox_retired_triangles(
         let triangle = DynvoxTriangle::from(triangle);
         sink(context, &raw const triangle);
     });
+    // The count is optional.
     if !count.is_null() {
         // SAFETY: not null; the rest is the caller's promise.
         match unsafe { output(count) } {

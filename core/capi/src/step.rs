@@ -50,10 +50,12 @@ pub unsafe extern "C" fn dynvox_step_with(
     unsafe {
         with(mapper, |mapper, buffer| {
             let frame = read(frame)?;
+            // A store, a sink and a report are optional.
             let mut store = if store.is_null() { DynvoxStore::NONE } else { read(store)? };
             let mut retiring =
                 Retiring { sink: DynvoxObjectSink::given(objects)?, mesh: mapper.config().mesh };
             let report = if report.is_null() { None } else { Some(output(report)?) };
+            // Detections are converted in a buffer on the stack: MAX_DETECTIONS bounds it.
             let mut buffered = [NOTHING; MAX_DETECTIONS];
             let frame_in_core = StereoFrame {
                 left: image(&frame, frame.left, buffer)?.ok_or(DynvoxStatus::Null)?,

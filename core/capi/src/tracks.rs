@@ -79,6 +79,7 @@ impl From<MotionState> for DynvoxMotionState {
 
 impl From<&TrackReport> for DynvoxTrack {
     fn from(track: &TrackReport) -> Self {
+        // C has no optional numbers: a negative speed stands for none.
         let [speed_m_s, speed_sigma_m_s] = track.speed_m_s.unwrap_or([-1.0, 0.0]);
         Self {
             id: track.id,
@@ -149,6 +150,8 @@ pub unsafe extern "C" fn dynvox_object_triangles(
     unsafe {
         with(mapper, |mapper, _| {
             hand_over((sink, context, count), |mut sink| {
+                // A track may have several volumes, one for each segment of its trajectory: the
+                // latest counts.
                 let of_track = mapper.objects().filter(|(summary, _)| summary.id == track_id);
                 let (_, object) = of_track
                     .max_by_key(|(summary, _)| summary.segment_id)

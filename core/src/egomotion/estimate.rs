@@ -214,13 +214,16 @@ impl<'s> Estimator<'s> {
         random: &mut Random,
         start: &Transform,
     ) -> (Transform, u32) {
+        // The start is a hypothesis, too: if it is good, few others have to be drawn.
         let mut best = *start;
         let mut most = self.points.score(start, rig, config.inlier_px, 0);
         let mut required = required_iterations(config, most, self.points.len());
         let mut drawn = 0;
         while drawn < required {
+            // Three points without a motion count as drawn, so that the loop ends.
             drawn += 1;
             let Some(motion) = self.hypothesis(config, rig, random, start) else { continue };
+            // Scoring stops as soon as the best can no longer be beaten.
             let count = self.points.score(&motion, rig, config.inlier_px, most);
             if count > most {
                 (best, most) = (motion, count);

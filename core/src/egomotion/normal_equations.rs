@@ -77,12 +77,15 @@ impl NormalEquations {
         // Derivatives of the projection by the carried point, times those of the carried point by
         // the step: a cross product and itself.
         let [u_left, v, u_right] = rig.project_jacobian(p);
+        // Columns do not depend on y, nor the row on x: those derivatives are zero and left out.
         let row = |[a, _, c]: [f64; 3]| [c * y, a * z - c * x, -a * y, a, 0.0, c];
         let (u_left, u_right, [_, b, c]) = (row(u_left), row(u_right), v);
         let v = [c * y - b * z, -c * x, b * x, 0.0, b, c];
+        // Both cameras see a point in the same row, so its derivatives serve twice.
         let both = up_left + up_right;
         for i in 0..N {
             self.vector[i] += weight * (u_left[i] * left + u_right[i] * right + v[i] * both);
+            // The matrix is symmetric: only its lower triangle is summed.
             for j in 0..=i {
                 self.matrix[i][j] +=
                     weight * (u_left[i] * u_left[j] + u_right[i] * u_right[j] + 2.0 * v[i] * v[j]);

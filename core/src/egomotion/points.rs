@@ -98,6 +98,7 @@ impl<'s> Points<'s> {
                 *slot = value as f32;
             }
         }
+        // The source decides: a point beyond the capacity is not counted.
         if let Some(slot) = self.source.get_mut(at) {
             *slot = source;
             self.len += 1;
@@ -130,6 +131,7 @@ impl<'s> Points<'s> {
         let view = SinglePrecision::new(motion, rig);
         let mut count = 0;
         let mut first = 0;
+        // A stride is long enough for vectors and short enough to give up early.
         while first < self.len && count + ((self.len - first) as u32) > to_beat {
             let last = (first + STRIDE).min(self.len);
             count += self.errors(&view, first..last, |hits, error| {
@@ -177,6 +179,7 @@ impl<'s> Points<'s> {
         mut fold: impl FnMut(u32, f32) -> u32,
     ) -> u32 {
         let n = range.len();
+        // Slices of one length, so that the loop needs no checks.
         let columns =
             [&*self.x, self.y, self.z, self.left_u, self.left_v, self.right_u, self.right_v];
         let [Some(x), Some(y), Some(z), Some(left_u), Some(left_v), Some(right_u), Some(right_v)] =

@@ -86,16 +86,19 @@ fn solve(
     for (row, difference_px) in rows {
         let residual_px = difference_px - row.dot(before);
         let share = residual_px / HALF_WEIGHT_PX;
+        // Cauchy's weight: a mismatch counts little, and none is left out entirely.
         let weight = 1.0 / (1.0 + share * share);
         matrix += row * row.transpose() * weight;
         vector += row * (weight * difference_px);
         squares += weight * residual_px * residual_px;
         weights += weight;
     }
+    // Compared with the diagonal, so that the unknowns' units do not matter.
     let is_determined =
         matrix.determinant() > DETERMINANT_MIN * (matrix.m11 * matrix.m22 * matrix.m33);
     let inverse = matrix.try_inverse().filter(|_| is_determined)?;
     let solution = inverse * vector;
+    // The residuals themselves say how noisy the rows are.
     let variance = squares / weights * inverse.m33;
     let is_known =
         solution.iter().all(|x| x.is_finite()) && variance.is_finite() && variance >= 0.0;

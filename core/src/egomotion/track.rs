@@ -188,6 +188,7 @@ impl Egomotion {
         let agree = estimate.inliers as f32 >= config.inlier_share_strong * estimate.matches as f32;
         let after_gap = self.since_reference > 0;
         let strong = as_many && agree;
+        // After lost frames a wrong motion would be applied several times over: ask for both signs.
         let vouched = if after_gap { strong } else { agree };
         let is_synchronous =
             |ahead: RightAhead| ahead.is_synchronous(config.right_ahead_max_m, vouched, after_gap);

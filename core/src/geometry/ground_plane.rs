@@ -58,6 +58,7 @@ impl GroundPlane {
     pub fn find(rig: &StereoRig, disparity_q8: View<'_, u16>) -> Option<Self> {
         let mut best: Option<(u32, Self)> = None;
         for step in -SLOPES..=SLOPES {
+            // Each point votes for the height of the plane of this slope that passes through it.
             let slope = SLOPE_STEP * f64::from(step);
             let mut counts = [0u32; HEIGHTS];
             for [x, y, z] in points_below_horizon(rig, disparity_q8) {
@@ -71,6 +72,7 @@ impl GroundPlane {
                     *count += 1;
                 }
             }
+            // Neighbouring bins are added, so that a plane near a bin's edge is not split.
             let pairs = counts.iter().zip(counts.iter().skip(1)).map(|(a, b)| a + b);
             for (bin, count) in (1..).zip(pairs) {
                 if count >= VOTES_MIN && best.is_none_or(|(most, _)| count > most) {
@@ -101,6 +103,7 @@ fn points_below_horizon<'a>(
             .map(move |at| (at * STEP_PX + FIRST_PX).min(size.saturating_sub(1)))
     };
     let (width, height) = (disparity_q8.width(), disparity_q8.height());
+    // A level camera sees ground below the horizon only.
     let rows = pixels(height).filter(move |&v| v as f64 > rig.center_v_px);
     rows.flat_map(move |v| {
         pixels(width).filter_map(move |u| {

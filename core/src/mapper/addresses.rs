@@ -40,6 +40,8 @@ impl Capacity {
         let object = product(self.object_blocks, block).saturating_add(OBJECT);
         let columns = product(self.planning_width, self.planning_length as u64);
         let cells = product(self.planning_height, columns);
+        // Products and sums stop at the largest number instead of wrapping: too many is still too
+        // many.
         FIXED
             .saturating_add(product(self.image_width, product(self.image_height, PIXEL)))
             .saturating_add(product(self.features, FEATURE))

@@ -149,6 +149,7 @@ impl Capacity {
         if least.bytes() > question.bytes {
             return Err(BudgetError::TooSmall { least: least.bytes() });
         }
+        // Colour doubles a block's bytes: unasked, it is given only where enough blocks remain.
         let solved = match options.colour {
             Some(colour) => question.solved(colour),
             None => {
@@ -168,6 +169,7 @@ impl Capacity {
     pub fn validate(&self) -> Result<(), CapacityProblem> {
         let above_0 = "must be above 0";
         let countable = "must be at most 268,435,456";
+        // One table, first broken rule first: the message names a bound that the caller can change.
         let rules = [
             (self.image_width >= MIN_WIDTH, "image_width", "must be at least 64 px"),
             (self.image_height >= MIN_HEIGHT, "image_height", "must be at least 32 px"),
@@ -255,6 +257,7 @@ impl<'o> Question<'o> {
         }
         // Surfaces of the same extent take fewer blocks of larger voxels, by the square of their
         // side.
+        // The default voxel's side compared with the one asked for.
         let finer = f64::from(VOXEL_SIZE_M) / f64::from(voxel_size_m);
         let pixels = width * height;
         let at_default = if pixels / 20 > 12_000 { pixels / 20 } else { 12_000 };

@@ -103,6 +103,7 @@ impl Config {
     /// ```
     pub fn validate(&self) -> Problems {
         let mut problems = Problems::new();
+        // The rig is checked once; each of its problems has a key of its own.
         let rig = self.rig.validate();
         require(
             &mut problems,

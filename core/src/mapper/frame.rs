@@ -77,8 +77,10 @@ impl<'a> StereoFrame<'a> {
             pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));
         }
         if let Some(time_ns) = self.time_ns {
+            // An absent time adds nothing to the digest.
             digest.u64(time_ns);
         }
+        // A sum, so that the order in which a detector lists its finds does not matter.
         digest.u64(self.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
         digest.finish()
     }

@@ -97,12 +97,16 @@ impl<'s> Localization<'s> {
             Found::new(if seen.number == 0 { PoseOrigin::First } else { PoseOrigin::Given })
         } else if seen.config.mapper.egomotion == MotionSource::Icp {
             let icp = (seen.number > 0).then(|| self.register_depth(seen, static_map, executor));
+            // ICP needs a picture of the map, which the first frame does not have yet.
             Found { icp, ..Found::new(self.origin(icp.is_some())) }
         } else {
             match seen.flow_status {
+                // One frozen camera: its matches would show a motion that did not happen.
                 FlowStatus::Frozen => self.hold(seen),
                 FlowStatus::Repeated
                     if !self.camera.may_stand(&seen.config.egomotion, seen.interval_s) =>
+                // Two equal images are one delivered twice, unless the camera can have stopped by
+                // now.
                 {
                     self.hold(seen)
                 }
@@ -200,6 +204,7 @@ impl<'s> Localization<'s> {
         let is_cast = static_map.cast(&seen.view(self.camera.t_world_camera()), executor);
         let mut report =
             if is_cast { static_map.register(seen, config) } else { IcpReport::unpaired() };
+        // Matches do not take part; they only tell how much of the image moves as depth says.
         report.matches = self.estimator.count_inliers(
             &seen.config.scaled_rig(),
             seen.selected(),

@@ -154,12 +154,15 @@ impl<'s> Mapper<'s> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
         }
+        // Checked before bytes are summed up: the sum could wrap on a small machine.
         if !capacity.is_countable(usize::MAX as u64) {
             return Err(NewError::Slab(SlabError::TooSmall { missing: usize::MAX }));
         }
         let mut carver = Carver::new(slab, capacity.bytes())?;
+        // The regions are cut first and checked once: a slab too short leaves empty ones.
         let mut mapper = Self::new_in(capacity, config, &mut carver);
         carver.check()?;
+        // Maps are filled only now that the memory for them exists.
         if let Some(rectification) = &config.rectification {
             mapper
                 .rectifier
@@ -212,6 +215,8 @@ impl<'s> Mapper<'s> {
             return Err(StepError::RawSizeDiffers { width: left[0], height: left[1] });
         }
         let same = |width: usize, height: usize| size == [width, height];
+        // Colour and left image come from one camera; the images of classes and disparities are
+        // rectified.
         let right = right == [frame.right.width(), frame.right.height()];
         let colour = frame.colour.is_none_or(|image| left == [image.width(), image.height()]);
         let class = frame.class.is_none_or(|image| same(image.width(), image.height()));
@@ -239,6 +244,7 @@ impl<'s> Mapper<'s> {
         if !self.clock.may_follow(frame.time_ns) {
             return Err(StepError::TimeNotLater);
         }
+        // History, masks and maps of rectification belong to one size.
         if self.size.is_some_and(|known| known != size) {
             return Err(StepError::SizeChanged);
         }

@@ -104,6 +104,7 @@ impl<'s> Mapper<'s> {
         let state = track.motion_state.state();
         let moves = state == MotionState::Dynamic;
         let posed = self.objects.posed(&self.tracker).find(|posed| posed.summary.id == track.id);
+        // A static object is in the map already.
         if state == MotionState::Static || (!moves && posed.is_some()) {
             return None;
         }
@@ -111,6 +112,7 @@ impl<'s> Mapper<'s> {
         let in_grid = |vector: [f64; 3]| grid.of_world(vector).map(|c| c * grid.cell_m());
         let velocity = if moves { in_grid(track.filter.velocity().into()) } else { [0.0; 3] };
         let velocity = [velocity[0], velocity[1]];
+        // The box's heading is that of the motion.
         let mut fit = BoxFit::new(velocity, in_grid(track.filter.center_world().coords.into()));
         match &posed {
             Some(posed) => self.add_object(&mut fit, posed),
@@ -118,6 +120,7 @@ impl<'s> Mapper<'s> {
             None => return None,
         }
         let moving = fit.solve().filter(|_| fit.points() >= POINTS_MIN)?;
+        // An object that has not moved may begin to: up to the speed that would make it dynamic.
         let sigma_m_s =
             if moves { track.sigma_m_s } else { self.config.tracking.state.dynamic_m_s };
         Some(MovingBox {
@@ -148,6 +151,7 @@ impl<'s> Mapper<'s> {
     fn add_mask(&self, fit: &mut BoxFit, track: &Track, rig: &StereoRig) {
         let (disparity_q8, grid) = (self.stereo.disparity_q8(), self.planning.grid());
         let pixels = track.mask.pixels;
+        // Clipped to the image: a mask's box may reach beyond it.
         let span = |from: i32, length: i32, size: usize| {
             let [from, to] =
                 [from, from.saturating_add(length)].map(|at| usize::try_from(at).unwrap_or(0));

@@ -58,6 +58,7 @@ impl<'s> Mapper<'s> {
         let map = &mut self.static_map;
         executor.stage(Stage::Raycast, || {
             map.raycaster.cast(&map.volume, &view, executor)?;
+            // The static map is layer 0.
             for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
                 // An object too far away for its coordinates is too far away to be seen.
                 let _ = map.raycaster.cast_over(
@@ -85,6 +86,7 @@ impl<'s> Mapper<'s> {
             .posed(&self.tracker)
             .find(|posed| posed.summary.id == track)
             .ok_or(RaycastError::Object)?;
+        // The camera is moved into the object's frame, in which the volume stands still.
         let view = from_object(&view, &posed);
         executor.stage(Stage::Raycast, || {
             self.static_map.raycaster.cast(posed.object.volume(), &view, executor)

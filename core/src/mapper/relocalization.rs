@@ -76,6 +76,7 @@ impl StaticMap<'_> {
     ) -> Option<Transform> {
         let mut t_world_camera = *guess;
         let mut correlation = self.correlation_at(seen, &t_world_camera, executor)?;
+        // Registration may run off: the best of all steps counts, not the last.
         let mut best = (correlation, t_world_camera, self.mean_depth_m());
         for _ in 0..REGISTRATIONS {
             let report = self.register(seen, &REGISTRATION);
@@ -89,12 +90,15 @@ impl StaticMap<'_> {
             }
         }
         let (correlation, t_world_camera, depth_m) = best;
+        // A pose is accepted only if poses a little to each side look less like the image: on a
+        // plain wall all look alike.
         let is_less_like = |aside: &Transform| {
             let there =
                 self.correlation_at(seen, &(t_world_camera * *aside).normalized(), executor);
             is_clearer(correlation, there.unwrap_or(0.0))
         };
         let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
+        // Turned about the scene's middle, so that the view stays on it.
         let around = |angle_rad: f64| {
             ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m)
         };
@@ -140,6 +144,7 @@ fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f6
     let (width, height) = (grey.width(), grey.height());
     let shown = |u: usize, v: usize| {
         let [red, green, blue] = picture.get(u, v)?.map(i64::from);
+        // Black shows nothing of the map.
         (red + green + blue > 0).then_some((red + 2 * green + blue) / 4)
     };
     let seen = |u: usize, v: usize| grey.get(u, v).map(i64::from);
@@ -147,6 +152,7 @@ fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f6
     // below 2^8, so sums fit.
     let (mut sums, mut squares, mut products, mut count) = ([0i64; 2], [0i64; 2], 0i64, 0i64);
     for v in (EDGE_PX..height.saturating_sub(EDGE_PX)).step_by(2) {
+        // A quarter of the pixels is enough for a correlation.
         for u in (EDGE_PX..width.saturating_sub(EDGE_PX)).step_by(2) {
             for (before, after) in
                 [([u - EDGE_PX, v], [u + EDGE_PX, v]), ([u, v - EDGE_PX], [u, v + EDGE_PX])]

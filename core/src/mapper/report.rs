@@ -134,6 +134,7 @@ impl Report {
     /// The worst event of this step. The map is affected where anything that belongs in a map was
     /// refused or lost: blocks of any map, detections, tracks, objects, masks and crops.
     pub fn severity(&self) -> Severity {
+        // Anything lost for the map counts, however little.
         let allocation = &self.allocate;
         let blocks =
             allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;

@@ -26,6 +26,7 @@ impl Segmentation<'_, '_> {
         let Self { segmenter, plans } = self;
         let (config, disparity_q8) = (seen.config, seen.disparity_q8);
         let (rig, motion) = (config.scaled_rig(), &config.tracking.motion);
+        // Without the camera's motion nothing can be said to move on its own.
         let segments = config.tracking.dynamic
             && config.segmentation.enabled
             && camera.t_current_previous.is_some();

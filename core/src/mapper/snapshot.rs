@@ -155,6 +155,7 @@ impl<'s> Mapper<'s> {
         let (mut magic, mut version, mut prints) = ([0; 8], 0, [0; 2]);
         reader.bytes(&mut magic);
         reader.check()?;
+        // Checked one by one, so that each error says what is different.
         if magic != MAGIC {
             return Err(RestoreError::Foreign);
         }
@@ -165,14 +166,17 @@ impl<'s> Mapper<'s> {
         }
         reader.u64s(&mut prints);
         reader.check()?;
+        // Capacity and configuration are not in the file; only their fingerprints are.
         if prints[0] != fingerprint(capacity) {
             return Err(RestoreError::Capacity);
         }
         if prints[1] != fingerprint(config) {
             return Err(RestoreError::Config);
         }
+        // One description reads, writes and hashes the state.
         self.visit(&mut reader);
         reader.finish()?;
+        // Indices and lists follow from what was read; contradictions end here.
         if self.rebuild() { Ok(()) } else { Err(RestoreError::Damaged) }
     }
 
@@ -198,6 +202,7 @@ impl<'s> Mapper<'s> {
             rectified: _,
             aligned: _,
         } = self;
+        // An absent size is written as zero.
         let [mut width, mut height] = size.unwrap_or_default();
         visitor.u32(frame);
         clock.visit(visitor);

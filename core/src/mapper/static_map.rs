@@ -84,6 +84,7 @@ impl<'s> StaticMap<'s> {
             disparity_q8: seen.disparity_q8,
         };
         executor.stage(Stage::Fuse, || observed.write(&mut depths, executor));
+        // After all pixels have depth: objects are removed from it, and not allocated.
         let mut depth_m = depths.peeled_mut();
         executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
     }

@@ -61,6 +61,7 @@ impl Mapper<'_> {
         sink: &mut O,
     ) -> Result<Report, StepError> {
         self.validate(frame)?;
+        // Of the input as it came, before rectification.
         let input = frame.digest();
         // The rectified images are lent out for the step, so that the stages may read them while
         // they change the mapper.
@@ -70,6 +71,7 @@ impl Mapper<'_> {
             executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
         let Pair { left, right, colour } = rectified.unwrap_or(raw);
         let rectification = self.rectifier.report(&Pair { left, right, colour });
+        // The self-calibration may ask for shifted rows of the right image.
         let mut aligned = core::mem::take(&mut self.aligned);
         let moved =
             self.localization.self_calibration.row_shift(&self.config.rig).and_then(|shift| {
@@ -77,6 +79,7 @@ impl Mapper<'_> {
             });
         let frame = StereoFrame { left, right: moved.unwrap_or(right), colour, ..*frame };
         let report = self.step_rectified(&frame, executor, store, sink);
+        // The images go back after every step: the next one needs their memory.
         (self.rectified, self.aligned) = (images, aligned);
         Ok(report.with_input(input, rectification))
     }
@@ -161,6 +164,7 @@ impl Mapper<'_> {
         frame: &StereoFrame<'_>,
         executor: &E,
     ) -> (StereoReport, FlowReport) {
+        // Pixels that no raw pixel covers take no part.
         let Self { config, rectifier, stereo, scene_flow, .. } = self;
         let invalid = rectifier.invalid();
         let pair = MaskedPair { left: frame.left, right: frame.right, invalid: invalid.as_ref() };
@@ -203,9 +207,11 @@ impl Mapper<'_> {
             allocation,
             prune,
         } = outcome;
+        // A lost frame is skipped as a reference: the next one is matched with the last good one.
         if self.localization.camera.since_reference() > 0 {
             self.scene_flow.keep_previous();
         }
+        // Free space seen from a guessed pose would free the wrong cells.
         if fused {
             self.observe_free_space(&camera.t_world_camera, ground);
         }

@@ -54,9 +54,11 @@ impl<'m, 's> ScaledMask<'m, 's> {
                 visit(first..end.min(width));
             }
         };
+        // A box has no bits: each row is one run.
         if self.mask.is_box() {
             return visit_scaled(0..from.width);
         }
+        // Enlarging by a fraction: a pixel belongs to the mask if both rows it comes from do.
         let [above, below] = sources(v - scaled.top, from.height, scaled.height)
             .map(|row| self.store.row(&self.mask, from.top + row));
         let before = from.left - self.mask.origin();

@@ -220,6 +220,7 @@ impl<'s> MaskStore<'s> {
         for v in common.top..common.top + common.height {
             let mut u = common.left;
             while u < common.left + common.width {
+                // Words of both masks at the same pixels; bits outside a mask are zero.
                 let bits =
                     self.bits(mask, u, v) & other.bits(other_mask, u - shift[0], v - shift[1]);
                 both += i64::from(bits.count_ones());

@@ -51,10 +51,12 @@ impl CropSource<'_> {
             return 0;
         };
         let size = [width.max(1) as usize, height.max(0) as usize];
+        // The histogram has bins of half a pixel: the middle of the median's bin is taken.
         let median = self.copy_masked(disparities).median().unwrap_or(0);
         let focal_baseline = self.rig.focal_baseline_px_m();
         let depth = focal_baseline / ((median as f64 + 0.5) * 0.5);
         let extent_m = f64::from(self.extent_m);
+        // A limit at or behind the camera excludes nothing.
         let limits = [depth + extent_m, depth - extent_m].map(|depth_m| {
             let disparity = focal_baseline / depth_m * 256.0;
             if depth_m > 0.0 && disparity < 65_535.0 { disparity as u16 } else { u16::MAX }
@@ -79,6 +81,7 @@ impl CropSource<'_> {
             for ((u, row), from) in
                 (left..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)).zip(from.chunks(BLOCK))
             {
+                // Masks are read by words: BLOCK pixels at a time.
                 let bits = self.masks.bits(self.mask, u, top + v as i32);
                 for (i, (to, &disparity)) in row.iter_mut().zip(from).enumerate() {
                     *to = if bits >> i & 1 == 1 { disparity } else { 0 };
@@ -124,6 +127,7 @@ impl Work for LeaveOut<'_> {
                     continue;
                 }
                 for (disparity, nearest) in block.iter_mut().zip(surroundings.nearest(u, v)) {
+                    // Just behind an edge the matcher mixes foreground and background.
                     let is_behind_edge = nearest > disparity.saturating_add(EDGE_Q8);
                     *disparity = if is_kept(*disparity) & !is_behind_edge { *disparity } else { 0 };
                     kept += u32::from(*disparity > 0);
@@ -228,6 +232,7 @@ impl<'s> Crops<'s> {
     /// Adds a crop, its disparity given row by row. Returns how many kept crops it displaced, or
     /// `None` when it is larger than the ring.
     pub fn push(&mut self, crop: Crop, disparity_q8: &[u16], picture: &Picture<'_>) -> Option<u32> {
+        // The part of the image is checked first: an error leaves the ring as it was.
         let picture = picture.part(&crop.pixels)?;
         let len = crop.pixels.area() as usize;
         if len > self.disparity_q8.len() || len == 0 {
@@ -270,6 +275,7 @@ impl<'s> Crops<'s> {
             coloured: u32::from(coloured.is_some()),
             ..crop
         };
+        // The digest covers the pixels, which only now are in place.
         kept.digest = self.digest(&kept);
         *self.entries.get_mut(self.len)? = kept;
         self.len += 1;
@@ -341,6 +347,7 @@ impl<'s> Crops<'s> {
         for crop in entries.iter_mut().take(*len) {
             crop.visit(visitor);
             let span = crop.start as usize..crop.start as usize + crop.len as usize;
+            // Lengths from a file are not trusted: pixels must lie in the ring and match the box.
             if span.end > disparity_q8.len() || i64::from(crop.len) != crop.pixels.area() {
                 visitor.refuse();
                 return;

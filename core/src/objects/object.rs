@@ -213,8 +213,10 @@ impl<'s> ObjectVolumes<'s> {
         }
         let summaries =
             self.objects.iter().enumerate().filter_map(|(at, object)| Some((at, object.summary?)));
+        // The object fused longest ago, between equals the older track's: a stated order.
         let (oldest, summary) =
             summaries.min_by_key(|(_, summary)| (summary.last_frame, summary.id))?;
+        // One fused in this very frame is in view: the new object is refused instead.
         if summary.last_frame == frame {
             return None;
         }

@@ -30,6 +30,7 @@ impl<'s> Objects<'s> {
         tracker: &'a Tracker<'_>,
     ) -> impl Iterator<Item = PosedObject<'a, 's>> {
         self.objects().filter_map(move |(summary, object)| {
+            // A volume belongs to one segment of a trajectory; in a later one its pose is unknown.
             let is_fused_segment = |track: &&Track| {
                 track.id == summary.id
                     && track.segment_len > 0
@@ -41,6 +42,7 @@ impl<'s> Objects<'s> {
                 .find(is_fused_segment)
             {
                 Some(track) => track.t_world_object,
+                // A static object stays where it was, out of view, too.
                 None if summary.state == MotionState::Static => summary.t_world_object,
                 None => return None,
             };

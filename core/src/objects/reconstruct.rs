@@ -60,6 +60,7 @@ impl<'s> Objects<'s> {
             .map(|(track, _)| track)
             .filter(is_new_segment)
             .for_each(|track| self.crops.forget(track.id));
+        // Objects whose track is gone retire before new ones need a volume.
         self.retire_orphans(tracker, sink);
         if let Some(frame) = frame {
             let detected = tracker
@@ -84,6 +85,7 @@ impl<'s> Objects<'s> {
         sink: &mut impl ObjectSink,
     ) {
         let &DetectedTrack { tracker, track, instance, frame } = detected;
+        // Only reconstructed classes, with a pose, near enough for a mask with detail.
         if track.segment_len == 0
             || track.class().treatment() != Treatment::Reconstruct
             || instance.tracked_only.get()
@@ -103,6 +105,7 @@ impl<'s> Objects<'s> {
             masks: tracker.masks(),
             mask: &instance.mask,
         };
+        // Nothing of the object has depth in this frame.
         if source.copy_into(disparity, executor.vectors()) == 0 {
             return;
         }
@@ -160,12 +163,14 @@ impl<'s> Objects<'s> {
         let pixels = CropPixels { crop, disparity_q8, picture: &picture };
         self.report.blocks_refused += fuse_crop(object, frame.rig, &pixels, depth_m, executor);
         self.report.fused += 1;
+        // The summary is what the object's sink and the planner read.
         if let Some(summary) = &mut object.summary {
             summary.class = track.class();
             summary.state = track.motion_state.state();
             summary.last_frame = number;
             summary.frames += 1;
             summary.t_world_object = track.t_world_object;
+            // Pruned whole every few frames: an object has no history of visible blocks.
             if self.config.prune_weight > 0
                 && summary.frames.is_multiple_of(u32::from(self.config.prune_frames))
             {
@@ -192,6 +197,7 @@ impl<'s> Objects<'s> {
         let ObjectVolumes { objects, depth_m, .. } = &mut self.volumes;
         let Some(object) = objects.get_mut(at) else { return };
         self.report.begun += 1;
+        // An object counts from this frame on, although its crops are older.
         object.summary = Some(ObjectSummary {
             id: track.id,
             segment_id: track.segment_id,
@@ -256,6 +262,7 @@ fn fuse_crop<E: Executor>(
         return 0;
     };
     let volume = object.volume.config();
+    // Limits of depth are the volume's own.
     depth_from_disparity(rig, volume.near_m, volume.far_m, disparity, &mut depth);
     // The crop's corner shifts the principal point.
     let rig = StereoRig {

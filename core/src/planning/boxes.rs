@@ -71,6 +71,7 @@ impl MovingBox {
         let more = sigmas * self.sigma_m + 0.5 * cell_m;
         let [along, across, up] = self.half_m.map(|half| half + more);
         let [cos, sin] = self.heading;
+        // Half the sides of the upright box of the grid's axes around the turned one.
         let reach = [
             (cos * along).abs() + (sin * across).abs(),
             (sin * along).abs() + (cos * across).abs(),
@@ -85,6 +86,7 @@ impl MovingBox {
         {
             let bound = |at: f32| {
                 let cell = at / cell_m - origin as f32;
+                // A position that is not a number reaches no cell.
                 if cell.is_finite() { min_f32(max_f32(cell, 0.0), size as f32) as usize } else { 0 }
             };
             *span = [bound(center - reach), bound(center + reach + cell_m)];
@@ -98,6 +100,7 @@ impl MovingBox {
         let [columns, rows, levels] = spans;
         for y in rows[0]..rows[1] {
             for x in columns[0]..columns[1] {
+                // In the box's own axes two comparisons decide.
                 let (dx, dy) = (center(0, x), center(1, y));
                 let is_beside =
                     (cos * dx + sin * dy).abs() > along || (cos * dy - sin * dx).abs() > across;
@@ -160,7 +163,9 @@ impl BoxFit {
         let mean = self.sum.map(|sum| sum / self.count);
         let mut half_m = [0.0; 3];
         for ((half, squares), mean) in half_m.iter_mut().zip(self.squares).zip(mean) {
+            // Rounding may leave a variance slightly below zero.
             let variance = squares / self.count - mean * mean;
+            // Two sigmas of evenly spread points reach beyond the box's end: at least HALF_MIN_M.
             *half = max_f32(
                 2.0 * libm::sqrt(if variance > 0.0 { variance } else { 0.0 }) as f32,
                 HALF_MIN_M,
@@ -168,6 +173,7 @@ impl BoxFit {
         }
         let [cos, sin] = self.heading;
         let [along, across, up] = mean;
+        // The sums were taken along the object's heading: turn their mean back into the grid.
         let center = [
             self.near[0] + cos * along - sin * across,
             self.near[1] + sin * along + cos * across,

@@ -203,6 +203,7 @@ impl<'s> Cells<'s> {
             let of = |cell: Cell| i64::from(cell.get(axis).copied().unwrap_or_default());
             of(origin) - of(before)
         });
+        // A jump of a whole window or more leaves no cell in common.
         let far =
             shifts.iter().zip(self.size).any(|(shift, size)| shift.unsigned_abs() >= size as u64);
         if far {
@@ -215,6 +216,8 @@ impl<'s> Cells<'s> {
         for y in 0..length {
             for x in 0..width {
                 let column = self.column(x, y);
+                // Cells wrap around in memory: only those that enter are cleared, and none is
+                // moved.
                 if is_new(dx, x, width) || is_new(dy, y, length) {
                     self.clear(column..column + height);
                 } else if dz != 0 {

@@ -125,9 +125,11 @@ impl<'s> DistanceField<'s> {
         }
         let row = width * height;
         self.across_rows(is_obstacle, row, length);
+        // The second pass, along x.
         for y in 0..length {
             (0..height).for_each(|z| self.along_line(is_obstacle, [y * row + z, height, width]));
         }
+        // The third pass, along z; a field of one level has none.
         if height > 1 {
             (0..width * length)
                 .for_each(|column| self.along_line(is_obstacle, [column * height, 1, height]));
@@ -202,6 +204,7 @@ impl<'s> DistanceField<'s> {
     /// One run of a line: the cells `begin..end` are of one kind, those next to it of the other.
     fn along_run(&mut self, [first, step, count]: [usize; 3], begin: usize, end: usize) {
         let mut len = 0usize;
+        // The cells next to the run, one at each end, are obstacles of the other kind.
         let from = begin.saturating_sub(1);
         let to = if end < count { end + 1 } else { end };
         for at in from..to {
@@ -219,6 +222,7 @@ impl<'s> DistanceField<'s> {
             };
             // A parabola that is nowhere lowest is dropped before this one is added.
             let site = Site { at: at as u32, squared, nearest, reserved: 0 };
+            // The lower envelope of the parabolas, after Felzenszwalb and Huttenlocher.
             while let Some([before, last]) = len
                 .checked_sub(2)
                 .and_then(|low| self.sites.get(low..len))
@@ -236,6 +240,8 @@ impl<'s> DistanceField<'s> {
         }
         let mut sites = clipped_mut(self.sites, ..len).iter().peekable();
         let Some(mut current) = sites.next() else { return };
+        // Envelope and cells ascend together: each cell moves on to the parabola that is lowest
+        // there.
         for at in begin as u32..end as u32 {
             let mut squared = current.squared_from(at);
             while let Some(next) = sites.next_if(|next| next.squared_from(at) < squared) {

@@ -41,6 +41,7 @@ impl Planning<'_> {
     /// time can be asked for next.
     pub fn predict(&mut self, ahead_s: f32) -> PlanningReport {
         let Self { cells, boxes, grid, config, box_count, .. } = self;
+        // Boxes of an earlier prediction leave no trace.
         cells.bits.iter_mut().for_each(|bits| *bits &= !OBJECT);
         for moving in boxes.iter().take(*box_count) {
             moving.predicted(ahead_s).draw(grid, config.object_sigmas, cells);

@@ -99,6 +99,7 @@ impl<'a> Rays<'a> {
         // The grid's axes in the camera: the rotation backwards.
         let axes = turn.map(|row| row.map(|c| c * cell_m));
         let mut first = [0.0; 3];
+        // The camera coordinates of the first cell's centre; all others are steps along the axes.
         for ((axis, origin), camera) in axes.iter().zip(cells.origin).zip(camera) {
             let offset = f64::from(origin) + 0.5 - camera;
             first.iter_mut().zip(axis).for_each(|(first, along)| *first += along * offset);
@@ -181,11 +182,14 @@ impl<'a> Rays<'a> {
         let half_px = self.half_side_px_m / z;
         let image = self.disparity_q8;
         let (Some(columns), Some(rows)) = (
+            // The pixels that the cell can cover; none, and the cell is not in view.
             span(x * scale + self.center_px[0], half_px, image.width()),
             span(y * scale + self.center_px[1], half_px, image.height()),
         ) else {
             return Visibility::Not;
         };
+        // The nearest surface among these pixels decides: one ray past an obstacle does not free a
+        // cell.
         let disparity_q8 = f32::from(self.pyramid.greatest(image, columns, rows));
         if disparity_q8 == 0.0 {
             Visibility::Not

@@ -36,6 +36,7 @@ impl Grid {
         let up = normalized([config.up_x, config.up_y, config.up_z].map(f64::from));
         // Ahead is the world's z, or its y where up is along z, without the part that is up.
         let ahead = if up[2] * up[2] < 0.9 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
+        // Gram and Schmidt: ahead loses its part along up.
         let part = dot(ahead, up);
         let ahead =
             normalized([ahead[0] - part * up[0], ahead[1] - part * up[1], ahead[2] - part * up[2]]);
@@ -44,6 +45,8 @@ impl Grid {
             ahead[2] * up[0] - ahead[0] * up[2],
             ahead[0] * up[1] - ahead[1] * up[0],
         ];
+        // Rounded once to integers: cells of a point are then found in integers, the same
+        // everywhere.
         let turn_q14 =
             [right, ahead, up].map(|axis| axis.map(|c| libm::round(c * TURN_ONE) as i32));
         Self {

@@ -184,6 +184,8 @@ impl<'s> HeightMap<'s> {
         let &Growth { config, cell_m, cells, .. } = growth;
         let (reference_m, gap) = self.reference(at, growth);
         let gap_m = f32::from(gap) * cell_m;
+        // Real ground may differ from the expected height by a step, by a slope over one cell, and
+        // by a drift that grows with the columns without ground.
         let allowed_m = config.ground_step_m
             + config.slope_max * cell_m
             + min_f32(DRIFT * gap_m, config.ground_step_m);
@@ -198,6 +200,7 @@ impl<'s> HeightMap<'s> {
         match best {
             Some((height_m, _)) => Column {
                 height_m,
+                // The next ring starts from what was found, not from what was expected.
                 reference_m: height_m,
                 flags: Column::GROUND,
                 ..Column::default()
@@ -225,6 +228,7 @@ impl<'s> HeightMap<'s> {
             return (self.level.height_m, 0);
         }
         // The column in the ring before that lies straight towards the camera, and those beside it.
+        // Rounded division brings a column of this ring to the nearest one of the ring before.
         let towards =
             |d: i32| (2 * d * (ring - 1) + d.signum() * ring).checked_div(2 * ring).unwrap_or(0);
         let side = if dx.abs() > dy.abs() { [0, 1] } else { [1, 0] };
@@ -259,6 +263,7 @@ impl<'s> HeightMap<'s> {
         let cell_m = growth.cell_m;
         let mut column = self.get(x, y);
         let Some(height_m) = column.ground_m() else { return column };
+        // Differences to the column's own height keep the sums small.
         let mut fit = PlaneFit::default();
         for dy in FIT_OFFSETS {
             for dx in FIT_OFFSETS {
@@ -314,6 +319,7 @@ fn surfaces([x, y]: [usize; 2], cell_m: f32, cells: &Cells<'_>) -> impl Iterator
         }
         (count > 0).then_some((count, i32::from(*cells.sum.get(position)?)))
     };
+    // Sums are read from below, so that the surfaces come out in order of height.
     let mut z = 0;
     core::iter::from_fn(move || {
         while z < cells.size[2] {

@@ -150,6 +150,7 @@ impl<'s> Planning<'s> {
     ) -> Self {
         let [width, length, height] = Cells::sides(capacity);
         let columns = width * length;
+        // The field in three dimensions is optional: without it no cell is allocated.
         let cells = if capacity.planning_distance_3d { columns * height } else { 0 };
         let longest = if width > height { width } else { height };
         Self {
@@ -225,11 +226,14 @@ impl<'s> Planning<'s> {
         let [a, b] =
             [ahead, right].map(|to| [to[0] - below[0], to[1] - below[1], to[2] - below[2]]);
         let determinant = a[0] * b[1] - a[1] * b[0];
+        // Two directions that are nearly parallel, as with a camera that looks straight down, span
+        // no plane.
         if libm::fabs(determinant) > 1.0 {
             let slope = [
                 (a[2] * b[1] - b[2] * a[1]) / determinant,
                 (a[0] * b[2] - b[0] * a[2]) / determinant,
             ];
+            // The level holds below the camera, from where growth begins.
             let camera = in_grid([0.0; 3]);
             let height_m =
                 below[2] + slope[0] * (camera[0] - below[0]) + slope[1] * (camera[1] - below[1]);

@@ -36,6 +36,7 @@ impl PlaneFit {
             return None;
         }
         let n = self.count as f32;
+        // Sums about the mean: heights are large compared with their differences.
         let central = |sum: f32, a: f32, b: f32| sum - a * b / n;
         let (xx, xy, yy) = (
             central(self.xx, self.x, self.x),
@@ -47,11 +48,14 @@ impl PlaneFit {
             central(self.yz, self.y, self.z),
             central(self.zz, self.z, self.z),
         );
+        // A determinant below the count means points close to a line: their slope across it is
+        // unknown.
         let determinant = xx * yy - xy * xy;
         if determinant < n {
             return None;
         }
         let slope = [(xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant];
+        // What the plane leaves of the squares; rounding may make it negative.
         let rest = zz - slope[0] * xz - slope[1] * yz;
         Some((slope, libm::sqrtf(max_f32(rest, 0.0) / n)))
     }

@@ -55,6 +55,7 @@ impl<'s> Pyramid<'s> {
             else {
                 return;
             };
+            // Beyond the border there is no surface: 0.
             let at = |u: usize, v: usize| match below {
                 None => image.get(u, v).unwrap_or(0),
                 Some(below) if u < width => below.get(v * width + u).copied().unwrap_or(0),

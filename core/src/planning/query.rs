@@ -89,8 +89,10 @@ pub(super) fn ray(
         point.iter_mut().zip(direction).for_each(|(point, along)| *point += along * at_m / length);
         let lattice = point.map(|c| libm::floor(c / voxel_m + 0.5) as i32);
         let end = match sampler.voxel(lattice) {
+            // Zero or below is behind the surface; ghosts of moved objects are no surface.
             Some(voxel) if voxel.sdf <= 0 && !bits_at(grid, cells, point).is_some_and(is_ghost) => {
                 let now = f64::from(voxel.sdf);
+                // Linear between the two samples: finer than the step.
                 let back = before.map_or(0.0, |before| now / (now - before) * step_m);
                 return FreePath {
                     end: PathEnd::Surface,
@@ -103,6 +105,7 @@ pub(super) fn ray(
             }
             None => state_at(grid, cells, point),
         };
+        // A surface between two samples with unknown space between them has no position.
         before = None;
         // Unknown is never free.
         if end == CellState::Unknown {
@@ -150,6 +153,7 @@ pub(super) fn sweep(
     let mut way = FreePath { end: PathEnd::Free, free_m: whole_m };
     let voxel_m = f64::from(volume.config().voxel_size_m);
     let block_m = voxel_m * BLOCK_SIDE as f64;
+    // Blocks in the order of the pool; the nearest touch wins, so that the order does not matter.
     for slot in volume.pool().live() {
         let Some(coord) = volume.blocks().coord(slot) else { continue };
         let center = to_grid_m(coord.origin().map(|c| f64::from(c) * voxel_m + 0.5 * block_m));
@@ -165,6 +169,7 @@ pub(super) fn sweep(
             let point = to_grid_m(point_m);
             let mut start_m = 0.0;
             for leg in legs() {
+                // Legs in order: the first that touches the point is where the robot meets it.
                 if let Some(at_m) = leg.touches(point, robot) {
                     if start_m + at_m < way.free_m {
                         way = FreePath { end: PathEnd::Surface, free_m: start_m + at_m };
@@ -250,6 +255,7 @@ impl Leg {
         let until_m = if until_m < self.length_m { until_m } else { self.length_m };
         let middle = 0.5 * (robot.low_m + robot.high_m);
         let steps = until_m / (0.5 * cell_m);
+        // Written so that NaN is refused; the bound keeps the cast exact.
         if !(0.0..1e7).contains(&steps) {
             return None;
         }

@@ -24,6 +24,7 @@ pub(super) fn reduce(
     for y in 0..length {
         for x in 0..width {
             let column = ground.get(x, y);
+            // A level robot keeps its height; others follow the ground.
             let level_m = if config.level { ground.level_m() } else { column.reference_m };
             // The first cell that lies above the lower limit as a whole, and the last that begins
             // below the upper one.
@@ -31,6 +32,7 @@ pub(super) fn reduce(
             let to = ceil_cell(level_m + config.high_m - floor_m, cell_m);
             let [from, to] = [from, to].map(|at| usize::try_from(at).unwrap_or(0).min(height));
             let first = cells.column(x, y);
+            // Every cell of the robot's height counts: one occupied cell blocks the column.
             let states_above = (from..to).map(|z| {
                 CellState::of(cells.bits.get(first + cells.level(z)).copied().unwrap_or_default())
             });

@@ -74,12 +74,15 @@ pub(crate) fn crossings(
         if let Some(along) = offset.get_mut(axis) {
             *along = 1;
         }
+        // The last plane of points has its edges into the next block.
         let next = coord.offset(offset).and_then(|coord| volume.find(coord));
         let next = next.and_then(|slot| Some((blocks.sdf(slot)?, blocks.weight(slot)?)));
         let [next_before, next_behind] = next
             .map_or([[0; BLOCK_SIDE]; 2], |(sdf, weight)| signs_of_block(sdf, weight, min_weight));
         let after = |words: &[u64; BLOCK_SIDE], next: &[u64; BLOCK_SIDE], z: usize| {
             let word = words.get(z).copied().unwrap_or_default();
+            // The bits of the points one step further along the axis, those of the next block
+            // filled in.
             let beside = next.get(z).copied().unwrap_or_default();
             match axis {
                 0 => (word >> 1 & BUT_LAST_COLUMN) | (beside << 7 & LAST_COLUMN),
@@ -111,6 +114,7 @@ pub(crate) fn crossings(
                 let (low, high) = (i32::from(low), i32::from(high));
                 let mut point = origin;
                 point.iter_mut().zip(local).for_each(|(point, local)| *point += local as i32);
+                // Where the line between the two distances is zero, in 256ths of a voxel.
                 let at_q8 = (STEP_ONE * low).checked_div(low - high).unwrap_or(0);
                 visit(Crossing { point, axis, at_q8, leaves_upwards: low <= 0 });
             }
@@ -164,6 +168,7 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
     let cell = i64::from(grid.cell_voxels) << TURN_BITS;
     let [.., up] = grid.turn_q14;
     let steepest = |&(_, along): &(usize, i32)| along.unsigned_abs();
+    // The steepest axis; of equals the first, because `max_by_key` keeps the last of the reversed.
     let (up_axis, up_along) =
         up.into_iter().enumerate().rev().max_by_key(steepest).unwrap_or_default();
     let window = Window {
@@ -189,6 +194,7 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
 
 /// Marks the cell of a surface point. Whether it lies in the window.
 fn mark(window: &Window<'_>, crossing: &Crossing, cells: &mut Cells<'_>) -> bool {
+    // Fixed point from here on: 256ths of a voxel.
     let mut point_q8 = crossing.point.map(|c| i64::from(c) * i64::from(STEP_ONE));
     if let Some(along) = point_q8.get_mut(crossing.axis) {
         *along += i64::from(crossing.at_q8);
@@ -212,6 +218,7 @@ fn mark(window: &Window<'_>, crossing: &Crossing, cells: &mut Cells<'_>) -> bool
     }
     // Upward faces are ground candidates: their heights are averaged by cell.
     if crossing.axis == window.up_axis && crossing.leaves_upwards == window.up_is_positive {
+        // A cell's height in 256ths, for cells of any size.
         let above = (at[2] - local[2] as i64 * window.cell) as i32;
         let share =
             (i64::from(above) * i64::from(SIDE_ONE)).checked_div(window.cell).unwrap_or(0) as u16;

@@ -128,12 +128,15 @@ impl RawRig {
         if self.angle_rad() > WIDEST_ANGLE_RAD {
             return Err(RectifyProblem::Diverging);
         }
+        // Each camera turns half of the way, so that both lose equally little of their view.
         let half = half_way(&r_right_left);
         let along = half * to_right / baseline_m;
+        // More aside than along: one camera stands above or ahead of the other.
         let aside = libm::sqrt(along.y * along.y + along.z * along.z);
         if libm::fabs(along.x) < aside {
             return Err(RectifyProblem::NotSideBySide);
         }
+        // The right camera stands on the left: the images or the calibrations are exchanged.
         if along.x < 0.0 {
             return Err(RectifyProblem::Exchanged);
         }

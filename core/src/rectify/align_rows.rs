@@ -65,6 +65,7 @@ impl Work for AlignRows<'_> {
         for (v, row) in (first..).zip(rows.chunks_exact_mut(right.width().max(1))) {
             for (block, pixels) in row.chunks_mut(BLOCK).enumerate() {
                 let u = block * BLOCK;
+                // One shift for a block: it changes little from pixel to pixel.
                 let (upper, lower, share) =
                     source(right.height(), v, shift.at([(u + BLOCK / 2) as f32, v as f32]));
                 let (upper, lower) = (right.row(upper), right.row(lower));
@@ -74,6 +75,7 @@ impl Work for AlignRows<'_> {
                     return;
                 };
                 for (pixel, (&upper, &lower)) in pixels.iter_mut().zip(upper.iter().zip(lower)) {
+                    // Fixed point, halves rounded up: the same on every machine.
                     let sum =
                         u16::from(upper) * (ONE_ROW as u16 - share) + u16::from(lower) * share;
                     *pixel = ((sum + ONE_ROW as u16 / 2) >> ROW_SHIFT) as u8;

@@ -131,7 +131,8 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     let span = stride + 2;
     for (out, &entry) in out.iter_mut().zip(map) {
         let ([u, v], weights) = packing.unpack(entry);
-        // [`NONE`] names the last column and row there could be: what follows does not lie within the image.
+        // `NONE` names the last column and row there could be, and the window from there on ends
+        // outside the image.
         let window = data.get(v * stride + u..).and_then(|rest| rest.get(..span));
         *out = match window.map(|window| (window.first_chunk::<2>(), window.last_chunk::<2>())) {
             Some((Some(upper), Some(lower))) => T::between(upper, lower, weights, &packing),

@@ -42,17 +42,20 @@ pub(super) fn inverse(sought: f64, end: f64, with_slope: impl Fn(f64) -> [f64; 2
     for _ in 0..MAX_STEPS {
         let [value, slope] = with_slope(at);
         let error = value - sought;
+        // The function grows, so the error's sign says in which part the solution lies.
         if error > 0.0 {
             high = at
         } else {
             low = at
         };
         let newton = at - error / slope;
+        // A step that is not half as long as the last one: Newton's method does not converge here.
         let short = libm::fabs(newton - at) <= 0.5 * length;
         let next =
             if newton >= low && newton <= high && short { newton } else { 0.5 * (low + high) };
         length = libm::fabs(next - at);
         at = next;
+        // A few units in the last place: further steps would only rock.
         if length <= 1e-15 * (1.0 + at) {
             return Some(at);
         }

@@ -123,8 +123,10 @@ impl CommonView {
                 let [fits_u, fits_v] =
                     [(f64::from(max_width) - 1.0) / wide, (f64::from(max_height) - 1.0) / high];
                 let fits = if fits_u < fits_v { fits_u } else { fits_v };
+                // No finer than the raw image in its middle: enlarging adds no detail.
                 let focal_px = if fits < middle_focal_px { fits } else { middle_focal_px };
                 let pixels = |tangent: f64, most: u32| {
+                    // A hair more, so that rounding does not take a pixel from an exact fit.
                     let pixels = libm::floor(tangent * focal_px + 1e-6) as u32;
                     pixels.saturating_add(1).min(most)
                 };
@@ -149,6 +151,7 @@ fn common_view(cameras: [&TurnedCamera; 2]) -> Result<CommonView, RectifyProblem
     for camera in cameras {
         let last = [f64::from(camera.raw.width) - 1.0, f64::from(camera.raw.height) - 1.0];
         for step in 0..=SIDE_POINTS {
+            // Distortion bends the sides: all their points are asked, and the innermost counts.
             let share = f64::from(step) / f64::from(SIDE_POINTS);
             let [u, v] = [last[0] * share, last[1] * share];
             if let Some([x, _]) = camera.tangents([0.0, v]) {
@@ -165,6 +168,7 @@ fn common_view(cameras: [&TurnedCamera; 2]) -> Result<CommonView, RectifyProblem
             }
         }
     }
+    // Less than three degrees of common view is a mistake in the calibration.
     let wide_enough = |[from, to]: [f64; 2]| to - from > 0.05;
     if wide_enough(common.x) && wide_enough(common.y) {
         Ok(common)

@@ -191,6 +191,7 @@ impl<'s> Rectifier<'s> {
         rig: &StereoRig,
     ) -> Result<(), RectifierError> {
         let Capacity { image_width, image_height, .. } = self.capacity;
+        // A map's entry has bits for MAX_RAW_SIDE columns and rows.
         let [raw_width, raw_height] = [self.capacity.raw_width, self.capacity.raw_height]
             .map(|side| side.min(MAX_RAW_SIDE as usize));
         let [width, height] = [rectification.width as usize, rectification.height as usize];
@@ -205,6 +206,7 @@ impl<'s> Rectifier<'s> {
                 height: image_height,
             });
         }
+        // All that can fail is behind: an error leaves the maps as they were.
         for (camera, turned) in
             [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)]
         {
@@ -245,10 +247,12 @@ impl<'s> Rectifier<'s> {
         let (size, out) = ([width, height], images);
         let raw_left = RawImage { camera: left, image: raw.left };
         let raw_right = RawImage { camera: right, image: raw.right };
+        // The two images are independent and remapped at the same time.
         let (left_image, right_image) = executor.join(
             || self.left.remap(raw_left, size, out.left, executor),
             || self.right.remap(raw_right, size, out.right, executor),
         );
+        // The colour image is the left camera's and shares its map.
         let colour = raw.colour.filter(|_| !out.colour.is_empty()).and_then(|image| {
             self.left.remap(RawImage { camera: left, image }, size, out.colour, executor)
         });

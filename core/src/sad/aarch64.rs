@@ -18,6 +18,7 @@ use core::arch::aarch64::{
 /// Runs work with 128 bits.
 #[target_feature(enable = "neon")]
 pub fn with_neon(work: impl Comparison) {
+    // Adds neighbours until each descriptor has one total, in the order of the descriptors.
     let whole = |[a, b, c, d, e, f, g, h]: Eight<uint16x8_t>| {
         let (fours, others) =
             ([vpaddq_u16(a, b), vpaddq_u16(c, d)], [vpaddq_u16(e, f), vpaddq_u16(g, h)]);
@@ -65,6 +66,7 @@ pub fn with_neon(work: impl Comparison) {
             let both = |[column, row]: [u16; 2]| {
                 vreinterpretq_u16_u32(vdupq_n_u32(u32::from(row) << 16 | u32::from(column)))
             };
+            // Saturating subtraction leaves zero only if both coordinates are inside the window.
             let beyond = vqsubq_u16(vsubq_u16(at, both(inside.low)), both(inside.span));
             let is_inside = vandq_u32(
                 vceqzq_u32(vreinterpretq_u32_u16(beyond)),

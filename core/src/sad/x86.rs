@@ -27,6 +27,8 @@ const KEY_SCALE: i16 = 1 << KEY_SCALE_BITS;
 /// Runs work with 128 bits.
 #[target_feature(enable = "sse2")]
 pub fn with_sse2(work: impl Comparison) {
+    // A SAD instruction leaves two sums of eight bytes each, 64 bits apart. Two packs bring the
+    // halves together, and the multiply-add joins and scales them.
     let scaled = |[a, b, c, d]: [__m128i; 4], scale: i16| {
         let halves = _mm_packs_epi32(_mm_packs_epi32(a, b), _mm_packs_epi32(c, d));
         _mm_madd_epi16(halves, _mm_set1_epi16(scale))
@@ -73,6 +75,7 @@ pub fn with_sse2(work: impl Comparison) {
             cost(a[6], b[6], c[6], d[6]),
             cost(a[7], b[7], c[7], d[7]),
         ]);
+        // At most 4 x 4,080: the saturating pack changes nothing.
         cast(_mm_packs_epi32(low, high))
     };
     run(
@@ -118,6 +121,7 @@ pub fn with_avx2(work: impl Comparison) {
         let halves = _mm256_packs_epi32(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
         _mm256_madd_epi16(halves, _mm256_set1_epi16(scale))
     };
+    // Packs work within 128 bits, which leaves the lanes out of order.
     let ordered = |sums: __m256i| {
         _mm256_permutevar8x32_epi32(sums, _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
     };
@@ -240,6 +244,7 @@ fn lesser(key: __m128i, best: __m128i) -> __m128i {
 #[target_feature(enable = "sse2")]
 fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>) -> Eight<u32> {
     let key = |sums: __m128i, at: __m128i, offset: __m128i| {
+        // Saturating subtraction leaves zero only if both coordinates are inside the window.
         let beyond = _mm_subs_epu16(
             _mm_sub_epi16(at, _mm_set1_epi32(both(inside.low))),
             _mm_set1_epi32(both(inside.span)),

@@ -28,6 +28,7 @@ pub(super) fn select(
     let mut slots = selection.iter_mut();
     let mut selected = 0;
     let score = |index: u32| score.get(index as usize).copied().unwrap_or(0.0);
+    // Consecutive starts delimit one cell.
     for (&from, &to) in start.iter().zip(start.iter().skip(1)) {
         let Some(cell) = order.get_mut(from as usize..to as usize) else { continue };
         let mut rest = cell;
@@ -37,6 +38,8 @@ pub(super) fn select(
             // Few are wanted of a cell, so each is sought among what is left: no sort, whose depth
             // would depend on the matches.
             for other in &mut *others {
+                // A total order, even if a score were not a number; of equals the earlier match
+                // comes first.
                 if score(*other).total_cmp(&score(*best)).reverse().then((*other).cmp(best)).is_lt()
                 {
                     core::mem::swap(other, best);

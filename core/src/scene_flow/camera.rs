@@ -95,6 +95,7 @@ impl<'s> Camera<'s> {
     pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
         let pixels = capacity.pixels();
         let sets = [capacity.features, sparse(capacity)];
+        // Two frames, the current and the previous one, with a dense and a sparse set each.
         let features = 2 * (sets[0] + sets[1]);
         let mut image = carver.alloc(names.pixels, 2 * pixels);
         let mut position = carver.alloc(names.position, features);
@@ -200,9 +201,11 @@ impl Work for FindFeatures<'_, '_> {
     #[inline(always)]
     fn run(self) -> FeatureCount {
         let Self { camera, size: [width, height], invalid, config } = self;
+        // The other frame is the previous one, and stays.
         let [a, b] = &mut camera.frames;
         let frame = if camera.current { b } else { a };
         let pixels = width * height;
+        // A size beyond the capacity leaves the frame without features.
         let (Some(gradient), Some(blob), Some(corner)) = (
             camera.gradient.get_mut(..pixels),
             camera.blob.get_mut(..pixels),
@@ -225,6 +228,7 @@ impl Work for FindFeatures<'_, '_> {
         let wanted = config.features_max as usize;
         let mut strongest =
             Strongest::new(camera.candidates, camera.lists, [width, height], wanted);
+        // Responses are signed 16-bit numbers; a larger threshold could never be reached.
         let response_min = config.response_min.min(i16::MAX as u16) as i16;
         let (blob, corner) = (Field { response: blob, width }, Field { response: corner, width });
         suppress(blob, corner, response_min, camera.sums, |candidate| strongest.add(candidate));

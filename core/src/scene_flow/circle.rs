@@ -92,8 +92,10 @@ impl Corners<'_, '_> {
         reach: impl Fn([u16; 2]) -> Reach,
         kernels: &impl Kernels,
     ) -> Option<[u32; 3]> {
+        // The class stays along the circle: a maximum never matches a minimum.
         let class = self.previous_left.class(first);
         let reach = reach(self.previous_left.at(first)?);
+        // Previous left, previous right, current right, current left, and back.
         let sides = [
             (self.previous_left, self.previous_right, reach.to_previous_right),
             (self.previous_right, self.current_right, reach.to_current_right),
@@ -103,6 +105,7 @@ impl Corners<'_, '_> {
         let mut corners = [first; 5];
         let mut index = first;
         for ((from, to, by), corner) in sides.into_iter().zip(corners.iter_mut().skip(1)) {
+            // Each window lies around the feature just found, so that errors do not add up.
             let ([u, v], by) = (from.at(index)?.map(i32::from), by.map(i32::from));
             let window =
                 Window { u_min: u + by[0], u_max: u + by[1], v_min: v + by[2], v_max: v + by[3] };
@@ -110,6 +113,7 @@ impl Corners<'_, '_> {
             *corner = index;
         }
         let [_, previous_right, current_right, current_left, back] = corners;
+        // A circle that ends elsewhere has a mismatch on its way.
         (back == first).then_some([
             previous_right as u32,
             current_right as u32,

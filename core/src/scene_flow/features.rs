@@ -210,6 +210,7 @@ impl<'s> Features<'s> {
             for offset in (from.saturating_sub(origin)..end).step_by(LANES) {
                 let start = (origin + offset) as usize;
                 let inside = |at| Inside { at, low, span, offset, end };
+                // The last few of the set are copied into eight padded ones.
                 keys = match (chunk(self.at, start), chunk(self.descriptor, start)) {
                     (Some(at), Some(others)) => {
                         kernels.least_inside(keys, descriptor, others, &inside(at))

@@ -32,6 +32,7 @@ pub(super) struct Responses<'a> {
 pub(super) fn filter(image: View<'_, u8>, out: Responses<'_>, sums: &mut [i16]) {
     let (width, height) = (image.width(), image.height());
     let Responses { gradient, blob, corner } = out;
+    // The margin keeps a response of zero and an even gradient.
     blob.fill(0);
     corner.fill(0);
     gradient.fill(128 | 128 << 8);
@@ -72,6 +73,7 @@ fn sum_columns(rows: [&[u8]; 5], sums: &mut [i16]) -> Option<()> {
     let (smooth, rest) = rest.split_at_mut_checked(width)?;
     let step = rest.get_mut(..width)?;
     let (b, c, d, e) = (b.get(..width)?, c.get(..width)?, d.get(..width)?, e.get(..width)?);
+    // Five bytes at most add up: 16 bits hold every sum.
     for u in 0..width {
         let [a, b, c, d, e] = [a[u], b[u], c[u], d[u], e[u]].map(i16::from);
         five[u] = a + b + c + d + e;
@@ -107,12 +109,14 @@ fn sum_rows(
     let step = [at(4, 1)?, at(4, 2)?, at(4, 3)?];
     let (pixels, blob, corner) =
         (pixels.get(FILTER_MARGIN..)?.get(..n)?, blob.get_mut(..n)?, corner.get_mut(..n)?);
+    // The kernels' extremes fit 16 bits: 16 x 255 for blobs, 8 x 255 for corners.
     for u in 0..n {
         let square = five[0][u] + five[1][u] + five[2][u] + five[3][u] + five[4][u];
         blob[u] = 2 * (three[0][u] + three[1][u] + three[2][u]) - square + 7 * i16::from(pixels[u]);
         corner[u] = halves[2][u] + halves[3][u] - halves[0][u] - halves[1][u];
         let along = (smooth[1][u] - smooth[0][u]) >> 2;
         let down = (step[0][u] + 2 * step[1][u] + step[2][u]) >> 2;
+        // Bytes around 128, along the row in the low one.
         gradient[u] =
             (along.clamp(-127, 127) + 128) as u16 | ((down.clamp(-127, 127) + 128) as u16) << 8;
     }

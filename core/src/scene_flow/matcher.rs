@@ -152,6 +152,8 @@ impl<'s> FlowMatcher<'s> {
     /// frame before, where it is expected outside an image or at no number, and where it is lost:
     /// no texture, or nothing alike within 1.75 px.
     pub(crate) fn find(&self, expected: &Match) -> Option<Match> {
+        // Features lie where the right image shows them, matches where the correction puts them: it
+        // is taken off for the search and put back on what is found.
         let expected = &expected.with_right(|at| self.correction.uncorrected(at));
         let [width, height] = self.last.filter(|_| self.matched)?;
         let inside = |at: [f32; 2]| {
@@ -297,6 +299,7 @@ impl<'s> FlowMatcher<'s> {
         &MaskedPair { left, right, invalid }: &MaskedPair<'_>,
         executor: &E,
     ) -> FlowReport {
+        // The next frame cannot be matched with a refused one: there is no last pair then.
         self.clear();
         let size = [left.width(), left.height()];
         if size != [right.width(), right.height()]

@@ -215,6 +215,7 @@ impl Template {
         if left + SIDE + 1 > image.width {
             return None;
         }
+        // Bilinear in sixteenths of a pixel: first along each row, then down.
         let mut rows = image.data.get(top * image.width + left..)?.chunks(image.width.max(1));
         let mut blend = || -> Option<[u16; SIDE]> {
             let row = rows.next()?.get(..SIDE + 1)?;
@@ -229,6 +230,7 @@ impl Template {
         for (error, pixel) in error.iter_mut().zip(&self.pixel) {
             let below = blend()?;
             for (((error, &pixel), &a), &b) in error.iter_mut().zip(pixel).zip(&above).zip(&below) {
+                // At most 255 x 256 / 8 = 8,160 either way, which fits 16 bits.
                 *error = ((a * (16 - down) + b * down) >> 3) as i16 - 32 * pixel;
             }
             above = below;
@@ -274,6 +276,7 @@ pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
         current_left: middle(m.current_left),
         current_right,
     };
+    // Without a positive disparity the point would lie at infinity or behind the camera.
     let valid = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
     valid.then_some(found)
 }
@@ -333,6 +336,7 @@ pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
         current_left,
         current_right,
     };
+    // Without a positive disparity the point would lie at infinity or behind the camera.
     let valid = refined.previous_disparity_px() > 0.0 && refined.current_disparity_px() > 0.0;
     valid.then_some((refined, template.texture as f32))
 }

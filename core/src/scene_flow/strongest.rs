@@ -81,6 +81,8 @@ impl<'a> Strongest<'a> {
         let Some(last) = self.last.get_mut(cell * CLASSES + usize::from(candidate.class)) else {
             return;
         };
+        // The slots of a cell and class form a list, newest first. Its weakest is remembered on the
+        // way.
         let (mut at, mut weakest, mut least) = (*last, END, u16::MAX);
         for _ in 0..self.quota {
             let Some(held) = self.slots.get(at as usize) else {
@@ -96,6 +98,7 @@ impl<'a> Strongest<'a> {
             }
             at = held.before;
         }
+        // The quota is used up: the weakest gives way, and of equals the earlier one stays.
         if let Some(held) = self.slots.get_mut(weakest as usize)
             && least < candidate.response
         {

@@ -43,6 +43,7 @@ pub(super) fn support(
     supported: &mut [u8],
 ) {
     let (start, order) = cells.sort(matches, shape);
+    // Motions in the order of cells: neighbouring cells of a row are one run.
     for (motion, m) in
         motion.iter_mut().zip(order.iter().filter_map(|&index| matches.get(index as usize)))
     {
@@ -78,6 +79,7 @@ impl Neighbours<'_> {
             return true;
         }
         let (mut neighbours, mut agreeing) = (0, 0);
+        // The neighbourhood grows until enough matches lie in it.
         for ring in 1..=RINGS {
             (neighbours, agreeing) = (0, 0);
             let (left, right) =

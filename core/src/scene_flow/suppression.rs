@@ -179,6 +179,7 @@ fn along_row<const SIGN: i16>(
     for u in 0..n {
         let beside = stronger::<SIGN>(stronger::<SIGN>(a[u], b[u]), stronger::<SIGN>(f[u], g[u]));
         let about = stronger::<SIGN>(stronger::<SIGN>(c[u], d[u]), stronger::<SIGN>(beside, e[u]));
+        // Equal pixels are all flagged here; `is_first` breaks the tie.
         let is_strongest = (row[u] == about) & (SIGN * about >= response_min);
         flags[u] |= if is_strongest { flag } else { 0 };
     }
@@ -246,6 +247,7 @@ impl<const SIGN: i16> Block<'_, SIGN> {
         // Most are weaker than a pixel of the seven rows about them.
         let about = Surroundings::new(u, width);
         let beaten = about.any(self.strongest, row, |x| x * SIGN > SIGN * response)?;
+        // A sparse feature is also the peak of the wider neighbourhood.
         let sparse = !beaten && is_peak::<SIGN>(self.field, u, v, SIGN * response);
         Some(Candidate {
             u: u as u16,

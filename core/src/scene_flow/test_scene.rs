@@ -24,10 +24,13 @@ fn image(t_world_camera: &Transform, x_m: f64) -> Vec<u8> {
     for v in 0..HEIGHT {
         for u in 0..WIDTH {
             let mut sum = 0.0;
+            // Four samples for each pixel soften the pattern's edges, as a lens does.
             for (du, dv) in [(-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)] {
                 let x = (u as f64 + du - RIG.center_u_px) / RIG.focal_px;
                 let y = (v as f64 + dv - RIG.center_v_px) / RIG.focal_px;
                 let ray = t_world_camera.rotate(Vector3::new(x, y, 1.0));
+                // Seen from inside a box, the nearest of the three walls ahead is the one that is
+                // hit.
                 let reach = (0..3)
                     .map(|i| ((if ray[i] > 0.0 { HIGH[i] } else { LOW[i] }) - eye[i]) / ray[i])
                     .fold(1e9, |a, b| if a < b { a } else { b });

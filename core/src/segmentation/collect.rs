@@ -38,6 +38,7 @@ impl MotionSegmenter<'_> {
             given.matches.iter().zip(given.codes).zip(self.is_candidate.iter_mut())
         {
             *mark = 0;
+            // A match that an instance owns is explained, and no candidate.
             let residual = if is_free(*match_owner) { model.residual(m) } else { None };
             report.matches += u32::from(is_free(*match_owner));
             let Some(residual) =
@@ -47,6 +48,8 @@ impl MotionSegmenter<'_> {
             };
             *mark = 1;
             count += 1;
+            // Once the buffer has overflowed, only every second, fourth, ... candidate is taken:
+            // the sample stays even over the image.
             if !(count - 1).is_multiple_of(stride) {
                 continue;
             }
@@ -101,8 +104,11 @@ impl MotionSegmenter<'_> {
             let residual = model
                 .residual(m)
                 .filter(|residual| residual.point_m.z < f64::from(model.config.far_m));
+            // Matches that are candidates already are added, too: they are neighbours of the
+            // others.
             residual.into_iter().for_each(|residual| far.add(m, index, &residual, *mark > 0));
         }
+        // Joint candidates come last: what fits into the buffer decides how many.
         for at in 0..far.len() {
             let Some(slot) = self.candidates.get_mut(len) else { break };
             let Some((index, residual)) = far.candidate(model, given.matches, at) else { continue };

@@ -86,12 +86,14 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
     for later in 1..candidates.len() {
         let Some((earlier, rest)) = candidates.split_at_mut_checked(later) else { return };
         let Some(candidate) = rest.first().copied() else { return };
+        // A distance in the world, in pixels at the candidate's depth; far away a floor in pixels.
         let reach_px =
             max_f64(NEIGHBOUR_M * focal_px / f64::from(candidate.point_m[2]), NEIGHBOUR_MIN_PX);
         for index in 0..earlier.len() {
             let is_neighbour =
                 earlier.get(index).is_some_and(|other| candidate.is_neighbour(other, reach_px));
             if is_neighbour {
+                // Union-find: the smaller root wins, so that a group is named by its first member.
                 let (a, b) = (root(earlier, rest, later as u32), root(earlier, rest, index as u32));
                 let (first, second) = if a < b { (a, b) } else { (b, a) };
                 let slot = if (second as usize) < later {
@@ -103,6 +105,7 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
             }
         }
     }
+    // Flattened, so that members of a group compare by one number.
     for index in 0..candidates.len() {
         let first = root(candidates, &[], index as u32);
         candidates.get_mut(index).into_iter().for_each(|candidate| candidate.parent = first);
@@ -139,11 +142,13 @@ pub(super) fn select<'m>(
         if candidate.parent != first {
             continue;
         }
+        // Gates first: few groups are left to count matches in.
         let Some(group) = measure(candidates, first, values).filter(|group| group.passes()) else {
             continue;
         };
         refused += u32::from(groups.push(group).is_err());
     }
+    // Within the extent of a moving group, enough of the matches must move.
     let mut counts = [[0u32; 2]; MAX_GROUPS];
     for (m, is_candidate) in matches {
         let Some(point) = model.current_point(m) else { continue };
@@ -207,6 +212,7 @@ fn from_ordered(bits: u32) -> f32 {
 /// members.
 pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) -> Option<Group> {
     let count = candidates.iter().filter(|candidate| candidate.parent == first).count();
+    // A median of two is one of the two.
     if count < 3 {
         return None;
     }
@@ -218,6 +224,7 @@ pub(super) fn measure(candidates: &[Candidate], first: u32, values: &mut [f32]) 
         members.percentile(500, |member| member.motion_m[2])?,
     );
     let depth_sigma_m = members.percentile(500, |member| member.depth_sigma_m)?;
+    // From the 5th to the 95th percentile: a single wrong match does not stretch the object.
     let mut extent = Extent::default();
     for (axis, (low, high)) in extent.low.iter_mut().zip(&mut extent.high).enumerate() {
         let of = |member: &Candidate| member.point_m.get(axis).copied().unwrap_or(0.0);
@@ -243,6 +250,7 @@ fn merge(groups: &mut Vec<Group, MAX_GROUPS>) {
     }
     let mut merged = 0;
     for at in 0..groups.len() {
+        // A group joins the largest of its motion before it; others keep their slots in order.
         let Some(group) = groups.get(at).copied() else { break };
         if let Some(other) = groups.iter_mut().take(merged).find(|other| other.is_same(&group)) {
             other.extent = other.extent.union(&group.extent);

@@ -74,6 +74,7 @@ impl<'s> Hypotheses<'s> {
                 depth_sigma_m: group.depth_sigma_m,
             }
         };
+        // In the order of the table, which is that of age: older hypotheses choose first.
         for hypothesis in self.table.iter_mut().take(self.len) {
             let predicted = hypothesis.center() + Vector3::from(hypothesis.motion_m);
             let mut best: Option<(f64, usize, Observed)> = None;
@@ -81,6 +82,7 @@ impl<'s> Hypotheses<'s> {
                 let found = observed(group);
                 let distance_m = (found.center - predicted).norm();
                 let difference_m = (found.motion - Vector3::from(hypothesis.motion_m)).norm();
+                // Depth is less certain far away: both bounds grow with it.
                 let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
                 let is_alike = difference_m
                     < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
@@ -103,6 +105,7 @@ impl<'s> Hypotheses<'s> {
         }
         self.drop_missed();
         let mut refused = 0;
+        // Groups that continue nothing begin a hypothesis each.
         for (group, _) in groups.iter().zip(used).filter(|(_, used)| !used) {
             let Some(slot) = self.table.get_mut(self.len) else {
                 refused += 1;

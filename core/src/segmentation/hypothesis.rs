@@ -119,7 +119,9 @@ impl Hypothesis {
     pub(super) fn update(&mut self, found: &Observed, t_world_camera: &Transform) {
         let is_known = self.history != 0;
         let expected = self.center() + Vector3::from(self.motion_m);
+        // The difference to the prediction, in the camera's axes, in which extents are measured.
         let offset_m = t_world_camera.inverse().rotate(expected - found.center);
+        // A bit for each frame, the latest lowest.
         self.history = self.history << 1 | 1;
         self.missed = 0;
         if (self.history & RECENT).count_ones() >= u32::from(CONFIRM_FRAMES) {
@@ -136,6 +138,7 @@ impl Hypothesis {
             .zip(KEPT_MAX_M)
         {
             let kept_m = if is_known { KEPT_SHARE * *half_m } else { 0.0 };
+            // The object may grow on either side, but not beyond the largest size allowed.
             let free_m = max_f64(found_m, max_m - found_m);
             let low_m = if is_known {
                 max_f64(-free_m, min_f64(-found_m, offset_m - kept_m))
@@ -147,6 +150,7 @@ impl Hypothesis {
             } else {
                 found_m
             };
+            // The new box need not lie about the members' centre: the shift moves it.
             (*half_m, *shift_m) = (0.5 * (high_m - low_m), 0.5 * (high_m + low_m));
         }
         self.center_m = (found.center + t_world_camera.rotate(shift_m)).into();

@@ -106,6 +106,7 @@ impl<'m> FarMatches<'m> {
     ) -> Option<(usize, Residual)> {
         let own = self.slots.get(at).filter(|own| own.candidate == 0)?;
         let m = matches.get(own.index as usize)?;
+        // A reach in the world, in pixels at the match's depth; far away a floor in pixels.
         let reach_px = REACH_M * model.rig.focal_px / f64::from(own.depth_m);
         let reach_px = (if reach_px > REACH_MIN_PX { reach_px } else { REACH_MIN_PX }) as f32;
         let mut sums = Sums::default();
@@ -114,10 +115,13 @@ impl<'m> FarMatches<'m> {
             .take(self.len)
             .filter(|other| own.is_neighbour(other, reach_px))
             .for_each(|other| sums.add(other));
+        // A mean of too few says no more than the single match.
         if sums.count < NEIGHBOURS_MIN {
             return None;
         }
         let count = f64::from(sums.count);
+        // The spread of the neighbours is their noise, with a floor; what they have in common, such
+        // as the camera's motion, does not average out.
         let mean = sums.residual / count;
         let variance = (sums.squares / count - mean.component_mul(&mean)).map(|square| {
             let least = NOISE_MIN_PX * NOISE_MIN_PX;
@@ -125,6 +129,7 @@ impl<'m> FarMatches<'m> {
         });
         let (residual, shared) = model.residual_and_shared(m)?;
         let covariance = Matrix3::from_diagonal(&variance) + shared;
+        // The chi-square test of a single match, with the mean and its covariance.
         let chi_square = mean.dot(&Cholesky::new(covariance).map(|factor| factor.solve(&mean))?);
         let depth_sigma_m =
             libm::sqrt(covariance.m33) * f64::from(own.depth_m) / f64::from(own.at[2]);

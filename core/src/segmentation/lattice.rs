@@ -140,6 +140,7 @@ impl<'a> Lattice<'a> {
         let is_visible = bounds.cells().any(|(column, row)| can_be_own(column, row, extent));
         let start = if is_visible { extent } else { &reach };
         let mut queued = 0;
+        // Seeds: all cells within the extent that can be the object's.
         for (column, row) in bounds.cells() {
             if can_be_own(column, row, start) {
                 let (cell, slot) =
@@ -148,12 +149,14 @@ impl<'a> Lattice<'a> {
                 queued += 1;
             }
         }
+        // Breadth first from all seeds at once; the queue holds each cell at most once.
         let mut next = 0;
         while next < queued {
             let at = *queue.get(next)? as usize;
             next += 1;
             let (column, row) = (at % self.columns, at / self.columns);
             let disparity_px = self.disparity_px(self.pixel(column, row))?;
+            // Neighbours of one surface have similar disparities.
             let step_px = step_px(disparity_px);
             let is_next = |column: usize, row: usize| {
                 self.disparity_px(self.pixel(column, row))
@@ -176,6 +179,7 @@ impl<'a> Lattice<'a> {
                 }
             }
         }
+        // Gaps are closed only after growing, so that they do not carry growth further.
         (queued > 0).then_some(())?;
         self.close(&bounds, cells);
         self.reach_border(&bounds, cells);
@@ -205,6 +209,8 @@ impl<'a> Lattice<'a> {
         let ([left, top, near], [right, bottom, far]) = (extent.low, extent.high);
         let near = if near > 1.0 { near } else { 1.0 };
         let far = if far > near { far } else { near };
+        // A side left of the axis is leftmost where it is nearest, one on the right where it is
+        // farthest.
         let farthest = |side: f64| self.rig.focal_px * side / if side < 0.0 { near } else { far };
         let nearest = |side: f64| self.rig.focal_px * side / if side < 0.0 { far } else { near };
         let cell = |px: f64, center: f64, cells: usize| {
@@ -306,6 +312,7 @@ impl<'a> Lattice<'a> {
             mark(column, row) == GROWN
                 && self.disparity_px(self.pixel(column, row)).is_some_and(like)
         };
+        // The pixel may lie in a cell whose middle shows something else: neighbours count, too.
         let near = [
             (column, row),
             (column.wrapping_sub(1), row),
@@ -352,16 +359,19 @@ fn widened(extent: &Extent) -> Extent {
     for (axis, ((low, high), margin_m)) in
         reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate()
     {
+        // Depth is uncertain with its square.
         let margin_m = if axis == 2 {
             margin_m + DEPTH_MARGIN * depth_m * depth_m
         } else {
             max_f64(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
         };
+        // Seen from one end, an object shows less than its length.
         let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M {
             LENGTH_M - length_m
         } else {
             margin_m
         };
+        // Beside the camera, the near end may be out of view as well.
         let before_m = if is_beside { behind_m } else { margin_m };
         (*low, *high) = (*low - before_m, *high + behind_m);
     }

@@ -42,13 +42,16 @@ impl MotionSegmenter<'_> {
         let mut found = Found::default();
         let len = self.collect(model, refined, &mut found.report);
         let len = self.collect_joint(model, refined, input.lattice.ground(), len);
+        // Where static matches lie, no object grows.
         self.block_static(input.lattice, refined);
         let Some(candidates) = self.candidates.get_mut(..len) else { return found.report };
         groups::join(candidates, model.rig.focal_px);
         let marked = free_matches(refined, self.is_candidate);
         found.report.refused +=
             groups::select(model, candidates, marked, self.values, &mut found.groups);
+        // Patch search costs time: without it the groups are the answer.
         if let Some(mut search) = search {
+            // A row of posts looks as if it moved by one post.
             found.groups.retain(|group| !search.is_repeated(model, candidates, group));
             self.seed_count = 0;
             self.seed_predicted(input.t_world_camera);
@@ -128,10 +131,12 @@ impl MotionSegmenter<'_> {
         let Self { seeds, seed_count, cells, blocked, queue, patches, values, .. } = self;
         let mut memory = PatchMemory { cells, queue, members: patches, values };
         for seed in seeds.iter().take(*seed_count) {
+            // A group found by its matches needs no patches.
             if found.groups.iter().any(|group| seed.is_at(group)) {
                 continue;
             }
             if let Some(group) = search.verify(model, seed, &mut memory) {
+                // What the patches showed to move no longer blocks growth.
                 search.unblock(
                     memory.members.get(..group.members as usize).unwrap_or_default(),
                     blocked,

@@ -88,6 +88,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
     ) -> Option<Group> {
         let PatchMemory { cells, queue, members, values } = memory;
         let pixels = self.lattice.grow(&seed.extent(), &[], cells, queue)?;
+        // Evenly spread over the object, at most MAX_PATCHES.
         let every = self.lattice.marked(cells, &pixels).count().div_ceil(MAX_PATCHES);
         let (mut moving, mut still) = (0usize, 0usize);
         let marked = self
@@ -96,6 +97,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
             .enumerate()
             .filter(|(index, _)| index.is_multiple_of(every));
         for (_, at) in marked {
+            // The frame's budget of patches: used up, nothing is verified.
             self.left = self.left.checked_sub(1)?;
             match self.search_patch(model, at, seed) {
                 Some(Patch::Moving(candidate)) => {
@@ -106,6 +108,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
                 None => {}
             }
         }
+        // A known object needs fewer moving patches than a supposed one.
         let share = if seed.is_known() { KNOWN_SHARE_MIN } else { f64::from(CANDIDATE_SHARE_MIN) };
         let is_moving = moving as f64 >= share * (moving + still) as f64;
         let group = measure(members.get(..moving)?, 0, values).filter(|_| is_moving)?;
@@ -133,6 +136,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
         let is_static = |chi_square: f64| chi_square <= f64::from(CANDIDATE_CHI_SQUARE);
         let motion_m = seed.motion_m();
         let back = Transform::from_translation((-motion_m).into());
+        // First where the object's motion would put the patch.
         if let Some((m, residual)) = found(&(self.t_previous_current * back)) {
             let side_m = motion_tolerance_m(residual.point_m.z);
             let off = residual.motion_m - motion_m;

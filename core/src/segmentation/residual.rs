@@ -108,6 +108,7 @@ impl<'a> StaticModel<'a> {
         let now = self.centered(m.current_left, m.current_right)?;
         let previous = self.point(&before);
         let predicted = self.predicted(&previous)?;
+        // The prediction in left column, row and disparity, as the match is measured.
         let per_m = self.rig.focal_px / predicted.z;
         let projected =
             Vector3::new(predicted.x * per_m, predicted.y * per_m, self.rig.baseline_m * per_m);
@@ -169,6 +170,7 @@ impl<'a> StaticModel<'a> {
             0.0,
             -previous.z / before.z,
         );
+        // The chain: pixels to the previous point, carried by the motion, back to pixels.
         let (per_m, z) = (focal / predicted.z, predicted.z);
         let by_point = Matrix3::new(
             per_m,
@@ -184,13 +186,16 @@ impl<'a> StaticModel<'a> {
         let noise = Matrix3::from_diagonal(&self.noise);
         let jacobian = by_point * self.rotation * by_match;
         let square = |sigma: f32| f64::from(sigma) * f64::from(sigma);
+        // A turn of the camera moves a point across its direction by its distance.
         let rotated =
             Matrix3::identity() * predicted.norm_squared() - predicted * predicted.transpose();
         let camera = Matrix3::identity() * square(CAMERA_M) + rotated * square(CAMERA_RAD);
+        // Errors of the lenses grow with the fourth power of the distance from the middle.
         let side = before.x / self.rig.center_u_px;
         let [offset_px, lens_px] = self.bias_px;
         let bias =
             (jacobian.column(2) - Vector3::z()) * (offset_px + lens_px * side * side * side * side);
+        // A match's own noise is independent; camera and calibration are shared by neighbours.
         let own = noise + jacobian * noise * jacobian.transpose();
         [own, by_point * camera * by_point.transpose() + bias * bias.transpose()]
     }

@@ -31,6 +31,7 @@ impl Trail {
     ) -> Self {
         let t_camera_world = t_world_camera.inverse();
         let depth_m = extent.center().z;
+        // In the camera's present axes; only the motion has to be turned.
         let mut now =
             OrientedBox { t_box_world: t_camera_world, low_m: extent.low, high_m: extent.high };
         for (axis, ((low, high), margin_m)) in

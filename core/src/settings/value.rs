@@ -87,6 +87,7 @@ impl Value<'_> {
             Self::F64(value) => **value = text.parse().ok()?,
             Self::Choice(choice) => choice.choose(text)?,
             Self::Bytes(values) => {
+                // All numbers are read before the first is set: an error changes nothing.
                 let numbers = || text.split(',').map(|number| number.trim().parse::<u8>());
                 if numbers().count() != values.len() || numbers().any(|number| number.is_err()) {
                     return None;

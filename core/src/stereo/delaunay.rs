@@ -231,10 +231,12 @@ impl<'s> Triangulation<'s> {
             let t = self.push([b, a, p]);
             self.link(3 * t, self.hull_edge.get(a));
             if t != first {
+                // Neighbours in the fan share the edge between a and p.
                 self.link(3 * t + 1, 3 * (t - 1) + 2);
             }
             a = b;
         }
+        // p replaces the hull points between the first and the last one that it sees.
         self.hull_link(start, p, 3 * first + 1);
         self.hull_link(p, a, 3 * (self.triangles as u32 - 1) + 2);
         first
@@ -252,12 +254,15 @@ impl<'s> Triangulation<'s> {
             let opposite = self.twin.get(3 * t);
             if opposite != NONE {
                 let c = seen(self, previous(opposite));
+                // A corner c within the circle means that the other diagonal is Delaunay. The flip
+                // gives t a new outer edge, so t is tested again.
                 if in_circle([a, b, c]) {
                     self.flip(p, t, opposite);
                     b = c;
                     continue;
                 }
             }
+            // Edge 2 leads to the next triangle of the fan, which ends at the hull.
             let next = self.twin.get(3 * t + 2);
             if next == NONE {
                 return;

@@ -87,13 +87,16 @@ impl DenseMatching<'_> {
         for (i, (left, right)) in rows.enumerate() {
             let v = band.first + i;
             let [left_image, right_image] = self.gradients;
+            // Rows in the margin have no descriptors, and hence no disparity.
             if describe_rows([(left_image, v, &mut *left_row), (right_image, v, &mut *right_row)]) {
+                // The left row becomes the result; the right row only serves to contradict it.
                 self.match_row::<true>(left_row, right_row, v, left, kernels);
                 self.match_row::<false>(right_row, left_row, v, right, kernels);
                 let [matched, contradicted] =
                     check_consistency(left, right, self.config.consistency_threshold);
                 band.counts[0] += matched;
                 band.counts[1] += contradicted;
+                // Fractions come last: consistency is tested in whole pixels.
                 refine_row(self.config, left_row, right_row, left, kernels);
             } else {
                 left.fill(NONE);
@@ -111,9 +114,12 @@ impl DenseMatching<'_> {
         planes: &mut [i16],
         kernels: &impl Kernels,
     ) {
+        // A descriptor reaches MARGIN pixels to each side, and exists no nearer to the border.
         let end = planes.len().saturating_sub(MARGIN);
         clipped_mut(planes, ..MARGIN).fill(NO_PLANE);
         clipped_mut(planes, end..).fill(NO_PLANE);
+        // Each image has a grid of its own: a point lies at u in the left one and at u - d in the
+        // right.
         let [left_cells, right_cells] = &self.cells;
         let grid = if LEFT { left_cells } else { right_cells };
         let size = self.config.grid_size.max(1);
@@ -122,6 +128,7 @@ impl DenseMatching<'_> {
         let mut list = [0; 256];
         let mut cell = 0..size;
         for set in sets {
+            // One list of disparities serves all pixels of a cell.
             let listed = list_candidates(set, self.cost.elsewhere, &mut list);
             for u in cell.clone().step_by(2 * LANES) {
                 row.match_sixteen(u, cell.end - u, listed, planes, kernels);

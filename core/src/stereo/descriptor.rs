@@ -67,6 +67,7 @@ impl<'a> Gradients<'a> {
             du: [row(self.du, v - 1), row(self.du, v), row(self.du, v + 1)],
             dv: [row(self.dv, v - 1), row(self.dv, v), row(self.dv, v + 1)],
         };
+        // Words cover all but the row's end, whose pixels are read byte by byte.
         let done = rows.describe_most(out);
         for (u, out) in out.iter_mut().enumerate().take(self.width - MARGIN).skip(done.max(MARGIN))
         {
@@ -103,6 +104,8 @@ impl<'a> SampledRows<'a> {
     fn describe_most(&self, out: &mut [Descriptor]) -> usize {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
         let from = |row: &'a [u8], column: usize| clipped(row, column..);
+        // Sixteen samples: of du five in the row and three each above and below; of dv three in the
+        // row and one each above and below.
         let words = du_here.array_windows::<8>();
         let threes = [du_above, du_below, dv_here].map(|row| from(row, 1).array_windows::<4>());
         let ones = [dv_above, dv_below].map(|row| from(row, 2).iter());
@@ -111,6 +114,8 @@ impl<'a> SampledRows<'a> {
         for (((out, five), (above, below)), (beside, (up, down))) in
             out.iter_mut().skip(2).zip(words).zip(above.zip(below)).zip(beside.zip(up.zip(down)))
         {
+            // Little-endian on every machine, so that bytes have the order that `describe` gives
+            // them.
             let three = |bytes: &[u8; 4]| u64::from(u32::from_le_bytes(*bytes) & 0xFF_FFFF);
             let low = (u64::from_le_bytes(*five) & 0xFF_FFFF_FFFF) | three(above) << 40;
             let high =

@@ -111,12 +111,14 @@ fn remove_redundant(
 fn remove_between(config: &StereoConfig, grid: &mut [i16], width: usize) -> u32 {
     let (reach, threshold, width) = (config.redundant_distance, REDUNDANT_THRESHOLD, width.max(1));
     let mut removed = 0;
+    // Rows change in place from the top down: a point removed here does not support those below.
     for start in (0..grid.len()).step_by(width) {
         let Some((above, rest)) = grid.split_at_mut_checked(start) else { break };
         let Some((row, below)) = rest.split_at_mut_checked(width) else { break };
         for (first, points) in (0usize..).step_by(BLOCK).zip(row.chunks_mut(BLOCK)) {
             let here: [i16; BLOCK] = padded(points, 0, 0, NO_MATCH);
             let mut between = [1; BLOCK];
+            // A point is redundant only with an alike one both above and below it.
             for rows in [
                 clipped(above, above.len().saturating_sub(reach * width)..),
                 clipped(below, ..below.len().min(reach * width)),

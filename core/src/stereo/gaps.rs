@@ -67,6 +67,8 @@ impl Work for FillRows<'_> {
             }
             let mut start = None;
             for_each_set(edges, |before| {
+                // A row that begins without disparity has a gap with one end only, which stays
+                // open.
                 start = match start {
                     None if row.get(before).is_some_and(|&d| d == NONE) => None,
                     None => Some(before + 1),

@@ -48,10 +48,12 @@ fn row(above: &[u8], here: &[u8], below: &[u8], du: &mut [u8], dv: &mut [u8]) ->
     let (a0, a1, a2) = (above.get(..n)?, above.get(1..)?.get(..n)?, above.get(2..)?.get(..n)?);
     let (h0, h2) = (here.get(..n)?, here.get(2..)?.get(..n)?);
     let (b0, b1, b2) = (below.get(..n)?, below.get(1..)?.get(..n)?, below.get(2..)?.get(..n)?);
+    // The outer columns lack a neighbour: no gradient.
     for gradients in [&mut *du, &mut *dv] {
         *gradients.first_mut()? = FLAT;
         *gradients.last_mut()? = FLAT;
     }
+    // All slices are n long, which lets the loop run without checks, many pixels at a time.
     let (du, dv) = (du.get_mut(1..)?.get_mut(..n)?, dv.get_mut(1..)?.get_mut(..n)?);
     let wide = i16::from;
     for i in 0..n {

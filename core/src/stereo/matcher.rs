@@ -291,6 +291,7 @@ impl<'s> StereoMatcher<'s> {
         left: View<'_, u8>,
         right: View<'_, u8>,
     ) -> StereoStatus {
+        // The size is clipped even if the pair is refused: readers of the result rely on it.
         self.width = left.width().min(self.image_width).max(1);
         self.height = left.height().min(self.image_height).max(1);
         let mut problems = Problems::new();

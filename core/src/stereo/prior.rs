@@ -251,6 +251,8 @@ impl PlaneCost {
 
     /// The tables for a valid configuration.
     pub fn new(config: &StereoConfig) -> Self {
+        // ELAS's prior: how much a Gaussian about the plane, over a uniform share, takes off the
+        // energy.
         let preference = |k: usize| {
             let deviation = k as f32;
             let density = libm::expf(-0.5 * deviation * deviation);
@@ -263,6 +265,7 @@ impl PlaneCost {
         };
         let (radius, elsewhere) =
             (config.plane_radius().min(MAX_PLANE_RADIUS), clamped(preference(0)));
+        // The preference is subtracted from the cost elsewhere, so that no cost is negative.
         let mut about_plane = [elsewhere; PLANE_WIDTH];
         for (i, cost) in about_plane.iter_mut().enumerate() {
             *cost = elsewhere - clamped(preference(i.abs_diff(radius))).min(elsewhere);

@@ -87,6 +87,7 @@ impl Work for Smooth<'_> {
         let inner_rows = REACH..(from.len() / width).saturating_sub(REACH);
         for (v, to) in (first..).zip(to.chunks_exact_mut(width)) {
             let row = v * width;
+            // Near the border the window does not fit: those pixels keep their values.
             to.iter_mut().zip(clipped(from, row..row + width)).for_each(|(to, from)| *to = *from);
             let (inner, stride) = match along {
                 Along::Rows => (REACH..width.saturating_sub(REACH), 1),

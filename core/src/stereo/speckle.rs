@@ -130,6 +130,7 @@ impl Work for RemoveSpeckles<'_> {
                     pixels.fill(NONE);
                 }
                 start = usize::from(end);
+                // The slots behind the row's last run hold ends of earlier frames.
                 if start == width {
                     break;
                 }
@@ -220,10 +221,12 @@ fn for_each_contact(touches: &[u8], [above, here]: [&[u8]; 2], mut each: impl Fn
     let mut known = 0;
     for (touches, (above, here)) in touches.chunks(8).zip(above.chunks(8).zip(here.chunks(8))) {
         let (touches, breaks) = (word(touches), [word(above), word(here)]);
+        // Runs that touch here, and break at neither of the two, touch at the next pixel, too.
         let goes_on = touches & !(breaks[0] | breaks[1]);
         let mut first = touches & !(goes_on << 8 | known);
         known = goes_on >> 56;
         while first != 0 {
+            // The breaks before a pixel are the number of its run within the row.
             let earlier = (1 << first.trailing_zeros()) - 1;
             each([before[0] + count(breaks[0] & earlier), before[1] + count(breaks[1] & earlier)]);
             first &= first - 1;

@@ -79,6 +79,7 @@ impl Rows<'_> {
         costs: &mut [Eight<i16>],
         kernels: &impl Kernels,
     ) {
+        // A support point is described by the four corners of a square about it.
         let (west, east) = (first - CORNER, first + CORNER);
         let from = [(self.above, west), (self.above, east), (self.below, west), (self.below, east)];
         let columns = from.map(|(row, at)| clipped(row, at..).as_chunks().0);
@@ -177,11 +178,13 @@ impl SupportMatching<'_> {
             if u < first || u >= end {
                 continue;
             }
+            // From left to right: the partner lies at most disparity_max columns to the left.
             let Some(x) =
                 self.best(left.corners(u), right, first.max(u.saturating_sub(most))..=u, kernels)
             else {
                 continue;
             };
+            // And back: a match that does not return to its pixel is an occlusion or a mistake.
             let Some(back) =
                 self.best(right.corners(x), left, x..=(end - 1).min(x + most), kernels)
             else {
@@ -204,11 +207,13 @@ impl SupportMatching<'_> {
         kernels: &impl Kernels,
     ) -> Option<usize> {
         let point = point?;
+        // A corner without texture does not tell columns apart.
         if point.iter().any(|corner| texture(corner) < SUPPORT_TEXTURE) {
             return None;
         }
         let first = *columns.start();
         let count = (columns.end() + 1).checked_sub(first)?;
+        // The ratio test needs a second best to compare with.
         if count < MIN_CHOICE {
             return None;
         }
@@ -230,6 +235,7 @@ impl SupportMatching<'_> {
         let least =
             |blocks: &[[i16; BLOCK]]| blocks.as_flattened().iter().fold(i16::MAX, |a, &b| a.min(b));
         let best = least(blocks);
+        // Of equal costs the first is taken: the order is a part of the result.
         let block = blocks
             .iter()
             .position(|block| block.iter().fold(false, |found, &cost| found | (cost == best)))?;

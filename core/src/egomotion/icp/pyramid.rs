@@ -35,16 +35,19 @@ impl<'a> Pyramid<'a> {
         let mut pyramid = Self { levels: [None; MAX_LEVELS as usize] };
         let (mut width, mut height) = (disparity_q8.width() / 2, disparity_q8.height() / 2);
         let mut rest = memory;
+        // The farthest point has the smallest disparity: the limits change places.
         let limits_px = [limits_m[1], limits_m[0]]
             .map(|depth_m| (rig.focal_baseline_px_m() / f64::from(depth_m)) as f32);
         let mut finer: Option<View<'a, f32>> = None;
         for slot in pyramid.levels.iter_mut().take(usize::from(levels)) {
             let pixels = width * height;
+            // The finest level is kept at any size; a coarser one needs enough pixels to pair.
             let coarse = finer.is_some() && (width < MIN_WIDTH || height < MIN_HEIGHT);
             if coarse || pixels == 0 {
                 break;
             }
             let Some(level) = rest.split_off_mut(..pixels) else { break };
+            // The first level halves the input, in 1/256 px; each other one the level before it.
             match finer {
                 None => halve_given(limits_px, disparity_q8, level, width),
                 Some(finer) => halve(finer, level, width),

@@ -76,6 +76,7 @@ pub(super) fn undistort(
     [u, v]: [f64; 2],
 ) -> Option<[f64; 3]> {
     let distorted = libm::sqrt(u * u + v * v);
+    // In the middle nothing is distorted, and no direction is defined.
     if distorted < 1e-300 {
         return Some([u, v, 1.0]);
     }
@@ -90,10 +91,10 @@ pub(super) fn undistort(
     let (mut x, mut y) = (u / distorted * radius, v / distorted * radius);
     let [p1, p2] = *p;
     for _ in 0..MAX_STEPS {
-        // Accepted only if it maps back to the pixel.
         let [at_x, at_y] = distort_plane(k, p, [x, y]);
         let [error_x, error_y] = [at_x - u, at_y - v];
         let [g, slope] = factor(k, x * x + y * y);
+        // The Jacobian is symmetric.
         let xx = g + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x;
         let xy = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let yy = g + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x;
@@ -108,6 +109,7 @@ pub(super) fn undistort(
             break;
         }
     }
+    // Accepted only if it maps back to the pixel.
     let [at_x, at_y] = distort_plane(k, p, [x, y]);
     let reached = libm::fabs(at_x - u) + libm::fabs(at_y - v) < ACCEPTED;
     (reached && x * x + y * y <= limit * limit).then_some([x, y, 1.0])

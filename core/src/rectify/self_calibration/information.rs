@@ -78,6 +78,8 @@ impl<const C: usize> Sums<C> {
     /// finite.
     pub(super) fn without_motion<const P: usize>(&self) -> Option<FrameInformation<P>> {
         let mut lower = self.0;
+        // Gauss's elimination of the motion leaves the Schur complement: what the matches say about
+        // the other unknowns, with any motion.
         for k in 0..MOTION {
             let pivot = lower[k][k];
             // False for NaN as well.
@@ -91,6 +93,7 @@ impl<const C: usize> Sums<C> {
                 }
             }
         }
+        // Only the lower triangle was eliminated.
         let at = |i: usize, j: usize| {
             if i > j { lower[MOTION + i][MOTION + j] } else { lower[MOTION + j][MOTION + i] }
         };
@@ -138,6 +141,8 @@ impl<const P: usize> Information<P> {
         frame: &FrameInformation<P>,
         at: [f64; P],
     ) -> Option<()> {
+        // A frame's own deviation widens its covariance to S^-1 + D^2. Its inverse is S - S D (1 +
+        // D S D)^-1 D S, which needs no inverse of S: S may be singular.
         let (s, d) = (&frame.matrix, prior.frame_sigma);
         let damped: [[f64; P]; P] = core::array::from_fn(|i| {
             core::array::from_fn(|j| d[i] * s[i][j] * d[j] + if i == j { 1.0 } else { 0.0 })
@@ -205,6 +210,7 @@ impl<const P: usize> Information<P> {
 )]
 #[inline(never)]
 fn solve<const P: usize>(matrix: &[[f64; P]; P], right: [f64; P]) -> Option<[f64; P]> {
+    // No pivoting: a matrix that is not positive definite is refused.
     let (mut upper, mut solution) = (*matrix, right);
     for k in 0..P {
         // False for NaN as well.

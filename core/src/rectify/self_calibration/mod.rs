@@ -277,9 +277,11 @@ impl SelfCalibration {
             return;
         }
         let offset = libm::fabs(report.offset_px);
+        // Two thresholds: an offset near one of them does not switch the correction on and off.
         self.offset_applies =
             offset > if self.offset_applies { APPLY_UNTIL_PX } else { APPLY_ABOVE_PX };
         let offset_px = if self.offset_applies { report.offset_px } else { 0.0 };
+        // Limited steps, so that depths do not jump between frames.
         let toward = |now: f64, target: f64| {
             let change = target - now;
             if libm::fabs(change) <= CHANGE_MAX_PX {
@@ -308,6 +310,8 @@ impl SelfCalibration {
             self.offset.estimate(&self.offset_prior()).unwrap_or_default();
         let ([_, slope_px, quartic_px, row_quadratic_px], _) =
             self.sides.estimate(&self.sides_prior()).unwrap_or_default();
+        // Known after many frames with a small deviation, or after fewer if the offset is many
+        // deviations away from zero.
         let is_certain = self.frames >= FRAMES_MIN && offset_sigma_px < SIGMA_MAX_PX;
         let obvious = self.frames >= OBVIOUS_FRAMES_MIN
             && libm::fabs(offset_px) > OBVIOUS_SIGMAS * offset_sigma_px;

@@ -87,6 +87,8 @@ impl<'r> Residuals<'r> {
         let [x, y, z] = self.t_current_previous.transform_point(before);
         let predicted = self.rig.project([x, y, z]).filter(|_| z > DEPTH_MIN_M)?;
         let by_point = self.rig.project_jacobian([x, y, z]);
+        // Noise of the previous observation reaches the prediction by triangulation, motion and
+        // projection.
         let by_previous =
             product(&product(&by_point, &self.rotation), &self.rig.triangulate_jacobian(previous));
         let errors = [
@@ -95,6 +97,7 @@ impl<'r> Residuals<'r> {
             predicted.u_right_px - current.u_right_px,
         ];
         let (before, now) = (self.basis(previous), self.basis(current));
+        // Derivatives by the motion: the carried point turned about each axis, then moved along it.
         let [mut left, mut row, mut right] = by_point
             .map(|[a, b, c]| [c * y - b * z, a * z - c * x, b * x - a * y, a, b, c])
             .map(rows_of);
@@ -116,6 +119,7 @@ impl<'r> Residuals<'r> {
             let [.., error] = derivatives;
             *error = value;
         }
+        // Rows of unit noise can be added, those of near and far points alike.
         let rows = whitened([left, row, right], &covariance(&by_previous))?;
         let squared = rows.iter().fold(0.0, |sum, [.., error]| sum + error * error);
         squared.is_finite().then_some(MatchRows {
@@ -183,6 +187,7 @@ fn whitened(rows: [Row; 3], covariance: &[[f64; 3]; 3]) -> Option<[Row; 3]> {
                 return None;
             }
         }
+        // Forward substitution, row by row, with the rows above.
         for k in 0..i {
             let (above, below) = white.split_at_mut(i);
             for (entry, other) in below[0].iter_mut().zip(&above[k]) {

@@ -83,6 +83,7 @@ impl RowCalibration {
             for (at, difference_px) in matches.clone() {
                 let at = shares(at);
                 let error = difference_px + self.applied.at(at) - expected.at(at);
+                // Geman-McClure: a match far off has hardly any weight.
                 let share = 1.0 / (1.0 + error * error / (scale_px * scale_px));
                 frame.add(
                     &RowCorrection::powers(at),
@@ -91,6 +92,7 @@ impl RowCalibration {
                 );
                 count += 1;
             }
+            // Each pass adds to what was known before this frame, so that the frame counts once.
             found = self.information;
             if count < MATCHES_MIN || found.take_exact(&frame, terms).is_none() {
                 return;

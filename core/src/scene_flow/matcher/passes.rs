@@ -113,8 +113,10 @@ impl FlowMatcher<'_> {
                 executor.vectors().run(RefineSupported { images, matches, supported, score })
             });
         } else {
+            // Without refinement no match is better than another: buckets keep the earlier ones.
             self.score.fill(0.0);
         }
+        // The order of the supported ones stays, because it decides ties later.
         let mut len = 0;
         for index in 0..closed {
             if self.supported.get(index) == Some(&1) {

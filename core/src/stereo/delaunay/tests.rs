@@ -15,6 +15,7 @@ fn check(points: &[SupportPoint]) -> usize {
     let skip = memory.as_ptr().align_offset(SLAB_ALIGN);
     let mut carver = Carver::new(&mut memory[skip..], 0).unwrap();
     let mut mesh = Triangulation::new_in(points.len(), ["p", "t", "h"], &mut carver);
+    // The matcher, too, adds its points from the top row down.
     let mut in_rows = points.to_vec();
     in_rows.sort_by_key(|point| point.v);
     for &point in &in_rows {

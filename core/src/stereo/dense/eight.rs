@@ -116,15 +116,18 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
         let texture = kernels.sums(&points, &UNTEXTURED);
         let (old, count) = (load(row, u), count.min(LANES) as i32);
         let (mut planes, mut reach) = ([NOTHING; LANES], [0; LANES]);
+        // A patch without texture looks the same everywhere, so its pixel is not matched.
         for lane in 0..LANES {
             let is_matched = (texture[lane] >= self.least_texture) & ((lane as i32) < count);
             planes[lane] = if is_matched { i32::from(old[lane]) } else { NOTHING };
         }
         let columns = self.here.len() as i32;
+        // The largest disparity whose partner has a descriptor in the other row.
         for (reach, at) in reach.iter_mut().zip(u as i32..) {
             let columns = if LEFT { at - MARGIN as i32 } else { columns - MARGIN as i32 - 1 - at };
             *reach = if columns < self.most { columns } else { self.most };
         }
+        // From left to right, reach grows in the left image and falls in the right one.
         let (reach_min, reach_max) =
             if LEFT { (reach[0], reach[LANES - 1]) } else { (reach[LANES - 1], reach[0]) };
         Group { points, u, count, planes, reach, reach_min, reach_max }
@@ -203,6 +206,8 @@ impl Group {
         kernels: &impl Kernels,
     ) {
         for &base in bases {
+            // The low byte of a base is the disparity, and bases ascend: none behind is within
+            // reach.
             let d = (base & 255) as i32;
             if d > self.reach_max {
                 break;
@@ -270,6 +275,7 @@ impl Group {
             steep[lane] = if planes[lane] >= i32::from(STEEP) { u32::MAX } else { 0 };
             outside |= (mean < radius) | (mean + radius > self.reach[lane]);
         }
+        // Near a border the slow twin tests each disparity by itself.
         if outside {
             return None;
         }
@@ -278,6 +284,7 @@ impl Group {
         // What a candidate's distance is added to; about a steep plane, which is not preferred, all
         // cost the same.
         let lowered = |mut best: Eight<u32>, sums: Eight<u32>, step: usize, about: u32| {
+            // In the left row, columns ascend while disparities fall.
             let d = if LEFT { last - step } else { step } as u32;
             let more = (cost.elsewhere - about) << 8;
             for lane in 0..LANES {

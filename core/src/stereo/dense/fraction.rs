@@ -30,6 +30,7 @@ pub(super) fn refine_row(
     for u in (0..row.len()).step_by(LANES) {
         let mut disparities = load(row, u);
         let mut fractions = [0; LANES];
+        // Eight pixels without a disparity have nothing to refine.
         if config.subpixel && disparities != [NO_PLANE; LANES] {
             let pixels =
                 Matched { points: eight(here, u, &mut spare), u, disparities_px: disparities };
@@ -70,6 +71,8 @@ fn find_fractions(
             *window = three;
         }
     }
+    // The kernels take the costs after and at the match as one pair, and the one before it by
+    // itself.
     let (mut twos, mut lasts) =
         ([&[Descriptor::UNTEXTURED; 2]; LANES], [&Descriptor::UNTEXTURED; LANES]);
     for lane in 0..LANES {
@@ -82,6 +85,7 @@ fn find_fractions(
     for lane in 0..LANES {
         let (before, at, after, d) =
             (before[lane] as i32, at[lane] as i32, after[lane] as i32, i32::from(px[lane]));
+        // A neighbour beyond the border, or beyond the largest disparity, was never a candidate.
         let reach = (u + lane) as i32 - MARGIN as i32;
         let reach = if reach < i32::from(config.disparity_max) {
             reach
@@ -94,6 +98,7 @@ fn find_fractions(
         // Below 2^17.
         dividends[lane] = MOST * (before - after);
         divisors[lane] = if rise > 1 { rise } else { 1 };
+        // Only a minimum between two larger costs has a vertex.
         counts[lane] = (d >= 1) & (d < reach) & (least >= at);
     }
     // A parabola's vertex by integer division: the same on every machine.

@@ -50,6 +50,8 @@ impl StereoMatcher<'_> {
             each(executor, jobs, |(first, du, dv)| {
                 executor.vectors().run(GradientRows { image, first, du, dv })
             });
+            // Invalid pixels get the gradient of an even surface: the border of a mask is not
+            // texture.
             if let Some(invalid) = invalid {
                 invalid::flatten(invalid, width, du);
                 invalid::flatten(invalid, width, dv);
@@ -70,6 +72,7 @@ impl StereoMatcher<'_> {
         );
         let bands = Bands::of(rows);
         let matching = SupportMatching { config, left, right };
+        // Bands run at the same time, each with its own rows of descriptors.
         let jobs = zip3(
             bands.first(),
             bands.split_mut(self.support, columns),
@@ -95,6 +98,7 @@ impl StereoMatcher<'_> {
         let Some(grid) = self.support.get_mut(..columns * rows) else { return };
         let filter = FilterSupport { config, grid, columns, scratch: self.support_scratch };
         [report.implausible, report.redundant] = executor.vectors().run(filter);
+        // Rows from the top: the triangulation takes its points in scan order.
         self.left_mesh.clear();
         self.right_mesh.clear();
         for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
@@ -120,6 +124,7 @@ impl StereoMatcher<'_> {
             mesh.triangulate();
             prior::mark_cells(config, mesh.points(), columns, clipped_mut(sets, ..cells));
         };
+        // The two meshes share nothing: one thread each.
         executor.join(
             || prepare(&mut self.left_mesh, self.left_cells),
             || prepare(&mut self.right_mesh, self.right_cells),
@@ -187,6 +192,8 @@ impl StereoMatcher<'_> {
         report: &mut StereoReport,
     ) {
         report.speckles = self.remove_segments(config, config.speckle_size, executor).measured;
+        // The second pass removes larger islands. Gaps within a surface are filled first, so that a
+        // surface with holes is one segment.
         let lone_size = (config.lone_share * (self.width * self.height) as f32) as u32;
         if lone_size > 1 {
             let filling = Filling {
@@ -197,6 +204,7 @@ impl StereoMatcher<'_> {
             report.filled = self.fill(filling, executor);
             let blanked = self.remove_segments(config, lone_size, executor);
             report.speckles += blanked.measured;
+            // A pixel that was filled and then removed does not count as filled.
             report.filled -= blanked.filled;
         }
     }
@@ -222,6 +230,8 @@ impl StereoMatcher<'_> {
         smallest: u32,
         executor: &E,
     ) -> Blanked {
+        // The gradients and the right image's disparities are done with: their memory holds the
+        // runs.
         let scratch = Scratch {
             runs: bytemuck::cast_slice_mut(self.gradients),
             ends: bytemuck::cast_slice_mut(self.other),
@@ -265,11 +275,14 @@ impl StereoMatcher<'_> {
                 executor.vectors().run(Smooth { from, width, along, first, to })
             });
         };
+        // Rows go to the other buffer and columns come back, so that the result ends where it
+        // began.
         for _ in 0..config.adaptive_mean {
             smooth(image, Along::Rows, other);
             smooth(other, Along::Columns, image);
         }
         if config.median {
+            // The median needs neighbours that have not changed yet.
             other.iter_mut().zip(&*image).for_each(|(to, from)| *to = *from);
             let rows = zip2(bands.first(), bands.split_mut(image, width));
             each(executor, rows, |(first, to)| median::median(other, width, first, to));
@@ -290,6 +303,7 @@ impl StereoMatcher<'_> {
             let value = DisparityQ8::new(px as u16 * (DISPARITY_ONE_PX / WORKING_ONE_PX as u16));
             *disparity = if filled { value.filled() } else { value }.get();
         }
+        // Gap filling and smoothing may have reached into invalid pixels.
         if let Some(invalid) = invalid {
             invalid::remove(invalid, self.width, disparities);
         }

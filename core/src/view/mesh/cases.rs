@@ -91,6 +91,8 @@ const fn segments(inside: usize) -> [usize; EDGE_COUNT] {
         let mut i = 0;
         while i < 4 {
             let before = corners[(i + 3) % 4];
+            // Each face is cut by segments that have the inside on one side, so that they form
+            // rings.
             if inside >> corners[i] & 1 == 1 && inside >> before & 1 == 0 {
                 // A run of inside corners begins at i: walk to its end.
                 let mut end = i;
@@ -116,6 +118,7 @@ const fn case(inside: usize) -> Case {
     let mut case = Case { edges: 0, triangles: [[0; 3]; MAX_TRIANGLES], count: 0 };
     let mut start = 0;
     while start < EDGE_COUNT {
+        // A segment that no triangle has used starts a new ring.
         if next[start] < EDGE_COUNT && case.edges >> start & 1 == 0 {
             let mut ring = [0; EDGE_COUNT];
             let mut len = 0;
@@ -126,6 +129,7 @@ const fn case(inside: usize) -> Case {
                 len += 1;
                 edge = next[edge];
             }
+            // A fan of triangles from the corner whose diagonals lie least in the cell's faces.
             let apex = best_apex(&ring, len);
             let mut i = 1;
             while i + 1 < len {
@@ -175,6 +179,8 @@ const fn best_apex(ring: &[usize; EDGE_COUNT], len: usize) -> usize {
         let mut within_faces = 0;
         let mut i = 2;
         while i + 1 < len {
+            // A diagonal in a face would meet the neighbouring cell's triangles with an edge they
+            // do not have.
             if share_a_face(ring[apex], ring[(apex + i) % len]) {
                 within_faces += 1;
             }

@@ -48,6 +48,7 @@ impl Volume<'_> {
         sink: &mut impl MeshSink,
     ) -> u64 {
         let (mut count, mut names) = (0, VertexNames::new());
+        // In the order of the pool, which is the same on every machine.
         for slot in self.pool().live() {
             if let Some(coord) = self.blocks().coord(slot).filter(|&coord| is_selected(coord)) {
                 let patch = Patch::load(self, slot, coord, config.min_weight);
@@ -104,6 +105,8 @@ impl<'v, 's> Patch<'v, 's> {
         let (Some(sdf), Some(weight)) = (self.blocks.sdf(slot), self.blocks.weight(slot)) else {
             return;
         };
+        // Bit by bit, n says on which axes the block lies after the patch's own; of such a block
+        // only the first points are needed.
         let span = |axis: usize| if n >> axis & 1 == 1 { BLOCK_SIDE..SIDE } else { 0..BLOCK_SIDE };
         let columns = span(0);
         for z in span(2) {

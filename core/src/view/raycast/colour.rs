@@ -17,6 +17,7 @@ pub(super) fn words([red, green, blue]: [u8; 3]) -> [u32; 2] {
 /// Returns the weights of a cell's corners at a point in it, in 256ths.
 #[inline(always)]
 fn counts([x, y, z]: [f32; 3]) -> [u32; 8] {
+    // Fixed point, so that the mean of colours is the same on every machine.
     let [x, y, z] = [
         floored_i32(x * 256.0) as u32,
         floored_i32(y * 256.0) as u32,
@@ -24,6 +25,7 @@ fn counts([x, y, z]: [f32; 3]) -> [u32; 8] {
     ];
     let (nx, ny, nz) = (256 - x, 256 - y, 256 - z);
     let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+    // Products of three shares in 2^24ths, brought down to 256ths.
     let count = |area: u32, height: u32| (area * height) >> 16;
     [
         count(a, nz),

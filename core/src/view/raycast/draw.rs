@@ -102,6 +102,7 @@ impl Scene<'_, '_> {
             for (u, &id) in
                 strip.row(row).iter().take(width).enumerate().filter(|(_, id)| **id != CellId::NONE)
             {
+                // Eight hits are refined at once; the row's last ones are shown after it.
                 hits.push(&self.cells, u, id);
                 if hits.is_full() {
                     show(&mut hits, &mut images);

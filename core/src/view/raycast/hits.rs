@@ -53,6 +53,7 @@ impl<'a> Hits<'a> {
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "lanes are below their number")]
     pub fn push(&mut self, cells: &CrossedCells<'a, '_>, u: usize, id: CellId) {
+        // The lane before, which for the first lane is the last one of the eight before.
         let [before, lane] = [(self.len + LANES - 1) % LANES, self.len % LANES];
         if id == self.ids[before] {
             // Rays side by side often meet the surface in the same cell.
@@ -243,6 +244,7 @@ impl Work for Meet<'_> {
         // Regula falsi in the Illinois form: an end that stays twice is halved.
         let ([mut low, mut low_value], [mut high, mut high_value]) =
             ([[0.0; LANES], values[0]], [[1.0; LANES], values[1]]);
+        // A ray that is good enough keeps its share, while the other lanes go on.
         let (mut share, mut side, mut is_open) = ([0.0; LANES], [0i32; LANES], [1i32; LANES]);
         for _ in 0..MAX_REFINEMENTS {
             let mut open = 0;
@@ -292,6 +294,7 @@ impl Meet<'_> {
         let Passages { fields, from, to, depths, share } = passages;
         let mut met = Met::default();
         for lane in 0..LANES {
+            // The last secant may overshoot by rounding.
             let share = max_f32(0.0, min_f32(share[lane], 1.0));
             let point = along([at_lane(from, lane), at_lane(to, lane)], share);
             let gradient = Field(at_lane(fields, lane)).gradient(point);

@@ -172,6 +172,7 @@ impl<'s> Raycaster<'s> {
         view: &Viewpoint,
         executor: &E,
     ) -> Result<RaycastReport, RaycastError> {
+        // An error leaves an empty picture, not the one before.
         (self.width, self.height) = (0, 0);
         let pixels = view.width.saturating_mul(view.height);
         if pixels == 0 || pixels > self.depth_m.len() || !self.visibility.fits(view.width) {
@@ -212,10 +213,12 @@ impl<'s> Raycaster<'s> {
         layer: u8,
         executor: &E,
     ) -> RaycastReport {
+        // Weight 0 marks voxels that were never observed.
         let min_weight = if self.config.min_weight == 0 { 1 } else { self.config.min_weight };
         let near_m = self.config.near_m;
         let sought =
             SurfaceSought { ray_camera, limits_m: [near_m, self.config.far_m], min_weight };
+        // Only blocks in view are read from here on.
         let in_view = self.surface.find(volume, &sought, executor);
         let limits_m = [near_m, min_f32(in_view.far_m, self.config.far_m)];
         if self.surface.len() > self.peak_blocks {
@@ -243,6 +246,7 @@ impl<'s> Raycaster<'s> {
         }
         .split(ray_camera.height, ray_camera.width)
         .0;
+        // Four bands of rows; the number is fixed, so that threads cannot reach the result.
         let rows = ray_camera.height.div_ceil(4);
         let (high, low) = picture.split(2 * rows, ray_camera.width);
         let ((a, b), (c, d)) =

@@ -69,6 +69,7 @@ impl RayCamera {
         view.rig.validate().ok()?;
         let voxel_m = f64::from(voxel_size_m);
         let camera = view.t_world_camera.translation() / voxel_m;
+        // Block coordinates are 16 bits wide.
         let bound = f64::from(i16::MAX) * BLOCK_SIDE as f64;
         if !view.t_world_camera.is_rotation() || !camera.iter().all(|c| *c > -bound && *c < bound) {
             return None;
@@ -121,6 +122,8 @@ impl RayCamera {
             |axis: usize| (dot(self.rows[axis], from_eye), dot(self.reaches[axis], half));
         let (across, down, (z, z_reach)) = (projected(0), projected(1), projected(2));
         let depth_m = [max_f32(z - z_reach, near_m), min_f32(z + z_reach, far_m)];
+        // Perspective divides by depth: the box's rims are bounded by its nearest and farthest
+        // depth.
         let inverse = [1.0 / depth_m[0], 1.0 / depth_m[1]];
         // The box in camera axes; its left rim looks leftmost from the nearest depth when left of
         // the axis, from the farthest when right.

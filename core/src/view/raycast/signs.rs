@@ -33,6 +33,7 @@ pub(crate) fn of_block(
             *is_observed = u8::from(weight >= min_weight);
             *is_before = u8::from(sdf > 0);
         }
+        // A point never observed is in neither of the two.
         let observed = bits(&is_observed);
         *before = observed & bits(&is_before);
         *behind = observed & !*before;
@@ -87,6 +88,7 @@ pub(super) fn cells(signs: [&[Layers; 2]; 8]) -> Cells {
             .zip(before.iter().zip(behind.iter()))
             .for_each(|(unseen, (before, behind))| *unseen = !(before | behind));
     }
+    // A cell has eight corners: its own voxel's point and those after it on each axis.
     let [before, behind, unseen] =
         [with_a_corner(&before), with_a_corner(&behind), with_a_corner(&unseen)];
     let mut cells = [CellLayer::default(); BLOCK_SIDE];

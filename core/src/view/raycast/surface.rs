@@ -188,6 +188,7 @@ impl<'s> Surface<'s> {
         self.shift = 64 - len.trailing_zeros();
         let Some(table) = self.table.get_mut(..len) else { return };
         table.fill(0);
+        // Entries count from one: zero marks an empty place.
         for (entry, local) in (1u64..).zip(self.local.iter()).take(self.len) {
             let key = key(*local);
             let mut at = bucket(key, self.shift);
@@ -219,6 +220,7 @@ impl<'s> Surface<'s> {
         else {
             return;
         };
+        // Each block writes its own signs, so bands may run at the same time.
         let bands = Bands::of(self.len);
         each(executor, zip2(bands.split_mut(signs, 1), bands.split(slots, 1)), read);
     }
@@ -236,6 +238,7 @@ impl<'s> Surface<'s> {
                 } else {
                     self.entry([x + (n & 1), y + (n >> 1 & 1), z + (n >> 2)])
                 };
+                // A neighbour out of view or not in the map counts as unseen.
                 if let Some((signs, slots)) =
                     entry.and_then(|entry| self.signs.get(entry).zip(self.slots.get(entry)))
                 {
@@ -248,6 +251,7 @@ impl<'s> Surface<'s> {
                 *to = cells;
                 *all = slots;
             }
+            // A block without a cell that the surface crosses is passed over when rows are drawn.
             if let Some(rows) = self.rows.get_mut(at)
                 && cells.iter().all(|layer| layer.crossed == 0)
             {

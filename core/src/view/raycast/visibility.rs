@@ -140,6 +140,7 @@ impl Work for Projection<'_, '_, '_, '_> {
                         CellIndex::of_voxel(z << 6 | bit),
                         layer.fully_observed >> bit & 1 == 1,
                     );
+                    // Cells are projected eight at a time; the block's last ones after it.
                     if cells.len == LANES {
                         self.project(entry, &block, &mut cells, &mut passing);
                     }
@@ -162,6 +163,7 @@ impl Projection<'_, '_, '_, '_> {
         passing: &mut Passing,
     ) {
         cells.find(self.ray_camera, block.local, self.limits_m);
+        // Cells may reach beyond the strip: its rows are clipped.
         for lane in 0..cells.len.min(LANES) {
             let [first, last] = [
                 cells.rows[0][lane].max(self.rows[0] as i32),
@@ -202,6 +204,7 @@ impl Projection<'_, '_, '_, '_> {
                 let Some((enters_m, cells)) = self.strip.eight(v - self.rows[0], u) else {
                     continue;
                 };
+                // Pixels that show something nearer need no test.
                 if enters_m
                     .iter()
                     .zip(own)
@@ -364,6 +367,7 @@ impl Target {
                 .wrapping_neg();
             passing.meets[lane] = passing.leaves_behind[lane] & is_before;
         }
+        // Masks instead of branches: which of eight rays meet the surface is hard to predict.
         for ((nearest_m, enters_m), &meets) in
             nearest_m.iter_mut().zip(&passing.depths_m[0]).zip(&passing.meets)
         {
