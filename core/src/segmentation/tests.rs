@@ -157,8 +157,8 @@ impl World {
         frames: u32,
         mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
     ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
-        let config =
-            TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() };
+        let mut config = TrackingConfig::default();
+        (config.instances.area_min_px, config.instances.track_area_min_px) = (0, 0);
         let segmentation = SegmentationConfig { enabled: true, ..SegmentationConfig::default() };
         let bytes = Tracker::bytes(&CAPACITY)
             + MotionSegmenter::bytes(&CAPACITY)

@@ -16,8 +16,7 @@
 use super::{
     TrackingConfig,
     config::Overlap,
-    index::OptionalIndex,
-    instance::Instance,
+    instances::{Instance, OptionalIndex},
     occlusion::{extent_affinity, next_extent},
     track::Track,
 };

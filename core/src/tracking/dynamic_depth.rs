@@ -1,6 +1,6 @@
 //! Which depth the static map does not get.
 
-use super::{Tracker, TrackingConfig, track::Track};
+use super::{InstancesConfig, Tracker, track::Track};
 use crate::{
     image::ViewMut,
     masks::{MaskStore, ScaledMask},
@@ -30,7 +30,7 @@ impl Tracker<'_> {
                 && (!track.tracked_only.get() || track.moves())
             {
                 let predicted = predicted_delete_mask(
-                    &self.config,
+                    self.instances.config(),
                     track,
                     gap,
                     self.masks.previous(),
@@ -46,7 +46,7 @@ impl Tracker<'_> {
 /// The delete mask of a track last detected `gap` frames ago, where its velocity in the image
 /// predicts it.
 fn predicted_delete_mask<'m, 's>(
-    config: &TrackingConfig,
+    config: &InstancesConfig,
     track: &Track,
     gap: u32,
     previous: &'m MaskStore<'s>,

@@ -1,6 +1,6 @@
 //! Which instance each match of the scene flow is assigned to.
 
-use super::{Tracker, instance::Instance, track::Track};
+use super::{Tracker, instances::Instance, track::Track};
 use crate::{
     geometry::scalar::floor_i32,
     masks::{MaskStore, PixelBox},

@@ -49,16 +49,13 @@
 //! gets the motion of the one with more matches.
 
 mod association;
-mod class;
 mod config;
-mod detection;
 mod dynamic_depth;
 mod egomotion_mask;
 mod guided_matching;
 mod image_velocity;
-mod index;
-mod instance;
 mod instance_at;
+mod instances;
 mod match_assignment;
 mod motion_estimate;
 mod motion_filter;
@@ -75,12 +72,12 @@ mod visit;
 
 pub use association::TrackCount;
 pub(crate) use association::remove_at;
-pub use class::{Class, Treatment};
 pub use config::{MotionConfig, Overlap, StateConfig, TrackingConfig};
-pub use detection::{Detection, DetectionCount, MAX_DETECTIONS};
 pub(crate) use egomotion_mask::{CameraMotion, EgomotionMask};
 pub(crate) use guided_matching::{GuidedMatching, expected};
 pub use instance_at::InstanceAt;
+pub(crate) use instances::Instance;
+pub use instances::{Class, Detection, DetectionCount, InstancesConfig, MAX_DETECTIONS, Treatment};
 pub(crate) use match_assignment::{FrameMatches, MatchOwner, OwnerCode};
 #[cfg(test)]
 pub(crate) use motion_state::MotionEvidence;
@@ -88,7 +85,6 @@ pub use motion_state::MotionState;
 pub use report::{TrackReport, TrackingReport};
 pub(crate) use stages::{Added, Assigned, Tracked};
 
-pub(crate) use instance::Instance;
 pub(crate) use track::Track;
 
 use crate::{
@@ -99,7 +95,7 @@ use crate::{
 use association::TrackTable;
 use guided_matching::MAX_GUIDED_MATCHES;
 use image_velocity::measure_image_velocities;
-use instance::Instances;
+use instances::Instances;
 use motions::MotionInput;
 
 /// Instances and tracks.
@@ -142,7 +138,7 @@ impl<'s> Tracker<'s> {
                 MaskStore::new(carver.alloc("tracking.mask0", capacity.mask_words)),
                 MaskStore::new(carver.alloc("tracking.mask1", capacity.mask_words)),
             ]),
-            instances: Instances::new_in(capacity, carver),
+            instances: Instances::new_in(capacity, &config.instances, carver),
             tracks: TrackTable::new_in(capacity, carver),
             refined_owner: carver.alloc("tracking.owner", capacity.matches),
             sparse_owner: carver.alloc("tracking.sparse_owner", capacity.matches),
@@ -168,7 +164,7 @@ impl<'s> Tracker<'s> {
         self.masks.advance();
         let current = self.masks.current_mut();
         current.clear();
-        self.report.detections = self.instances.ingest(&self.config, given, size, current);
+        self.report.detections = self.instances.ingest(given, size, current);
         measure_image_velocities(self.tracks.all_mut(), frame, matches, self.masks.previous());
         self.report.tracks =
             self.tracks.associate(&self.config, frame, self.instances.all_mut(), &self.masks);

@@ -7,7 +7,7 @@
 
 use super::{
     TrackingConfig,
-    instance::Instance,
+    instances::Instance,
     track::{Track, is_cut},
 };
 use crate::masks::PixelBox;

@@ -28,22 +28,27 @@ impl TrackingConfig {
         Row::user("tracking.frame_interval_s", "s", |c| F32(&mut c.frame_interval_s))
             .range(Range::POSITIVE)
             .text("Time between two frames; a run sets it by its data set."),
-        Row::user("tracking.score_min", "", |c| F32(&mut c.score_min))
+        Row::user("tracking.instances.score_min", "", |c| F32(&mut c.instances.score_min))
             .range(Range::SHARE)
             .text("Least score of a detection; others are ignored."),
-        Row::user("tracking.area_min_px", "px", |c| U32(&mut c.area_min_px)).range(AREA).text(
+        Row::user("tracking.instances.area_min_px", "px", |c| {
+            U32(&mut c.instances.area_min_px)
+        })
+        .range(AREA)
+        .text(
             "A detection's box must be larger than this to be reconstructed, and to be kept out of \
              the static map in every state, at an image width of 1242; at other widths in \
              proportion to the width squared.",
         ),
-        Row::user("tracking.track_area_min_px", "px", |c| U32(&mut c.track_area_min_px))
-            .range(AREA)
-            .published("as `area_min_px`")
-            .text(
-                "A detection's box must be larger than this to be tracked, and kept out of the \
-                 static map once it is known to move. The default is what 18 matches take, 7 px \
-                 apart.",
-            ),
+        Row::user("tracking.instances.track_area_min_px", "px", |c| {
+            U32(&mut c.instances.track_area_min_px)
+        })
+        .range(AREA)
+        .published("as `area_min_px`")
+        .text(
+            "A detection's box must be larger than this to be tracked, and kept out of the static \
+             map once it is known to move. The default is what 18 matches take, 7 px apart.",
+        ),
         Row::expert("tracking.overlap", "", |c| Choice(&mut c.overlap)).published("box").text(
             "Intersection over union by which a detection is associated with a track: that of \
              masks or of boxes.",

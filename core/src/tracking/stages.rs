@@ -75,7 +75,7 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
         score: f32,
         is_own: impl Fn(i32, i32) -> bool,
     ) -> Added {
-        let Tracker { masks, instances, config, size, .. } = &mut *self.tracker;
+        let Tracker { masks, instances, size, .. } = &mut *self.tracker;
         let masks = masks.current_mut();
         let Some(mask) = masks.alloc(pixels) else { return Added::Full };
         masks.fill(&mask, is_own);
@@ -85,7 +85,7 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
             masks.free_last(mask);
             return Added::Covered;
         }
-        if instances.add(config, mask, Class::MovingObject, score, size[0]) {
+        if instances.add(mask, Class::MovingObject, score, size[0]) {
             Added::Yes
         } else {
             masks.free_last(mask);

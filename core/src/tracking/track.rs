@@ -2,8 +2,7 @@
 
 use super::{
     Class, MotionState,
-    index::{Flag, OptionalIndex},
-    instance::Instance,
+    instances::{Flag, Instance, OptionalIndex},
     motion_filter::MotionFilter,
     motion_state::MotionHysteresis,
 };

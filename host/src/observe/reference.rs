@@ -280,8 +280,8 @@ fn region(
     u: i32,
     v: i32,
 ) -> Region {
-    let instances = &run.plan.config.tracking;
-    if instances.dynamic {
+    let tracking = &run.plan.config.tracking;
+    if tracking.dynamic {
         return Region::from_instance(mapper.instance_at(u, v).as_ref());
     }
     let (width, height) = run.plan.dataset.size();
@@ -289,8 +289,8 @@ fn region(
     let taken = |one: &&InstanceMask| {
         one.contains(u, v)
             && one.class.treatment() != Treatment::Ignore
-            && one.score >= instances.score_min
-            && instances.is_reconstructable(one.pixels.intersection(&image).area(), width)
+            && one.score >= tracking.instances.score_min
+            && tracking.instances.is_reconstructable(one.pixels.intersection(&image).area(), width)
     };
     let object = images.masks.instances.iter().find(taken);
     Region::from_instance(

@@ -165,7 +165,7 @@ impl Observer for TracksObserver {
         if let Some(truth) = &frame.images.objects {
             let size = run.plan.dataset.size();
             let large_enough = |pixels: &PixelBox| {
-                run.plan.config.tracking.is_reconstructable(pixels.area(), size.0)
+                run.plan.config.tracking.instances.is_reconstructable(pixels.area(), size.0)
             };
             let t_world_camera = &frame.row.report.t_world_camera;
             let compared = TrackedFrame { tracks: &tracks, t_world_camera, truth, size };
@@ -173,8 +173,9 @@ impl Observer for TracksObserver {
             self.compared_frames.push(frame.row.frame);
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
-                let large_enough =
-                    |pixels: u64| run.plan.config.tracking.is_trackable(pixels as i64, size.0);
+                let large_enough = |pixels: u64| {
+                    run.plan.config.tracking.instances.is_trackable(pixels as i64, size.0)
+                };
                 let compared = ComparedMasks {
                     overlaps: &overlaps,
                     objects: &truth.objects,

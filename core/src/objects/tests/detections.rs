@@ -124,7 +124,7 @@ fn the_static_map_sees_nothing_under_any_delete_mask_tracked_or_not() {
     let mask = vec![1; 3600];
     let walker = detection(Class::Person, 0.6, &pixels(300, 30, 60, 60), &mask);
     let car = detection(Class::Car, 0.9, &pixels(20, 30, 60, 60), &mask);
-    let config = TrackingConfig { area_min_px: 2025, ..TrackingConfig::default() };
+    let config = TrackingConfig::default();
     // A table of one track: the walker, of lower score, gets none.
     with(&Capacity { tracks: 1, ..CAPACITY }, &config, |instances, _| {
         instances.ingest(0, &[walker, car], [WIDTH, HEIGHT]);
@@ -240,7 +240,8 @@ fn of_a_box_half_beside_the_image_the_half_within_counts() {
 fn a_score_below_the_least_is_ignored() {
     let mask = vec![1; 3600];
     let car = |score| detection(Class::Car, score, &pixels(10, 10, 60, 60), &mask);
-    let config = TrackingConfig { score_min: 0.4, ..any_size() };
+    let mut config = any_size();
+    config.instances.score_min = 0.4;
     let count = |score| accepted_of(&config, [WIDTH, HEIGHT], &[car(score)]).0;
     assert_eq!(
         [count(0.39), count(0.4)].map(|count| (count.accepted, count.ignored)),

@@ -31,46 +31,48 @@ fn run(camera_m_s: f64, with_images: bool) -> Vec<TrackReport> {
         height: PIECE.height as u32,
         mask: &mask,
     };
-    with(
-        &capacity,
-        &TrackingConfig { area_min_px: 0, track_area_min_px: 0, ..TrackingConfig::default() },
-        |instances, estimator| {
-            (0..6)
-                .map(|frame| {
-                    let at_m = 0.3 * f64::from(frame);
-                    let images = test_scene::see(&shift(0.0, 0.0, at_m));
-                    let [left, right] = [0, 1].map(|side| {
-                        View::new(&images[side], test_scene::WIDTH, test_scene::HEIGHT).unwrap()
-                    });
-                    matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
-                    let q8 = (test_scene::RIG.focal_px * test_scene::RIG.baseline_m
-                        / (WALL_M - at_m)
-                        * 256.0) as u16;
-                    let disparity = vec![q8; test_scene::WIDTH * test_scene::HEIGHT];
-                    let disparity =
-                        View::new(&disparity, test_scene::WIDTH, test_scene::HEIGHT).unwrap();
-                    instances.ingest(frame, &[detection], SIZE);
-                    instances.assign_matches(&[], &[]);
-                    let camera = CameraMotion {
-                        t_world_camera: shift(0.0, 0.0, 0.1 * camera_m_s * f64::from(frame)),
-                        t_current_previous: (frame > 0).then(|| shift(0.0, 0.0, -0.1 * camera_m_s)),
-                    };
-                    let search = with_images
-                        .then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
-                    let none = FrameMatches { refined: &[], sparse: &[] };
-                    instances.tracker.test_estimate_motions(
-                        &test_scene::RIG,
-                        &camera,
-                        none,
-                        search,
-                        estimator,
-                    );
-                    instances.reconstruct(None, &mut NoSink);
-                    instances.tracks().next().unwrap()
-                })
-                .collect()
-        },
-    )
+    with(&capacity, &of_any_size(), |instances, estimator| {
+        (0..6)
+            .map(|frame| {
+                let at_m = 0.3 * f64::from(frame);
+                let images = test_scene::see(&shift(0.0, 0.0, at_m));
+                let [left, right] = [0, 1].map(|side| {
+                    View::new(&images[side], test_scene::WIDTH, test_scene::HEIGHT).unwrap()
+                });
+                matcher.push(&SceneFlowConfig::default(), left, right, &Serial);
+                let q8 = (test_scene::RIG.focal_px * test_scene::RIG.baseline_m / (WALL_M - at_m)
+                    * 256.0) as u16;
+                let disparity = vec![q8; test_scene::WIDTH * test_scene::HEIGHT];
+                let disparity =
+                    View::new(&disparity, test_scene::WIDTH, test_scene::HEIGHT).unwrap();
+                instances.ingest(frame, &[detection], SIZE);
+                instances.assign_matches(&[], &[]);
+                let camera = CameraMotion {
+                    t_world_camera: shift(0.0, 0.0, 0.1 * camera_m_s * f64::from(frame)),
+                    t_current_previous: (frame > 0).then(|| shift(0.0, 0.0, -0.1 * camera_m_s)),
+                };
+                let search = with_images
+                    .then_some(GuidedMatching { matcher: &matcher, disparity_q8: disparity });
+                let none = FrameMatches { refined: &[], sparse: &[] };
+                instances.tracker.test_estimate_motions(
+                    &test_scene::RIG,
+                    &camera,
+                    none,
+                    search,
+                    estimator,
+                );
+                instances.reconstruct(None, &mut NoSink);
+                instances.tracks().next().unwrap()
+            })
+            .collect()
+    })
+}
+
+/// No detection is too small to be tracked or reconstructed.
+fn of_any_size() -> TrackingConfig {
+    let mut config = any_size();
+    config.instances.track_area_min_px = 0;
+    config
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn deleted(
         let row: Vec<u8> = (0..side).map(|u| u8::from(u >= corner || v >= corner)).collect();
         store.set_row(&mask, pixels.top + v, pixels.left, &row);
     }
-    let scale = TrackingConfig::default().delete_permille(pixels.area(), 1242);
+    let scale = InstancesConfig::default().delete_permille(pixels.area(), 1242);
     let scaled = ScaledMask::new(&store, mask, scale);
     test(&|u, v| scaled.contains(u, v), &|u, v| store.contains(&mask, u, v), scaled.pixels);
 }

@@ -192,11 +192,12 @@ fn seen_at(speed_m_s: f32) -> Option<MotionEvidence> {
 
 #[test]
 fn a_small_object_takes_its_neighbours_matches_only_once_it_moves() {
-    let config = TrackingConfig {
+    let instances = InstancesConfig {
         area_min_px: 1_000_000,
         track_area_min_px: 0,
-        ..TrackingConfig::default()
+        ..InstancesConfig::default()
     };
+    let config = TrackingConfig { instances, ..TrackingConfig::default() };
     with(&CAPACITY, &config, |instances, _| {
         instances.ingest(0, &[car(40, 0.9), car(100, 0.5)], [WIDTH, HEIGHT]);
         instances.assign_matches(&[at(97.0)], &[]);

@@ -25,8 +25,8 @@ use crate::{
     segmentation::SegmentationReport,
     tracking::{
         CameraMotion, Class, Detection, DetectionCount, FrameMatches, GuidedMatching, InstanceAt,
-        MotionConfig, MotionEvidence, MotionState, Overlap, StateConfig, TrackCount, TrackReport,
-        Tracker, TrackingConfig,
+        InstancesConfig, MotionConfig, MotionEvidence, MotionState, Overlap, StateConfig,
+        TrackCount, TrackReport, Tracker, TrackingConfig,
         tests::{MAX_GUIDED_MATCHES, MatchOwner, step_px},
     },
 };
@@ -360,7 +360,8 @@ pub(super) fn take_frame(
 
 /// No detection is too small.
 pub(super) fn any_size() -> TrackingConfig {
-    TrackingConfig { area_min_px: 0, ..TrackingConfig::default() }
+    let instances = InstancesConfig { area_min_px: 0, ..InstancesConfig::default() };
+    TrackingConfig { instances, ..TrackingConfig::default() }
 }
 
 /// Returns a configuration in which standing takes as long to confirm as moving: either is known in

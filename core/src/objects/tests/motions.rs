@@ -182,11 +182,12 @@ fn small_car(speed_m_s: f64) -> impl Fn(u32) -> [Transform; 2] {
 
 #[test]
 fn a_small_object_is_reported_once_measured_and_masked_once_moving() {
-    let config = TrackingConfig {
+    let instances = InstancesConfig {
         area_min_px: 1_000_000,
         track_area_min_px: 0,
-        ..TrackingConfig::default()
+        ..InstancesConfig::default()
     };
+    let config = TrackingConfig { instances, ..TrackingConfig::default() };
     for (speed_m_s, state) in [(8.0, MotionState::Dynamic), (0.0, MotionState::Static)] {
         with(&CAPACITY, &config, |instances, estimator| {
             let mut run = Run::new(instances, estimator);

@@ -21,9 +21,9 @@ fn each_setting_out_of_its_range_is_named() {
     assert_eq!(named(|_| {}), [""; 0]);
     let spoilt: [(Spoil, &str); 22] = [
         (|c| c.frame_interval_s = 0.0, "frame_interval_s"),
-        (|c| c.score_min = f32::NAN, "score_min"),
-        (|c| c.area_min_px = 1 << 21, "area_min_px"),
-        (|c| c.track_area_min_px = 1 << 21, "track_area_min_px"),
+        (|c| c.instances.score_min = f32::NAN, "instances.score_min"),
+        (|c| c.instances.area_min_px = 1 << 21, "instances.area_min_px"),
+        (|c| c.instances.track_area_min_px = 1 << 21, "instances.track_area_min_px"),
         (|c| c.association_min = -0.1, "association_min"),
         (|c| c.extent_frames = 1001, "extent_frames"),
         (|c| c.forget_frames = 0, "forget_frames"),
