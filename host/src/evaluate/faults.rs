@@ -55,6 +55,7 @@ impl FaultOutcome {
         let Some(mut before) = frames.get(first.saturating_sub(1)) else { return Self::default() };
         let mut outcome = Self { recovered_after: Some(0), ..Self::default() };
         for (since, frame) in frames.iter().skip(first).enumerate() {
+            // A new segment has a pose of its own: the jump to it is no error.
             if frame.segment != before.segment {
                 before = frame;
             }
@@ -62,10 +63,12 @@ impl FaultOutcome {
             let truly = before.true_t_world_camera.inverse() * frame.true_t_world_camera;
             let error = truly.inverse() * moved;
             let (distance_m, angle_deg) = (error.distance_m(), error.angle_rad().to_degrees());
+            // Wrong means off the ground truth; reported means that the mapper said so.
             let (wrong, reported) = (
                 distance_m > WRONG_M || angle_deg > WRONG_DEG,
                 frame.severity >= Severity::MapAffected,
             );
+            // What was reported may be wrong: only silence counts against the mapper.
             if !reported {
                 outcome.unreported_m = outcome.unreported_m.max(distance_m);
                 outcome.unreported_deg = outcome.unreported_deg.max(angle_deg);
@@ -74,6 +77,7 @@ impl FaultOutcome {
             outcome.wrong_fused += usize::from(wrong && frame.fused);
             outcome.extrapolated += usize::from(frame.pose == PoseOrigin::Extrapolated);
             outcome.map_affected += usize::from(reported);
+            // Recovered after the last bad frame, unless that is the last of all.
             if wrong || reported {
                 outcome.recovered_after = (first + since + 1 < frames.len()).then_some(since + 1);
             }

@@ -72,6 +72,7 @@ impl SeenSide {
     pub fn add(&mut self, view: &TrueView<'_>, truth: &TrueObject, t_truth_object: &Transform) {
         let t_truth_camera = truth.t_world_object.inverse() * view.t_world_camera;
         let [width, height, length] = truth.dimensions_m;
+        // The box without its foot: the ground below an object is not the object.
         let inside = |p: &Point3<f64>| {
             p.x.abs() <= 0.5 * width + MARGIN_M
                 && p.z.abs() <= 0.5 * length + MARGIN_M
@@ -83,6 +84,7 @@ impl SeenSide {
         for v in pixels.top.max(0)..pixels.top + pixels.height {
             for u in pixels.left.max(0)..pixels.left + pixels.width {
                 let depth_m = view.depth_m.get(u as usize, v as usize).map_or(0.0, f64::from);
+                // Written so that NaN is left out.
                 if !(depth_m > 0.0 && depth_m <= view.far_m) {
                     continue;
                 }
@@ -94,6 +96,7 @@ impl SeenSide {
                 );
                 let point = t_truth_camera.transform_point(camera);
                 if inside(&point) {
+                    // Points of a cell are averaged: noise in depth cancels over frames.
                     let cell = self.cells.entry(cell(&point, CELL_M)).or_default();
                     [point.x, point.y, point.z, 1.0]
                         .iter()
@@ -106,6 +109,7 @@ impl SeenSide {
         if seen {
             self.frames += 1;
             let distance_m = t_truth_camera.distance_m();
+            // The frame nearest to the object fixes how its own frame lies in the true one.
             if self.nearest.is_none_or(|(nearest_m, _)| distance_m < nearest_m) {
                 self.nearest = Some((distance_m, *t_truth_object));
             }
@@ -117,6 +121,7 @@ impl SeenSide {
     pub fn compare(&self, triangles: &[Triangle], voxel_size_m: f64) -> Option<SurfaceFigures> {
         let (nearest_m, t_truth_object) = self.nearest?;
         let reach_m = REACH_VOXELS * voxel_size_m;
+        // Hash order must not reach the figures.
         let mut samples: Vec<([i32; 3], Point3<f64>)> = self
             .cells
             .iter()
@@ -137,10 +142,12 @@ impl SeenSide {
         if middles.is_empty() || samples.is_empty() {
             return None;
         }
+        // From the mesh to the truth: how much of what was made is right.
         let truth = PointGrid::new(&samples, reach_m);
         let mut distances: Vec<f64> =
             middles.iter().map(|middle| truth.distance_m(middle)).collect();
         distances.sort_by(f64::total_cmp);
+        // From the truth to the mesh: how much of what was seen was made.
         let mesh = PointGrid::new(&middles, reach_m);
         let there = samples.iter().filter(|sample| mesh.distance_m(sample).is_finite()).count();
         Some(SurfaceFigures {

@@ -69,6 +69,7 @@ impl Swept {
                 t_object_map: t_map_object.inverse(),
                 dimensions_m: object.dimensions_m,
             });
+            // All squares of the ground that the box may touch: a point then asks few boxes.
             let ([left, near], [right, far]) =
                 (square(foot.x - reach, foot.z - reach), square(foot.x + reach, foot.z + reach));
             for x in left..=right {

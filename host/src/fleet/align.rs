@@ -91,6 +91,8 @@ impl Alignment {
             .iter()
             .map(|job| Sampled::of(job, folder))
             .collect::<Result<Vec<_>, _>>()?;
+        // The first map is held tighter than its poses are known: it fixes the world for the
+        // others.
         let node = |(at, (prior, of)): (usize, (&Prior, &Sampled))| {
             let share = if at == 0 { FIRST_SHARE } else { 1.0 };
             Node {
@@ -113,6 +115,7 @@ impl Alignment {
                 .map(|(nodes, of)| edge(*nodes, of, &sampled))
                 .collect();
             poses = solve(&nodes, &edges, &poses);
+            // Pairs of the last round are those that are reported.
             pairs = found
                 .iter()
                 .map(|(nodes, of)| (*nodes, pair(manifest, *nodes, of, &pairs)))
@@ -233,6 +236,8 @@ fn register_all(
                 map_b = Some(load(b)?);
             }
             let Some(map_b) = &map_b else { continue };
+            // A registration that contradicts the given poses is refused later: they are handed
+            // over.
             let given = nodes[b].given.inverse() * nodes[a].given;
             let registration = register(
                 (&load(a)?, map_b),

@@ -31,10 +31,12 @@ impl Averages {
     /// # Errors
     /// The folder has no tile, a tile is damaged or of other voxels, or the disk refuses.
     pub fn of(folder: &Path, out: &Path) -> Result<Self, FleetError> {
+        // All tiles have one lattice; the first says which.
         let lattice = match tiles(folder)?.values().next() {
             Some(first) => TileReader::open(first)?.lattice(),
             None => return Err(FleetError::content(folder, "has no tile: nothing was mapped")),
         };
+        // The averages may be larger than memory: they go to a file next to the result.
         let scratch = DraftFolder::of(&out.with_extension("blocks"));
         std::fs::create_dir_all(scratch.path()).map_err(FleetError::io(scratch.path()))?;
         let path = scratch.path().join(BLOCKS_FILE);
@@ -47,6 +49,7 @@ impl Averages {
                 weight: &average.weight,
                 colour: average.colour.as_deref(),
             };
+            // Free blocks have no surface to draw.
             if !resolved.has_surface || store.store(block) {
                 Ok(())
             } else {

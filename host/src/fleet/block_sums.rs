@@ -85,11 +85,13 @@ impl BlockSums {
             overflowed: 0,
         };
         for (voxel, &weight) in self.weight.iter().enumerate() {
+            // Never seen, or seen so often that the sums could have overflowed.
             if weight == 0 || weight > MAX_WEIGHT {
                 average.overflowed += u64::from(weight > 0);
                 continue;
             }
             average.sdf[voxel] = nearest(i64::from(self.distance[voxel]), weight) as i16;
+            // A voxel's weight has 8 bits; more observations add little.
             average.weight[voxel] = weight.min(255) as u8;
             if let (Some(planes), Some(sums)) = (&mut average.colour, &self.colour) {
                 planes.iter_mut().zip(&**sums).for_each(|(plane, sums)| {

@@ -57,6 +57,7 @@ type Kind = (ChangeKind, u32, u32);
 
 /// Changes of at least `least_m3`, the largest first.
 pub fn changes(blocks: &[BlockChange], lattice: &Lattice, least_m3: f64) -> Vec<Change> {
+    // By kind and pair of epochs: blocks of different changes are never joined.
     let mut kinds: BTreeMap<Kind, BTreeMap<BlockCoord, BlockChange>> = BTreeMap::new();
     for &block in blocks {
         let kind = if block.surface < block.free { ChangeKind::Gone } else { ChangeKind::Appeared };
@@ -65,11 +66,13 @@ pub fn changes(blocks: &[BlockChange], lattice: &Lattice, least_m3: f64) -> Vec<
     }
     let mut changes: Vec<Change> = Vec::new();
     for (kind, mut left) in kinds {
+        // Neighbouring blocks of one kind are one change.
         while let Some((_, first)) = left.pop_first() {
             let blocks = connected(first, &mut left);
             let total = |of: fn(&BlockChange) -> u32| {
                 blocks.iter().map(|block| f64::from(of(block))).sum::<f64>()
             };
+            // A change counts if most of its voxels were clearly seen through.
             let is_clear = total(|block| block.clear) >= CLEAR_MIN * total(|block| block.voxels);
             let change = summed(kind, &blocks, lattice);
             changes.extend((is_clear && change.volume_m3 >= least_m3).then_some(change));
@@ -101,6 +104,7 @@ fn summed((kind, from_epoch, to_epoch): Kind, blocks: &[BlockChange], lattice: &
     let voxel_m = f64::from(lattice.voxel_size_m);
     let block_m = voxel_m * BLOCK_SIDE as f64;
     let (mut voxels, mut centre_m) = (0.0, [0.0; 3]);
+    // The centre by voxels, the extent by whole blocks.
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for block in blocks {
         let count = f64::from(block.voxels);
@@ -111,6 +115,7 @@ fn summed((kind, from_epoch, to_epoch): Kind, blocks: &[BlockChange], lattice: &
         }
         voxels += count;
     }
+    // Most blocks decide which epoch is believed.
     let for_later = blocks.iter().filter(|block| block.believed == to_epoch).count();
     Change {
         kind,

@@ -64,11 +64,13 @@ pub fn coverage(recordings: &[PathBuf]) -> Result<Coverage, FleetError> {
                     (count, *saw) = (count + 1, true);
                 }
             }
+            // No recording saw a surface there.
             let Some(last) = usize::checked_sub(count, 1) else { continue };
             for counts in [&mut tile.blocks_by_recordings, &mut coverage.blocks_by_recordings] {
                 counts.resize(counts.len().max(count), 0);
                 counts[last] += 1;
             }
+            // A column has the recordings of its best block.
             let column = coverage.columns.entry([coord.x, coord.z]).or_default();
             *column = (*column).max(count as u16);
         }

@@ -43,6 +43,7 @@ impl DistanceField {
             truncation_m: lattice.truncation_m.into(),
         };
         for &coord in &field.order {
+            // A block that cannot be read is unknown.
             if let Some(source) = Source::load(store, coord, lattice.colour) {
                 let mut sdf = Box::new([UNSEEN; BLOCK_VOXELS]);
                 let seen = source
@@ -84,12 +85,14 @@ impl DistanceField {
                 std::array::from_fn(
                     |axis| if ahead[axis] { share[axis] } else { 1.0 - share[axis] },
                 );
+            // Trilinear.
             distance += value * factor[0] * factor[1] * factor[2];
             for axis in 0..3 {
                 let others = factor[(axis + 1) % 3] * factor[(axis + 2) % 3];
                 gradient[axis] += if ahead[axis] { value * others } else { -value * others };
             }
         }
+        // Units of distance to metres, and of the gradient to metres by metre.
         let unit_m = self.truncation_m / 32_767.0;
         Some((distance * unit_m, gradient.map(|part| part * unit_m / self.voxel_size_m)))
     }
@@ -104,6 +107,7 @@ impl DistanceField {
                 for axis in 0..3 {
                     let Some(crossing) = self.crossing(at, axis) else { continue };
                     count += 1;
+                    // The surface is thinned while it is read: memory stays bounded.
                     if !count.is_multiple_of(stride) {
                         continue;
                     }

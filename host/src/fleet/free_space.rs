@@ -62,6 +62,7 @@ pub fn free_blocks(field: &DistanceField, camera: &Camera) -> BTreeMap<BlockCoor
     let mut views: BTreeMap<BlockCoord, u8> = BTreeMap::new();
     let mut last: Option<Transform> = None;
     for CameraPose { t_map_camera: pose, .. } in &camera.poses {
+        // Views close together show the same space: they would count it twice.
         if last.is_some_and(|last| (last.inverse() * *pose).distance_m() < APART_M) {
             continue;
         }
@@ -73,6 +74,7 @@ pub fn free_blocks(field: &DistanceField, camera: &Camera) -> BTreeMap<BlockCoor
         let centre = pose.translation_m.map(|side| (side / block_m).floor() as i32);
         for x in -reach..=reach {
             for y in -reach..=reach {
+                // All blocks within reach of the camera.
                 for z in -reach..=reach {
                     let Some(coord) = BlockCoord::new(centre[0] + x, centre[1] + y, centre[2] + z)
                     else {
@@ -86,6 +88,7 @@ pub fn free_blocks(field: &DistanceField, camera: &Camera) -> BTreeMap<BlockCoor
             }
         }
     }
+    // One view may be mistaken.
     views.retain(|_, count| *count >= VIEWS_MIN);
     views
 }
@@ -124,6 +127,7 @@ impl Depths {
             };
             let [x, y, z] =
                 to_camera.transform_point([side(0, coord.x), side(1, coord.y), side(2, coord.z)]);
+            // All corners must be in front of the camera and within range.
             if !(NEAR_M..FAR_M).contains(&z) {
                 return false;
             }
@@ -143,6 +147,8 @@ impl Depths {
         if left < 0.0 || top < 0.0 || right >= self.width as f64 || bottom >= self.height as f64 {
             return false;
         }
+        // Every ray through the outline must end behind the block's farthest corner and the
+        // truncation.
         let behind_m = high[2] + truncation_m;
         let mut pixels = (top as usize..=bottom as usize)
             .flat_map(|v| (left as usize..=right as usize).map(move |u| (u, v)));
@@ -160,6 +166,7 @@ fn first_surface(field: &DistanceField, from_m: [f64; 3], ray: [f64; 3]) -> Opti
             ((from_m[axis] + ray[axis] * depth_m) / field.voxel_size_m).round() as i32
         });
         let here = field.voxel(point).map(|sdf| f64::from(sdf) / 32_767.0 * field.truncation_m);
+        // From before a surface to behind it, or out of nowhere into the back of one.
         match (here, before) {
             (Some(here), Some(before)) if here <= 0.0 && before > 0.0 => return Some(depth_m),
             (Some(here), None) if here <= 0.0 => return None,

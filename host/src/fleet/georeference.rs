@@ -88,6 +88,7 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
     let fixes = read_gnss(gnss)?;
     let cameras = Submap::cameras(&job.submap(folder))?;
     let plane = LocalPlane::at(*origin);
+    // Frames without a fix are left out.
     let seen = cameras.iter().filter_map(|camera| {
         let fix = fixes.get(camera.frame).copied().flatten()?;
         Some(Observation::of(&camera.t_map_camera, &fix, &plane))
@@ -149,6 +150,7 @@ impl Estimate {
             weights: vec![1.0; points.len()],
         };
         let mut estimate = start.next(points, axes)?;
+        // Weights and pose depend on each other: iterate until the pose rests.
         for _ in 1..MAX_ROUNDS {
             let next = estimate.next(points, axes)?;
             let change = (next.rotation - estimate.rotation)
@@ -166,18 +168,21 @@ impl Estimate {
     fn next(&self, points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
         let centres = centres(points, &self.weights);
         let mut sum =
+            // Angles, where known, weigh as their standard deviation says.
             axes.copied().unwrap_or_else(Matrix3::zeros) / (2.0 * ANGLES_SIGMA_RAD.powi(2));
         for ((from, to), weight) in points.iter().zip(&self.weights) {
             sum += (weight / information_of(self.sigma_m))
                 * (to - centres.1)
                 * (from - centres.0).transpose();
         }
+        // Kabsch: the rotation nearest to the correlation of both sets.
         let rotation = nearest_rotation(&sum)?;
         let shift_m = centres.1 - rotation * centres.0;
         let residuals_m: Vec<f64> =
             points.iter().map(|(from, to)| (to - rotation * from - shift_m).norm()).collect();
         let mut sorted = residuals_m.clone();
         sorted.sort_by(f64::total_cmp);
+        // The median residual gives sigma: outliers do not raise it.
         let sigma_m = (sorted.get(sorted.len() / 2)? / MEDIAN_LENGTH).max(SIGMA_MIN_M);
         let weights = residuals_m
             .iter()
@@ -199,6 +204,7 @@ impl Estimate {
             information += (weight / information_of(self.sigma_m))
                 * (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose());
         }
+        // The least known axis has the smallest eigenvalue.
         let least = SymmetricEigen::new(information).eigenvalues.min();
         if least > 0.0 {
             least.sqrt().recip().min(std::f64::consts::PI)
@@ -234,6 +240,7 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     if frames.len() < FIXES_MIN {
         return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
     }
+    // The antenna is not where the camera is.
     let points: Vec<_> = frames
         .iter()
         .map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m))
@@ -244,6 +251,7 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
         .filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
     let axes = turned.clone().next().and_then(|_| nearest_rotation(&turned.sum()));
     let unclear = || "its positions are not finite".to_owned();
+    // Once without angles, to see whether they contradict the positions.
     let by_positions = Estimate::of(&points, None).ok_or_else(unclear)?;
     let estimate = Estimate::of(&points, axes.as_ref()).ok_or_else(unclear)?;
     let off_rad = axes.map_or(0.0, |axes| {

@@ -103,6 +103,7 @@ impl Manifest {
         let origin = recordings.origin()?;
         for recording in &recordings.recordings {
             let Recording { name, arguments, epoch, .. } = recording;
+            // A recording's own arguments come before those of all.
             let arguments: Vec<String> =
                 arguments.iter().chain(&recordings.arguments).cloned().collect();
             let (request, identity) = identify(&arguments)?;
@@ -110,6 +111,7 @@ impl Manifest {
                 .given(origin, identity.first_pose.as_ref())
                 .map_err(|reason| FleetError::content(path, reason))?;
             let job = Job { epoch: *epoch, ..Job::new(name, request, &identity, given) };
+            // A job's name follows from what it maps: twice the same would be merged twice.
             if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
                 return Err(FleetError::content(
                     path,
@@ -141,6 +143,7 @@ impl Manifest {
                 format!("is no list of jobs of this version: {error}. {again}"),
             )
         })?;
+        // Another version may map to other bits.
         if manifest.program != program() {
             let [planned, own] = [&manifest.program, &program()];
             return Err(FleetError::content(

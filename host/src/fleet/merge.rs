@@ -33,10 +33,12 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
         return Err(FleetError::Exists { path: out.to_path_buf() });
     }
     let folders = inputs.iter().map(|folder| tiles(folder)).collect::<Result<Vec<_>, _>>()?;
+    // All tiles of all inputs, in order.
     let all: BTreeSet<WorldTile> = folders.iter().flat_map(BTreeMap::keys).copied().collect();
     let draft = DraftFolder::of(out);
     std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
     let mut merged = Merged { tiles: 0, blocks: 0, lattice: None };
+    // A tile's blocks are merged as streams: one block of each input is in memory.
     for tile in all {
         let paths = folders.iter().filter_map(|folder| folder.get(&tile));
         let mut heads = paths
@@ -49,6 +51,7 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
             })?);
         merged.tiles += 1;
     }
+    // The folder appears under its name only when it is whole.
     draft.rename(out).map_err(FleetError::io(out))?;
     Ok(merged)
 }

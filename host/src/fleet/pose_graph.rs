@@ -58,7 +58,9 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
     for _ in 0..MAX_ITERATIONS {
         let mut matrix = DMatrix::zeros(6 * nodes.len(), 6 * nodes.len());
         let mut vector = DVector::zeros(6 * nodes.len());
+        // Each map is held by its given pose, as surely as that is known.
         for (at, node) in nodes.iter().enumerate() {
+            // Errors are taken about the map's centre, where turn and shift are independent.
             let centre_m = Vector3::from(poses[at].transform_point(node.centre_m));
             let to_centre = about(&centre_m);
             let information = to_centre.transpose() * prior(&node.uncertainty);
@@ -80,6 +82,7 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
                 weighted * to_centre,
                 weighted * step_about(&centre_m, &(wanted * poses[a].inverse())),
             );
+            // Only the difference of both poses counts.
             [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)]
                 .into_iter()
                 .for_each(|(i, j, sign)| add(&mut matrix, i, j, &(sign * own)));
@@ -94,6 +97,7 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
             let own = Vector6::from(step.fixed_rows::<6>(6 * at));
             *pose = (motion_about(&Vector3::zeros(), &own) * *pose).normalized();
         }
+        // The largest entry: rotations in rad and shifts in m alike.
         if step.amax() < STEP_MIN {
             break;
         }

@@ -115,6 +115,7 @@ impl Recording {
         first_pose: Option<&Transform>,
     ) -> Result<Given, String> {
         let Self { name, t_world_camera, poses_in_world, gnss, antenna_m, .. } = self;
+        // Exactly one of the three ways, or none for the identity.
         match (t_world_camera, poses_in_world, gnss, origin) {
             (None, false, Some(file), Some(origin)) => {
                 Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin })

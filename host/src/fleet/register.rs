@@ -155,6 +155,7 @@ pub fn register(
         .filter(|limit_m| *limit_m > near_m)
         .chain([near_m])
         .collect();
+    // How far off the maps were, at the widest limit.
     let rms_before_m = pair.equations(guess, limits_m[0]).rms_m();
     let mut t_b_a = *guess;
     // Coarse to fine: outliers are cut at ever smaller distances.
@@ -163,6 +164,7 @@ pub fn register(
             let equations = pair.equations(&t_b_a, limit_m);
             let Some(solver) = equations.matrix.cholesky() else { break };
             let step = solver.solve(&-equations.vector);
+            // Steps turn about the centre of the common points, which keeps turn and shift apart.
             t_b_a = (motion_about(&pair.centre_m, &step) * t_b_a).normalized();
             if step.fixed_rows::<3>(3).norm() + step.fixed_rows::<3>(0).norm() * pair.radius_m()
                 < STEP_MIN_M
@@ -184,6 +186,7 @@ pub fn register(
     };
     let moved = step_about(&pair.centre_m, &(t_b_a * given.inverse()));
     fit.refused = refusal(&fit, &moved, (field.voxel_size_m, &pair, uncertainty));
+    // Neighbouring points share their errors: they count as fewer than they are.
     let information = last.matrix / (variance * CORRELATED_POINTS);
     Some(Registration { t_b_a, information, centre_m: pair.centre_m.into(), fit })
 }
@@ -243,6 +246,7 @@ impl<'p> Pair<'p> {
     /// The points of each map that lie where the other was seen, evenly chosen.
     fn new(a: &'p RegisteredMap, b: &'p RegisteredMap, t_b_a: &Transform) -> Option<Self> {
         let back = t_b_a.inverse();
+        // Points of each map where the other was seen: elsewhere there is nothing to fit.
         let of_a =
             chosen(&a.points, |point| b.field.at(t_b_a.transform_point(point.at_m)).is_some());
         let of_b =
@@ -250,6 +254,7 @@ impl<'p> Pair<'p> {
         if of_a.len() + of_b.len() < POINTS_MIN {
             return None;
         }
+        // The centre of all, in the second map.
         let in_b = of_a
             .iter()
             .map(|point| t_b_a.transform_point(point.at_m))
@@ -278,6 +283,7 @@ impl<'p> Pair<'p> {
             sum_of_squares: 0.0,
         };
         let back = t_b_a.inverse();
+        // Points of the first map in the field of the second, and the other way round.
         for point in &self.of_a {
             let (at_m, normal) = (t_b_a.transform_point(point.at_m), t_b_a.rotate(point.normal));
             if let Some((distance_m, gradient)) = self.b.field.at(at_m) {
@@ -320,11 +326,13 @@ impl Equations {
             return;
         }
         self.points += 1;
+        // An outlier counts as a point, not as an inlier.
         if distance_m.abs() >= limit_m {
             return;
         }
         self.inliers += 1;
         self.sum_of_squares += distance_m * distance_m;
+        // Tukey's weight, which is zero at the limit.
         let weight = (1.0 - (distance_m / limit_m).powi(2)).powi(2);
         let turn = arm_m.cross(&gradient);
         let row = sign * Vector6::new(turn.x, turn.y, turn.z, gradient.x, gradient.y, gradient.z);

@@ -76,6 +76,7 @@ impl Report {
     ) -> Result<Self, FleetError> {
         let (mut sums, mut recordings) = (Vec::new(), Vec::new());
         for (job, t_world_map) in manifest.jobs.iter().zip(poses(manifest, folder)?) {
+            // Without a pose for every job there is no report.
             let t_world_map = t_world_map?;
             sums.push(job.sums(folder, &t_world_map));
             let cameras = Submap::cameras(&job.submap(folder))?;
@@ -110,6 +111,7 @@ impl Report {
         if out.exists() {
             return Err(FleetError::Exists { path: out.to_path_buf() });
         }
+        // The folder appears under its name only when it is whole.
         let draft = DraftFolder::of(out);
         std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
         let file = |name: &str, text: String| {
@@ -159,6 +161,7 @@ impl Report {
                 (low[axis], high[axis]) = (low[axis].min(at[axis]), high[axis].max(at[axis]))
             })
         });
+        // Nothing was mapped: a picture of one pixel.
         if low[0] > high[0] {
             return RgbImage::from_pixel(1, 1, BACKGROUND);
         }
@@ -190,6 +193,7 @@ impl Report {
                 )
             });
         }
+        // Paths are drawn over the columns they passed.
         for (of, colour) in self.recordings.iter().zip(PATHS.iter().cycle()) {
             let points: Vec<_> = of
                 .cameras_m

@@ -55,6 +55,7 @@ pub fn resample(
     let lattice = &map.lattice;
     let mut source = SourceMap::new(&mut map.store, lattice.colour);
     let way = LatticeWay::new(t_world_map, lattice);
+    // Blocks of the world in the order of tiles, so that each tile is written once.
     let (targets, beyond) = targets(source.store, &way, lattice, epoch);
     // The folder appears under its name only when it is whole.
     let draft = DraftFolder::of(out);
@@ -66,6 +67,7 @@ pub fn resample(
         let blocks = tile_file::write(&path, lattice, || {
             Ok(coords.next().map(|coord| (coord, source.sums_at(coord, &way, lattice.colour))))
         })?;
+        // A tile without any sums leaves no file.
         if blocks == 0 {
             std::fs::remove_file(&path).map_err(FleetError::io(&path))?;
             continue;
@@ -252,8 +254,10 @@ impl<'s> SourceMap<'s> {
             let values =
                 [0.0, f64::from(weight), f64::from(red), f64::from(green), f64::from(blue)];
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value);
+            // Distance, weight and colour are interpolated alike; distances separately below.
             seen += factor;
         }
+        // Too much of the cell is unknown.
         if seen < SEEN_MIN {
             return None;
         }
@@ -276,6 +280,7 @@ fn factor(share: &[f64; 3], corner: usize) -> f64 {
 /// others stands in; `None` where they give none.
 fn distance(corners: &[Option<f64>; 8], share: &[f64; 3]) -> Option<f64> {
     let counts = |corner: &usize| factor(share, *corner) > 0.0;
+    // Mean steps along each axis, from the edges with both ends seen.
     let steps: [Option<f64>; 3] = std::array::from_fn(|axis| {
         let pairs = (0..8usize)
             .filter(|corner| corner >> axis & 1 == 0)
@@ -284,6 +289,7 @@ fn distance(corners: &[Option<f64>; 8], share: &[f64; 3]) -> Option<f64> {
         (count > 0.0).then(|| sum / count)
     });
     (0..8usize).filter(counts).try_fold(0.0, |sum, corner| {
+        // Through each seen neighbour of the corner.
         let beside = |axis: usize| {
             let from = corners[corner ^ 1 << axis]?;
             Some(if corner >> axis & 1 == 1 { from + steps[axis]? } else { from - steps[axis]? })

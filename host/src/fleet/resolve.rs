@@ -100,6 +100,7 @@ pub fn resolve(
             .iter()
             .map(|(_, path)| TileCursor::open(path, &mut lattice))
             .collect::<Result<Vec<_>, _>>()?;
+        // Epochs of one block come together, because files are read in step.
         while let Some(coord) = least(&heads) {
             let mut blocks = Vec::new();
             for ((tile, _), head) in of_tile.iter().zip(&mut heads) {
@@ -156,6 +157,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                 if (voxels.len() as u32) < CONTRADICTIONS_MIN {
                     continue;
                 }
+                // Weights over the contradicting voxels: what each epoch saw of them.
                 let weight = |of: usize| {
                     voxels.iter().map(|&voxel| u64::from(blocks[of].1.weight[voxel])).sum::<u64>()
                 };
@@ -174,6 +176,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
                         .filter(|&&voxel| share(&blocks[free].1, voxel) >= CLEAR_MIN)
                         .count() as u32,
                 };
+                // The other epoch loses what the believed one contradicts, and keeps the rest.
                 (0..BLOCK_VOXELS)
                     .filter(|&v| contradicts(statements[other][v], statements[believed][v]))
                     .for_each(|v| clear(&mut blocks[other].1, v));

@@ -139,6 +139,7 @@ pub fn keep(
     std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
     let path = draft.path().join(BLOCKS_FILE);
     let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
+    // Segments after a loss stand apart, above the first: only the first is kept.
     let apart = FirstSegment::of(camera, f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64);
     let FirstSegment { camera, left_out_frames, top } = apart.ok_or_else(|| {
         FleetError::content(
@@ -164,11 +165,13 @@ pub fn keep(
             return Err(not_stored(&kept, &path));
         }
     }
+    // Free space is found by the map itself: rays from the camera to its surfaces.
     let field = DistanceField::of(&mut kept, lattice, 1);
     let colour = lattice.colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3]));
     for (coord, views) in
         free_blocks(&field, &camera).into_iter().filter(|(coord, _)| !field.holds(*coord))
     {
+        // A free block has the largest distance everywhere, and as weight its number of views.
         let (sdf, weight) = ([i16::MAX; BLOCK_VOXELS], [views; BLOCK_VOXELS]);
         if !kept.store(EvictedBlock {
             coord,
@@ -187,6 +190,7 @@ pub fn keep(
         cameras: camera.poses.iter().map(|of| (of.frame, rows_of(&of.t_map_camera))).collect(),
         left_out_frames,
     };
+    // The head is written last: without it the folder is no map.
     let text = serde_json::to_string(&head).unwrap_or_default();
     let head_path = draft.path().join(HEAD_FILE);
     write_whole(&head_path, |file| file.write_all(text.as_bytes()))

@@ -60,6 +60,7 @@ pub fn write(
 ) -> Result<u32, FleetError> {
     let (mut count, mut failed) = (0, None);
     let written = write_whole(path, |file| {
+        // The number of blocks is known only at the end: the head is written again then.
         file.write_all(&head(lattice, 0))?;
         let mut record = Record::default();
         loop {
@@ -79,6 +80,7 @@ pub fn write(
         file.seek(SeekFrom::Start(0))?;
         file.write_all(&head(lattice, count))
     });
+    // An error of the source is the reason, not the interrupted writing.
     match (failed, written) {
         (Some(error), _) => Err(error),
         (None, Ok(())) => Ok(count),
@@ -113,6 +115,7 @@ impl Record {
         sums: &BlockSums,
     ) -> std::io::Result<()> {
         sums.write(&mut self.plain);
+        // The checksum covers coordinates, length and data.
         self.packed.resize(lz4_flex::block::get_maximum_output_size(self.plain.len()), 0);
         let len = lz4_flex::block::compress_into(&self.plain, &mut self.packed)
             .map_err(std::io::Error::other)?;
@@ -153,6 +156,7 @@ impl TileReader {
     pub fn open(path: &Path) -> Result<Self, FleetError> {
         let mut file = BufReader::new(File::open(path).map_err(FleetError::io(path))?);
         let mut head = [0; HEAD];
+        // Head and version are checked before any number is believed.
         let is_whole = file.read_exact(&mut head).is_ok()
             && head[HEAD_CHECKED..] == crc32fast::hash(&head[..HEAD_CHECKED]).to_le_bytes();
         if !is_whole || head[..8] != MAGIC {
@@ -189,6 +193,7 @@ impl TileReader {
         let damaged =
             || FleetError::content(&self.path, "is damaged. Remove the folder and make it again");
         if self.left == 0 {
+            // Bytes after the last block are damage, too.
             let ends = self.file.read(&mut [0]).is_ok_and(|read| read == 0);
             return if ends { Ok(None) } else { Err(damaged()) };
         }
@@ -199,12 +204,14 @@ impl TileReader {
             |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
         let plain_len = BlockSums::bytes(self.lattice.colour);
         let len = word(8) as usize;
+        // A length from a damaged file must not become an allocation.
         if len > lz4_flex::block::get_maximum_output_size(plain_len) {
             return Err(damaged());
         }
         let mut packed = vec![0; len];
         self.file.read_exact(&mut packed).map_err(|_| damaged())?;
         let coord = BlockCoord { x: half(0), y: half(2), z: half(4) };
+        // Blocks ascend: merging relies on it.
         if checksum(&head, &packed) != word(12) || self.last.is_some_and(|last| last >= coord) {
             return Err(damaged());
         }

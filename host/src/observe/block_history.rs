@@ -44,9 +44,11 @@ impl Observer for BlockHistoryObserver {
         let mut left = self.note_visible(volume, frame.row.frame as u32);
         let report = &frame.row.report;
         let eviction = &report.allocate.eviction;
+        // Looking for absent blocks costs a look-up each: only in frames in which some were freed.
         if report.prune.blocks_freed + eviction.stored + eviction.lost + eviction.empty > 0 {
             left.extend(self.take_absent(volume));
         }
+        // A block that eviction did not name was freed by pruning.
         let fate = |coord: &[i16; 3]| {
             if frame.evicted.contains(&key_of(*coord)) {
                 BlockFate::Evicted

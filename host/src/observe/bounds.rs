@@ -57,6 +57,8 @@ impl BoundUses {
         let report = &row.report;
         self.add_flow(&report.scene_flow);
         let (blocks, allocation) = (&report.blocks, &report.allocate);
+        // Needed is what was used and what was refused: with so much, nothing would have been
+        // refused.
         let refused = allocation.refused + allocation.eviction.lost;
         self.blocks.add(
             blocks.peak as usize + lost_blocks as usize + allocation.refused as usize,
@@ -80,6 +82,7 @@ impl BoundUses {
             instances.mask_words as usize,
             found.mask_store_full + instances.tracks.masks_lost,
         );
+        // An evicted track gave its slot to another: both were needed.
         let tracks = &instances.tracks;
         self.tracks.add(
             (tracks.tracks + tracks.evicted + tracks.refused) as usize,
@@ -126,6 +129,7 @@ impl BoundUses {
 
     /// The least capacity with these uses, for images of `size`, instead of `used`.
     fn least(&self, used: &Capacity, size: (usize, usize)) -> Capacity {
+        // A mapper cannot work with a bound of zero.
         let at_least_1 = |of: BoundUse| of.needed.max(1);
         let blocks = at_least_1(self.blocks);
         let objects = self.objects.needed;

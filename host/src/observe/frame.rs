@@ -65,6 +65,7 @@ impl FrameRow {
 
     /// Returns how the camera's motion was found, in one word.
     pub fn motion(&self) -> &'static str {
+        // Depth registration, where it was used, says more than the matches.
         if let Some(icp) = &self.report.icp {
             return match icp.status {
                 IcpStatus::Tracked => "tracked",
@@ -136,6 +137,7 @@ impl FrameRow {
         let (allocation, motion, masks) =
             (&self.report.allocate, self.motion(), &self.mask_refusals);
         let instances = &self.report.instances;
+        // A frame may have several causes, the gravest first.
         let lost = (self.report.segment > 0).then(|| {
             format!(
                 "segment {} of the map, apart from the others: the camera was lost before",

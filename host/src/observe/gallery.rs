@@ -39,6 +39,7 @@ impl Observer for GalleryObserver {
         if !folder.is_dir() {
             return Ok(());
         }
+        // Pictures noted at the checkpoint stay.
         let known: Vec<String> = self
             .taken
             .iter()
@@ -50,6 +51,7 @@ impl Observer for GalleryObserver {
                 std::fs::remove_file(entry.path()).map_err(failed)?;
             }
         }
+        // An empty folder would show a gallery without pictures.
         if self.taken.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
     }
 
@@ -76,6 +78,7 @@ impl Observer for GalleryObserver {
         run: &ObservedRun<'_>,
         end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
+        // A run without frames, or whose disk refused, has no index.
         if end.last.is_none() || self.failure.is_some() {
             return Ok(());
         }

@@ -88,12 +88,14 @@ impl GrowingFile {
             }
             Err(source) => return Err(failed(source)),
         };
+        // Only the part written before the checkpoint has to be as it was.
         if checksum_of(&file, self.bytes).map_err(failed)? != Some(self.checksum) {
             return Err(changed(format!(
                 "its first {} bytes are truncated or changed",
                 self.bytes
             )));
         }
+        // Rows after the checkpoint are cut off: the frames will be mapped again.
         file.set_len(self.bytes).map_err(failed)?;
         self.file = Some(file);
         Ok(())

@@ -55,10 +55,12 @@ fn found_by_motion(mapper: &Mapper<'_>, size: (usize, usize)) -> Vec<InstanceMas
     let track_at = |u: i32, v: i32| {
         mapper.instance_at(u, v).filter(|at| at.class == Class::MovingObject).map(|at| at.track)
     };
+    // One pass over the image: masks of all objects at once.
     let mut labels = vec![0u16; width * height];
     let mut tracks = BTreeMap::new();
     for (at, label) in labels.iter_mut().enumerate() {
         let Some(track) = track_at((at % width) as i32, (at / width) as i32) else { continue };
+        // Labels from 1: 0 is the background.
         let next = tracks.len() as u16 + 1;
         *label = *tracks.entry(track).or_insert(next);
     }

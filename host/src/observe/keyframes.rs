@@ -57,6 +57,7 @@ impl Observer for KeyframesObserver {
             |frames| spread(frames, KEYFRAMES)(position),
         );
         if chosen {
+            // A stream has no known end: the newest picture replaces the oldest.
             if self.keyframes.len() == KEYFRAMES {
                 self.keyframes.remove(0);
             }

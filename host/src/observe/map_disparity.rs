@@ -44,9 +44,11 @@ impl Observer for MapDisparityObserver {
         end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let Some(folder) = run.map_disparity_folder.as_deref() else { return Ok(()) };
+        // A correction that was found but not applied is not in the disparities.
         let calibration =
             end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
         let correction = calibration.and_then(|report| report.found()).unwrap_or_default();
+        // Frames are drawn at the end, when the map knows most.
         for (name, t_world_camera) in self.frames.drain(..) {
             let seen = end
                 .view
@@ -80,6 +82,7 @@ fn disparities(
         }
         let corrected_px = of_1_m / depth_m;
         let right_px = [(at % width) as f32 - corrected_px, (at / width) as f32];
+        // At least one unit: zero would say that there is no surface.
         ((corrected_px - correction.added_px(rig, right_px)) * UNITS_PER_PX).round().max(1.0) as u16
     };
     Image::new(

@@ -153,6 +153,7 @@ impl Observer for ObjectsObserver {
         _: &ObservedRun<'_>,
         finished: &Finished,
     ) -> Result<ObjectsSection, ObserveError> {
+        // Swept triangles are counted in the mesh as written: without it there is no figure.
         let mesh = finished.mesh_path.is_file();
         let swept = self
             .swept
@@ -179,9 +180,11 @@ impl ObjectsObserver {
     /// Notes what is really there, where the truth is exact: the volume moving objects sweep, and
     /// the surfaces that are seen.
     fn note_truth(&mut self, run: &ObservedRun<'_>, frame: &FrameContext<'_, '_>) {
+        // Only synthetic recordings know the truth.
         let (Some(truth), Some(exact)) = (&frame.images.objects, &frame.images.exact) else {
             return;
         };
+        // The map's world and the true one differ by the drift so far.
         let t_map_world = frame.row.report.t_world_camera * truth.t_world_camera.inverse();
         let swept = self.swept.get_or_insert_default();
         truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
@@ -194,6 +197,7 @@ impl ObjectsObserver {
         };
         let tracks: Vec<TrackReport> =
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
+        // Only objects fused in this frame have a pose to compare.
         for object in fused(frame) {
             let track = tracks.iter().find(|track| track.id == object.id);
             if let Some(truth) = track.and_then(|track| true_object(&track.pixels, truth)) {
@@ -247,11 +251,13 @@ impl ObjectsObserver {
         let meshed = volume
             .triangles(&run.plan.config.mesh, &mut |triangle: Triangle| triangles.push(triangle));
         meshed.map_err(|source| ObserveError::Write { path: folder.clone(), source })?;
+        // Too small a part was seen for a surface.
         if triangles.is_empty() {
             return Ok(());
         }
         let object = MeshedObject { id: summary.id, name, triangles: &triangles };
         write_files(&folder, &object, run.plan.request.exports.axes, &poses)?;
+        // Synchronised with the disk at the next checkpoint, not one by one.
         self.unsynced.extend(files(name).map(|file| format!("{OBJECTS_FOLDER}/{file}")));
         self.retired.push(ReconstructedObject {
             id: summary.id,
@@ -324,6 +330,7 @@ fn write_files(
         move |source| ObserveError::Write { path, source }
     };
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
+    // In the world the mesh stands where the object was last.
     let last = poses.last().map(|pose| pose.t_world_object).unwrap_or_default();
     let own = MeshFrame {
         name: "the object's own frame: the camera's when it was first seen",
@@ -333,6 +340,7 @@ fn write_files(
     let world = MeshFrame { name: "the first camera", axes, t_frame_object: &last };
     write_mesh(&mesh, object, &own).map_err(failed(&mesh))?;
     write_mesh(&world_mesh, object, &world).map_err(failed(&world_mesh))?;
+    // Both forms of poses: by frame number, and by time.
     let mut by_frame = Vec::new();
     let numbered: Vec<_> = poses.iter().map(|pose| (pose.frame, pose.t_world_object)).collect();
     write_numbered(&mut by_frame, &numbered)

@@ -290,12 +290,14 @@ impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
         let (depth, normal, colour) =
             (self.depth_m.get(u, v)?, self.normal.get(u, v)?, self.colour.get(u, v)?);
         if depth <= 0.0 {
+            // No surface: the background shows through.
             return None;
         }
         let facing: f32 =
             normal.iter().zip(TO_LIGHT).map(|(n, light)| f32::from(*n) * light).sum::<f32>()
                 / NORMAL_ONE;
         let lit = facing.clamp(0.0, 1.0);
+        // Without colour the shading has to show the form.
         let (base, ambient) =
             if colour == [0; 3] { ([205, 205, 200], 0.35) } else { (colour, 0.9) };
         let shaded =

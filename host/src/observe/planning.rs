@@ -100,6 +100,7 @@ impl PlanningObserver {
         frame: usize,
         view: &mut dyn super::MapView<'_>,
     ) -> Result<(), ObserveError> {
+        // A run without a window writes no folder.
         if view.mapper().planning().is_empty() {
             return Ok(());
         }
@@ -153,7 +154,9 @@ fn describe(
     let planning = columns.planning;
     let grid = planning.grid();
     let cell_m = grid.cell_m();
+    // Columns of the grid's turn, from the world's axes.
     let axis = |unit: [f64; 3]| grid.to_world(unit.map(|c| c / cell_m));
+    // Heights are stored above the lowest, so that they fit 16 bits.
     let heights = columns.all().filter_map(|cell| planning.column(cell)?.ground_m()).map(f64::from);
     let lowest = heights.fold(f64::INFINITY, f64::min);
     Description {
@@ -262,6 +265,7 @@ impl Columns<'_, '_> {
         RgbImage::from_fn(width, length, |u, v| {
             let cell = self.at(u, v);
             let column = self.planning.column(cell).unwrap_or_default();
+            // The camera is drawn over everything else.
             if (cell[0] - camera_x).abs() <= 1 && (cell[1] - camera_y).abs() <= 1 {
                 return Rgb([40, 90, 255]);
             }
@@ -272,6 +276,7 @@ impl Columns<'_, '_> {
                 CellState::Occupied => Rgb([0, 0, 0]),
                 CellState::Unknown => Rgb([128, 128, 128]),
                 CellState::Free => match column.ground_m() {
+                    // A step a robot would have to climb.
                     _ if column.step_m > 0.06 => Rgb([255, 160, 40]),
                     Some(height_m) => {
                         let above = ((f64::from(height_m) - description.scales.height_zero_m)

@@ -42,6 +42,7 @@ impl PlanningLayers {
                 .flat_map(|row| (0..width as i32).map(move |column| [x + column, y + row, z]))
         };
         let height = |cell| planning.column(cell).and_then(|column| column.ground_m());
+        // Heights relative to the lowest ground, where viewers draw the grid.
         let lowest_m = cells().filter_map(height).fold(f32::INFINITY, f32::min);
         let lowest_m = if lowest_m.is_finite() { lowest_m } else { 0.0 };
         let cell_m = grid.cell_m();
@@ -49,6 +50,7 @@ impl PlanningLayers {
             .map(|axis| grid.to_world(axis.map(|c| c / cell_m)));
         let rows = [0, 1, 2].map(|row| [right[row], ahead[row], up[row]]);
         let corner = grid.to_world([f64::from(x), f64::from(y), f64::from(lowest_m) / cell_m]);
+        // The three states as the numbers of ROS's occupancy grids.
         let state = |cell| match planning.slice_state(cell) {
             CellState::Free => FREE,
             CellState::Occupied => OCCUPIED,

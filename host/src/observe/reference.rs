@@ -131,6 +131,7 @@ impl Observer for ReferenceObserver {
         } else {
             None
         };
+        // With a delay the map is compared when pruning is through with the frame.
         let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
         // Object poses of past frames are not kept: later the background is viewed alone.
         let seen = match plan.delay {
@@ -173,10 +174,13 @@ impl ReferenceObserver {
         let rig = &run.plan.config.rig;
         let focal_baseline_px_m = rig.focal_baseline_px_m();
         let (size, full_size) = (run.plan.dataset.size(), run.plan.dataset.full_size());
+        // Scaled images have fewer pixels: errors count at full size.
         let enlarged = (full_size.0 as f64 / size.0 as f64) as f32;
         let (evaluated, shown_px) = due.compare(map_depth_m, focal_baseline_px_m, enlarged);
         self.frames.push(evaluated);
         self.outcomes.push(PointOutcomes::from_frame(due, &shown_px, enlarged));
+        // Depth errors count where the static map shows a surface, at the points of static
+        // surfaces.
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
         for (sample, &shown_px) in
             due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static)
@@ -263,6 +267,7 @@ fn pending(
             region,
         );
         let rectified = mapper.rectified_pair().map(|[left, _]| Image::from_view(&left));
+        // Pictures are taken of a few frames only.
         pending.picture = plan
             .drawn
             .contains(&frame.position)
@@ -286,6 +291,7 @@ fn region(
     }
     let (width, height) = run.plan.dataset.size();
     let image = PixelBox { left: 0, top: 0, width: width as i32, height: height as i32 };
+    // The same rules by which the tracker would have accepted the mask.
     let taken = |one: &&InstanceMask| {
         one.contains(u, v)
             && one.class.treatment() != Treatment::Ignore

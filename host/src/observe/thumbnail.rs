@@ -35,12 +35,14 @@ fn view(triangles: &[Triangle], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> {
     let range = |axis: usize| {
         let mut values: Vec<f32> =
             triangles.iter().map(|one| turned(one.vertices[0].position_m)[axis]).collect();
+        // A few stray triangles would make the object small: they are left out of the frame.
         values.sort_by(f32::total_cmp);
         let stray = (values.len() as f64 * STRAY) as usize;
         (values[stray], values[values.len() - 1 - stray])
     };
     let ((left, right), (top, bottom)) = (range(0), range(1));
     let (width, height) = (VIEW_PX.0 as f32, VIEW_PX.1 as f32);
+    // One scale for both axes, and at least half a metre across.
     let scale =
         (0.92 * width / (right - left).max(0.5)).min(0.92 * height / (bottom - top).max(0.5));
     let middle = [0.5 * (left + right), 0.5 * (top + bottom)];
@@ -55,6 +57,7 @@ fn view(triangles: &[Triangle], axes: [Vector3<f32>; 3]) -> Vec<[u8; 3]> {
         fill(&corners, |at, [a, b, c], depth| {
             if depth < nearest[at] {
                 nearest[at] = depth;
+                // Uncoloured vertices are grey.
                 let [p, q, r] = vertices
                     .map(|vertex| if vertex.colour == [0; 3] { [200; 3] } else { vertex.colour });
                 pixels[at] = [0, 1, 2].map(|i| {
@@ -85,6 +88,7 @@ fn fill(corners: &[[f32; 3]; 3], mut visit: impl FnMut(usize, [f32; 3], f32)) {
         let high = (a[axis].max(b[axis]).max(c[axis]).ceil().max(0.0) as usize).min(most);
         low..high
     };
+    // A triangle seen edge on has no pixels.
     if area.abs() < 1e-6 {
         return;
     }
@@ -94,6 +98,7 @@ fn fill(corners: &[[f32; 3]; 3], mut visit: impl FnMut(usize, [f32; 3], f32)) {
             let at_b = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area;
             let at_c = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area;
             let at_a = 1.0 - at_b - at_c;
+            // A hair of tolerance closes seams between triangles.
             if at_a >= -1e-4 && at_b >= -1e-4 && at_c >= -1e-4 {
                 visit(
                     v * VIEW_PX.0 + u,

@@ -160,6 +160,7 @@ impl Observer for TracksObserver {
         run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
+        // Tracks without a detection in this frame have no box to compare.
         let tracks: Vec<TrackReport> =
             frame.view.mapper().tracks().filter(|track| track.detected).collect();
         if let Some(truth) = &frame.images.objects {
@@ -171,6 +172,7 @@ impl Observer for TracksObserver {
             let compared = TrackedFrame { tracks: &tracks, t_world_camera, truth, size };
             self.errors.add(&compared, large_enough);
             self.compared_frames.push(frame.row.frame);
+            // With exact instances masks are compared as well.
             if let Some(exact) = &frame.images.exact {
                 let (overlaps, by_motion) = overlaps(frame.view.mapper(), &exact.instances);
                 let large_enough = |pixels: u64| {
@@ -192,6 +194,7 @@ impl Observer for TracksObserver {
                 source,
             })?,
         );
+        // Sums over the run, which end in the summary.
         for row in &rows {
             let sums =
                 self.tracks.entry(row.id).or_insert_with(|| TrackSums::begin(frame.row.frame));

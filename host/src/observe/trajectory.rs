@@ -124,14 +124,17 @@ impl Observer for TrajectoryObserver {
     ) -> Result<(), ObserveError> {
         let (row, pose) = (frame.row, frame.row.report.t_world_camera);
         self.kitti.append(kitti_line(&pose).as_bytes());
+        // The recording's own stamp, or its time in seconds.
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
         self.path.add(pose.translation_m);
+        // Later segments are apart from the first by an unknown motion.
         if run.plan.dataset.truth().is_some() && row.report.segment == 0 {
             self.compared.push((row.frame, pose));
         }
         self.extrapolated_frames += usize::from(row.is_extrapolated());
         self.segments = row.report.segment + 1;
+        // Only depth registration reports its failures as a status.
         if let Some(status) =
             row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked)
         {

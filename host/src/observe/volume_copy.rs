@@ -66,6 +66,7 @@ impl VolumeCopy {
     ///
     /// No memory for a volume of as many blocks.
     pub fn triangles(&self, mesh: &MeshConfig, sink: &mut impl MeshSink) -> std::io::Result<u64> {
+        // Only the pool counts: meshing needs no lists and no history.
         let capacity = Capacity {
             blocks: self.blocks.len(),
             visible_blocks: 1,
@@ -81,6 +82,7 @@ impl VolumeCopy {
         let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
         let mut volume = Volume::new_in(&capacity, &self.config, &mut carver);
         carver.check().map_err(misfit)?;
+        // In the order of the pool, so that the mesh has the order that the object's had.
         for block in &self.blocks {
             volume.load(block.coord, &mut One(block));
         }

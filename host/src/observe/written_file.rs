@@ -49,6 +49,7 @@ impl WrittenFile {
             }
             Err(source) => return Err(failed(source)),
         };
+        // The length first: a checksum takes reading the whole file.
         let as_long = file.metadata().map_err(failed)?.len() == self.bytes;
         if !as_long || checksum_of(&file, self.bytes).map_err(failed)? != Some(self.checksum) {
             return Err(changed(

@@ -22,6 +22,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
             .filter_map(|reference| reference.figures.as_ref())
             .flat_map(reference_lines),
     );
+    // Figures against ground truth, where there is one.
     if let Some(figures) = &tracks.figures {
         lines.push(("tracks, 20 m", states_in_time(&figures.late_near)));
         lines.push((
@@ -39,6 +40,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.extend(block_lines(run));
     lines.push(("memory", bounds::sentence(run)));
     lines.extend(pose_lines(run));
+    // A miscalibrated rig is the one finding that makes all others doubtful.
     lines.push((
         if rig::is_warning(run) { "calibration WARNING" } else { "calibration" },
         rig::sentence(run),
@@ -67,6 +69,7 @@ fn ending_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
 }
 
 fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {
+    // Segments need a path of some length; a short run has figures by frame only.
     let over_segments = errors.t_err_percent.zip(errors.r_err_deg_per_m);
     let over_segments = over_segments
         .map(|(percent, deg_per_m)| format!("{percent:.3} %, {deg_per_m:.4} deg/m over segments"));
@@ -83,6 +86,7 @@ fn trajectory_lines(errors: &TrajectoryErrors) -> Vec<(&'static str, String)> {
                 100.0 * rpe_t_m
             )
         });
+    // The label stands before the first line only.
     let labels = std::iter::once("trajectory error").chain(std::iter::repeat(""));
     labels.zip(over_segments.into_iter().chain([per_frame]).chain(without)).collect()
 }
@@ -100,6 +104,7 @@ fn reference_lines(figures: &ReferenceFigures) -> Vec<(&'static str, String)> {
     };
     let mut lines = vec![line("static map", &figures.still)];
     lines.extend(figures.dynamic.iter().filter(|of| of.frames > 0).map(|of| line("objects", of)));
+    // Accuracy where both show something favours what shows little: these figures do not.
     if let [Some(input), Some(map)] =
         [&figures.still.input, &figures.still.fused].map(|of| of.accuracy_alone)
     {
@@ -139,6 +144,7 @@ fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             run.plan.capacity.blocks
         ),
     )];
+    // Each loss comes with what to change.
     if totals.refused > 0 {
         let advice = "Give more bytes with --memory, or a larger volume.voxel_size_m";
         lines

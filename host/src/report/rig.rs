@@ -66,6 +66,7 @@ pub fn sentence(run: &RunRecord) -> String {
         return "disparity offset unknown: the camera has to move past something within about 30 m"
             .to_owned();
     };
+    // Rows apart are mentioned only where they matter.
     let rows = rows_apart(&report).map_or_else(String::new, |rows| {
         let moved = if report.corrected { ", aligned" } else { "" };
         format!("; rows up to {:.1} px apart{moved}", rows.largest_px())
@@ -79,6 +80,7 @@ pub fn sentence(run: &RunRecord) -> String {
     } else {
         "not taken out: set rig.self_calibration=\"apply\""
     };
+    // Each state says what to do next.
     match report.state() {
         CalibrationState::Sound => format!("sound: {value}"),
         CalibrationState::Inaccurate => {
@@ -104,6 +106,7 @@ pub fn calibration_toml(run: &RunRecord) -> Option<String> {
 }
 
 fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
+    // Only what differs from zero: an empty correction would look like a finding.
     let disparity = report.found().filter(|found| !found.is_zero()).map(|found| {
         format!(
             "[rig.disparity_correction]\noffset_px = {:.4}\nslope_px = {:.4}\nquartic_px = \

@@ -138,6 +138,7 @@ impl ObjectSummary {
             me_t_m: errors.and_then(|errors| errors.me_t_m),
             me_r_deg: errors.and_then(|errors| errors.me_r_deg),
             truth: errors.cloned(),
+            // An object may have been reconstructed in several segments: the longest counts.
             surface: objects
                 .iter()
                 .filter(|object| object.id == track.id)

@@ -55,6 +55,7 @@ pub enum Source {
 /// Opens the source with its depth, scaled, without masks and faults.
 pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource>, RequestError> {
     let Input { source, layout, sequence, rate_hz, when_late, .. } = &request.input;
+    // Options of streams are refused elsewhere, rather than ignored.
     let only_streams = *source != Source::Stream && (rate_hz.is_some() || when_late.is_some());
     if only_streams {
         return Err(RequestError::invalid(

@@ -40,6 +40,7 @@ impl Request {
             self.settings.volume.voxel_size_m,
         )?;
         let settings = self.fitted_settings(&capacity, interval_s);
+        // Without a data set no file of poses can be read row by row.
         if matches!(self.poses, Poses::File(_)) {
             return Err(RequestError::invalid(
                 "--egomotion file:POSES needs a data set. Give each frame its pose",

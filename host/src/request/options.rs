@@ -247,6 +247,7 @@ impl Options {
             },
             limits: Limits { strict: self.strict, ..Limits::default() },
         };
+        // A relative path would mean another file on another day.
         request.absolute().map_err(|error| {
             RequestError::Invalid(format!("the current folder is unknown: {error}. Enter another"))
         })
@@ -328,6 +329,7 @@ impl Options {
     fn settings(&self) -> Result<Settings, RequestError> {
         let mut settings = Settings::resolve(self.config.as_deref(), &self.set)
             .map_err(|error| RequestError::Invalid(format!("{error:#}")))?;
+        // Options of their own come last and win over --set.
         if let Some(size) = self.rectified {
             let side = |side: usize| Some(u32::try_from(side).unwrap_or(u32::MAX));
             settings.rectify = RectifiedSize {

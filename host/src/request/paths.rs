@@ -19,6 +19,7 @@ impl Request {
 
     /// Every path that is read or written.
     fn paths_mut(&mut self) -> Vec<&mut PathBuf> {
+        // All parts are named: a new path does not compile until it is decided here.
         let Self { input, depth, masks, poses, exports, .. } = self;
         let mut paths: Vec<&mut PathBuf> = input.calibration.iter_mut().collect();
         if let Source::Recording(path) = &mut input.source {

@@ -35,6 +35,7 @@ impl Request {
             dataset.rectification(),
             self.settings.volume.voxel_size_m,
         )?;
+        // Settings that depend on the rate need the recording's own.
         let settings = self.fitted_settings(&capacity, interval_s);
         let frames = FrameNumbers::new(dataset.as_ref(), &self.frames)?;
         let poses = match &self.poses {
@@ -97,6 +98,7 @@ impl Request {
     /// Checks that no part contradicts another.
     fn check_parts(&self) -> Result<(), RequestError> {
         let Self { frames, storage, evaluation, exports, .. } = self;
+        // None of these can be continued from a snapshot.
         let snapshots = storage.snapshot_every.is_some();
         let whole = [
             ("an evaluation", evaluation.reference.is_some()),

@@ -76,6 +76,7 @@ impl Settings {
                     one_line(&error)
                 )
             })?;
+            // Key by key, so that an error names its key.
             for (key, value) in leaves("", &table) {
                 layers.set(&key, value).with_context(|| format!("{shown} cannot be used"))?;
             }
@@ -113,6 +114,7 @@ impl Settings {
 
     /// The mapper's configuration for a rig, and for raw images where they are rectified.
     pub fn config(&self, rig: StereoRig, rectification: Option<&Rectification>) -> Config {
+        // Named field by field: a new section does not compile until it is handed over.
         let Self {
             rig: rig_settings,
             rectify: _,
@@ -198,6 +200,7 @@ impl Layers {
     /// Sets one key and checks at once that it is known and its value of the right kind, so that
     /// the error can name it.
     fn set(&mut self, key: &str, value: Value) -> anyhow::Result<()> {
+        // A setting of an older version gets a sentence of its own.
         if let Some(constant) = constant(key) {
             bail!("`{key}` is a constant now, {constant}: leave it out");
         }

@@ -19,6 +19,7 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
             "a stream has no calibration beside it. Give one with --calibration FILE",
         ));
     }
+    // A stream can be read once, and not be counted beforehand.
     if let Some(option) = of_recordings(request) {
         return Err(RequestError::Invalid(format!(
             "{option} needs a recording, and a stream comes once. Leave it out, or record the \
@@ -37,6 +38,7 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
         input.stacking,
         input.bits,
     );
+    // An empty input is not an empty recording.
     match Stream::begin(options, stop.clone(), pairs) {
         Err(InputError::PastEnd { .. }) => Err(RequestError::invalid(
             "standard input ended without an image. Let a program write PGM or PPM images to it",

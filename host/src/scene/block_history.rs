@@ -49,6 +49,7 @@ impl BlockHistory {
     /// A file is damaged.
     pub fn read(folder: &Path) -> Result<Self, FormatError> {
         let (table, config) = (folder.join(BLOCKS_TABLE_FILE), folder.join(SETTINGS_FILE));
+        // Runs without the table are shown without its layer.
         if !table.is_file() || !config.is_file() {
             return Ok(Self::default());
         }
@@ -67,6 +68,7 @@ impl BlockHistory {
                 last_seen.insert(coord, row.last_frame);
             }
         })?;
+        // A block that came back is no longer pruned, and one pruned twice is listed once.
         let mut known = hashbrown::HashSet::new();
         pruned.retain(|coord| !last_seen.contains_key(coord) && known.insert(*coord));
         let pruned_m =

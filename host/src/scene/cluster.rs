@@ -133,6 +133,7 @@ impl VertexClustering {
         vertex: impl FnOnce(u32) -> io::Result<Option<Vertex>>,
     ) -> io::Result<Option<u32>> {
         let slot = number as usize % RECENT;
+        // Neighbouring triangles share vertices: most are still among the recent ones.
         let known = self.recent[slot];
         if known.vertex == number && known.cluster != Recent::NONE.cluster {
             return Ok(Some(known.cluster));
@@ -142,6 +143,7 @@ impl VertexClustering {
         else {
             return Ok(None);
         };
+        // The vertex counts in its cell's mean.
         let cluster = self.cluster(vertex);
         self.recent[slot] = Recent { vertex: number, cluster };
         Ok(Some(cluster))

@@ -70,6 +70,7 @@ impl PlanningWindow {
         let damaged = |reason: String| FormatError::content(&path, reason, "Make the run again");
         let of: WindowScales =
             serde_json::from_str(&read_text(&path)?).map_err(|error| damaged(error.to_string()))?;
+        // The occupancy grid has the format that ROS's map server reads.
         let Picture::Grey(map) = read_picture(&folder.join("map.pgm"))? else {
             return Err(damaged("map.pgm has no grey levels".to_owned()));
         };
@@ -77,6 +78,7 @@ impl PlanningWindow {
             read_png_deep(&folder.join("height.png"))?,
             read_png_deep(&folder.join("distance.png"))?,
         );
+        // The largest number stands for unknown ground.
         let height_m = |value: u16| {
             (value != u16::MAX).then(|| of.height_zero_m + of.height_unit_m * f64::from(value))
         };
@@ -102,6 +104,7 @@ impl PlanningWindow {
                     + of.ahead_world[axis] * ahead_m
                     + of.up_world[axis] * up_m
             };
+            // Zero stands for no distance.
             let distance = distances.get(u, v).filter(|&value| value > 0);
             Some(PlanningCell {
                 position_m: [0, 1, 2].map(|axis| along(axis) as f32),

@@ -30,6 +30,7 @@ impl Scene {
     /// # Errors
     /// There is no trajectory or no table of frames, or a file is damaged.
     pub fn read(folder: &Path, max_triangles: usize) -> Result<Self, FormatError> {
+        // Objects first: the map gets the triangles that they leave.
         let objects = objects(&folder.join(OBJECTS_FOLDER), max_triangles / OBJECT_SHARE)?;
         let of_objects: usize = objects.iter().map(|object| object.mesh.triangles.len()).sum();
         let map = folder.join(MAP_FILE);
@@ -94,8 +95,10 @@ fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatErro
     let mut rows: Vec<FrameColumns> = Vec::new();
     read_rows(&folder.join(FRAMES_FILE), |row| rows.push(row))?;
     let poses = read_poses(&folder.join(TRAJECTORY_FILE))?.poses;
+    // Only recordings with true poses have this file.
     let truth_file = folder.join(TRUE_TRAJECTORY_FILE);
     let truth = if truth_file.is_file() { read_poses(&truth_file)?.poses } else { Vec::new() };
+    // Every n-th frame, so that a long run still fits a page.
     let every = rows.len().div_ceil(MAX_FRAMES).max(1);
     let frame = |(row, t_world_camera): (FrameColumns, Transform)| SceneFrame {
         row,
@@ -104,6 +107,7 @@ fn frames(folder: &Path) -> Result<(Vec<SceneFrame>, Vec<Transform>), FormatErro
     };
     let mut frames: Vec<SceneFrame> =
         rows.into_iter().zip(poses).map(frame).step_by(every).collect();
+    // Rows of the tracks come by frame; those of frames left out are passed over.
     let position: BTreeMap<usize, usize> =
         frames.iter().enumerate().map(|(at, frame)| (frame.row.frame, at)).collect();
     let tracks = folder.join(TRACKS_FILE);

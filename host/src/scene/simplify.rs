@@ -90,6 +90,7 @@ impl MeshFile {
         max_triangles: usize,
         every: usize,
     ) -> io::Result<Clustered> {
+        // The number of faces asked for tells later how large the cells have to be.
         let (mut clustering, mut read, mut asked_for) =
             (VertexClustering::new(cell_m, max_triangles), 0, 0);
         let static_only = self.static_only;
@@ -99,6 +100,7 @@ impl MeshFile {
                 let PlyVertex { object, vertex, .. } = vertices.get(number)?;
                 Ok((object == 0 || !static_only).then_some(vertex))
             })?);
+            // A full clustering is of no use: the next one has larger cells.
             Ok(if clustering.is_full() {
                 ControlFlow::Break(())
             } else {

@@ -58,6 +58,7 @@ fn original(name: &str, colour: usize, numbers: Vec<Option<f64>>) -> Curve<'_> {
     Curve { name, colour: COLOURS[colour], dashed: true, numbers }
 }
 
+// The published curves are drawn where this sweep has their values.
 fn prune(rows: &[Row<'_>]) -> Markup {
     let at = |table: [f64; 7]| {
         published_at(rows, |weight| {
@@ -75,7 +76,9 @@ fn prune(rows: &[Row<'_>]) -> Markup {
             ];
             boxes_and_curves(title, &labels, &[boxes("map, by frame", 0, rows, of)], &curves)
         };
+    // Memory relative to no pruning: the original's blocks differ in size.
     let relative = |table: [f64; 7]| at(table.map(|gib| gib / table[0]));
+    // Weight 0 is the run without pruning, which others are compared with.
     let unpruned = rows
         .iter()
         .find(|(point, _)| point.value == "0")
@@ -103,6 +106,7 @@ fn prune(rows: &[Row<'_>]) -> Markup {
 }
 
 /// Blocks in use frame by frame, a line for each value.
+// A line needs two points.
 fn over_time(rows: &[Row<'_>]) -> Markup {
     let results = || rows.iter().filter_map(|(_, result)| result.as_ref());
     let frames =
@@ -110,6 +114,7 @@ fn over_time(rows: &[Row<'_>]) -> Markup {
     if frames < 2 {
         return html! {};
     }
+    // Times evenly spread over the longest run.
     let times: Vec<usize> = (0..TIMES).map(|nth| nth * (frames - 1) / (TIMES - 1)).collect();
     let curve = |(colour, (point, result)): (usize, &Row<'_>)| {
         let blocks = |&at: &usize| {

@@ -113,6 +113,7 @@ fn tracking(result: Option<&RunResult>) -> Markup {
 }
 
 fn cells(result: Option<&RunResult>, common: Option<&(f64, u64)>) -> Vec<String> {
+    // A run that is not finished, or lacks the figure, shows a dash.
     let unknown = || "–".to_owned();
     let shares = [
         ("static", "input", "accuracy"),

@@ -154,6 +154,8 @@ impl Plan {
         for &kind in &request.kinds {
             for (data, reference) in &request.data {
                 for (value, mut run) in values(kind, request, data) {
+                    // A map that is pruned later is evaluated when pruning is through with the
+                    // frame.
                     run.evaluation.reference = *reference;
                     if kind.is_evaluated_late() {
                         run.settings.volume.prune_lag = request.prune_lag;
@@ -164,6 +166,7 @@ impl Plan {
                     // Figures of another version are not taken over.
                     digest.bytes(program().as_bytes());
                     digest.bytes(&serde_json::to_vec(&run)?);
+                    // The name shows the data, the digest everything that can change the result.
                     let key = format!("{label}-{:016x}", digest.finish());
                     plan.points.push(Point { kind, data: label, value, run: key.clone() });
                     plan.runs.insert(key, run);
@@ -213,6 +216,7 @@ impl Plan {
 fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Request)> {
     let is_street = data.path.is_none();
     let mut base = request.common.clone();
+    // The street knows its masks: detections would only add their own errors.
     if is_street {
         base.masks.source = MaskChoice::Exact;
     }

@@ -26,6 +26,7 @@ impl SweepFolder {
         std::fs::create_dir_all(&runs)
             .map_err(|source| FolderError::Write { path: runs, source })?;
         let path = folder.root.join("plan.json");
+        // A folder continues only the plan it was made for.
         if path.is_file() {
             if folder.plan()? != *plan {
                 return Err(SweepError::Other { path });
@@ -35,6 +36,7 @@ impl SweepFolder {
                 path: path.clone(),
                 reason: error.to_string(),
             })?;
+            // Written as a whole: an interruption leaves no half of a plan.
             write_whole(&path, |file| file.write_all(&text))?;
         }
         Ok(folder)
@@ -125,9 +127,11 @@ pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Res
             merged = Some((plan, results));
             continue;
         };
+        // Results of two plans cannot be put into one table.
         if *first != plan {
             return Err(SweepError::Other { path: root.join("plan.json") });
         }
+        // The same run on two machines must give the same digest.
         for (run, result) in results {
             let digest = |result: &RunResult| {
                 result.summary["digest"].as_str().unwrap_or_default().to_owned()
@@ -143,6 +147,7 @@ pub fn merge(parts: &[PathBuf], target: &Path) -> Result<(Plan, SweepFolder, Res
             all.insert(run, result);
         }
     }
+    // Without parts the result is an empty plan.
     let (plan, results) = merged
         .unwrap_or_else(|| (Plan { points: Vec::new(), runs: BTreeMap::new() }, Results::new()));
     let folder = SweepFolder::open(target, &plan)?;

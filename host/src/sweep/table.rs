@@ -69,11 +69,13 @@ pub(super) fn common_accuracy(
     // What the tracker lost shows nothing that could be compared.
     let is_whole =
         |result: &&RunResult| !result.outcomes.is_empty() && result.tracking_failures().is_none();
+    // Only finished runs whose tracking held.
     let runs: BTreeMap<&String, &RunResult> = plan
         .of(kind, data)
         .filter_map(|point| Some((&point.run, results.get(&point.run).filter(is_whole)?)))
         .collect();
     let outcomes: Vec<_> = runs.values().map(|result| result.outcomes.as_slice()).collect();
+    // One run has nothing in common with another.
     let Some((accuracy, points)) = on_common_points(&outcomes).filter(|_| runs.len() > 1) else {
         return BTreeMap::new();
     };

@@ -26,6 +26,7 @@ pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
 
 /// Returns the camera's pose on the street at a time.
 pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) -> Transform {
+    // One generator for all waves: their phases depend on the seed only, not on the time.
     let mut rng = Rng::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {
         let full_circle_rad = 2.0 * core::f64::consts::PI;
@@ -37,6 +38,7 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
     };
     let (pitch, roll, yaw, bounce, drift) =
         (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
+    // Rotations in the order yaw, pitch, roll, as a car's body moves on its springs.
     let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - CAMERA_HEIGHT_M, 0.0);
     on_road

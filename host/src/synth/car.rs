@@ -198,6 +198,7 @@ fn half_ring(section: &Section) -> [(f64, f64); 8] {
 /// Builds a body.
 pub fn body(kind: CarKind) -> Mesh {
     let mut mesh = Mesh::default();
+    // The kind rides along in the surface, so that the painter finds the body's shape.
     let shell = mesh.surface(Surface {
         size_m: [kind as u32 as f32, 0.0],
         ..Surface::new(Kind::Car, tone(255, 255, 255), 0)
@@ -207,6 +208,7 @@ pub fn body(kind: CarKind) -> Mesh {
     let tyre = mesh.surface(Surface::new(Kind::Plain, tone(30, 30, 32), 0));
     let rim = mesh.surface(Surface::new(Kind::Wheel, tone(160, 162, 166), 0));
     let (radius, half_width) = (f64::from(figures.wheel_m), f64::from(figures.half_m[1]));
+    // Wheels: a tyre is a bar across, its rim a disc on the outer side.
     for axle in figures.axles_m {
         for side in [-1.0, 1.0] {
             let outer = Point::new(side * (half_width + 0.012), -radius, f64::from(axle));
@@ -215,6 +217,7 @@ pub fn body(kind: CarKind) -> Mesh {
             disc(&mut mesh, rim, outer, side, radius);
         }
     }
+    // Door mirrors, at the front end of the side windows.
     let black = mesh.surface(Surface::new(Kind::Plain, tone(36, 36, 38), 0));
     let height = f64::from(figures.side_height_m[0]);
     let along = f64::from(figures.side_glass_m[0]) - 0.12;

@@ -33,11 +33,13 @@ pub fn shell(
     let dirt = 0.25 * (1.0 - above(0.45, point.up, 0.4));
     let mut tone = blend(times(coat, 1.0 + 0.06 * speck), [0.10, 0.09, 0.08], dirt);
     let mut gloss = 0.30;
+    // Joints of doors are seen on the sides only.
     if side > 0.0 {
         tone = blend(tone, times(coat, 0.22), joints(shape, &point) * side);
     }
     // The strip below the doors and the bumpers' lower edge are black.
     tone = blend(tone, BLACK, 1.0 - above(0.30, point.up, point.f));
+    // Wheel arches are dark discs, a little larger than the wheels.
     for axle in shape.axles_m {
         let radius = ((z - axle) * (z - axle)
             + (point.up - shape.wheel_m) * (point.up - shape.wheel_m))
@@ -54,6 +56,7 @@ pub fn shell(
         tone = blend(tone, blend(GLASS, [0.45, 0.52, 0.62], sky), glass);
         gloss += 0.20 * glass;
     }
+    // Lamps, grille and plates are painted on the last 60 cm of either end.
     if z.abs() > shape.half_m[0] - 0.6 {
         let ends = if z > 0.0 { front(shape, &point) } else { rear(shape, &point) };
         for (share, paint) in ends {
@@ -86,6 +89,7 @@ fn glass(shape: &Shape, p: &BodyPoint, side: f32, nz: f32) -> f32 {
         low + (high - low) * (at - from) / (to - from)
     };
     let mut share: f32 = 0.0;
+    // Side windows: a trapezium between belt and roof, divided by pillars.
     if p.up > belt - 0.1 && side > 0.0 {
         let [front, rear, front_top, rear_top] = shape.side_glass_m;
         let (head, tail) =
@@ -96,6 +100,7 @@ fn glass(shape: &Shape, p: &BodyPoint, side: f32, nz: f32) -> f32 {
         }
         share = share.max(pane);
     }
+    // Windscreen and rear window, on the parts of the shell that face forward or back.
     for (facing, [low, high, wide, narrow]) in [(nz, shape.windscreen_m), (-nz, shape.rear_glass_m)]
     {
         let toward = above(0.25, facing, 0.1);
@@ -109,10 +114,12 @@ fn glass(shape: &Shape, p: &BodyPoint, side: f32, nz: f32) -> f32 {
 }
 
 fn front(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
+    // Lamps reach around the corner, the grille lies on the nose only.
     let depth = above(shape.half_m[0] - 0.45, p.z, 0.05);
     let nose = above(shape.half_m[0] - 0.14, p.z, 0.05);
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[0]);
     let away = p.x.abs();
+    // Each figure is a product of soft bounds: at any distance it fades by the pixel's footprint.
     let lamps = depth
         * within(lamp - 0.075, lamp + 0.065, p.up, p.f)
         * within(0.60 * half, 0.97 * half, away, p.f);
@@ -134,6 +141,7 @@ fn front(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
 }
 
 fn rear(shape: &Shape, p: &BodyPoint) -> [(f32, Tone); 5] {
+    // Behind, the same figures with their measures from the rear end.
     let depth = 1.0 - above(-shape.half_m[0] + 0.30, p.z, 0.05);
     let tail = 1.0 - above(-shape.half_m[0] + 0.14, p.z, 0.05);
     let (half, lamp) = (shape.half_m[1], shape.lamps_m[1]);

@@ -111,9 +111,11 @@ impl Default for Traffic {
 impl Traffic {
     fn problem(&self) -> Option<String> {
         let Self::Moving(moving) = self else { return None };
+        // 60 m/s is 216 km/h: faster cars leave the rendered span within a frame or two.
         if moving.cars.iter().any(|car| !(0.0..=60.0).contains(&car.profile.speed_m_s())) {
             return Some("a speed in street.traffic lies outside 0 to 60 m/s".to_owned());
         }
+        // A rate of zero would never reach the speed.
         moving.cars.iter().find_map(|car| match car.profile {
             SpeedProfile::Starting { acceleration_m_s2: rate, .. }
             | SpeedProfile::Stopping { deceleration_m_s2: rate, .. }
@@ -157,6 +159,8 @@ impl Default for MovingTraffic {
         };
         Self {
             oncoming_gap_m: 70.0,
+            // One car of each behaviour that a tracker has to tell apart: constant, starting,
+            // stopping.
             overtaking_gap_m: 90.0,
             cars: vec![
                 car(

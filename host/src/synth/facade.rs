@@ -85,6 +85,7 @@ struct House {
 
 /// Builds a house `width` m wide with its front in the plane z = 0.
 pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
+    // Draws come in a fixed order: another order is another street for every seed.
     let seed = rng.seed();
     let (house, shop) = materials(mesh, rng, width, seed);
     let floors = [2, 3, 3, 4, 4, 5][rng.below(6)];
@@ -96,6 +97,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
     } else {
         home_floor(mesh, rng, &house, ground_height, frame_tone);
     }
+    // The y axis points down: higher is smaller.
     let mut roofline = -ground_height;
     let mut windows = Windows {
         width: rng.between(0.95, 1.4),
@@ -110,6 +112,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
     for floor in 1..floors {
         let bottom = roofline;
         roofline -= floor_height;
+        // Balconies alternate from floor to floor, as in many houses.
         windows.balconies = balcony_mask >> (floor % 2);
         upper_floor(mesh, rng, &house, Storey { top: roofline, bottom }, &windows);
         if cornices || floor == 1 {
@@ -123,6 +126,7 @@ pub fn house(mesh: &mut Mesh, rng: &mut Rng, width: f64) {
 
 /// Draws a house's measures and what covers it, and whether a shop is in it.
 fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, bool) {
+    // Shares of plaster, brick and stone.
     let style = rng.unit();
     let wall_tone = tone_of(rng.pick(&WALLS));
     let brick_tone = tone_of(rng.pick(&BRICKS));
@@ -133,6 +137,7 @@ fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, b
         _ => Surface::new(Kind::Stone, scaled(wall_tone, 0.75), seed).with(tone(120, 112, 102)),
     };
     let trim_tone = tone_of(rng.pick(&TRIMS));
+    // A shop needs width for its panes.
     let shop = width > 6.5 && rng.chance(0.3);
     let base_surface = if rng.chance(0.5) {
         Surface::new(Kind::Stone, scaled(tone(150, 144, 134), rng.between(0.7, 1.1)), seed ^ 7)
@@ -141,6 +146,7 @@ fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, b
         Surface::new(Kind::Plaster, scaled(wall_tone, 0.5), seed ^ 7)
     };
     let shutter_tone = tone_of(rng.pick(&DOORS));
+    // Shutters belong to homes.
     let shuttered = !shop && rng.chance(0.25);
     let house = House {
         width,
@@ -157,6 +163,7 @@ fn materials(mesh: &mut Mesh, rng: &mut Rng, width: f64, seed: u32) -> (House, b
 }
 
 fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
+    // The two gables' walls; their upper triangles come with the roof.
     for x in [0.0, house.width] {
         let outward = Point::new(x - 0.5 * house.width, 0.0, 0.0);
         let down = Point::new(0.0, -roofline, 0.0);
@@ -171,6 +178,7 @@ fn side_and_back_walls(mesh: &mut Mesh, house: &House, roofline: f64) {
             [0.0, roofline, 0.0],
         );
     }
+    // The back, which other streets' cameras may see.
     let back = Point::new(0.0, roofline, -house.depth);
     mesh.sheet(
         house.wall,
@@ -209,6 +217,7 @@ fn floor_front(
     Storey { top, bottom }: Storey,
     openings: &[Opening],
 ) {
+    // Strips too thin to be seen would only make degenerate triangles.
     let mut panel = |left: f64, right: f64, top: f64, bottom: f64| {
         if right - left > 1e-6 && bottom - top > 1e-6 {
             let (u, v) = (Point::new(right - left, 0.0, 0.0), Point::new(0.0, bottom - top, 0.0));
@@ -220,6 +229,7 @@ fn floor_front(
             );
         }
     };
+    // Openings come from left to right: wall before, above and below each, then what is left.
     let mut left = 0.0;
     for opening in openings {
         panel(left, opening.left, top, bottom);
@@ -237,6 +247,7 @@ fn recess(mesh: &mut Mesh, house: &House, wall: u16, opening: &Opening) {
     let &Opening { left, right, top, bottom, pane } = opening;
     let (width, height, inward) =
         (right - left, bottom - top, Point::new(0.0, 0.0, -house.reveal_m));
+    // Left and right reveal, then lintel, sill and the pane set back.
     let (across, down) = (Point::new(width, 0.0, 0.0), Point::new(0.0, height, 0.0));
     mesh.sheet(
         wall,
@@ -271,6 +282,7 @@ fn recess(mesh: &mut Mesh, house: &House, wall: u16, opening: &Opening) {
 }
 
 fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
+    // Small parts are left out far away, where they are less than a pixel.
     mesh.slight = true;
     let &Opening { left, right, top, bottom, .. } = opening;
     let at = |x0: f64, y0: f64, x1: f64, y1: f64, out: f64| {
@@ -289,6 +301,7 @@ fn sill_and_surround(mesh: &mut Mesh, house: &House, opening: &Opening) {
     if let Some(shutter) = house.shutters {
         let half = 0.5 * (right - left);
         for (a, b) in [(left - half - 0.02, left - 0.02), (right + 0.02, right + half + 0.02)] {
+            // A shutter that would hang beyond the house's edge is left out.
             if a > 0.05 && b < house.width - 0.05 {
                 let (low, high) = at(a, top, b, bottom, 0.06);
                 mesh.cuboid(shutter, low, high, &[4]);
@@ -307,13 +320,16 @@ fn window(mesh: &mut Mesh, rng: &mut Rng, frame: Tone, width: f64, height: f64) 
 fn upper_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, storey: Storey, windows: &Windows) {
     let Storey { top, bottom } = storey;
     let &Windows { columns, width, height, frame, balconies } = windows;
+    // Windows are spread evenly and leave at least 60 cm of wall between them.
     let spacing = house.width / columns as f64;
     let width = width.min(spacing - 0.6);
     let mut openings = Vec::new();
     for column in 0..columns {
         let middle = (column as f64 + 0.5) * spacing;
+        // Balconies only where two neighbours would not touch.
         let balcony = balconies >> (column % 16) & 5 == 5 && spacing > 2.2;
         let sill = if balcony { bottom - 0.12 } else { bottom - 0.85 };
+        // The head stays below the next floor.
         let head = (bottom - 0.85 - height).max(top + 0.3);
         let pane = window(mesh, rng, frame, width, sill - head);
         let opening = Opening {

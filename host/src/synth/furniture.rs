@@ -32,6 +32,7 @@ pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
     mesh.bar(bark, BarEnd::new(Point::zeros(), 1.25 * radius), BarEnd::new(fork, radius), 9);
     let (red, green, blue) = rng.pick(&GREENS);
     let green = scaled(tone(red, green, blue), rng.between(0.75, 1.15));
+    // Four tones of green, from the shaded side to the lit one.
     let leaves: Vec<u16> = (0..4)
         .map(|k| {
             let surface =
@@ -40,6 +41,7 @@ pub fn tree(mesh: &mut Mesh, rng: &mut Rng) {
         })
         .collect();
     let middle = lean - Point::y() * (height - crown);
+    // Seven boughs, each with a branch that carries it.
     for _ in 0..7 {
         let toward = direction(rng);
         let blob = middle
@@ -71,6 +73,7 @@ fn crown_part(
         let point = blob + out * (radius * rng.between(0.55, 1.05));
         let size = rng.between(0.18, 0.36);
         let facing = (out + direction(rng) * 0.7).normalize();
+        // Two axes of the sheet, square to the way it faces.
         let u = facing.cross(&direction(rng)).normalize();
         let v = facing.cross(&u);
         // Sheets on the shaded, inner side are darker.
@@ -91,6 +94,7 @@ fn crown_part(
             facing,
             &[corner(-1.0, -0.3 * p), corner(0.1, -q), corner(1.0, 0.2), corner(-0.2 * q, p)],
         );
+        // Normals of the crown as a whole, not of the sheet: a tree is not lit leaf by leaf.
         let soft = (facing * 0.35 + (point - middle).normalize() + out * 0.5).normalize();
         for vertex in &mut mesh.vertices[first..] {
             vertex.normal = [soft.x as f32, soft.y as f32, soft.z as f32];
@@ -107,6 +111,7 @@ pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
         rng.seed(),
     ));
     let height = rng.between(0.9, 1.5);
+    // A bend every 70 cm, so that no part of a hedge repeats another.
     let steps = libm::ceil(length / 0.7) as usize;
     let edge = |rng: &mut Rng| {
         (rng.between(-0.06, 0.06), rng.between(-0.06, 0.06), rng.between(0.32, 0.42))
@@ -124,6 +129,7 @@ pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
                 [at(z0, near, 0.0), at(z1, far, 0.0), at(z1, far, 1.0), at(z0, near, 1.0)];
             mesh.polygon(leaves, Point::new(side, 0.0, 0.0), &corners);
         }
+        // The top, between the two sides.
         let at = |z: f64, (x, y, w): (f64, f64, f64), side: f64| {
             let point = Point::new(side * w + 0.3 * x, -(height + y), z);
             (point, [z as f32, point.x as f32, 0.0])
@@ -135,6 +141,7 @@ pub fn hedge(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
         );
         near = far;
     }
+    // Both ends are closed.
     for (z, out) in [(0.0, -1.0), (length, 1.0)] {
         let (u, v) = (Point::new(0.7, 0.0, 0.0), Point::new(0.0, height, 0.0));
         mesh.sheet(
@@ -154,6 +161,7 @@ pub fn lamp(mesh: &mut Mesh, rng: &mut Rng) {
         rng.seed(),
     ));
     let glass = mesh.surface(Surface::new(Kind::Plain, tone(220, 216, 200), rng.seed()));
+    // Post, bend and arm.
     let top = Point::new(0.0, -6.4, 0.0);
     mesh.bar(
         metal,
@@ -206,6 +214,7 @@ pub fn sign(mesh: &mut Mesh, rng: &mut Rng) {
             })
             .collect()
     };
+    // The back is a little behind the face, so that neither covers the other.
     mesh.polygon(face, -Point::z(), &ring(0.0, 0.0));
     mesh.polygon(back, Point::z(), &ring(0.0, 0.012));
 }
@@ -291,6 +300,7 @@ pub fn fence(mesh: &mut Mesh, rng: &mut Rng, length: f64) {
         )
         .with(tone(150, 146, 138));
         let wall = mesh.surface(wall);
+        // A wall with a cap, or boards.
         mesh.cuboid(wall, Point::new(-0.12, -1.1, 0.0), Point::new(0.12, 0.1, length), &[3, 2]);
         let cap = mesh.surface(Surface::new(Kind::Plain, tone(160, 158, 150), rng.seed()));
         mesh.cuboid(

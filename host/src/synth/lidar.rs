@@ -49,10 +49,12 @@ impl Street {
     pub fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
         let around = self.surroundings(index);
         let scene = &around.scene;
+        // Faces in the sensor's frame, those beyond its range left out.
         let faces: Vec<Face> = (0..scene.objects.len())
             .into_par_iter()
             .flat_map_iter(|number| self.faces(scene, number))
             .collect();
+        // Sectors are independent; joined in order, they do not depend on the number of threads.
         let sectors: Vec<Vec<(f64, u32)>> =
             (0..SECTORS).into_par_iter().map(|sector| scan(&faces, sector)).collect();
         let width = DIRECTIONS / SECTORS;
@@ -60,6 +62,7 @@ impl Street {
         for beam in 0..BEAMS {
             for direction in 0..DIRECTIONS {
                 let (nearness, face) = sectors[direction / width][beam * width + direction % width];
+                // Echoes too near or too far are not reported.
                 if nearness > 1.0 / RANGE_M.1 && nearness < 1.0 / RANGE_M.0 {
                     points.push(self.echo(
                         scene,
@@ -88,9 +91,12 @@ impl Street {
         let face = |(triangle, face): (usize, &super::mesh::Triangle)| {
             let corners = face.corners.map(|corner| positions[corner as usize]);
             let [a, b, c] = corners;
+            // The planes through the sensor and two corners: a ray within all three meets the
+            // triangle.
             let planes = [b.cross(&c), c.cross(&a), a.cross(&b)];
             let volume = a.dot(&planes[0]);
             let hidden = volume > 0.0 && !mesh.surfaces[face.surface as usize].two_sided;
+            // Faces seen from behind, or edge on, return nothing.
             if volume.abs() < 1e-14 || hidden {
                 return None;
             }
@@ -111,11 +117,13 @@ impl Street {
         let object = &scene.objects[face.object as usize];
         let mesh = object.mesh(self.bodies());
         let triangle = &mesh.triangles[face.triangle as usize];
+        // The shares of the corners at the echo, for texture and normal.
         let shares = face.planes.map(|plane| (plane.dot(&ray) * range_m) as f32);
         let mix = |value: fn(&super::mesh::Vertex) -> [f32; 3]| {
             let [a, b, c] = triangle.corners.map(|corner| value(&mesh.vertices[corner as usize]));
             [0, 1, 2].map(|k| shares[0] * a[k] + shares[1] * b[k] + shares[2] * c[k])
         };
+        // The beam widens by 3 mrad.
         let spread = (0.003 * range_m) as f32;
         let surface_point = SurfacePoint {
             surface_m: mix(|vertex| vertex.surface_m),
@@ -162,6 +170,7 @@ fn ray(beam: usize, direction: usize) -> Point {
 /// Directions and beams a triangle may meet, a little more rather than less.
 fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
     let angles = corners.map(|corner| libm::atan2(corner.y, corner.x));
+    // Differences of angles stay within half a turn, so that the seam at the back does not matter.
     let deltas_rad = angles.map(|angle| {
         let delta_rad = angle - angles[0];
         delta_rad - TURN * libm::round(delta_rad / TURN)
@@ -169,6 +178,7 @@ fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
     let (low, high) = deltas_rad.iter().fold((0.0_f64, 0.0_f64), |(low, high), &delta_rad| {
         (low.min(delta_rad), high.max(delta_rad))
     });
+    // A triangle around the sensor's axis is met in every direction.
     let around = high - low >= 0.5 * TURN;
     let per_rad = DIRECTIONS as f64 / TURN;
     let directions = if around {
@@ -189,6 +199,7 @@ fn reach(corners: [Point; 3]) -> Option<((i64, i64), (usize, usize))> {
     let (bottom, top) = corners
         .iter()
         .fold((f64::MAX, f64::MIN), |(low, high), corner| (low.min(corner.z), high.max(corner.z)));
+    // A corner above the horizon is steepest where it is nearest, one below where it is farthest.
     let angle = |height: f64, outward: bool| {
         libm::atan2(height, if (height > 0.0) == outward { near.max(1e-6) } else { far })
     };
@@ -231,6 +242,7 @@ fn scan(faces: &[Face], sector: usize) -> Vec<(f64, u32)> {
             for beam in face.beams.0..=face.beams.1 {
                 for k in from as usize..to as usize {
                     let slot = beam * width + k;
+                    // Inside of all three planes.
                     let shares = [0, 1, 2].map(|corner| face.planes[corner].dot(&rays[slot]));
                     if shares.iter().all(|&share| share >= 0.0) {
                         let nearness = shares[0] + shares[1] + shares[2];

@@ -41,6 +41,7 @@ impl Light {
         let facing = normal.dot(&self.to_sun);
         // Leaves let light through.
         let direct = if thin { 0.30 + 0.45 * facing.max(-0.4 * facing) } else { facing.max(0.0) };
+        // Upward faces see the sky, downward ones the road's light.
         let up = 0.5 - 0.5 * normal.y;
         let open = open * painted.open;
         let mut light = [0.0; 3];
@@ -53,11 +54,13 @@ impl Light {
             let cosine = normal.dot(&to_eye).clamp(0.0, 1.0);
             let mirrored = normal * (2.0 * normal.dot(&to_eye)) - to_eye;
             let grazing = (1.0 - cosine) * (1.0 - cosine);
+            // Schlick's approximation: glass and paint mirror most at a grazing angle.
             let share = painted.gloss * (0.12 + 0.88 * grazing * grazing);
             let sky = above(-0.05, -mirrored.y, 0.5);
             let (wall, road) = (0.22, 0.14);
             let low = wall + (road - wall) * above(0.0, mirrored.y, 0.3);
             let spark = mirrored.dot(&self.to_sun).max(0.0);
+            // The 36th power of the cosine, by squares and cubes: the sun's reflection is small.
             let spark = spark * spark;
             let spark = spark * spark;
             let spark = spark * spark * spark;
@@ -73,6 +76,7 @@ impl Light {
     /// The sky in a direction.
     pub fn sky(&self, direction: Direction, noise: &Ripmap) -> Tone {
         let up = -direction.y;
+        // Below the horizon nothing but the ground's haze is seen.
         if up < 0.0 {
             return [0.40, 0.42, 0.40];
         }
@@ -85,6 +89,7 @@ impl Light {
         // Clouds hang on a ceiling; near the horizon they are small and many.
         let scale = 5.0 / (up + 0.10);
         let (x, z) = (direction.x * scale, direction.z * scale);
+        // Two octaves of noise make clouds of two sizes.
         let mass = noise.at(x, z, 0.25, 0.25) + 0.35 * noise.at(x * 3.1, z * 3.1, 0.4, 0.4);
         let cover = ((mass + 0.1) * 0.75).clamp(0.0, 1.0) * (up * 9.0).min(1.0);
         let lit = 1.25 - 0.30 * (mass * 0.4).clamp(0.0, 1.0);

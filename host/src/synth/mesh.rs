@@ -89,10 +89,12 @@ impl Mesh {
 
     /// Adds a convex polygon that faces `outward`; texture coordinates come with the corners.
     pub fn polygon(&mut self, surface: u16, outward: Point, corners: &[(Point, [f32; 3])]) {
+        // Newell's normal of the fan: well defined for any convex polygon, thin ones, too.
         let fan = corners.windows(2).skip(1);
         let raw = fan.fold(Point::zeros(), |sum, pair| {
             sum + (pair[0].0 - corners[0].0).cross(&(pair[1].0 - corners[0].0))
         });
+        // The caller says where outside is; the order of corners follows.
         let flipped = raw.dot(&outward) < 0.0;
         let scale = if flipped { -1.0 } else { 1.0 } / (raw.norm() + 1e-12);
         let normal = [0, 1, 2].map(|k| (raw[k] * scale) as f32);
@@ -102,6 +104,7 @@ impl Mesh {
             surface_m,
             normal,
         }));
+        // A fan about the first corner.
         for k in 1..corners.len() as u32 - 1 {
             let (a, b) = if flipped { (k + 1, k) } else { (k, k + 1) };
             self.triangles.push(Triangle {
@@ -135,6 +138,7 @@ impl Mesh {
             if omit.contains(&face) {
                 continue;
             }
+            // Two opposite faces for each axis.
             let axis = face / 2;
             let (u, v) = [(2, 1), (0, 2), (0, 1)][axis];
             let mut outward = Point::zeros();
@@ -159,10 +163,12 @@ impl Mesh {
     pub fn bar(&mut self, surface: u16, from: BarEnd, to: BarEnd, sides: u32) {
         let axis = to.middle - from.middle;
         let length = axis.norm();
+        // Any direction that is not along the bar gives the axes across it.
         let helper = if axis.y.abs() > 0.9 * length { Point::x() } else { Point::y() };
         let u = axis.cross(&helper).normalize();
         let v = axis.cross(&u).normalize();
         let first = self.vertices.len() as u32;
+        // The seam's vertices come twice, because texture begins there anew.
         for k in 0..=sides {
             let angle = 2.0 * core::f64::consts::PI * f64::from(k % sides) / f64::from(sides);
             let out = u * libm::cos(angle) + v * libm::sin(angle);
@@ -211,6 +217,7 @@ impl Mesh {
 
     /// Finds the bounding sphere and the faces' planes; call it when the mesh is complete.
     pub fn finish(mut self) -> Self {
+        // Planes decide whether a face is seen from behind before its corners are projected.
         let plane = |triangle: &Triangle| {
             if self.surfaces[triangle.surface as usize].two_sided {
                 return [f64::INFINITY; 4];

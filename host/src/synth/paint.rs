@@ -141,6 +141,7 @@ impl Painter {
     fn road(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
         let [s, d, _] = surface_point.surface_m;
         let [fs, fd, _] = surface_point.footprint_m;
+        // Grain and stains of the asphalt, each filtered by the pixel's footprint.
         let fine = self.textures.asphalt.at(s, d, fs, fd);
         let broad = self.textures.broad.at(s, d, fs, fd);
         let mut shade = 1.0 + 0.50 * fine + 0.06 * broad;
@@ -160,6 +161,7 @@ impl Painter {
         if let Some(lid) = manhole(surface.seed, point) {
             tint = blend(tint, [0.07, 0.065, 0.06], lid);
         }
+        // Worn paint lets the asphalt through.
         let worn = (0.86 + 0.16 * broad + 0.10 * fine).clamp(0.25, 1.0);
         let marking = markings(surface.size_m[0] > 0.5, point) * worn;
         let painted =
@@ -180,6 +182,7 @@ impl Painter {
         let h = cell(seed.wrapping_mul(31), cs, cd);
         // Patches, cracks and seams come from one hash of each piece of road.
         let (ls, ld) = (s - cs as f32 * 8.0, d + 10.2 - cd as f32 * 3.5);
+        // One piece in four has a patch, with a dark rim.
         if h & 3 == 0 {
             let (a, b) = (unit(h << 4), unit(h << 12));
             let (s0, s1) = (0.5 + 3.0 * a, 4.0 + 3.5 * b);
@@ -192,6 +195,7 @@ impl Painter {
         if h & 12 == 4 {
             // A crack wanders like a sum of triangle waves.
             let wave = |x: f32| ((x - floor(x) as f32) - 0.5).abs() - 0.25;
+            // Sums of triangle waves, not of sines: the same on every machine and cheap.
             let phase = unit(h << 7) * 10.0;
             let wander = 1.6 * wave(d * 0.31 + phase)
                 + 0.5 * wave(d * 1.3 + phase)
@@ -263,12 +267,14 @@ impl Painter {
         let &Bond { length, height, joint, spread } = bond;
         let [u, v, _] = surface_point.surface_m;
         let [fu, fv, _] = surface_point.footprint_m;
+        // Every second row begins with half a stone.
         let row = floor(v / height);
         let along = u + 0.5 * length * (row & 1) as f32;
         let column = floor(along / length);
         let gap =
             1.0 - (1.0 - stripes(along, length, joint, fu)) * (1.0 - stripes(v, height, joint, fv));
         let h = cell(surface.seed, column, row);
+        // Stones smaller than the footprint lose their own tone, so that far walls do not flicker.
         let kept = survives(length, fu) * survives(height, fv);
         let own = (unit(h) - 0.5) * 2.0 * spread * kept;
         let fine = self.fine(surface.seed, surface_point, 1.0);
@@ -387,6 +393,7 @@ fn markings(crossing: bool, RoadPoint { s, d, fs, fd }: RoadPoint) -> f32 {
     let half = 0.06;
     let line = |at: f32| within(at - half, at + half, d, fd);
     let lane = layout::LANE_M as f32;
+    // Dashes and lines by their lane, then bays, then the crossing, which replaces them all.
     let mut share = line(0.5 * lane).max(line(-2.5 * lane)) * stripes(s, 2.0, 1.0, fs);
     share = share.max(line(-0.5 * lane) * stripes(s + 1.5, 8.0, 3.0, fs));
     let twin = line(-1.5 * lane - 0.12).max(line(-1.5 * lane + 0.12));

@@ -97,6 +97,7 @@ impl Centerline {
             }
         }
         starts_m.reverse();
+        // The last span's start is remembered: driving on costs a step, not the whole way.
         let mut walked = self.walked.lock().unwrap_or_else(PoisonError::into_inner);
         let (known, mut start) = if walked.0 <= first { *walked } else { Default::default() };
         for segment in known..=last {

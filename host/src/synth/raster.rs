@@ -52,17 +52,20 @@ impl Setup {
     /// Prepares a triangle of corners in camera coordinates; `None` where it cannot be seen.
     pub fn new(pinhole: &Pinhole, corners: [Vector3<f64>; 3], two_sided: bool) -> Option<Self> {
         let [a, b, c] = corners;
+        // Wholly behind the camera.
         if a.z <= NEAR_M && b.z <= NEAR_M && c.z <= NEAR_M {
             return None;
         }
         let planes = [b.cross(&c), c.cross(&a), a.cross(&b)];
         let volume = a.dot(&planes[0]);
+        // Edge on, or seen from behind.
         if volume.abs() < 1e-14 || (volume > 0.0 && !two_sided) {
             return None;
         }
         let (columns, rows, extent_px) = reach(pinhole, corners)?;
         let scale = 1.0 / (volume * pinhole.focal_px);
         let (u, v) = pinhole.center_px;
+        // Barycentric weights over depth are linear in the image: three numbers for each corner.
         let weights = planes.map(|plane| {
             let (x, y) = (plane.x * scale, plane.y * scale);
             [x, y, plane.z * (1.0 / volume) - x * u - y * v]
@@ -94,6 +97,7 @@ fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<Reach> {
         if from.z > NEAR_M {
             take(from);
         }
+        // Where an edge crosses the near plane, its end is the crossing.
         if (from.z > NEAR_M) != (to.z > NEAR_M) {
             take(from + (to - from) * ((NEAR_M - from.z) / (to.z - from.z)));
         }
@@ -105,6 +109,7 @@ fn reach(pinhole: &Pinhole, corners: [Vector3<f64>; 3]) -> Option<Reach> {
     let span = |low: f64, high: f64, last: f64| {
         ((low - 0.5).max(0.0) as i32, (high + 0.5).min(last) as i32)
     };
+    // A hair wider, so that rounding does not lose a row.
     Some((span(low.0, high.0, last.0), span(low.1, high.1, last.1), (low.1 - 1e-9, high.1 + 1e-9)))
 }
 
@@ -159,11 +164,13 @@ impl Band {
                 let Some((from, to)) = sides.span(du, v) else { continue };
                 let start = (sample * self.rows + row - self.first_row) * self.width;
                 let begin =
+                    // Inverse depth is linear along a row: one addition for each pixel.
                     (per_column * (f64::from(from as u32) + du) + per_row * v + constant) as f32;
                 let range = start + from..=start + to;
                 let slots = self.inverse_depth[range.clone()].iter_mut().zip(&mut self.seen[range]);
                 for (k, (near, seen)) in slots.enumerate() {
                     let here = begin + slope * k as i32 as f32;
+                    // Selections instead of branches, which the compiler turns into vectors.
                     let closer = here > *near;
                     *near = if closer { here } else { *near };
                     *seen = if closer { number } else { *seen };
@@ -202,6 +209,7 @@ impl Sides {
 
     /// First and last column of a row of samples.
     fn span(&self, du: f64, v: f64) -> Option<(usize, usize)> {
+        // The first column to the right of all left edges, the last to the left of all right ones.
         let at = |(slope, start): (f64, f64)| slope * v + start - du;
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let smaller = |a: f64, b: f64| if a < b { a } else { b };

@@ -63,12 +63,14 @@ pub fn calibration(
                 .to_owned(),
         ));
     };
+    // One size for both cameras: the larger extent, with a rim.
     let side = |axis: usize| {
         let span = |extent: &[[f64; 2]; 2]| extent[1][axis] - extent[0][axis];
         (span(&left).max(span(&right)) + 2.0 * RIM_PX).ceil() as u32 + 1
     };
     let [width, height] = [side(0), side(1)];
     let camera = |[low, high]: [[f64; 2]; 2]| {
+        // The middle of what is seen comes to the middle of the image.
         let center =
             |axis: usize, side: u32| 0.5 * (f64::from(side) - 1.0) - 0.5 * (low[axis] + high[axis]);
         Ok::<_, SynthError>(RawCamera {
@@ -117,6 +119,7 @@ fn extent(
 ) -> Option<[[f64; 2]; 2]> {
     let last = [f64::from(config.width) - 1.0, f64::from(config.height) - 1.0];
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+    // The border bounds the image: lenses are monotonic.
     for step in 0..=SIDE_POINTS {
         let share = f64::from(step) / f64::from(SIDE_POINTS);
         let [u, v] = [last[0] * share, last[1] * share];
@@ -150,6 +153,7 @@ pub fn views(
     if calibration.is_none() && config.rig_error.is_none() {
         return None;
     }
+    // Both cameras as the rectification turns them.
     let rectification = calibration.and_then(rectification);
     let ideal = [config.width, config.height];
     let left = CameraView::new(
@@ -197,6 +201,7 @@ impl CameraView {
                 }
                 None => ray(rig, [u, v]),
             };
+            // Rays nearly across the axis have no tangent worth rendering.
             (ray.z > 0.05).then(|| off.seen([ray.x / ray.z, ray.y / ray.z]))
         };
         let of_pixel = |pixel: u32| {

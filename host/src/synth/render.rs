@@ -76,6 +76,7 @@ impl Renderer<'_> {
                     .band(&band)
             })
             .collect();
+        // Bands come back in order.
         let mut picture = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
         for part in bands {
             picture.rgb.extend(part.rgb);
@@ -92,6 +93,7 @@ impl Renderer<'_> {
         if self.out_of_sight(middle, mesh.radius_m) {
             return Vec::new();
         }
+        // Beyond this distance small parts are less than a pixel.
         let far = middle.z - mesh.radius_m > SLIGHT_PER_PX * self.pinhole.focal_px;
         // The eye in the mesh's frame tells faces that look away before anything is computed.
         let eye = object.to_camera.rotation.tr_mul(&(shift - object.to_camera.shift));
@@ -106,11 +108,14 @@ impl Renderer<'_> {
             if triangle.slight && far {
                 continue;
             }
+            // The eye is behind the face's plane.
             if !two_sided && plane[0] * eye.x + plane[1] * eye.y + plane[2] * eye.z < plane[3] {
                 continue;
             }
             let corners = triangle.corners.map(|corner| positions[corner as usize]);
             if let Some(setup) = Setup::new(&self.pinhole, corners, two_sided) {
+                // Triangles of one surface of one object form a group: samples of one group share
+                // their shade.
                 let group = number << 12 | u32::from(triangle.surface);
                 setups.push(Setup { object: number, triangle: index as u32, group, ..setup });
             }
@@ -167,6 +172,7 @@ impl Shading<'_> {
             for (column, &centre) in seen[0].iter().enumerate() {
                 let samples = core::array::from_fn(|sample| seen[sample][column]);
                 let (light, depth_m) = self.pixel(column as f64, v, samples);
+                // The exposure: light to grey levels.
                 let levels = light.map(|value| develop(value * self.gain));
                 picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
                 picture.depth_m.push(depth_m);
@@ -210,6 +216,7 @@ impl Shading<'_> {
         let rotation = &self.scene.anchor_camera.rotation;
         let direction = (rotation * ray).map(|value| value as f32);
         let painter = self.renderer.painter;
+        // The sky has no depth: 0.
         if seen == SKY {
             return (
                 self.renderer.light.sky(
@@ -226,6 +233,7 @@ impl Shading<'_> {
         let surface = &mesh.surfaces[triangle.surface as usize];
         let corners = triangle.corners.map(|corner| &mesh.vertices[corner as usize]);
         let (surface_point, depth) = surface_point(setup, corners, u, v);
+        // Shadows are looked up relative to the anchor, where 32 bits are precise enough.
         let position = rotation * (ray * depth + Point::new(self.offset_m, 0.0, 0.0))
             + self.scene.anchor_camera.shift;
         let position = position.map(|value| value as f32);
@@ -234,11 +242,13 @@ impl Shading<'_> {
         let mut normal = normal * (1.0 / normal.dot(&normal).sqrt());
         let to_eye = direction * (-1.0 / direction.dot(&direction).sqrt());
         let thin = surface.two_sided;
+        // Thin surfaces have two lit sides; leaves keep their crown's normals.
         if thin && surface.kind != Kind::Leaves && normal.dot(&to_eye) < 0.0 {
             normal = -normal;
         }
         let painted = painter.paint(surface, &surface_point, object.coat);
         let open = self.openness(surface.kind, position);
+        // A face turned away from the sun needs no look-up.
         let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 {
             self.scene.shadow.light(position, normal)
         } else {

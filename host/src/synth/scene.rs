@@ -112,6 +112,7 @@ impl Scene {
                 instance,
             }
         };
+        // Segments first, then cars: the number of an object is its position.
         let mut objects = Vec::new();
         for segment in segments {
             for number in 0..segment.meshes.len() {
@@ -126,12 +127,14 @@ impl Scene {
         for (number, (kind, coat, t_street_car)) in cars.iter().enumerate() {
             objects.push(object(Source::Body(*kind), t_street_car, *coat, number as u8 + 1));
         }
+        // Positions in the shadow map are relative to the anchor, near the camera.
         let mut anchor_camera = MatrixPose::new(t_street_camera);
         anchor_camera.shift -= anchor;
         let ahead = anchor_camera.rotation * Vector3::z();
         let focus = anchor + anchor_camera.shift + ahead * 40.0;
         let mut shadow = ShadowMap::new(sun, anchor, focus);
         let mut ground = GroundLight::new(anchor, focus);
+        // Segments bring their shadow, drawn once; cars move and are drawn in each frame.
         for segment in segments {
             shadow.lay(&segment.shadow);
         }
@@ -142,6 +145,7 @@ impl Scene {
             }
             let mesh = &bodies[*kind as usize];
             shadow.lay(&ShadowTile::new(&sun, core::iter::once((mesh, pose))));
+            // Contact shadows under the cars, which the map's texels are too coarse for.
             let (low, high) = mesh.bounds_m();
             let half = [0.5 * (high.x - low.x) - 0.12, 0.5 * (high.z - low.z)];
             ground.cover(

@@ -77,6 +77,8 @@ pub fn segment(
 ) -> Segment {
     let builder = Builder::new(config, centerline, number);
     let mut meshes = builder.ground();
+    // Each side, and each kind of furniture, has a generator of its own: a change of one leaves the
+    // others.
     for side in [Side::Left, Side::Right] {
         builder.houses(side, &mut meshes);
         builder.street_furniture(side, &mut meshes);
@@ -185,6 +187,7 @@ impl<'a> Builder<'a> {
         ];
         let steps = SEGMENT_M as usize;
         let frames: Vec<Transform> = (0..=steps).map(|k| self.local(k as f64, 0.0, 0.0)).collect();
+        // Each strip in steps of one metre, so that it follows bends and hills.
         for (surface, from, to) in strips {
             for k in 0..steps {
                 let corner = |k: usize, (lateral, y): (f64, f64)| {
@@ -209,6 +212,7 @@ impl<'a> Builder<'a> {
 
     fn houses(&self, side: Side, meshes: &mut Vec<Mesh>) {
         let mut rng = self.rng(if side == Side::Left { 10 } else { 20 });
+        // Widths of the plots of one segment.
         let cuts: &[f64] = rng.pick(&[
             &[0.0, 10.0, 24.0][..],
             &[0.0, 8.0, 15.0, 24.0],
@@ -219,11 +223,13 @@ impl<'a> Builder<'a> {
         ]);
         for pair in cuts.windows(2) {
             let (from, to) = (pair[0], pair[1]);
+            // One plot in seven has no house.
             if rng.chance(0.14) {
                 self.garden(Plot { side, from, to }, &mut rng, meshes);
                 continue;
             }
             let setback = if rng.chance(0.2) { rng.between(1.0, 2.5) } else { 0.0 };
+            // A house stands on the chord between its corners, even in a bend.
             let lateral = side.front_m() + side.sign() * setback;
             let corner = |along: f64| Point::from(self.local(along, lateral, 0.0).translation_m);
             let (a, b) = if side == Side::Right {
@@ -265,6 +271,7 @@ impl<'a> Builder<'a> {
                 meshes,
             );
         }
+        // Behind the garden, a house that shows its side.
         let mut mesh = Mesh::default();
         facade::house(&mut mesh, rng, to - from + 4.0);
         let yaw = side.sign() * -0.25 * core::f64::consts::PI * 2.0;
@@ -285,6 +292,7 @@ impl<'a> Builder<'a> {
             furniture::fence(&mut mesh, rng, to - from);
         }
         let lateral = side.front_m() + side.sign() * 0.35;
+        // The edge follows the chord between its ends, as houses do.
         let (a, b) = (
             Point::from(self.local(from, lateral, 0.0).translation_m),
             Point::from(self.local(to, lateral, 0.0).translation_m),
@@ -323,6 +331,7 @@ impl<'a> Builder<'a> {
                 meshes,
             );
         }
+        // Lamps alternate between the two sides.
         if (self.number + i64::from(side == Side::Left)) % 2 == 0 {
             let mut mesh = Mesh::default();
             furniture::lamp(&mut mesh, &mut rng);
@@ -332,6 +341,7 @@ impl<'a> Builder<'a> {
                 meshes,
             );
         }
+        // Two pieces at places that trees and lamps leave free.
         for _ in 0..2 {
             let mut mesh = Mesh::default();
             let along = rng.pick(&[2.4, 3.6, 10.8, 12.6, 21.2, 22.6]) + rng.between(-0.4, 0.4);
@@ -353,6 +363,7 @@ impl<'a> Builder<'a> {
                 meshes,
             );
         }
+        // At times a row of bollards, which matching confuses.
         if rng.chance(0.3) {
             for k in 0..6 {
                 let mut mesh = Mesh::default();
@@ -373,6 +384,7 @@ impl<'a> Builder<'a> {
     fn parked(&self) -> Vec<ParkedCar> {
         let mut cars = Vec::new();
         let cleared = layout::cleared_m(self.config);
+        // Four slots a side.
         for slot in 0..8 {
             let mut rng = self.rng(100 + slot);
             let side = if slot < 4 { Side::Left } else { Side::Right };
@@ -384,6 +396,7 @@ impl<'a> Builder<'a> {
             let lateral = layout::parking_m(side == Side::Right) + rng.between(-0.1, 0.1);
             let facing_rad = if side == Side::Left { core::f64::consts::PI } else { 0.0 };
             let yaw = facing_rad + rng.between(-0.025, 0.025);
+            // Scripted cars need their space.
             let blocked = cleared.iter().any(|&(right, from, to)| {
                 right == (side == Side::Right) && (from..to).contains(&at)
             });

@@ -51,6 +51,7 @@ impl ShadowTile {
         axes: &SunAxes,
         meshes: impl Iterator<Item = (&'a Mesh, MatrixPose)> + Clone,
     ) -> Self {
+        // First the extent in texels, then the tile.
         let (mut low, mut high) = (Point::repeat(f64::MAX), Point::repeat(f64::MIN));
         for (mesh, pose) in meshes.clone() {
             for vertex in &mesh.vertices {
@@ -80,6 +81,7 @@ impl ShadowTile {
     }
 
     fn rasterize(&mut self, [a, b, c]: [Point; 3], two_sided: bool) {
+        // Faces away from the sun are skipped.
         let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
         if area.abs() < 1e-9 || (area < 0.0 && !two_sided) {
             return;
@@ -92,12 +94,14 @@ impl ShadowTile {
         if first > last || low(a.x, b.x, c.x) > high(a.x, b.x, c.x, self.size[0]) {
             return;
         }
+        // Depth is linear over the triangle.
         let (d1, d2) = (b.z - a.z, c.z - a.z);
         let slope_u = (d1 * (c.y - a.y) - d2 * (b.y - a.y)) / area;
         let slope_v = (d2 * (b.x - a.x) - d1 * (c.x - a.x)) / area;
         for row in first as usize..=last as usize {
             let v = row as f64;
             let (mut from, mut to) = (f64::MAX, f64::MIN);
+            // The row's first and last texel from the two edges it crosses.
             for (p, q) in [(a, b), (b, c), (c, a)] {
                 if (p.y <= v) != (q.y <= v) {
                     let u = p.x + (q.x - p.x) * ((v - p.y) / (q.y - p.y));
@@ -152,6 +156,7 @@ impl ShadowMap {
         let (Some((left, right, skip_u)), Some((top, bottom, skip_v))) = (span(0), span(1)) else {
             return;
         };
+        // Tiles have bases of their own: heights are brought to the map's.
         let lift = (tile.base_m - self.base_m) as f32;
         for row in top..bottom {
             let source = &tile.depth_m[(row - top + skip_v) * tile.size[0] + skip_u..];
@@ -168,6 +173,7 @@ impl ShadowMap {
     /// shines.
     pub fn light(&self, point: Vector3<f32>, normal: Vector3<f32>) -> f32 {
         let axis = |k: usize| self.axes.0[k].map(|value| value as f32);
+        // Lifted off the surface, so that it does not shade itself.
         let lifted = point + normal * 0.06;
         let scale = 1.0 / TEXEL_M as f32;
         // Two look-ups half a texel to either side, averaged: a tent over three texels each way.
@@ -187,6 +193,7 @@ impl ShadowMap {
             let open = |k: usize| f32::from(u8::from(cells[k] < depth));
             sum += row_weight * (wu[0] * open(0) + wu[1] * open(1) + wu[2] * open(2));
         }
+        // The map's rim fades out instead of ending.
         let edge = (u.min(v).min(limit - u).min(limit - v) * 0.02).min(1.0);
         1.0 + (sum - 1.0) * edge
     }
@@ -228,11 +235,13 @@ impl GroundLight {
             for column in u0..=u1 {
                 let (x, z) =
                     ((column as f64 - u) * GROUND_TEXEL_M, (row as f64 - v) * GROUND_TEXEL_M);
+                // Inside the box distances are negative, to -0.6 m.
                 let across = ((x * right.x + z * right.z).abs() - half_m[0]).max(-0.6);
                 let along = ((x * ahead.x + z * ahead.z).abs() - half_m[1]).max(-0.6);
                 let outside =
                     libm::sqrt(across.max(0.0) * across.max(0.0) + along.max(0.0) * along.max(0.0));
                 let distance = if outside > 0.0 { outside } else { across.max(along) };
+                // A smooth step from dark under the car to open beside it.
                 let x = ((distance + 0.35) / 0.95).clamp(0.0, 1.0);
                 let open = 0.16 + 0.84 * x * x * (3.0 - 2.0 * x);
                 let cell = &mut self.open[row * GROUND_SIDE + column];

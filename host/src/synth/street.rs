@@ -98,6 +98,7 @@ impl Street {
             return Err(SynthError::Config(problem));
         }
         let centerline = Centerline::new(&config);
+        // A generator for the sun: other draws do not move it.
         let mut rng = Rng::new(config.seed, 0x50_1A2, 0);
         // The sun stands behind the camera's left shoulder: houses on the right are lit, those on
         // the left throw shadows on the road.
@@ -171,6 +172,7 @@ impl Street {
 
     /// Frame `index` with all its truth.
     pub fn frame(&self, index: u32) -> SynthFrame {
+        // The scene is built once and rendered twice.
         let around = self.surroundings(index);
         let ideal = camera::pinhole(&self.config);
         let (left, right) = rayon::join(

@@ -23,6 +23,7 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
         (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let h = surface.seed;
     let mut tone = glass(painter, surface, surface_point);
+    // Folds of cloth: noise stretched along v.
     let folds = || {
         let hung = SurfacePoint {
             footprint_m: [fu, 0.2 * fv, 0.0],
@@ -33,6 +34,7 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
     };
     let cloth = [[0.62, 0.60, 0.55], [0.55, 0.50, 0.40], [0.60, 0.60, 0.62], [0.40, 0.30, 0.26]]
         [(h >> 3) as usize & 3];
+    // Curtains, a blind, net curtains, or nothing, as the seed says.
     match h % 6 {
         0 | 1 => {
             let open = 0.2 + 0.25 * unit(h << 6);
@@ -50,6 +52,7 @@ pub fn window(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint
     let border = 0.055;
     let mut bars =
         1.0 - within(border, width - border, u, fu) * within(border, height - border, v, fv);
+    // Wide windows have two sashes or three.
     if width > 0.75 {
         let sashes = if width > 1.5 { 3.0 } else { 2.0 };
         let step = width / sashes;
@@ -82,10 +85,12 @@ pub fn shop(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) 
             fu,
         );
     let own = [unit(h), unit(h << 5), unit(h << 11)].map(|value| 0.03 + 0.30 * value * value);
+    // Goods smaller than a pixel merge into the shelf's tone.
     let kept = survives(0.42, fu.max(fv));
     if row > 0 {
         tone = blend(tone, own, 0.65 * goods * kept);
     }
+    // Lamps on the ceiling.
     let lamp = stripes(u + 0.4, 1.3, 0.5, fu) * within(0.08, 0.14, v, fv);
     tone = blend(tone, [1.1, 1.05, 0.9], lamp * 0.8);
     let mut bars = 1.0 - within(0.07, width - 0.07, u, fu) * within(0.07, height - 0.09, v, fv);
@@ -104,6 +109,7 @@ pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint)
         1.0 + 0.05 * painter.fine(surface.seed, surface_point, 1.0)
             + 0.05 * painter.broad(surface.seed, surface_point, 1.0),
     );
+    // As many letters as the seed says, centred.
     let letter = 0.34;
     let count = 5 + (surface.seed % 6) as i32;
     let start = 0.5 * width - 0.5 * letter * count as f32;
@@ -118,6 +124,7 @@ pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint)
     let upright = |at: f32| within(at, at + 0.055, x, fu) * within(0.0, 1.0, y, fy);
     let bar = |at: f32| within(at - 0.08, at + 0.08, y, fy) * within(0.04, 0.26, x, fu);
     let mut ink: f32 = 0.0;
+    // Each letter is a set of six strokes.
     for (bit, stroke) in
         [upright(0.04), upright(0.205), bar(0.08), bar(0.5), bar(0.92), upright(0.12)]
             .into_iter()
@@ -127,6 +134,7 @@ pub fn board(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint)
             ink = ink.max(stroke);
         }
     }
+    // One letter in sixteen is a space.
     let space = h >> 12 & 15 == 0;
     Painted::dull(blend(ground, surface.second, if space { 0.0 } else { ink }))
 }
@@ -137,6 +145,7 @@ pub fn door(painter: &Painter, surface: &Surface, surface_point: &SurfacePoint) 
         (surface_point.surface_m, surface_point.footprint_m, surface.size_m);
     let wood = times(surface.tone, 1.0 + 0.08 * painter.fine(surface.seed, surface_point, 1.0));
     let mut tone = wood;
+    // Two rows of two panels, each with a groove around it.
     for (from, to) in [(0.30, 0.58), (0.64, 0.95)] {
         for (a, b) in [(0.14, 0.46), (0.54, 0.86)] {
             let panel = |grow: f32| {

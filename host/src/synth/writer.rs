@@ -76,6 +76,8 @@ fn write_all(
     }
     fs::create_dir_all(folder.join("poses")).map_err(at(folder))?;
     let count = street.config().frames;
+    // Tables are collected and written last: an interrupted run leaves no table that looks
+    // complete.
     let (mut times, mut poses) = (String::new(), String::new());
     let mut objects = String::from("frame,id,instance,class");
     for k in 0..12 {
@@ -83,6 +85,7 @@ fn write_all(
     }
     objects.push_str(",width_m,height_m,length_m,moving,speed_m_s\n");
     for index in 0..count {
+        // Images and scan of one frame at the same time.
         let (frame, scan) = rayon::join(|| street.frame(index), || street.lidar(index));
         write_frame(street, &sequence, &frame, &scan)?;
         // Writing to a String cannot fail.
@@ -104,6 +107,7 @@ fn write_all(
     write(&sequence.join("times.txt"), times.as_bytes())?;
     write(&sequence.join("objects.csv"), objects.as_bytes())?;
     write(&sequence.join("calib.txt"), calibration(street).as_bytes())?;
+    // Raw cameras come with their calibration, in this program's format and in Kalibr's.
     if let Some(calibration) = street.calibration() {
         write(&sequence.join(CALIBRATION_FILE), to_toml(calibration).as_bytes())?;
         if let Some(text) = to_kalibr(calibration) {
@@ -145,6 +149,7 @@ fn write_frame(
     scan: &[[f32; 4]],
 ) -> Result<(), SynthError> {
     let focal_baseline = street.rig().focal_baseline_px_m() as f32;
+    // KITTI's convention: 256ths, 0 for nothing, so that 256 m and more do not fit.
     let fixed = |value: f32| {
         if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 }
     };
@@ -162,6 +167,7 @@ fn write_frame(
         ("instances", frame.instances.clone(), L8, truth),
     ];
     let index = frame.index;
+    // Encoding PNG takes longest: all images of a frame at the same time.
     pictures.par_iter().try_for_each(|(name, bytes, colour, [width, height])| {
         let path = sequence.join(name).join(format!("{index:06}.png"));
         image::save_buffer(&path, bytes, *width as u32, *height as u32, *colour)
@@ -183,6 +189,7 @@ fn instance_list(frame: &SynthFrame) -> String {
             *b = (b.0.min(u), b.1.min(v), b.2.max(u + 1), b.3.max(v + 1));
         }
     }
+    // An instance without a pixel is not listed.
     let mut text = String::from("# id class score x1 y1 x2 y2\n");
     for (number, (object, b)) in frame.objects.iter().zip(&boxes).enumerate() {
         if b.0 != usize::MAX {

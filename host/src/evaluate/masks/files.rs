@@ -74,6 +74,7 @@ pub fn compare(found: &Path, truth: &Path) -> Result<FileFigures, InputError> {
             let iou = overlaps.best_for_truth(id).map_or(0.0, |(_, iou)| iou);
             for ((area, sums), least) in figures.truth.iter_mut().zip(&mut sums).zip(AREAS_PX) {
                 let is_found = iou >= FOUND_IOU;
+                // The sums of an area stand for all true masks larger than its bound.
                 if pixels > least {
                     area.masks += 1;
                     area.found += u64::from(is_found);

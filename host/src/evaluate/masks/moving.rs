@@ -82,6 +82,7 @@ impl MovingErrors {
     ) {
         self.frames += 1;
         // An object counts once it has been in sight for some frames: motion needs time to show.
+        // An object out of sight begins anew.
         let before = std::mem::take(&mut self.in_sight);
         for object in objects.iter().filter(|object| object.moving) {
             let label = u16::from(object.instance);
@@ -97,6 +98,7 @@ impl MovingErrors {
             else {
                 continue;
             };
+            // A missed object lowers the recall, not the mean overlap of those that were found.
             let iou = overlaps.best_for_truth(label).map_or(0.0, |(_, iou)| iou);
             sums.objects += 1;
             if iou >= FOUND_IOU {

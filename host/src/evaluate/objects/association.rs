@@ -73,8 +73,10 @@ impl Association {
             paired_objects.insert(object);
             *self.pairs.entry((track, object)).or_default() += 1;
             let before = self.last.insert(object, track);
+            // A switch: the object's track is another one than when it was last seen.
             self.id_switches += u64::from(before.is_some_and(|before| before != track));
         }
+        // A track on a region without labels may be right: it does not count.
         for (track, pixels) in tracks {
             let hidden = |region: &PixelBox| 2 * pixels.intersection(region).area() > pixels.area();
             if paired_tracks.contains(track) || !unknown.iter().any(hidden) {
@@ -83,6 +85,7 @@ impl Association {
             }
         }
         for (object, _, expected) in objects {
+            // An object too small to be expected does not count as missed.
             if *expected || paired_objects.contains(object) {
                 *self.objects.entry(*object).or_default() += 1;
                 self.misses += u64::from(!paired_objects.contains(object));
@@ -94,6 +97,7 @@ impl Association {
     pub fn figures(&self) -> Option<AssociationFigures> {
         let matched: u64 = self.pairs.values().sum();
         let all = matched + self.misses + self.false_tracks;
+        // HOTA's association accuracy: frames together over frames that either has.
         let associated = self.pairs.iter().map(|((track, object), &together)| {
             let of = |counts: &BTreeMap<u32, u64>, id| counts.get(id).copied().unwrap_or_default();
             let either = of(&self.tracks, track) + of(&self.objects, object) - together;

@@ -58,6 +58,7 @@ impl ObjectFigures {
             .values()
             .map(|comparisons| TrackErrors::from_comparisons(comparisons))
             .collect();
+        // Medians: a single wrong association would dominate a mean.
         let medians = |moving: bool, from_m: f64, to_m: f64| {
             let all = comparisons.values().flatten();
             let within =
@@ -76,6 +77,7 @@ impl ObjectFigures {
             moving_near: medians(true, 0.0, NEAR_M),
             moving_far: medians(true, NEAR_M, FAR_M),
             standing_near: medians(false, 0.0, NEAR_M),
+            // The worst track: a static object taken for a moving one is a hole in the map.
             false_dynamic_frames: tracks
                 .iter()
                 .map(|track| track.confusion[0][2])

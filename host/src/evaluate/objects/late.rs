@@ -28,12 +28,15 @@ impl LateStates {
     ) -> Self {
         let mut sum = Self::default();
         for track in comparisons.values() {
+            // Only frames in which the state should be known by now.
             let due =
                 || track.iter().filter(|one| one.is_due() && distances_m.contains(&one.distance_m));
             let late = || due().filter(|one| one.is_late());
             sum.tracks += usize::from(due().next().is_some());
             if late().next().is_some() {
                 sum.late += 1;
+                // Late tracks are split by what was in view: a cut or small object cannot be told
+                // earlier.
                 let cut = late().all(|one| one.view == Visibility::Cut);
                 sum.late_cut += usize::from(cut);
                 sum.late_small +=

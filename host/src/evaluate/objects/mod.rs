@@ -158,8 +158,10 @@ impl ObjectErrors {
             .map(|one| (one.id, one.pixels, large_enough(&one.pixels)))
             .collect();
         self.association.add(&boxes, &objects, &truth.unlabelled);
+        // Frames are counted here, because runs may begin anywhere.
         let frame = self.frame;
         for object in &truth.objects {
+            // An object that starts or stops gets time to be noticed.
             let known = self.truths.entry(object.id).or_insert((object.moving, frame));
             if known.0 != object.moving {
                 *known = (object.moving, frame);
@@ -171,6 +173,7 @@ impl ObjectErrors {
             let Some(object) = true_object(&track.pixels, truth) else { continue };
             let first = *self.first_seen.entry(track.id).or_insert(frame);
             let changed = self.truths.get(&object.id).map_or(frame, |known| known.1);
+            // A motion is compared only if the tracker claims one.
             let estimated = track.measured || track.state != MotionState::Uncertain;
             let error = self.before.get(&object.id).filter(|_| estimated).map(|before| {
                 let estimate = t_true_estimated * track.motion_world * t_true_estimated.inverse();
@@ -190,6 +193,7 @@ impl ObjectErrors {
                 speed_m_s: track.speed_m_s.map(|[speed, _]| f64::from(speed)),
             });
         }
+        // Motions lead from this frame's true poses to the next one's.
         self.before =
             truth.objects.iter().map(|object| (object.id, object.t_world_object)).collect();
         self.frame += 1;

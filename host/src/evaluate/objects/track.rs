@@ -60,6 +60,7 @@ impl TrackErrors {
             confusion[usize::from(one.moving)][state] += 1;
             *votes.entry(one.truth).or_default() += 1;
             late_frames += u32::from(one.is_late() && one.distance_m < FAR_M);
+            // Uncertain is no answer: it neither flips nor ends a flip.
             if one.state != MotionState::Uncertain {
                 let same = |before: &&TrackComparison| {
                     before.truth == one.truth && before.moving == one.moving && one.is_due()
@@ -72,6 +73,7 @@ impl TrackErrors {
         let dynamic = comparisons.iter().filter(|one| one.state == MotionState::Dynamic);
         let errors = |at: usize| comparisons.iter().filter_map(move |one| Some(one.error?[at]));
         Self {
+            // The object that most frames agree on; a track may wander.
             truth: votes.into_iter().max_by_key(|&(_, count)| count).map_or(0, |(truth, _)| truth),
             frames: comparisons.len(),
             confusion,

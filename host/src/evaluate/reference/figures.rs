@@ -92,6 +92,7 @@ impl ReferenceFigures {
             delay_frames,
             frames: frames.len(),
             still: pair(frames, Region::Static),
+            // Objects have moved on by the time the map is evaluated late.
             dynamic: (delay_frames == 0).then(|| pair(frames, Region::Dynamic)),
             ignored_points: counted(|frame| frame.regions[Region::Ignored as usize].total),
             left_out_points: counted(|frame| frame.count.out_of_range + frame.count.outside),
@@ -102,6 +103,7 @@ impl ReferenceFigures {
 }
 
 fn pair(frames: &[EvaluatedFrame], region: Region) -> PairFigures {
+    // Means over frames: a frame with many points does not outweigh the others.
     let counts: Vec<&Counts> = frames.iter().map(|frame| &frame.regions[region as usize]).collect();
     let source = |source: usize| {
         let over = |of: &dyn Fn(&Counts) -> Option<f64>| {

@@ -43,6 +43,7 @@ pub fn on_common_points(runs: &[&[PointOutcomes]]) -> Option<(Vec<f64>, u64)> {
     let (first, _) = runs.split_first()?;
     let (mut sums, mut frames, mut points) = (vec![0.0; runs.len()], 0u32, 0u64);
     for frame in *first {
+        // The same frame, with the same points: others cannot be compared.
         let same = |run: &&[PointOutcomes]| {
             run.iter().position(|other| (other.frame, other.points) == (frame.frame, frame.points))
         };
@@ -61,6 +62,7 @@ pub fn on_common_points(runs: &[&[PointOutcomes]]) -> Option<(Vec<f64>, u64)> {
         if all == 0 {
             continue;
         }
+        // Accuracy on the common points, which differ between runs only in the maps.
         for (sum, one) in sums.iter_mut().zip(&of) {
             let right: u32 = common
                 .iter()

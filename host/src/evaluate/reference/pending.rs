@@ -65,6 +65,7 @@ impl PendingFrame {
         let shown = |sample: &Sample| {
             let depth_m =
                 map_depth_m.get(sample.point.u.into(), sample.point.v.into()).unwrap_or_default();
+            // Zero depth is no surface.
             let shown_px = if depth_m > 1e-5 {
                 (focal_baseline_px_m / f64::from(depth_m)) as f32
             } else {

@@ -73,6 +73,7 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
             scan.cameras.map(|camera| seen(&camera, point));
         let disparity_px = u - u_right;
         // False for NaN.
+        // The disparity is measured in the images, so that both calibrations are used.
         let measures = field.contains(depth_m) && disparity_px > 0.0;
         if !measures {
             projected.count.out_of_range += 1;
@@ -86,6 +87,7 @@ pub fn project_scan(scan: &LidarScan, field: &Field) -> ProjectedScan {
             projected.count.outside += 1;
             continue;
         }
+        // The two projections of one point share a row, or the calibration is off.
         projected.count.epipolar += u32::from((v - v_right).abs() > EPIPOLAR_PX);
         projected.points.push(ProjectedPoint {
             u: column as u16,
@@ -106,6 +108,7 @@ fn seen(camera: &[f64; 12], [x, y, z]: &[f64; 3]) -> [f64; 3] {
 /// Takes a renderer's exact depth instead of a scan, thinned evenly to at most [`EXACT_POINTS`].
 pub fn sample_exact_depth(depth_m: &Image<f32>, rig: &StereoRig, field: &Field) -> ProjectedScan {
     let (width, height) = (depth_m.width(), depth_m.height());
+    // The finest grid of pixels with at most that many points.
     let step = (1..)
         .find(|step| width.div_ceil(*step) * height.div_ceil(*step) <= EXACT_POINTS)
         .unwrap_or(1);

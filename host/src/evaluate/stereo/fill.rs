@@ -10,11 +10,13 @@ pub fn filled(disparity: &Image<u16>) -> Image<u16> {
     let (width, height) = (disparity.width(), disparity.height());
     let mut pixels = disparity.pixels().to_vec();
     for row in pixels.chunks_exact_mut(width) {
+        // Zero at the row's ends stands for no neighbour.
         let mut left = 0u16;
         let mut at = 0;
         while at < width {
             let run = row.iter().skip(at).take_while(|&&pixel| pixel == 0).count();
             let right = row.get(at + run).copied().unwrap_or_default();
+            // The smaller disparity is the background, which is what most holes show.
             let filling = match (left, right) {
                 (0, only) | (only, 0) => only,
                 (left, right) => left.min(right),

@@ -87,6 +87,7 @@ pub fn find_stereo_set(path: &Path) -> Result<StereoSet, StereoSetError> {
         return Err(StereoSetError::Absent { path: path.to_path_buf() });
     }
     let mut without_truth = None;
+    // As unpacked, or one folder further up.
     for root in [path.to_path_buf(), path.join("training")] {
         for Layout { name, cameras, truth } in LAYOUTS {
             let found = |names: &[&str]| {
@@ -114,10 +115,12 @@ pub fn find_stereo_set(path: &Path) -> Result<StereoSet, StereoSetError> {
                     pair.truth.iter().any(Option::is_some).then_some(pair)
                 })
                 .collect();
+            // By name, since folders list their files in any order.
             pairs.sort_by(|a, b| a.name.cmp(&b.name));
             if !pairs.is_empty() {
                 return Ok(StereoSet { name, pairs });
             }
+            // Remembered, because the images are there: the message should name what is missing.
             without_truth = Some(StereoSetError::NoTruth { path: root.clone(), truth: truth[0] });
         }
     }

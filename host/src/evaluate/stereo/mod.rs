@@ -84,6 +84,7 @@ impl StereoCounts {
         {
             self.pixels += 1;
             self.given += u64::from(given > 0);
+            // The given disparities count where they are; the filled ones everywhere.
             for (way, estimate) in [given, filled]
                 .into_iter()
                 .enumerate()
@@ -96,6 +97,7 @@ impl StereoCounts {
                     .zip(BAD_PX)
                     .for_each(|(bad, limit)| *bad += u64::from(off_px > limit));
             }
+            // Mean and bias, over what the matcher gave.
             if given > 0 {
                 let error = f64::from(px(given) - px(truth));
                 self.error_sums_px[0] += error.abs();

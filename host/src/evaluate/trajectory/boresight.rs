@@ -25,12 +25,14 @@ const STEPS: usize = 3;
 /// The rotation that takes the segments' estimated translations nearest to the true ones, all of
 /// the same length. `None` where they have no direction.
 pub(super) fn boresight(segments: &[Segment]) -> Option<Transform> {
+    // The turn about the direction of travel cannot be told from translations: it stays zero.
     let travelled: Vector3<f64> = segments
         .iter()
         .map(|segment| Vector3::from(segment.actual.translation_m) / segment.length_m)
         .sum();
     let ahead = travelled.try_normalize(f64::EPSILON)?;
     let across = Matrix3::identity() - ahead * ahead.transpose();
+    // Gauss-Newton on the rotation; the problem is nearly linear.
     (0..STEPS).try_fold(Transform::IDENTITY, |turn, _| {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for Segment { length_m, estimated, actual } in segments {
@@ -39,6 +41,7 @@ pub(super) fn boresight(segments: &[Segment]) -> Option<Transform> {
             normal += Matrix3::from_diagonal_element(e.norm_squared()) - e * e.transpose();
             right += e.cross(&a);
         }
+        // The direction of travel gets a unit entry, so that the matrix can be factored.
         let step = (across * normal * across + ahead * ahead.transpose())
             .cholesky()?
             .solve(&(across * right));

@@ -123,6 +123,7 @@ pub fn matched(
                     .iter()
                     .enumerate()
                     .min_by(|a, b| (a.1 - time).abs().total_cmp(&(b.1 - time).abs()))?;
+                // A pose farther away in time belongs to another frame.
                 ((at.1 - time).abs() <= SAME_TIME_S)
                     .then(|| second.poses.get(at.0).copied())
                     .flatten()
@@ -144,6 +145,7 @@ pub fn matched(
             });
         }
     };
+    // One pose has no motion to compare.
     if pairs.len() < 2 {
         return Err(TrajectoryError::Few { pairs: pairs.len() });
     }

@@ -65,6 +65,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
         return None;
     }
     let travelled = travelled_m(truth);
+    // KITTI's lengths need a path of 200 m; shorter ones get shorter segments from every frame.
     let long = travelled.last()? >= &LONG_M[1];
     let (lengths, step): (&[f64], usize) = if long { (&LONG_M, LONG_STEP) } else { (&SHORT_M, 1) };
     // KITTI's metric: relative motion over segments of fixed lengths.
@@ -74,6 +75,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
     };
     let (mut all, mut per_length) = (Vec::new(), Vec::new());
     for &length_m in lengths {
+        // A segment ends at the first frame beyond its length, along the true path.
         let segments = (0..truth.len()).step_by(step).map_while(|from| {
             let to = travelled.partition_point(|&at| at < travelled[from] + length_m);
             (to < truth.len()).then(|| segment(from, to, length_m))
@@ -84,6 +86,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
         }
         all.extend(segments);
     }
+    // From frame to frame, segments of one step each.
     let steps: Vec<Segment> = (1..truth.len()).map(|to| segment(to - 1, to, 1.0)).collect();
     let overall = SegmentError::mean(&all);
     Some(TrajectoryErrors {

@@ -84,6 +84,7 @@ pub fn objects(stamp: Stamp, mapper: &Mapper<'_>) -> Value {
         &dynvox_core::objects::ObjectSummary,
         &dynvox_core::objects::Object<'_>,
     )| {
+        // An object without a block has no box.
         let ([low, high], t_world_object) = (box_of(object.volume())?, summary.t_world_object);
         let middle =
             Transform::from_translation([0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis])));
@@ -153,6 +154,7 @@ pub fn cloud(stamp: Stamp, seen: &Raycaster<'_>, rig: &StereoRig) -> Option<Valu
                     (from_center(u, rig.center_u_px) * z, from_center(v, rig.center_v_px) * z);
                 data.extend([x, y, z].iter().flat_map(|value| value.to_le_bytes()));
                 data.extend(colour.get(u, v).unwrap_or_default());
+                // Opaque.
                 data.push(255);
             }
         }

@@ -106,6 +106,7 @@ impl Recording {
         self.note_pose(frame.position, &t_world_camera);
         self.write(Topic::Transform, time_ns, &messages::transform(stamp, &t_world_camera))?;
         self.write(Topic::Pose, time_ns, &messages::pose(stamp, &t_world_camera))?;
+        // The picture may be missing, as in a run on depth only.
         if let Some(left) = frame_pictures::left(frame) {
             self.write(
                 Topic::Calibration,
@@ -123,6 +124,7 @@ impl Recording {
         self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
         self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
+        // Clouds are large: one every few frames.
         if frame.position.is_multiple_of(MAP_EVERY)
             && let Some(seen) =
                 frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
@@ -152,6 +154,7 @@ impl RecordingObserver {
         run: &ObservedRun<'_>,
         write: impl FnOnce(&mut Recording) -> Result<(), mcap::McapError>,
     ) {
+        // A recording that failed once is given up: the run itself goes on.
         if !run.plan.request.exports.record || self.failure.is_some() {
             return;
         }

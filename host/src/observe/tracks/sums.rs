@@ -42,6 +42,7 @@ impl TrackSums {
         self.states[state] += 1;
         let speed_m_s = row.speed_m_s.map(|[speed, _]| speed);
         speed_m_s.iter().for_each(|speed| self.speeds_m_s[state].add(f64::from(*speed)));
+        // A span goes on while state and measurement stay and no frame is missing.
         let like = |last: &&mut TrackSpan| {
             last.to == position && (last.state, last.measured) == (row.state, row.measured)
         };
@@ -59,6 +60,7 @@ impl TrackSums {
 
     /// The track over the whole run.
     pub fn record(self, id: u32, errors: Option<&TrackErrors>) -> TrackRecord {
+        // Uncertain frames do not count; of equals, static.
         let state = match self.states {
             [_, 0, 0] => MotionState::Uncertain,
             [_, still, moving] if moving > still => MotionState::Dynamic,

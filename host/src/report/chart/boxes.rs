@@ -38,12 +38,14 @@ pub fn boxes_and_curves(
 ) -> Markup {
     let of_boxes = boxes.iter().flat_map(|one| one.boxes.iter().flatten().flatten().copied());
     let all = of_boxes.chain(curves.iter().flat_map(|one| one.numbers.iter().flatten().copied()));
+    // One scale for all: boxes and curves are read against each other.
     let (low, high) =
         all.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
     if low > high || labels.is_empty() {
         return html! {};
     }
     let plot = Plot::around(low, high);
+    // Each label has a slot, in which its boxes stand side by side.
     let slot = (WIDTH - LEFT - RIGHT) / labels.len() as f64;
     let x = |at: usize| LEFT + slot * (at as f64 + 0.5);
     let width = (slot / (boxes.len() as f64 + 1.0)).min(WIDEST);

@@ -45,7 +45,9 @@ pub fn lanes(
     label: &str,
     styles: &[&'static str],
 ) -> Markup {
+    // An empty run must not divide by zero.
     let count = count.max(1) as f64;
+    // The list of frames may be thinned: each of its numbers stands for several frames.
     let per_number = (count / frames.len().max(1) as f64).ceil() as usize;
     let x = |at: usize| LEFT + (WHOLE - LEFT - RIGHT) * at as f64 / count;
     let width = |bar: &Bar| (x(bar.to) - x(bar.from)).max(1.0);

@@ -51,6 +51,7 @@ pub fn lines(frames: &[usize], series: &[Series<'_>], title: &str, least_top: f6
 
 /// Areas on top of one another, over frames.
 pub fn stacked(frames: &[usize], series: &[Series<'_>], title: &str) -> Markup {
+    // Each area lies on the sum of those before it.
     let mut sums = vec![0.0; frames.len()];
     let mut areas = Vec::new();
     for one in series {
@@ -64,6 +65,7 @@ pub fn stacked(frames: &[usize], series: &[Series<'_>], title: &str) -> Markup {
     // percentile.
     sums.sort_by(f64::total_cmp);
     let plot = Plot::from_zero(1.15 * quantile(&sums, 0.99).unwrap_or(1.0));
+    // Along the upper edge and back along the lower one.
     let outline = |below: &[f64], above: &[f64]| {
         let (upper, lower) = (thinned(above), thinned(below));
         polyline(

@@ -40,6 +40,7 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
     let turned = x1 - x0 < z1 - z0;
     let (along, across) = if turned { (z1 - z0, x1 - x0) } else { (x1 - x0, z1 - z0) };
     let margin = 0.06 * along.max(1.0);
+    // One scale for both axes: a path is not distorted.
     let scale = ((WHOLE - 28.0) / (along + 2.0 * margin)).min(HIGHEST / (across + 2.0 * margin));
     let height = ((across + 2.0 * margin) * scale).max(90.0) + BAR;
     let middle = ((x0 + x1) / 2.0, (z0 + z1) / 2.0);
@@ -48,10 +49,12 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
             if turned { (z - middle.1, x - middle.0) } else { (x - middle.0, middle.1 - z) };
         (WHOLE / 2.0 + right * scale, (height - BAR) / 2.0 + up * scale)
     };
+    // More points than the page has pixels would only make the file larger.
     let d = |points: &[(f64, f64)]| {
         let every = points.len().div_ceil(4 * POINTS).max(1);
         polyline(points.iter().step_by(every).chain(points.last()).map(to_page))
     };
+    // A scale bar of about a tenth of the width, of a round length.
     let step = nice_step((along + 2.0 * margin) / 10.0);
     let (bar, base) = (px(step * scale), height - 18.0);
     html! {

@@ -145,6 +145,7 @@ impl RunDigests {
             .map_err(|error| damaged(SETTINGS_FILE, error.message().to_owned()))?;
         let summary: serde_json::Value = serde_json::from_str(&summary)
             .map_err(|error| damaged(SUMMARY_FILE, error.to_string()))?;
+        // What a run was made from counts as a setting: runs of two data sets differ in it.
         for key in ["dataset", "profile"] {
             if let Some(value) = summary.get(key).and_then(serde_json::Value::as_str) {
                 settings.insert(format!("({key})"), value.to_owned());
@@ -154,6 +155,7 @@ impl RunDigests {
         let poses = read_poses(&folder.join(TRAJECTORY_FILE))
             .map(|trajectory| trajectory.poses)
             .unwrap_or_default();
+        // A trajectory of another length does not belong to the table.
         if poses.len() == rows.len() {
             rows.values_mut().zip(poses).for_each(|(row, pose)| row.outcome.pose = Some(pose));
         }
@@ -176,8 +178,10 @@ impl RunDigests {
 /// # Errors
 /// They share none.
 pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareError> {
+    // Frames by number: one run may have begun later or ended earlier.
     let shared =
         || a.rows.iter().filter_map(|(frame, row)| Some((*frame, row, b.rows.get(frame)?)));
+    // The first frame that differs: what follows differs because of it.
     let divergence =
         shared().find(|(_, one, other)| (one.digest, one.stages) != (other.digest, other.stages));
     let most = || {
@@ -196,6 +200,7 @@ pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareErro
         shared: shared().count(),
         frames: [a.frames(), b.frames()],
     };
+    // Runs without a common frame say nothing about each other.
     if comparison.shared == 0 {
         let range = |[first, last, count]: [usize; 3]| {
             if count == 0 { "none".to_owned() } else { format!("{first} to {last}") }
@@ -237,6 +242,7 @@ fn row_of(row: &FrameDigests) -> Option<Row> {
         let (id, digest) = text.split_once(':')?;
         Some(ObjectDigest { id: id.parse().ok()?, digest: hex(digest)? })
     };
+    // A dash stands for no objects, as an empty cell would be ambiguous.
     let objects: Vec<ObjectDigest> = match row.objects_digest.as_str() {
         "-" => Vec::new(),
         objects => objects.split(';').map(object).collect::<Option<_>>()?,

@@ -25,6 +25,7 @@ pub fn section(run: &RunRecord) -> Markup {
 fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
     let sections = &run.sections;
     let mut cards = vec![(format!("{:.1} fps", run.fps()), "mapping and reading images")];
+    // The map's figures come first, where there is a reference.
     if let Some(figures) =
         sections.reference.as_ref().and_then(|reference| reference.figures.as_ref())
     {
@@ -42,6 +43,7 @@ fn cards(run: &RunRecord) -> Vec<(String, &'static str)> {
         );
     }
     if let Some(errors) = &sections.trajectory.errors {
+        // A short path has no segments: the error by frame stands in.
         cards.push(match errors.t_err_percent {
             Some(percent) => (format!("{percent:.2} %"), "translation error over segments"),
             None => (format!("{:.2} cm", 100.0 * errors.rpe_t_m), "translation error per frame"),

@@ -40,6 +40,7 @@ pub fn page(title: &str, content: &Markup) -> Markup {
 /// # Errors
 /// The disk refuses.
 pub fn write(out: &mut impl Write, run: &RunRecord, viewer: &Markup) -> io::Result<()> {
+    // From what a reader asks first to what explains a fault.
     let content = html! {
         (head::section(run))
         (viewer)

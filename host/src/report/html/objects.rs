@@ -18,10 +18,12 @@ const TRACKS: usize = 60;
 pub fn section(run: &RunRecord) -> Markup {
     let (tracks, health) = (&run.sections.tracks, &run.sections.health);
     let detections = &health.detections;
+    // A run without detections has nothing to show here.
     if tracks.tracks.is_empty() && detections.given == 0 {
         return html! {};
     }
     let shown = shown(tracks);
+    // Only refusals that happened are named.
     let refused: Vec<String> = health
         .mask_refusals
         .named()
@@ -175,6 +177,7 @@ fn track_table(shown: &[&TrackRecord]) -> Markup {
 }
 
 fn track_row(track: &TrackRecord) -> Vec<String> {
+    // A figure that is not known is an empty cell, not a zero.
     let number = |value: Option<f64>, digits: usize| {
         value.map_or(String::new(), |value| format!("{value:.digits$}"))
     };

@@ -66,6 +66,7 @@ fn table_of(figures: &ReferenceFigures) -> Markup {
         ("within 2 px", true),
         ("points", true),
     ];
+    // Two rows for each part of the scene: what came in, and what the map made of it.
     let mut rows = Vec::new();
     let dynamic = figures.dynamic.iter().map(|of| ("dynamic objects", of));
     for (name, PairFigures { input, fused, .. }) in
@@ -87,6 +88,7 @@ fn row(region: &str, source: &str, of: &SourceFigures) -> Vec<String> {
 
 fn charts(frames: &[EvaluatedFrame]) -> Markup {
     let numbers: Vec<usize> = frames.iter().map(|frame| frame.frame).collect();
+    // A frame without points is a gap in the curve.
     let percent = |value: Option<f64>| value.map_or(f64::NAN, |value| 100.0 * value);
     let chart = |title: &str, value: &dyn Fn(&EvaluatedFrame, usize) -> f64| {
         let of =

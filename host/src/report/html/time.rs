@@ -8,6 +8,7 @@ use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let frames = frames(run);
+    // The step as a whole, then its stages.
     let mut wall = vec![series(run, "whole step", "currentColor", "step_ms")];
     wall.extend(stages(run, "ms"));
     let rows: Vec<Vec<String>> = run

@@ -8,6 +8,7 @@ use maud::{Markup, html};
 
 pub fn section(run: &RunRecord) -> Markup {
     let trajectory = &run.sections.trajectory;
+    // From above: x to the right, z ahead.
     let above = |position_m: [f64; 3]| (position_m[0], position_m[2]);
     let mut paths = vec![Path {
         name: "estimate",
@@ -45,6 +46,7 @@ pub fn section(run: &RunRecord) -> Markup {
 }
 
 fn errors_of(errors: &TrajectoryErrors) -> Markup {
+    // A row for each length of segment, as KITTI reports them, then their mean.
     let mut rows: Vec<Vec<String>> = errors
         .per_length
         .iter()

@@ -86,16 +86,19 @@ fn cloud(
     points: &[([f32; 3], [u8; 3])],
     side_m: f32,
 ) -> io::Result<Option<Cloud>> {
+    // Thinned evenly, so that the page stays small.
     let every = points.len().div_ceil(MAX_POINTS).max(1);
     let mut points: Vec<_> = points.iter().step_by(every).copied().collect();
     let positions_m = points.iter().map(|(at, _)| *at).collect();
     let Some(bounds_m) = IndexedMesh { positions_m, ..IndexedMesh::default() }.bounds_m() else {
         return Ok(None);
     };
+    // Along a Morton curve neighbours follow each other: their differences are small and pack well.
     points.sort_by_key(|(at, _)| morton(*at, bounds_m));
     let (low_m, size_m) = (bounds_m[0], longest_side(bounds_m).max(1e-3));
     let mut planes = Vec::with_capacity(9 * points.len());
     for axis in 0..3 {
+        // Planes of one kind of number each, which deflate better than interleaved ones.
         push_word_differences(
             &mut planes,
             points.iter().map(|(at, _)| ((at[axis] - low_m[axis]) / size_m * STEPS).round() as u16),

@@ -71,6 +71,7 @@ impl<'s> ViewerIndex<'s> {
         Self {
             name,
             frames: frames.iter().map(|frame| frame.row.frame).collect(),
+            // Milliseconds and millimetres are enough on a screen, and shorter than all digits.
             times_s: frames.iter().map(|frame| rounded(frame.row.time_s, 3)).collect(),
             poses: frames.iter().map(|frame| numbers(&frame.t_world_camera)).collect(),
             truth: scene

@@ -41,6 +41,7 @@ const SCRIPT: [&str; 8] = [
 pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
     let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
     let values = SurfaceValues::new(scene);
+    // Values are scaled over the whole scene, so that colours mean the same in every tile.
     let mut tiles = tiles::tiles(&scene.static_map, &values.of_static(&scene.static_map), None)
         .map_err(failed)?;
     for (at, object) in scene.objects.iter().enumerate() {
@@ -50,6 +51,7 @@ pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, Form
     }
     let mut head = ViewerIndex::new(name, scene, values.heads());
     let mut elements = Vec::new();
+    // Each tile is an element of its own, decoded when the page shows it.
     for (at, tile) in tiles.into_iter().enumerate() {
         elements.push((format!("dynvox-tile-{at}"), STANDARD.encode(&tile.bytes)));
         head.tiles.push(tile.head);
@@ -58,6 +60,7 @@ pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, Form
         elements.push((format!("dynvox-cloud-{at}"), STANDARD.encode(&cloud.bytes)));
         head.clouds.push(cloud.head);
     }
+    // The index comes last: it counts what was encoded.
     let head = deflated(&head).map_err(failed)?;
     Ok(html! {
         style { (PreEscaped(STYLE)) }

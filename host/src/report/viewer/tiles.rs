@@ -65,6 +65,7 @@ pub fn tiles(
 ) -> io::Result<Vec<Tile>> {
     let Some(bounds_m) = mesh.bounds_m() else { return Ok(Vec::new()) };
     let surface = Surface { mesh, normals: mesh.normals(), values };
+    // Triangles in Morton order: a tile is a compact piece of the map.
     let mut order: Vec<(u32, usize)> = mesh
         .triangles
         .iter()
@@ -76,6 +77,7 @@ pub fn tiles(
         .chunks(TRIANGLES)
         .map(|chunk| chunk.iter().map(|(_, at)| mesh.triangles[*at]).collect())
         .collect();
+    // One step for all tiles: vertices on a common border fall on the same point.
     let longest_m = chunks
         .iter()
         .map(|chunk| longest_side(box_of(mesh, chunk.iter().flatten())))
@@ -99,6 +101,7 @@ fn tile(
     let Surface { mesh, normals, values } = surface;
     let (mut numbers, mut vertices, mut corners) =
         (hashbrown::HashMap::new(), Vec::<usize>::new(), Vec::new());
+    // Vertices are numbered as triangles first use them; corners then count back from the newest.
     for &corner in triangles.iter().flatten() {
         let next = vertices.len() as u16;
         let number = *numbers.entry(corner).or_insert(next);
@@ -108,11 +111,13 @@ fn tile(
         corners.push(next - number);
     }
     let [low_m, high_m] = box_of(mesh, triangles.iter().flatten());
+    // Multiples of the step, from the origin and not from the tile's corner, for the same reason.
     let lowest = low_m.map(|metres| (f64::from(metres) / f64::from(step_m)).floor());
     let steps = |at: usize, axis: usize| {
         (f64::from(mesh.positions_m[at][axis]) / f64::from(step_m)).round() - lowest[axis]
     };
     let quantised = |axis: usize| vertices.iter().map(move |&at| steps(at, axis) as u16);
+    // Planes of one kind of number each, which deflate better than interleaved ones.
     let mut planes = Vec::with_capacity((11 + VALUES) * vertices.len() + 2 * corners.len());
     (0..3).for_each(|axis| push_word_differences(&mut planes, quantised(axis)));
     let octahedral: Vec<[i8; 2]> = vertices.iter().map(|&at| octahedral(normals[at])).collect();

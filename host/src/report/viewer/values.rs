@@ -114,6 +114,7 @@ impl<'s> SurfaceValues<'s> {
         last_frame: impl Fn(usize) -> Option<usize>,
         error_m: impl Fn(usize) -> Option<f32>,
     ) -> Vec<ValueBytes> {
+        // Zero means that the value is not known.
         let byte = |scale: Option<Scale>, value: Option<f32>| {
             scale.zip(value).map_or(0, |(scale, value)| scale.byte(value))
         };

@@ -44,6 +44,7 @@ pub fn write(out: &mut impl Write, scene: &Scene) -> io::Result<()> {
     children.extend(
         document.path_node("ground truth", scene.truth.iter().map(|pose| pose.translation_m)),
     );
+    // Animations begin at zero, whenever the recording did.
     let began_s = scene.frames.first().map_or(0.0, |frame| frame.row.time_s);
     let times_s: BTreeMap<usize, f32> = scene
         .frames
@@ -53,6 +54,7 @@ pub fn write(out: &mut impl Write, scene: &Scene) -> io::Result<()> {
     children
         .extend(scene.objects.iter().filter_map(|object| document.object_node(object, &times_s)));
     document.nodes.push(json!({ "name": "world", "rotation": HALF_TURN, "children": children }));
+    // A node may not name an empty list of children.
     if children.is_empty() {
         document.nodes = vec![json!({ "name": "world", "rotation": HALF_TURN })];
     }
@@ -76,6 +78,7 @@ impl Document {
     ) -> Option<usize> {
         let points: Vec<[f32; 3]> = positions_m.map(|at| at.map(|metres| metres as f32)).collect();
         let first = *points.get(1).and(points.first())?;
+        // The format demands the bounds of all positions.
         let bound = |pick: fn(f32, f32) -> f32| {
             points.iter().fold(first, |bound, at| [0, 1, 2].map(|axis| pick(bound[axis], at[axis])))
         };
@@ -108,6 +111,7 @@ impl Document {
             .iter()
             .filter_map(|(frame, pose)| Some((*times_s.get(frame)?, pose)))
             .collect();
+        // Times must ascend.
         moments.dedup_by(|later, earlier| later.0 <= earlier.0);
         if moments.len() > 1 {
             self.animate(node, &moments);
@@ -144,6 +148,7 @@ impl Document {
             "scenes": [{ "nodes": [self.nodes.len() - 1] }],
             "nodes": self.nodes,
         });
+        // Empty lists are not allowed: what is not there is not named.
         if !self.meshes.is_empty() {
             root["meshes"] = self.meshes.into();
             root["materials"] =
@@ -168,6 +173,7 @@ impl Document {
         let length = |bytes: usize| {
             u32::try_from(bytes).map_err(|_| io::Error::other("a GLB holds at most 4 GiB"))
         };
+        // Magic, version, length of the whole file; then each chunk with its length.
         out.write_all(b"glTF")?;
         out.write_all(&2u32.to_le_bytes())?;
         out.write_all(

@@ -15,6 +15,7 @@ const STRIDES: [usize; 3] = [8, 4, 8];
 /// m. Nothing for an empty mesh.
 pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32; 3], f32)> {
     let [low_m, high_m] = mesh.bounds_m()?;
+    // One scale for all axes, so that normals need no correction.
     let size_m = (0..3).map(|axis| high_m[axis] - low_m[axis]).fold(1e-3, f32::max);
     let step = |at: &[f32; 3]| {
         [0, 1, 2].map(|axis| ((at[axis] - low_m[axis]) / size_m * MOST).round() as u16)
@@ -22,6 +23,7 @@ pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32
     let count = mesh.positions_m.len();
     let (mut positions, mut normals, mut colours) = (Vec::new(), Vec::new(), Vec::new());
     for at in &mesh.positions_m {
+        // A fourth number pads each position to a multiple of four bytes.
         positions.extend(step(at).into_iter().chain([0]).flat_map(u16::to_le_bytes));
     }
     for normal in mesh.normals() {
@@ -30,6 +32,7 @@ pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32
         );
     }
     for &colour in &mesh.colours {
+        // Points without colour are drawn like clay.
         let shown = if colour == [0; 3] { CLAY } else { colour };
         colours.extend(shown.map(linear).into_iter().chain([0]).flat_map(u16::to_le_bytes));
     }

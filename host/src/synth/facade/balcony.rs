@@ -54,6 +54,7 @@ fn parapet(mesh: &mut Mesh, wall: u16, middle: f64, floor: f64) {
 fn railing(mesh: &mut Mesh, rail: u16, middle: f64, floor: f64) {
     let (half, out, top) = (HALF_M, OUT_M, floor - 1.1);
     let bars = 11;
+    // Bars of the front, evenly spaced.
     for k in 0..=bars {
         let x = middle - half + 0.03 + (2.0 * half - 0.06) * f64::from(k) / f64::from(bars);
         mesh.cuboid(
@@ -63,6 +64,7 @@ fn railing(mesh: &mut Mesh, rail: u16, middle: f64, floor: f64) {
             &[2, 3, 4],
         );
     }
+    // Bars of the two ends, and their hand rails.
     for x in [middle - half, middle + half - 0.04] {
         for k in 0..5 {
             let z = 0.1 + 0.2 * f64::from(k);
@@ -75,6 +77,7 @@ fn railing(mesh: &mut Mesh, rail: u16, middle: f64, floor: f64) {
         }
         mesh.cuboid(rail, Point::new(x, top - 0.05, 0.0), Point::new(x + 0.05, top, out), &[]);
     }
+    // The front's hand rail, last.
     mesh.cuboid(
         rail,
         Point::new(middle - half, top - 0.05, out - 0.06),

@@ -11,12 +11,14 @@ use crate::synth::surface::{Kind, Surface, Tone, tone};
 pub fn home_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, frame: Tone) {
     let columns = libm::floor(house.width / rng.between(2.4, 3.0)).max(1.0) as usize;
     let spacing = house.width / columns as f64;
+    // One of the columns is the door's.
     let door_at = rng.below(columns);
     let (width, window_height) =
         ((spacing - 0.9).min(rng.between(1.0, 1.5)).max(0.7), rng.between(1.4, 1.7));
     let mut openings = Vec::new();
     for column in 0..columns {
         let middle = (column as f64 + 0.5) * spacing;
+        // A door, its step, and in half of the houses a canopy.
         if column == door_at {
             let (half, head) = (0.55, -2.45);
             let door = Surface::new(Kind::Door, tone_of(rng.pick(&DOORS)), rng.seed())
@@ -79,6 +81,7 @@ pub fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
     for bay in 0..bays {
         let (left, right) = (bay as f64 * spacing + 0.3, (bay + 1) as f64 * spacing - 0.3);
         let shop = Surface::new(Kind::Shop, tone(44, 44, 44), rng.seed()).with(frame);
+        // The door is the right part of its bay.
         if bay == door_at {
             let split = right - 1.1;
             let pane = mesh.surface(shop.sized(split - left - 0.1, -0.5 - head));
@@ -92,6 +95,7 @@ pub fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
         }
     }
     floor_front(mesh, house, house.base, Storey { top: -height, bottom: 0.1 }, &openings);
+    // The sign above the panes, with letters painted on.
     let letters = if rng.chance(0.6) { tone(238, 234, 220) } else { tone(236, 200, 84) };
     let sign = Surface::new(Kind::Board, tone_of(rng.pick(&BOARDS)), rng.seed()).with(letters);
     let board = mesh.surface(sign.sized(house.width - 0.6, 0.62));
@@ -112,6 +116,7 @@ pub fn shop_floor(mesh: &mut Mesh, rng: &mut Rng, house: &House, height: f64, fr
 
 fn awning(mesh: &mut Mesh, rng: &mut Rng, house: &House, y: f64) {
     let mut cloth =
+        // Cloth is thin and seen from both sides.
         Surface::new(Kind::Fence, tone_of(rng.pick(&BOARDS)), rng.seed()).with(tone(230, 226, 216));
     cloth.two_sided = true;
     let cloth = mesh.surface(cloth);

@@ -23,6 +23,7 @@ pub fn roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64, frame: Tone
     if rng.chance(0.7) {
         chimney(mesh, rng, house, &pitch);
     }
+    // Dormers need some 4.5 m of roof each.
     let dormers = if rng.chance(0.5) { libm::floor(house.width / 4.5) as usize } else { 0 };
     for k in 0..dormers {
         let middle = (k as f64 + 0.5) * house.width / dormers as f64;
@@ -50,6 +51,7 @@ impl Pitch {
 fn flat_roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64) {
     let (width, depth) = (house.width, house.depth);
     let parapet = rng.between(0.4, 0.9);
+    // The parapet hides the deck from the street.
     mesh.cuboid(
         house.wall,
         Point::new(0.0, top - parapet, -0.25),
@@ -78,6 +80,7 @@ fn flat_roof(mesh: &mut Mesh, rng: &mut Rng, house: &House, top: f64) {
 fn pitched_roof(mesh: &mut Mesh, house: &House, pitch: &Pitch) {
     let (width, depth, slope) = (house.width, house.depth, pitch.slope(house));
     let &Pitch { top, rise, tiles } = pitch;
+    // The roof reaches over the walls on the street's side only.
     let over = 0.45;
     let eave = Point::new(0.0, top + over * slope, over);
     let up = Point::new(0.0, -rise - over * slope, -0.5 * depth - over);
@@ -95,8 +98,10 @@ fn pitched_roof(mesh: &mut Mesh, house: &House, pitch: &Pitch) {
         Parallelogram::new(eave_back, Point::new(width, 0.0, 0.0), up_back),
         [0.0; 3],
     );
+    // A gutter along the eave.
     let (low, high) = (eave + Point::new(0.0, 0.0, -0.08), eave + Point::new(width, 0.1, 0.04));
     mesh.cuboid(house.trim, low, high, &[]);
+    // Gables close the roof at both ends.
     for x in [0.0, width] {
         let corner = |y: f64, z: f64| (Point::new(x, y, z), [z as f32, y as f32, 0.0]);
         let gable = [corner(top, 0.0), corner(top, -depth), corner(top - rise, -0.5 * depth)];
@@ -120,6 +125,7 @@ fn chimney(mesh: &mut Mesh, rng: &mut Rng, house: &House, pitch: &Pitch) {
 
 fn dormer(mesh: &mut Mesh, house: &House, pitch: &Pitch, middle: f64, pane: u16) {
     let (top, slope, tiles) = (pitch.top, pitch.slope(house), pitch.tiles);
+    // The dormer's face stands half a metre behind the wall.
     let (front, base) = (-0.5, top - 0.5 * slope);
     let head = base - 1.5;
     let (low, high) = (
