@@ -1,6 +1,12 @@
 //! What can be wrong with a file.
 
+use super::bounds::{TABLE_TEXT, TextBound, check_bytes, most_text};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+/// Next action for a file beyond its bounds.
+const FETCH_ANEW: &str = "Check that it is the right file; write it anew, or split it";
 
 /// A file that cannot be read as what it should be.
 #[derive(Debug, thiserror::Error)]
@@ -47,10 +53,42 @@ impl FormatError {
     }
 }
 
-/// The text of a file.
+/// The text of a file within the bounds of a table.
 ///
 /// # Errors
-/// It cannot be read, or is not UTF-8.
+/// It cannot be read, is not UTF-8, or is beyond the bounds.
 pub fn read_text(path: &Path) -> Result<String, FormatError> {
-    std::fs::read_to_string(path).map_err(FormatError::read(path))
+    read_text_within(path, &TABLE_TEXT)
+}
+
+/// The text of a file within bounds. A file that is too long is refused by its length, before it is
+/// read; of one without a length, such as a pipe, no more than the bound is read.
+///
+/// # Errors
+/// It cannot be read, is not UTF-8, or is beyond the bounds.
+pub fn read_text_within(path: &Path, bound: &TextBound) -> Result<String, FormatError> {
+    let refuse = |reason: String| FormatError::content(path, reason, FETCH_ANEW);
+    let bytes = read_bytes_within(path, bound.what, bound.bytes)?;
+    bound.check_lines(&bytes).map_err(refuse)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let source = std::io::Error::new(std::io::ErrorKind::InvalidData, error.utf8_error());
+        FormatError::read(path)(source)
+    })
+}
+
+/// The bytes of a file that may have `most` of them; `what` says of which kind, in a message.
+///
+/// # Errors
+/// It cannot be read, or is longer.
+pub fn read_bytes_within(path: &Path, what: &str, most: u64) -> Result<Vec<u8>, FormatError> {
+    let refuse = |reason: String| FormatError::content(path, reason, FETCH_ANEW);
+    let file = File::open(path).map_err(FormatError::read(path))?;
+    let len = file.metadata().map_err(FormatError::read(path))?.len();
+    check_bytes(what, len, most).map_err(refuse)?;
+    let mut bytes = Vec::with_capacity(len as usize);
+    file.take(most + 1).read_to_end(&mut bytes).map_err(FormatError::read(path))?;
+    if bytes.len() as u64 > most {
+        return Err(refuse(format!("it does not end; {}", most_text(what, most))));
+    }
+    Ok(bytes)
 }

@@ -2,12 +2,14 @@
 //! map; of a run's files only names are here, for who reads them need not know runs.
 //!
 //! A reader takes a path and gives numbers, images or poses; what it cannot use is a
-//! [`FormatError`] that says what is wrong and what to do. Readers of images are told the size that
-//! is expected where a header could ask for any amount of memory.
+//! [`FormatError`] that says what is wrong and what to do. Each takes memory and time within
+//! [`bounds`], whatever a file says.
 
+pub mod bounds;
 pub mod calibration;
 mod capacity;
 mod checksum;
+mod decode;
 mod draft;
 mod error;
 mod gnss;
@@ -27,7 +29,7 @@ mod tests;
 pub use capacity::{CapacityFile, CapacityTable};
 pub use checksum::checksum_of;
 pub use draft::DraftFolder;
-pub use error::{FormatError, read_text};
+pub use error::{FormatError, read_bytes_within, read_text, read_text_within};
 pub use gnss::{Fix, LocalPlane, read_gnss};
 pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;

@@ -7,12 +7,14 @@
 //! made anew in each picture would change the brightness from frame to frame, which the matchers
 //! follow.
 //!
-//! Memory: the file's samples once, and the 8-bit images made of them. A header may ask for 512 MiB
-//! at most.
+//! Memory: the file's samples once, and the 8-bit images made of them; [`super::decode`] has the
+//! bounds.
 
-use super::{FormatError, Image, luma};
-use image::{DynamicImage, ImageReader};
-use std::io::{BufRead, Cursor, Seek};
+use super::{FormatError, Image, decode, luma};
+use bytemuck::allocation::try_cast_vec;
+use image::DynamicImage;
+use std::fs::File;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 /// Endings of the names of files that hold pictures, in lower case.
@@ -92,45 +94,30 @@ pub fn significant_bits(largest: u16) -> u32 {
 /// Reads a picture. An alpha channel is dropped.
 ///
 /// # Errors
-/// The file cannot be read or decoded.
+/// The file cannot be read or decoded, or its sides or the memory it takes are beyond the bounds.
 pub fn read_picture(path: &Path) -> Result<Picture, FormatError> {
     let refuse = |reason: String| FormatError::content(path, reason, FETCH_ANEW);
-    let decoded = open(path)?.decode().map_err(|error| refuse(plain(&error)))?;
-    picture_of(decoded).map_err(refuse)
+    picture_of(decode::decode(open(path)?).map_err(refuse)?).map_err(refuse)
 }
 
 /// Decodes a picture that lies in memory.
 ///
 /// # Errors
-/// What is wrong, as the rest of a sentence.
+/// Reason, as the rest of a sentence.
 pub fn decode_picture(bytes: &[u8]) -> Result<Picture, String> {
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| error.to_string())?;
-    picture_of(limited(reader).decode().map_err(|error| plain(&error))?)
+    picture_of(decode::decode(Cursor::new(bytes))?)
 }
 
 /// Width and height without decoding the pixels.
 ///
 /// # Errors
-/// The file cannot be read, or has no header of a picture.
+/// The file cannot be read, has no header of a picture, or its sides are beyond the bound.
 pub fn picture_size(path: &Path) -> Result<(usize, usize), FormatError> {
-    let size = open(path)?
-        .into_dimensions()
-        .map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))?;
-    Ok((size.0 as usize, size.1 as usize))
+    decode::size(open(path)?).map_err(|reason| FormatError::content(path, reason, FETCH_ANEW))
 }
 
-fn open(path: &Path) -> Result<ImageReader<impl BufRead + Seek>, FormatError> {
-    let reader = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(FormatError::read(path))?;
-    Ok(limited(reader))
-}
-
-fn limited<R: BufRead + Seek>(mut reader: ImageReader<R>) -> ImageReader<R> {
-    reader.limits(image::Limits::default());
-    reader
+fn open(path: &Path) -> Result<BufReader<File>, FormatError> {
+    Ok(BufReader::new(File::open(path).map_err(FormatError::read(path))?))
 }
 
 fn picture_of(decoded: DynamicImage) -> Result<Picture, String> {
@@ -142,19 +129,15 @@ fn picture_of(decoded: DynamicImage) -> Result<Picture, String> {
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
             Picture::Grey(owned(width, height, decoded.into_luma8().into_raw())?)
         }
-        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => Picture::Colour(owned(
-            width,
-            height,
-            decoded.into_rgb8().into_raw().as_chunks().0.to_vec(),
-        )?),
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
+            Picture::Colour(owned(width, height, grouped(decoded.into_rgb8().into_raw()))?)
+        }
         DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
             Picture::DeepGrey(owned(width, height, decoded.into_luma16().into_raw())?)
         }
-        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => Picture::DeepColour(owned(
-            width,
-            height,
-            decoded.into_rgb16().into_raw().as_chunks().0.to_vec(),
-        )?),
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) => {
+            Picture::DeepColour(owned(width, height, grouped(decoded.into_rgb16().into_raw()))?)
+        }
         other => {
             return Err(format!(
                 "its pixels are {:?}; integers of 8 or 16 bit are read, grey or colour",
@@ -164,9 +147,9 @@ fn picture_of(decoded: DynamicImage) -> Result<Picture, String> {
     })
 }
 
-/// The decoder's words without a full stop, to stand inside a sentence.
-pub(super) fn plain(error: &image::ImageError) -> String {
-    error.to_string().trim_end_matches(['.', '\n']).replace('\n', " ")
+/// Samples as pixels of three, without a copy where the memory allows it.
+fn grouped<T: bytemuck::Pod>(samples: Vec<T>) -> Vec<[T; 3]> {
+    try_cast_vec(samples).unwrap_or_else(|(_, samples)| samples.as_chunks().0.to_vec())
 }
 
 #[cfg(test)]

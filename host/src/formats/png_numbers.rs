@@ -1,8 +1,10 @@
 //! PNG files whose grey values are numbers: of instances, of disparity, of depth.
 
-use super::picture::plain;
+use super::decode::{self, plain};
 use super::{FormatError, Image};
-use image::{DynamicImage, ExtendedColorType, ImageReader};
+use image::{DynamicImage, ExtendedColorType};
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 /// Next action for a file that cannot be decoded.
@@ -11,7 +13,7 @@ const FETCH_ANEW: &str = "Fetch or convert this image anew";
 /// Reads a grey PNG of 8 or 16 bit as numbers.
 ///
 /// # Errors
-/// The file cannot be read or decoded, or has colours.
+/// The file cannot be read or decoded, has colours, or is beyond the bounds.
 pub fn read_png_u16(path: &Path) -> Result<Image<u16>, FormatError> {
     let decoded = decode(path)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -33,7 +35,7 @@ pub fn read_png_u16(path: &Path) -> Result<Image<u16>, FormatError> {
 /// refused.
 ///
 /// # Errors
-/// The file cannot be read or decoded, or is not of one channel of 16 bit.
+/// The file cannot be read or decoded, is not of one channel of 16 bit, or is beyond the bounds.
 pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
     match decode(path)? {
         DynamicImage::ImageLuma16(image) => {
@@ -70,9 +72,9 @@ pub fn write_png_deep(path: &Path, image: &Image<u16>) -> Result<(), FormatError
 }
 
 fn decode(path: &Path) -> Result<DynamicImage, FormatError> {
-    let mut reader = ImageReader::open(path).map_err(FormatError::read(path))?;
-    reader.set_format(image::ImageFormat::Png);
-    reader.decode().map_err(|error| FormatError::content(path, plain(&error), FETCH_ANEW))
+    let file = File::open(path).map_err(FormatError::read(path))?;
+    decode::decode_png(BufReader::new(file))
+        .map_err(|reason| FormatError::content(path, reason, FETCH_ANEW))
 }
 
 fn owned(

@@ -5,12 +5,11 @@
 //! as its last byte is.
 
 use super::Pair;
+use crate::formats::bounds::{check_decoding, check_sides};
 use crate::formats::{Decoded, decode_picture, significant_bits};
 use crate::input::source::{InputError, Stacking};
 use std::io::{ErrorKind, Read};
 
-/// Widest and highest image, px: beyond it a header is damaged rather than an image that large.
-const LARGEST_PX: usize = 16_384;
 /// Longest header, bytes: comments included.
 const LONGEST_HEADER: usize = 4_096;
 
@@ -86,16 +85,17 @@ impl<R: Read> NetpbmPairs<R> {
             *number = self.number(&mut header)?;
         }
         let [width, height, largest] = numbers;
-        if !(1..=LARGEST_PX).contains(&width)
-            || !(1..=LARGEST_PX).contains(&height)
-            || !(1..=65_535).contains(&largest)
-        {
+        check_sides(width, height).map_err(|reason| self.error(reason))?;
+        if width == 0 || height == 0 || !(1..=65_535).contains(&largest) {
             return Err(self.error(format!(
                 "its header says {width} x {height} px with values up to {largest}"
             )));
         }
         let sample = if largest > 255 { 2 } else { 1 };
-        Ok(Some((header, width * height * channels * sample)))
+        let len = width * height * channels * sample;
+        // The image is held as it came, and decoded.
+        check_decoding(width, height, 2 * len as u64).map_err(|reason| self.error(reason))?;
+        Ok(Some((header, len)))
     }
 
     /// The next number of a header, and the one blank behind it.
