@@ -3,17 +3,20 @@
 use super::cdr::{CameraInfo, stamp_ns};
 use super::{Entry, images};
 use crate::formats::Picture;
+use crate::formats::bounds::{
+    MAX_BAG_IMAGES, MAX_BAG_INDEX_BYTES, MAX_BAG_RATIO, MAX_BAG_RECORD_BYTES, bytes_text,
+    check_bytes, thousands,
+};
 use crate::input::source::InputError;
-use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
+use mcap::sans_io::indexed_reader::{
+    IndexedReadEvent, IndexedReader, IndexedReaderOptions, ReadOrder,
+};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{McapError, Summary};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-
-/// Longest record or chunk, bytes: beyond it a length is damaged.
-const LONGEST: usize = 1 << 30;
 
 /// A file and its index.
 pub struct BagFile {
@@ -48,6 +51,9 @@ impl BagFile {
         if summary.chunk_indexes.is_empty() {
             return Err(broken("no chunk is listed".to_owned()));
         }
+        let len = file.metadata().map_err(crate::input::source::read_failed(path))?.len();
+        check_chunks(&summary, len)
+            .map_err(|reason| InputError::bag(path, format!("{reason}. Record or copy it anew")))?;
         Ok(Self { path: path.to_path_buf(), summary })
     }
 
@@ -90,7 +96,9 @@ impl BagFile {
             .include_topics(topics.iter().copied())
             .starting_at(*logged_ns.start())
             .ending_at(*logged_ns.end())
-            .with_record_length_limit(LONGEST);
+            // By time, chunks that overlap would be in memory together.
+            .with_order(ReadOrder::File)
+            .with_record_length_limit(MAX_BAG_RECORD_BYTES);
         let mut reader =
             IndexedReader::new_with_options(&self.summary, options).map_err(damaged)?;
         let mut file = File::open(&self.path).map_err(failed)?;
@@ -109,6 +117,8 @@ impl BagFile {
                         return Err(damaged(McapError::UnexpectedEof));
                     }
                     reader.insert_chunk_record_data(offset, &chunk).map_err(damaged)?;
+                    // Unpacked, it is in the reader; a picture will need the memory.
+                    chunk = Vec::new();
                 }
                 IndexedReadEvent::Message { header, data } => {
                     let Some(channel) = self.summary.channels.get(&header.channel_id) else {
@@ -128,8 +138,18 @@ impl BagFile {
         let mut entries = Vec::new();
         self.messages(&[topic], 0..=u64::MAX, &mut |_, log_ns, data| {
             entries.extend(stamp_ns(data).map(|stamp_ns| Entry { log_ns, stamp_ns }));
-            true
+            entries.len() <= MAX_BAG_IMAGES
         })?;
+        if entries.len() > MAX_BAG_IMAGES {
+            let most = thousands(MAX_BAG_IMAGES);
+            return Err(InputError::bag(
+                &self.path,
+                format!(
+                    "{topic} has more than the {most} images that are read of a topic. Split the \
+                     recording"
+                ),
+            ));
+        }
         entries.sort_by_key(|entry: &Entry| entry.stamp_ns);
         entries.dedup_by_key(|entry| entry.stamp_ns);
         Ok(entries)
@@ -182,12 +202,54 @@ impl BagFile {
     }
 }
 
+/// Refuses chunks that are too long, lie outside the file, overlap, or unpack to far more than the
+/// file's length.
+fn check_chunks(summary: &Summary, file_bytes: u64) -> Result<(), String> {
+    let mut ranges = Vec::with_capacity(summary.chunk_indexes.len());
+    let (mut packed, mut unpacked) = (0u64, 0u64);
+    for chunk in &summary.chunk_indexes {
+        let longest = chunk.compressed_size.max(chunk.uncompressed_size);
+        check_bytes("a chunk of an MCAP file", longest, MAX_BAG_RECORD_BYTES as u64)?;
+        packed = packed.saturating_add(chunk.compressed_size);
+        unpacked = unpacked.saturating_add(chunk.uncompressed_size);
+        ranges.push((chunk.chunk_start_offset, chunk.compressed_size));
+    }
+    ranges.sort_unstable();
+    let overlap = ranges
+        .windows(2)
+        .any(|pair| pair[0].0.checked_add(pair[0].1).is_none_or(|end| end > pair[1].0));
+    if overlap || packed > file_bytes {
+        return Err("its index lists chunks that overlap or lie beyond its end".to_owned());
+    }
+    let most = MAX_BAG_RECORD_BYTES as u64 + file_bytes.saturating_mul(MAX_BAG_RATIO);
+    if unpacked > most {
+        return Err(format!(
+            "its chunks unpack to {}; of a file of {} at most {} are read",
+            bytes_text(unpacked),
+            bytes_text(file_bytes),
+            bytes_text(most)
+        ));
+    }
+    Ok(())
+}
+
+/// Reads the index at the file's end, within its bound.
 fn summary(file: &mut File) -> Result<Option<Summary>, McapError> {
-    let mut reader = SummaryReader::new();
+    let options = SummaryReaderOptions::default()
+        .with_file_size(file.metadata()?.len())
+        .with_record_length_limit(MAX_BAG_INDEX_BYTES as usize);
+    let mut reader = SummaryReader::new_with_options(options);
+    let mut bytes = 0;
     while let Some(event) = reader.next_event() {
         match event? {
             SummaryReadEvent::ReadRequest(need) => {
-                let read = file.read(reader.insert(need.min(LONGEST)))?;
+                if bytes > MAX_BAG_INDEX_BYTES {
+                    let most = bytes_text(MAX_BAG_INDEX_BYTES);
+                    let error = format!("its index is longer than the {most} that are read");
+                    return Err(McapError::Io(std::io::Error::other(error)));
+                }
+                let read = file.read(reader.insert(need.min(MAX_BAG_INDEX_BYTES as usize)))?;
+                bytes += read as u64;
                 reader.notify_read(read);
             }
             SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),

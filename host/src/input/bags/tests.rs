@@ -62,7 +62,6 @@ fn pictures_of_every_encoding_are_what_was_in_them() {
     let refused = |message: &[u8]| picture(message, false).unwrap_err();
     assert!(refused(&image(2, 2, "yuv422", 4, &[0; 8])).contains("its encoding is yuv422"));
     assert!(refused(&image(2, 2, "mono8", 2, &[0; 3])).contains("fewer bytes than 2 x 2 pixels"));
-    assert!(refused(&image(u32::MAX, 2, "mono8", 2, &[0; 4])).contains("fewer bytes"));
 }
 
 #[test]
@@ -74,4 +73,26 @@ fn messages_cut_at_any_byte_are_refused_without_a_panic() {
         assert!(picture(&whole[..len], false).is_err(), "{len}");
         let _ = CameraInfo::read(&whole[..len]);
     }
+}
+
+#[test]
+fn sizes_that_the_data_does_not_hold_are_refused_before_any_row() {
+    let refused = |message: &[u8]| picture(message, false).unwrap_err();
+    // Rows that are 0 bytes apart are all there in one byte.
+    let rows = refused(&image(1, 4_000_000_000, "mono8", 0, &[7]));
+    assert_eq!(rows, "it is 1 x 4000000000 px; at most 8,192 px a side are read");
+    let columns = refused(&image(u32::MAX, 2, "mono8", 2, &[0; 4]));
+    assert!(columns.contains("at most 8,192 px a side"), "{columns}");
+    let step = refused(&image(1, 8_000, "mono8", 0, &[7]));
+    assert_eq!(step, "its rows are 0 bytes apart (step), but 1 px take 1");
+    let narrow = refused(&image(4, 2, "rgb8", 11, &[0; 24]));
+    assert_eq!(narrow, "its rows are 11 bytes apart (step), but 4 px take 12");
+    let far = refused(&image(2, 2, "mono8", u32::MAX, &[0; 4]));
+    assert!(far.contains("fewer bytes than 2 x 2 pixels"), "{far}");
+    let deep = refused(&image(8_192, 8_192, "mono16", 16_384, &[0; 4]));
+    assert!(deep.contains("fewer bytes"), "{deep}");
+    // The last row needs no padding.
+    let last = picture(&image(2, 2, "mono8", 3, &[1, 2, 9, 3, 4]), false).unwrap();
+    assert_eq!(last.to_8_bit(None).grey.pixels(), [1, 2, 3, 4]);
+    assert!(refused(&image(0, 2, "mono8", 0, &[])).contains("no pixels"));
 }

@@ -1,6 +1,7 @@
 //! Which topics are the two cameras.
 
 use super::file::{BagFile, Topic};
+use crate::formats::bounds::MAX_BAG_TOPICS;
 use crate::input::data_set::Topics;
 use crate::input::source::InputError;
 
@@ -27,6 +28,16 @@ fn is_image(topic: &Topic) -> bool {
 /// A topic is not there, or there is no such pair.
 pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], InputError> {
     let images: Vec<Topic> = file.topics().into_iter().filter(is_image).collect();
+    if images.len() > MAX_BAG_TOPICS {
+        let (found, most) = (images.len(), MAX_BAG_TOPICS);
+        return Err(InputError::bag(
+            file.path(),
+            format!(
+                "it has {found} topics with images; at most {most} are read. Keep those of the two \
+                 cameras: `mcap filter`"
+            ),
+        ));
+    }
     let names = images.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>().join(", ");
     if let Some(Topics(sides)) = given {
         return match sides.iter().find(|side| images.iter().all(|topic| topic.name != **side)) {
