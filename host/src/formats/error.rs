@@ -76,7 +76,7 @@ pub fn read_text_within(path: &Path, bound: &TextBound) -> Result<String, Format
     })
 }
 
-/// The bytes of a file that may have `most` of them; `what` says of which kind, in a message.
+/// The bytes of a file that may have `most` of them; `what` names their kind in a message.
 ///
 /// # Errors
 /// It cannot be read, or is longer.

@@ -3,7 +3,7 @@
 //!
 //! A reader takes a path and gives numbers, images or poses; what it cannot use is a
 //! [`FormatError`] that says what is wrong and what to do. Each takes memory and time within
-//! [`bounds`], whatever a file says.
+//! [`bounds`].
 
 pub mod bounds;
 pub mod calibration;
