@@ -1,7 +1,9 @@
 //! How good are the maps for planners on the synthetic street? Occupancy, heights, slopes and kerbs
 //! against exact geometry.
 //!
-//! `cargo run --release -p dynvox --example evaluate_planning -- [exact] [frames=40] [hills=0.15] [width=1242] [seed=1] [parked=0.6] [planning.KEY=VALUE]`
+//! `cargo run --release -p dynvox --example evaluate_planning -- WORDS`, where WORDS are any of
+//! `exact`, `frames=40`, `hills=0.15`, `width=1242`, `seed=1`, `parked=0.6` and
+//! `planning.KEY=VALUE`.
 //!
 //! The street has no traffic; poses are the true ones, so that the figures are those of the map and
 //! not of the trajectory. Disparity is ELAS's, or the exact one with `exact`. Truth is what exact

@@ -24,7 +24,8 @@ fn main() {
     let mut matcher = FlowMatcher::new_in(&Capacity::SMALL, &mut carver);
     carver.check().expect("a slab that fits");
     println!(
-        "frame,previous_left_u,previous_left_v,previous_right_u,previous_right_v,current_left_u,current_left_v,current_right_u,current_right_v"
+        "frame,previous_left_u,previous_left_v,previous_right_u,previous_right_v,\
+         current_left_u,current_left_v,current_right_u,current_right_v"
     );
     for index in 0..FRAMES {
         let frame = street.frame(index);

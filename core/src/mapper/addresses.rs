@@ -1,10 +1,10 @@
 //! Whether the bytes of a capacity can be counted where a `usize` has 32 bits.
 //!
-//! [`Capacity::bytes`] is a constant that sums up in `usize`: for every bound that 64 bits allow it stays far below their end, and 32 bits end at
-//! 4 GiB. The bound here is summed up in 64 bits without any overflow, and is never below that sum,
-//! nor below any part of it. Where it fits a `usize` so does the sum. It counts some parts for
-//! twice what they take, so that it may refuse bounds that need more than 1.5 GiB; a slice has at
-//! most 2 GiB there.
+//! [`Capacity::bytes`] is a constant that sums up in `usize`: for every bound that 64 bits allow it
+//! stays far below their end, and 32 bits end at 4 GiB. The bound here is summed up in 64 bits
+//! without any overflow, and is never below that sum, nor below any part of it. Where it fits a
+//! `usize` so does the sum. It counts some parts for twice what they take, so that it may refuse
+//! bounds that need more than 1.5 GiB; a slice has at most 2 GiB there.
 
 use crate::memory::Capacity;
 

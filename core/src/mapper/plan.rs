@@ -5,7 +5,7 @@
 //! |---|---|
 //! | has a map and does not move | its surface, as the static map's |
 //! | moves, has a map | a box around its surface |
-//! | moves or may move, has no map, detected in this frame | a box around what its mask shows, standing still while its motion is not known |
+//! | moves or may move, no map, detected now | a box around what its mask shows; still until its motion is known |
 
 use super::Mapper;
 use crate::{

@@ -15,7 +15,7 @@
 //! | 4 | frames taken |
 //! | 4, 8, 4 | whether the last frame had a time, that time, ns, and the time since the frame before, s |
 //! | 4, 4 | image width and height, px (0 before the first frame) |
-//! | | the last pair, the camera, the rig's self-calibration, tracks, masks and objects, the static map, the planner's window where there is one |
+//! | | last pair, camera, self-calibration, tracks, masks, objects, static map, planner's window |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
 //!
 //! Memory: none but the mapper's. Bytes: about those of the blocks in use, and of what waits to be

@@ -6,7 +6,8 @@
 //!
 //! | when | then |
 //! |---|---|
-//! | all volumes are in use | the object fused longest ago retires, between equals the older track's, unless it was fused in this frame: then the new object is refused, and counted |
+//! | all volumes are in use | the object fused longest ago retires, of equals the older track's |
+//! | that object was fused in this very frame | the new object is refused, and counted |
 //! | a track is forgotten or evicted | its volume retires |
 //! | a track's trajectory segment ended (a gap, a motion lost for too long) | its volume retires when the next segment fuses |
 //! | the sequence ends | every volume retires |

@@ -177,7 +177,8 @@ pub fn table(volume: &VolumeConfig) -> String {
     }
     let _ = writeln!(
         table,
-        "\nimage: the largest; m3: blocks of {block_m:.2} m a side; window: frames `volume.prune_lag` can span; path: seconds at {SPEED_M_S} m/s until \
+        "\nimage: the largest; m3: blocks of {block_m:.2} m a side; window: frames \
+         `volume.prune_lag` can span; path: seconds at {SPEED_M_S} m/s until \
          the pool is full and blocks are evicted to disk,\nby the {BLOCKS_PER_M} blocks a metre \
          of the synthetic street at its default size, noise pruned, with \
          voxels of 0.05 m (another street or voxel: another figure)"

@@ -277,7 +277,8 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
     if rotation_rad > TURN_MAX_RAD {
         let [found, most] = [rotation_rad, TURN_MAX_RAD].map(f64::to_degrees);
         return Err(format!(
-            "its turn is known to {found:.1} degrees only (one standard deviation; at most {most:.1}), for the path is short, nearly straight, or its \
+            "its turn is known to {found:.1} degrees only (one standard deviation; at most \
+             {most:.1}), because the path is short, nearly straight, or its \
              fixes are noisy. Give roll, pitch and yaw with the fixes, or t_world_camera"
         ));
     }

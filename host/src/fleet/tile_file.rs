@@ -7,7 +7,16 @@
 //! | 4 | 1 with colour, 0 without |
 //! | 4 | number of blocks |
 //! | 4 | CRC-32 of the bytes before |
-//! | | the blocks: coordinates x, y, z (`i16`), 2 bytes 0, length of the sums (`u32`), CRC-32 of these 12 bytes and the sums, the sums as LZ4 |
+//! | | the blocks, one after the other |
+//!
+//! A block:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 2, 2, 2, 2 | coordinates x, y, z (`i16`), and 0 |
+//! | 4 | length of its sums, `u32` |
+//! | 4 | CRC-32 of these 12 bytes and the sums |
+//! | | the sums as LZ4 |
 
 use super::FleetError;
 use super::block_sums::BlockSums;

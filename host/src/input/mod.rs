@@ -1,10 +1,12 @@
 //! Where frames come from: data sets on disk, the synthetic street, and the depth and masks that
 //! other programs made of them.
 //!
-//! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else here. [`layouts`] reads recordings, [`bags`] those of ROS, [`stream`] what comes
-//! through a pipe or from an iterator,
-//! [`depth`] and [`masks`] lay files over any source, [`faults`] spoils one on purpose; [`diagnosis`] examines images before they are mapped. Loaders guess nothing silently: what they assume stands in [`FrameSource::notes`], and
-//! what they cannot use is an [`InputError`] that says what to do.
+//! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else
+//! here. [`layouts`] reads recordings, [`bags`] those of ROS, [`stream`] what comes through a pipe
+//! or from an iterator, [`depth`] and [`masks`] lay files over any source, [`faults`] spoils one on
+//! purpose; [`diagnosis`] examines images before they are mapped. Loaders guess nothing silently:
+//! what they assume stands in [`FrameSource::notes`], and what they cannot use is an [`InputError`]
+//! that says what to do.
 
 pub mod bags;
 mod data_set;

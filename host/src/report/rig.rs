@@ -123,7 +123,8 @@ fn begin_with(report: &SelfCalibrationReport, frames: usize) -> Option<String> {
     });
     (disparity.is_some() || rows.is_some()).then(|| {
         format!(
-            "# What must be added to the disparities of this rig and to the rows of its right images, px, as a run over {frames} frames found it.\n\
+            "# What must be added to the disparities of this rig and to the rows of its right \
+             images, px, as a run over {frames} frames found it.\n\
              # Another run of the same rig begins with it: dynvox run PATH --config \
              calibration.toml\n{}{}",
             disparity.unwrap_or_default(),

@@ -56,7 +56,8 @@ pub enum RequestError {
     },
     /// The pruning window is longer than the profile's history.
     #[error(
-        "volume.prune_lag is {prune_lag} frames; profile {profile} has a history of {history_frames}. Give more bytes with --memory or a larger --profile, or \
+        "volume.prune_lag is {prune_lag} frames; profile {profile} has a history of \
+         {history_frames}. Give more bytes with --memory or a larger --profile, or \
          --set volume.prune_lag={history_frames}"
     )]
     Window {

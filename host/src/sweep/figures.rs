@@ -99,7 +99,12 @@ fn prune(rows: &[Row<'_>]) -> Markup {
         (side_by_side([
             figure("accuracy of the static map by prune \
                     weight", "accuracy", |sample| sample.accuracy[1], [elas.accuracy, dispnet.accuracy]),
-            figure("completeness by prune weight", "completeness", |sample| sample.completeness[1], [elas.completeness, dispnet.completeness]),
+            figure(
+                "completeness by prune weight",
+                "completeness",
+                |sample| sample.completeness[1],
+                [elas.completeness, dispnet.completeness],
+            ),
         ]))
         (side_by_side([memory, over_time(rows)]))
     }

@@ -144,7 +144,12 @@ fn originals(kind: Kind) -> Markup {
         Kind::Methods => html! {
             (heading("Table I: tracking sequence 09"))
             div.scroll { table {
-                tr { th { "method" } @for name in ["ELAS accuracy", "ELAS compl.", "DispNet accuracy", "DispNet compl."] { th.n { (name) } } }
+                tr {
+                    th { "method" }
+                    @for name in [
+                        "ELAS accuracy", "ELAS compl.", "DispNet accuracy", "DispNet compl."
+                    ] { th.n { (name) } }
+                }
                 @for (method, shares) in published::METHODS {
                     tr {
                         td { (method) }

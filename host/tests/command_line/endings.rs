@@ -193,7 +193,8 @@ fn a_file_size_limit_loses_the_map_and_nothing_else() {
     let root = TempDir::new().unwrap();
     // 1 KiB blocks: the mesh outgrows the limit, what is kept for the last files does not.
     let script = format!(
-        "trap '' XFSZ; ulimit -f 2600; exec {} run --out result --quiet --profile tiny --no-stream --set street.width=320 --set street.height=96 \
+        "trap '' XFSZ; ulimit -f 2600; exec {} run --out result --quiet --profile tiny --no-stream \
+         --set street.width=320 --set street.height=96 \
          --set street.frames=12",
         env!("CARGO_BIN_EXE_dynvox")
     );

@@ -7,7 +7,10 @@ use tempfile::TempDir;
 
 /// Three recordings of small streets; the last stands elsewhere in the world, and is turned.
 const RECORDINGS: &str = r#"
-arguments = ["--profile", "tiny", "--instances", "none", "--set", "street.width=160", "--set", "street.height=64", "--set", "volume.voxel_size_m=0.1"]
+arguments = [
+  "--profile", "tiny", "--instances", "none",
+  "--set", "street.width=160", "--set", "street.height=64", "--set", "volume.voxel_size_m=0.1",
+]
 
 [[recording]]
 name = "first"
@@ -243,7 +246,8 @@ fn georeferenced(root: &Path) {
         .map(|frame| format!("1 0 0 60 0 1 0 0 0 0 1 {}\n", 0.8 * f64::from(frame)))
         .collect();
     fs::write(root.join("poses.txt"), poses).unwrap();
-    let list = "[[recording]]\nname = \"fixed\"\narguments = []\ngnss = \"fixes.txt\"\n\n[[recording]]\nname = \"posed\"\nposes_in_world = true\n\
+    let list = "[[recording]]\nname = \"fixed\"\narguments = []\ngnss = \
+        \"fixes.txt\"\n\n[[recording]]\nname = \"posed\"\nposes_in_world = true\n\
                 arguments = [\"--start\", \"5\", \"--frames\", \"3\", \"--egomotion\", \
                 \"file:poses.txt\"]\n";
     fs::write(root.join("recordings.toml"), format!("origin = [0, 8, 92]\n{shared}{list}"))

@@ -15,7 +15,11 @@ const until = async (done) => { while (!done()) await new Promise((resolve) => s
 const drawn = async (change) => { const before = data.drawn; change(); await until(() => data.drawn !== before); };
 const layer = (name) => root.querySelector(`.layers input[value=${name}]`);
 const toggle = (name) => drawn(() => layer(name).click());
-const scrub = (at) => drawn(() => { const slider = root.querySelector(".slider"); slider.value = at; slider.dispatchEvent(new Event("input")); });
+const scrub = (at) => drawn(() => {
+  const slider = root.querySelector(".slider");
+  slider.value = at;
+  slider.dispatchEvent(new Event("input"));
+});
 const shown = () => {
   const gl = canvas.getContext("webgl2"), pixels = new Uint8Array(4 * canvas.width * canvas.height);
   gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -108,7 +112,9 @@ for (const value of ["1", "2", "3", "4", "5", "6"]) {
   result[`colour${value}`] = shown().red !== photo;
   result[`legend${value}`] = legend.hidden ? "" : [...legend.querySelectorAll("span")].map((end) => end.textContent).join(" to ");
 }
-const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true }));
+const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, {
+  pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true,
+}));
 canvas.setPointerCapture = () => {};
 turn("pointerdown", 200);
 const before = shown().red;
@@ -181,7 +187,9 @@ fn without_a_graphics_card_motion_is_coarse_and_rest_is_whole() {
     let root = TempDir::new().unwrap();
     FakeRun { frames: 4, objects: 0, squares: 190, pictures: false }.write(root.path());
     let script = r#"
-const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true }));
+const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, {
+  pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true,
+}));
 canvas.setPointerCapture = () => {};
 const whole = Number(data.triangles), share = shown().share;
 turn("pointerdown", 200);
@@ -232,7 +240,8 @@ fn extremes_give_a_page_that_makes_sense() {
     let script = r#"
 report({
   frame: data.frame, note: root.querySelector(".note").textContent, reason: root.querySelector(".reason").textContent,
-  triangles: Number(data.triangles || 0), colours: root.querySelector(".colour").options.length, live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
+  triangles: Number(data.triangles || 0), colours: root.querySelector(".colour").options.length,
+  live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
 });
 "#;
     let of = |run: FakeRun, before: &str| {

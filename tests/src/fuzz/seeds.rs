@@ -41,7 +41,8 @@ distortion_coefficients: [-0.28, 0.07, 0.0, 0.0]\n";
   - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: \
   [-0.28, 0.07, 0.0, 0.0]\n\
   distortion_model: radtan\n  intrinsics: [40.0, 40.0, 24.0, 16.0]\n  resolution: [48, 32]\n";
-    let opencv: &[u8] = b"%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\n\
+    let opencv: &[u8] = b"%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: \
+        d\n   data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\n\
 D1: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   data: [ -0.28, 0.07, 0., 0., 0. ]\nM2: \
 !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n\
    data: [ 40., 0., 24., 0., 40., 16., 0., 0., 1. ]\nD2: !!opencv-matrix\n   rows: 1\n   cols: \
@@ -104,7 +105,8 @@ pub fn depth() -> Vec<Vec<u8>> {
 }
 
 pub fn masks() -> Vec<Vec<u8>> {
-    let coco: &[u8] = b"{\"images\": [{\"id\": 1, \"file_name\": \"000000.pgm\", \"width\": 48, \"height\": 32}], \"categories\": [{\"id\": 3, \"name\": \"car\"}], \
+    let coco: &[u8] = b"{\"images\": [{\"id\": 1, \"file_name\": \"000000.pgm\", \"width\": 48, \
+        \"height\": 32}], \"categories\": [{\"id\": 3, \"name\": \"car\"}], \
 \"annotations\": [{\"id\": 1, \"image_id\": 1, \"category_id\": 3, \"segmentation\": [[10, 10, \
 30, 10, 30, 24, 10, 24]], \"bbox\": [10, 10, 20, 14], \
 \"score\": 0.9, \"iscrowd\": 0}, {\"id\": 2, \"image_id\": 1, \"category_id\": 3, \

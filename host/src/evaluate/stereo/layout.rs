@@ -58,7 +58,8 @@ pub enum StereoSetError {
     },
     /// None of the layouts.
     #[error(
-        "{path} is not a stereo benchmark. KITTI 2012 has image_0, image_1 (or colored_0, colored_1) and disp_noc, disp_occ; KITTI 2015 has image_2, image_3 and \
+        "{path} is not a stereo benchmark. KITTI 2012 has image_0, image_1 (or colored_0, \
+         colored_1) and disp_noc, disp_occ; KITTI 2015 has image_2, image_3 and \
          disp_noc_0, disp_occ_0; give the folder with these, or the one with training/ in it"
     )]
     Layout {

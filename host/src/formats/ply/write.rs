@@ -2,10 +2,10 @@
 //! are filled in at the end.
 //!
 //! A vertex has position, normal (the mean over its triangles by area), colour, weight and the
-//! number of the object it belongs to. Memory: a window of
-//! [`WINDOW`] recent vertices that may come again, so that triangles share them, and the records of those written last, whose normals grow. The
-//! mesh itself is never in memory. Vertices that fall out of the window are written again when they
-//! return, which costs bytes, not correctness.
+//! number of the object it belongs to. Memory: a window of [`WINDOW`] recent vertices that may come
+//! again, so that triangles share them, and the records of those written last, whose normals grow.
+//! The mesh itself is never in memory. Vertices that fall out of the window are written again when
+//! they return, which costs bytes, not correctness.
 
 use super::Axes;
 use super::records::Records;

@@ -248,7 +248,8 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     let RowError { shift_px, roll_deg, median_px } = RowError::of(matches, width_px);
     if median_px > ROWS_PX || shift_px.abs() > ROWS_PX || roll_deg.abs() > ROLL_DEG {
         let message = format!(
-            "these images are not rectified: matches lie {median_px:.1} px apart in height (median). Right images are {:.1} px too {} in the \
+            "these images are not rectified: matches lie {median_px:.1} px apart in height \
+             (median). Right images are {:.1} px too {} in the \
              middle and rotated by {roll_deg:+.2} degrees (clockwise). Give the raw images with \
              their calibration: --calibration FILE",
             shift_px.abs(),

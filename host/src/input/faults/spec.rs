@@ -94,7 +94,8 @@ pub struct Faults {
 }
 
 /// Grammar of a specification, for messages.
-const GRAMMAR: &str = "NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by commas, with NAME one of drop, duplicate, swap, \
+const GRAMMAR: &str = "NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by \
+    commas, with NAME one of drop, duplicate, swap, \
                        jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, \
                        occlude=SHARE, brightness=FACTOR, masks; and seed=N";
 

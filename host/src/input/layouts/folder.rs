@@ -28,7 +28,8 @@ pub const DATA_SET: Layout = Layout::new(&DataSet {
 /// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see
 /// [`calibration::read_rig`]); without it a calibration of raw images is looked for ([`beside`]).
 fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
-    let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and cam1/, one folder with left_ and right_ before the \
+    let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and \
+        cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, \
                   center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());

@@ -92,7 +92,8 @@ pub enum InputError {
     },
     /// Images as the lenses drew them.
     #[error(
-        "the images of {path} are raw, and no calibration of their lenses is beside them. Put cam0/sensor.yaml and cam1/sensor.yaml there, or name \
+        "the images of {path} are raw, and no calibration of their lenses is beside them. Put \
+         cam0/sensor.yaml and cam1/sensor.yaml there, or name \
          the files with --calibration, once for each; if the images were rectified, their \
          calibration as calib.txt"
     )]

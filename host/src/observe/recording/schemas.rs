@@ -96,7 +96,8 @@ impl Topic {
                 "frame_id": text(), "pose": pose(), "point_stride": integer(), "data": bytes(), "fields": fields(),
             }),
             Self::Planning => json!({
-                "frame_id": text(), "pose": pose(), "column_count": integer(), "cell_size": object(&json!({ "x": number(), "y": number() })),
+                "frame_id": text(), "pose": pose(), "column_count": integer(),
+                "cell_size": object(&json!({ "x": number(), "y": number() })),
                 "row_stride": integer(), "cell_stride": integer(), "data": bytes(), "fields": fields(),
             }),
             Self::Trajectory => json!({ "frame_id": text(), "poses": array(&pose()) }),

@@ -60,7 +60,9 @@ pub fn from_above(paths: &[Path<'_>]) -> Markup {
     html! {
         svg viewBox={ "0 0 " (WHOLE) " " (format!("{height:.0}")) } role="img" aria-label="trajectory from above" {
             path d={ "M14 " (px(base)) "h" (bar) "m0 -4v8m-" (bar) " -8v8" } stroke="currentColor" fill="none" {}
-            text x=(px(22.0 + step * scale)) y=(px(base + 4.0)) { (step) " m" (if turned { ", forward to the right" } else { ", forward up" }) }
+            text x=(px(22.0 + step * scale)) y=(px(base + 4.0)) {
+                (step) " m" (if turned { ", forward to the right" } else { ", forward up" })
+            }
             @for path in paths {
                 path d=(d(&path.points)) fill="none" stroke=(path.colour) stroke-width="2.2" stroke-linejoin="round"
                     stroke-dasharray=[path.dashed.then_some("6 5")] {}

@@ -40,7 +40,13 @@ pub fn section(run: &RunRecord) -> Markup {
             }
             div.two { div { (pool) } div { (resident) } }
             p.small { "Bounds: " (bounds::sentence(run)) "." }
-            details { summary.small { "Bound by bound" } (table(&[("bound", false), ("of the run", true), ("needed", true), ("refused", true)], &bounds_table(run))) }
+            details {
+                    summary.small { "Bound by bound" }
+                    (table(
+                        &[("bound", false), ("of the run", true), ("needed", true), ("refused", true)],
+                        &bounds_table(run),
+                    ))
+                }
             details { summary.small { "The slab, region by region" } (regions(run)) }
         }
     }

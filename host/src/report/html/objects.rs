@@ -50,7 +50,14 @@ pub fn section(run: &RunRecord) -> Markup {
             @if let Some(count) = run.sections.objects.swept_triangles {
                 p.small { "Triangles of the static map in the volume that moving objects swept: " b { (grouped(count)) } "." }
             }
-            (lanes(&frames(run), run.frames.len(), &lanes_of(&shown), "tracks over frames", &[MotionState::Uncertain, MotionState::Static, MotionState::Dynamic].map(state_name)))
+            (lanes(
+                &frames(run),
+                run.frames.len(),
+                &lanes_of(&shown),
+                "tracks over frames",
+                &[MotionState::Uncertain, MotionState::Static, MotionState::Dynamic]
+                    .map(state_name),
+            ))
             (track_table(&shown))
             (gallery(&run.sections.objects.objects))
         }
@@ -92,7 +99,12 @@ fn truth(figures: &ObjectFigures) -> Markup {
             (figures.false_dynamic_frames) " frames."
         }
         @if !motions.is_empty() { p.small { "Median per-frame motion error: " (motions.join("; ")) "." } }
-        div.narrow { (table(&[("frames", false), ("uncertain", true), ("static", true), ("dynamic", true)], &confusion.collect::<Vec<_>>())) }
+        div.narrow {
+            (table(
+                &[("frames", false), ("uncertain", true), ("static", true), ("dynamic", true)],
+                &confusion.collect::<Vec<_>>(),
+            ))
+        }
         @if let Some(of) = &figures.association { (association(of)) }
     }
 }
@@ -224,7 +236,8 @@ fn gallery(objects: &[ReconstructedObject]) -> Markup {
                 figure {
                     (image(&object.thumbnail_jpeg, &format!("mesh of object {}", object.name)))
                     figcaption {
-                        (object.class.name()) " " code { (object.name) ".ply" } ", " (state_name(object.state)) ": " (object.frames) " frames, "
+                        (object.class.name()) " " code { (object.name) ".ply" } ", "
+                        (state_name(object.state)) ": " (object.frames) " frames, "
                         (grouped(object.triangles)) " triangles"
                         @if let Some(figures) = &object.surface { (surface(figures)) }
                     }

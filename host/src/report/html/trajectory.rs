@@ -78,7 +78,8 @@ fn errors_of(errors: &TrajectoryErrors) -> Markup {
         @if let Some(without) = errors.without_boresight {
             p.small {
                 (format!(
-                    "The camera's axes differ from those of the truth by {:.2}° throughout (boresight angle), which is calibration, not drift. Without it \
+                    "The camera's axes differ from those of the truth by {:.2}° throughout \
+                     (boresight angle), which is calibration, not drift. Without it \
                     {:.3} % of a segment, {:.2} cm from frame to frame.",
                     without.angle_deg, without.t_err_percent, 100.0 * without.rpe_t_m
                 ))

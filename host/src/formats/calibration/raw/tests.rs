@@ -11,7 +11,8 @@ const KALIBR: &str = kalibr::FORMAT.example[0].1;
 
 fn euroc(x: f64) -> String {
     format!(
-        "%YAML:1.0\n# General sensor definitions.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, {x},\n         0.0, 1.0, 0.0, 0.02,\n         \
+        "%YAML:1.0\n# General sensor definitions.\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: \
+         4\n  data: [1.0, 0.0, 0.0, {x},\n         0.0, 1.0, 0.0, 0.02,\n         \
          0.0, 0.0, 1.0, 0.01,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [752, \
          480]\ncamera_model: pinhole\n\
          intrinsics: [458.6, 457.2, 367.2, 248.3] #fu, fv, cu, cv\ndistortion_model: \

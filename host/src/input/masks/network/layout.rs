@@ -79,9 +79,11 @@ impl Layout {
             _ => None,
         };
         layout.ok_or_else(|| {
-            let shapes: Vec<String> = outputs.iter().map(|output| format!("{:?}", output.shape)).collect();
+            let shapes: Vec<String> =
+                outputs.iter().map(|output| format!("{:?}", output.shape)).collect();
             format!(
-                "its outputs have the shapes {}, which fit none that is known: boxes [1, N, 5 + C] or [1, 4 + C, N]; a map [1, H, W] or [1, C, H, W] of \
+                "its outputs have the shapes {}, which fit none that is known: boxes [1, N, 5 + C] \
+                 or [1, 4 + C, N]; a map [1, H, W] or [1, C, H, W] of \
                  the input's size, or a whole part of it; boxes and prototypes [1, 4 + C + P, N], \
                  [1, P, H, W]; boxes, labels and masks [1, N, 5], [1, N], \
                  [1, N, H, W]. Export it with one of these; what shapes cannot tell (names, \

@@ -60,7 +60,8 @@ fn coco_has_polygons_runs_and_boxes() {
         ]
     );
     assert_eq!(masks.refusals, MaskRefusals { unknown_class: 1, ..MaskRefusals::default() });
-    let results = r#"[{"image_id": 0, "category_id": 8, "score": 0.75, "bbox": [4, 10, 10, 20]}, {"image_id": 1, "category_id": 3, "bbox": [0, 0, 9, 9]}]"#;
+    let results = r#"[{"image_id": 0, "category_id": 8, "score": 0.75, "bbox": [4, 10, 10, 20]},
+        {"image_id": 1, "category_id": 3, "bbox": [0, 0, 9, 9]}]"#;
     assert_eq!(
         found(&of_file("results.json", results, &coco::FORMAT).unwrap()),
         [(Class::Truck, 0.75, SHRUNK_CAR)]
