@@ -1,4 +1,4 @@
-//! What digests cost: a block's and an image's, to compare with a frame's time.
+//! Cost of digests: of a block and of an image, to compare with a frame's time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::digest::Digest;

@@ -1,4 +1,4 @@
-//! What objects add to a frame at KITTI size on one thread: CPU time of the stages `instances` and
+//! Cost of objects in a frame of KITTI's size on one thread: CPU time of the stages `instances` and
 //! `segmentation` and of the whole step, with 0, 1, 4 and 8 cars detected in the same pictures. A
 //! street of textured boxes is rendered from a camera in motion; the cars map_frames along with it,
 //! 8 to 15 m away, so that in every frame measured every car detected is tracked, followed by its

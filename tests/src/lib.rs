@@ -1,5 +1,5 @@
-//! What the integration tests share: a slab for a mapper, clips of the synthetic street, and the
-//! repository's own source.
+//! Parts that the integration tests share: a slab for a mapper, clips of the synthetic street, and
+//! the repository's own source.
 //!
 //! The Rust blocks of the README and of the book are compiled and run with the doc tests of this
 //! package.

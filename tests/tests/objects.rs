@@ -1,4 +1,4 @@
-//! What moves stays out of the static map, is followed and reconstructed apart; shown on the
+//! Moving objects stay out of the static map, are tracked and reconstructed apart; shown on the
 //! synthetic street with exact masks.
 
 use dynvox::evaluate::surfaces::{SeenSide, TrueView};

@@ -25,7 +25,7 @@ pub unsafe fn read<T: Copy>(pointer: *const T) -> Result<T, DynvoxStatus> {
 /// The pointer, when a value can be written there.
 ///
 /// # Safety
-/// None for the check; writing needs a pointer to a `T`.
+/// The check itself has no condition; writing needs a pointer to a `T`.
 pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
     if pointer.is_null() {
         Err(DynvoxStatus::Null)

@@ -89,7 +89,7 @@ pub unsafe extern "C" fn dynvox_create(
 /// Makes a mapper by `new` in a caller's buffer.
 ///
 /// # Safety
-/// As [`dynvox_create`].
+/// The promises of [`dynvox_create`].
 pub unsafe fn make(
     (capacity, config): (*const DynvoxCapacity, *const DynvoxConfig),
     (buffer, len): (*mut u8, usize),

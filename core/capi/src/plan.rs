@@ -68,7 +68,7 @@ pub struct DynvoxMovingBox {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxPathEnd {
-    /// It is free as far as was asked.
+    /// The way is free as far as was asked.
     Free = 0,
     /// At a surface of the map.
     Surface,

@@ -15,9 +15,9 @@ use dynvox_core::tracking::{MotionState, TrackReport};
 pub enum DynvoxMotionState {
     /// Not known yet.
     Uncertain = 0,
-    /// It stands.
+    /// The object stands.
     Static,
-    /// It moves.
+    /// The object moves.
     Dynamic,
 }
 

@@ -1,4 +1,4 @@
-//! What is done wrong comes back as a status.
+//! Misuse of the C interface comes back as a status.
 #![allow(missing_docs, clippy::unwrap_used, clippy::indexing_slicing)]
 #![expect(
     clippy::undocumented_unsafe_blocks,

@@ -1,4 +1,4 @@
-//! Whether both cameras of a rig expose at the same time.
+//! Test of whether both cameras of a rig expose at the same time.
 //!
 //! A camera that exposes later, or delivers an older image, is not where the calibration says:
 //! while the rig moves forward it stands ahead of that, or behind. Seen from a right camera that

@@ -1,4 +1,4 @@
-//! What is left of a calibration's error in the disparity, and how it is taken out.
+//! Remaining error of a calibration in the disparity, and its correction.
 
 use super::{Shares, StereoRig, scalar::floored_i32};
 use crate::image::{DISPARITY_ONE_PX, DisparityQ8};

@@ -1,4 +1,4 @@
-//! What is left of a calibration's error in the rows, and how it is taken out.
+//! Remaining error of a calibration in the rows, and its correction.
 
 use super::{Shares, StereoRig};
 

@@ -1,4 +1,4 @@
-//! Where a pixel lies, as shares of the way from the principal point to the image's borders.
+//! Position of a pixel, as shares of the way from the principal point to the image's borders.
 
 use super::StereoRig;
 

@@ -1,4 +1,4 @@
-//! Which pixels of an image show anything.
+//! Coverage of an image: the pixels that show anything.
 
 use super::View;
 use crate::{bits::set_bits, slices::clipped};

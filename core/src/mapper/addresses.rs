@@ -1,4 +1,4 @@
-//! Whether the bytes of a capacity can be counted where a `usize` has 32 bits.
+//! Check that the bytes of a capacity can be counted where a `usize` has 32 bits.
 //!
 //! [`Capacity::bytes`] is a constant that sums up in `usize`: for every bound that 64 bits allow it
 //! stays far below their end, and 32 bits end at 4 GiB. The bound here is summed up in 64 bits

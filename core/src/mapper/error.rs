@@ -1,4 +1,4 @@
-//! Why a mapper cannot be made, and why it refuses a frame.
+//! Errors: the reasons why a mapper cannot be made, or refuses a frame.
 
 use crate::{memory::SlabError, rectify::RectifierError, settings::Problem};
 use core::fmt;

@@ -1,4 +1,4 @@
-//! What the mapper takes, frame by frame.
+//! Input of the mapper, frame by frame.
 
 use crate::{
     digest::Digest,

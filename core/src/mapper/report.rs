@@ -1,4 +1,4 @@
-//! What one step did, as plain values.
+//! Report of one step, as plain values.
 
 use super::StageDigests;
 use crate::{

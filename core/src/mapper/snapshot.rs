@@ -89,8 +89,8 @@ impl<'s> Mapper<'s> {
     /// goes on bit for bit as this one does. Nothing changes; `&mut` only because one description
     /// of the state serves writing and reading.
     ///
-    /// What a [`crate::volume::BlockStore`] or an [`crate::objects::ObjectSink`] holds is the
-    /// caller's, and not in it.
+    /// Blocks in a [`crate::volume::BlockStore`] and objects in an [`crate::objects::ObjectSink`]
+    /// are the caller's, and not in the snapshot.
     ///
     /// # Errors
     /// The sink's first one; what it took until then is not a snapshot.

@@ -1,4 +1,4 @@
-//! What each region of the slab holds, uses now and has used at most.
+//! Use of the slab: bytes of each region, and how much of it is used now and at most.
 
 use heapless::Vec;
 

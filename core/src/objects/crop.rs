@@ -1,5 +1,5 @@
-//! What a frame shows of one object: its virtual frame, cropped to the object's box (Section III-B
-//! of the paper).
+//! Crop: the part of a frame that shows one object, its virtual frame, cropped to the object's box
+//! (Section III-B of the paper).
 //!
 //! A crop is the disparity under the copy mask, 0 elsewhere, and the picture of the box. Next to an
 //! edge the matcher's surface continues behind what is in front, and would stay attached to the

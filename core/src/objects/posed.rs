@@ -1,4 +1,4 @@
-//! Which objects are in the world now, and their poses.
+//! Objects that are in the world now, with their poses.
 //!
 //! | object | pose |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! How work is split and where it runs: the only place that knows.
+//! Division of work: how it is split and where it runs. No other module knows.
 //!
 //! The core splits work into four bands at boundaries that depend on its amount alone, and asks an
 //! [`Executor`] to do them. Whether they run one after the other or at once is the caller's business

@@ -1,4 +1,4 @@
-//! Which vector instructions kernels may use: told to the core by its caller, never a reason for
+//! Vector instructions that kernels may use: told to the core by its caller, never a reason for
 //! another bit.
 //!
 //! A value of [`Vectors`] above [`Vectors::BASELINE`] exists only where the processor was asked, so
@@ -30,7 +30,7 @@ pub(crate) trait Work {
 /// Levels of vector instructions that kernels are written for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Level {
-    /// None but what the compiler finds.
+    /// No explicit instructions: only those that the compiler finds.
     Plain,
     /// 128 bits: every x86-64 has them, but some kernels of operating systems must not use them.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]

@@ -1,4 +1,4 @@
-//! Where cells lie: integer coordinates with z up, turned from the world's.
+//! Grid of cells: integer coordinates with z up, turned from the world's.
 //!
 //! A grid point is a world point turned by a rotation of 14 fractional bits. Cell (x, y, z) holds
 //! the grid points from `cell * (x, y, z)` up to but without the next cell's: x to the right of the

@@ -15,7 +15,7 @@ use crate::volume::{BLOCK_SIDE, Volume};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PathEnd {
-    /// It does not: it is free as far as was asked.
+    /// The path does not end: it is free as far as was asked.
     Free,
     /// At a surface of the map.
     Surface,

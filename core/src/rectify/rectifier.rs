@@ -184,7 +184,7 @@ impl<'s> Rectifier<'s> {
     /// Makes the maps. Time: two projections a rectified pixel, once.
     ///
     /// # Errors
-    /// When the images do not fit the capacity; the rectifier is as it was.
+    /// The images do not fit the capacity. The rectifier is unchanged then.
     pub fn prepare(
         &mut self,
         rectification: &Rectification,

@@ -1,4 +1,4 @@
-//! What is kept of one camera: two frames, the previous and the current one, swapped by index.
+//! State of one camera: two frames, the previous and the current one, swapped by index.
 
 use super::{
     SceneFlowConfig,

@@ -1,4 +1,4 @@
-//! What a match is.
+//! Matches: one scene point in four images.
 
 use bytemuck::{Pod, Zeroable};
 

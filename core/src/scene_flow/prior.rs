@@ -1,5 +1,5 @@
-//! What the sparse pass teaches the dense one: how far each side of a circle leads, for each bin of
-//! [`BIN_PX`].
+//! Prior that the sparse pass learns for the dense one: how far each side of a circle leads, for
+//! each bin of [`BIN_PX`].
 //!
 //! A bin takes the extremes over the supported sparse matches in it and in the eight bins around
 //! it, widened by [`SLACK_PX`] on each side (so at least 20 px wide) and never beyond the

@@ -1,4 +1,4 @@
-//! What one frame's scene flow did, in numbers.
+//! Counts of one frame's scene flow.
 
 use super::camera::FeatureCount;
 

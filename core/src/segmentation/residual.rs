@@ -1,4 +1,4 @@
-//! How far a match lies from where a static point would be, in sigmas.
+//! Residual of a match: its distance from where a static point would be, in sigmas.
 //!
 //! A point triangulated in the previous frame is moved by the camera's motion and projected: the
 //! prediction `p` of (u, v, disparity). The residual `r` has the covariance

@@ -1,4 +1,4 @@
-//! Where objects are supposed to be.
+//! Seeds: places where objects are supposed to be.
 
 use super::{extent::Extent, groups::Group};
 use bytemuck::{Pod, Zeroable};

@@ -1,5 +1,5 @@
-//! What a moving object leaves in the static map in the frames before it is known to move, and in
-//! those in which it is not found.
+//! Trail that a moving object leaves in the static map in the frames before it is known to move,
+//! and in those in which it is not found.
 
 use super::extent::Extent;
 use crate::geometry::{OrientedBox, Transform};

@@ -172,7 +172,7 @@ impl<C> Copy for Rule<C> {}
 /// The rules of a table without their texts.
 ///
 /// # Panics
-/// When the table has fewer than `N` rows: at compile time, where it is called.
+/// A table of fewer than `N` rows fails to compile, where it is called.
 #[expect(clippy::indexing_slicing, reason = "the compiler evaluates it")]
 pub const fn rules<C, const N: usize>(settings: &[Setting<C>]) -> [Rule<C>; N] {
     let mut rules = [settings[0].rule; N];

@@ -1,4 +1,4 @@
-//! What the support points say about every pixel (Geiger et al., section 3.2): the plane of its
+//! Prior of every pixel from the support points (Geiger et al., section 3.2): the plane of its
 //! triangle, and the disparities of the support points near it.
 //!
 //! Planes are rasterised, triangle by triangle, into the image that will receive the disparities:

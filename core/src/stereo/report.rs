@@ -1,4 +1,4 @@
-//! What one stereo frame came to.
+//! Counts of one stereo frame.
 
 /// Result of a frame's stereo matching.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

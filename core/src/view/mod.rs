@@ -1,4 +1,4 @@
-//! What leaves a map on demand: the picture a camera would take of it, and its surface as
+//! Views of a map, made on demand: the picture a camera would take of it, and its surface as
 //! triangles.
 //!
 //! A view reads a [`Volume`](crate::volume::Volume) and keeps no part of it.

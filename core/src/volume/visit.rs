@@ -54,8 +54,9 @@ impl Volume<'_> {
     }
 
     /// Inserts the blocks that were read into the index, in slot order, and sums their digests.
-    /// Whether they can be: no coordinates twice, space for all. Nothing that comes later depends
-    /// on the order of insertion: the index answers for one block, and nothing walks it.
+    /// Returns true if the blocks can be in one map: no coordinates twice, space for all. Nothing
+    /// that comes later depends on the order of insertion: the index answers for one block, and
+    /// nothing walks it.
     pub(crate) fn rebuild(&mut self) -> bool {
         for slot in self.pool.live() {
             let Some(coord) = self.blocks.coord(slot) else { return false };

@@ -1,4 +1,4 @@
-//! What a mapper hands out: new arrays.
+//! Arrays that a mapper hands out: each call makes new ones.
 
 use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;

@@ -1,5 +1,5 @@
-//! What a run with a fault in its images makes of it: how wrong poses are that nothing warns of,
-//! what is fused from them, and when all is well again.
+//! Outcome of a run with a fault in its images: how wrong poses are that nothing warns of, what is
+//! fused from them, and when all is well again.
 
 use dynvox_core::geometry::Transform;
 use dynvox_core::{PoseOrigin, Severity};

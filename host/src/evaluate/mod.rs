@@ -1,4 +1,4 @@
-//! How good a run was, where the truth is known.
+//! Quality of a run, where the truth is known.
 
 pub mod faults;
 pub mod histogram;

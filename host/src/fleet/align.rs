@@ -1,5 +1,5 @@
-//! Where recordings lie in the world: maps that overlap are registered with one another, and a pose
-//! graph gives each map its place.
+//! Alignment of recordings in the world: maps that overlap are registered with one another, and a
+//! pose graph gives each map its place.
 //!
 //! **Memory.** The distances of two maps, and 200,000 surface points of each recording, 48 bytes
 //! each.

@@ -1,4 +1,4 @@
-//! What has changed between epochs: blocks that changed alike and touch one another are one change.
+//! Changes between epochs: blocks that changed alike and touch one another are one change.
 //!
 //! Of a surface that only lies elsewhere, for depth or pose were off, the epoch with free space has
 //! one as well, half a truncation away or more. Where an object came or went, that epoch has none

@@ -1,4 +1,4 @@
-//! Which blocks how many recordings saw.
+//! Coverage: the number of recordings that saw each block.
 //!
 //! **Memory.** One block of each recording, and 4 bytes for each column of blocks.
 

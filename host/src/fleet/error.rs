@@ -1,4 +1,4 @@
-//! Why maps cannot be merged.
+//! Errors: the reasons why maps cannot be merged.
 
 use super::tile_file::Lattice;
 use std::path::{Path, PathBuf};

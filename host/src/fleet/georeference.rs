@@ -1,5 +1,5 @@
-//! Where a recording lies in the world, from fixes of a receiver of satellites along its path: a
-//! rigid motion by least squares.
+//! Pose of a recording in the world, from fixes of a receiver of satellites along its path: a rigid
+//! motion by least squares.
 //!
 //! Umeyama's closed form without scale (*Least-squares estimation of transformation parameters
 //! between two point patterns*, PAMI 1991), repeated with Cauchy's weights, whose scale is that of

@@ -1,4 +1,4 @@
-//! What there is to do: a list of recordings becomes a list of jobs, each with its bytes of memory
+//! Manifest of the work: a list of recordings becomes a list of jobs, each with its bytes of memory
 //! and a name that is a hash of all that decides its result, so that what is done is known by its
 //! folder.
 
@@ -93,7 +93,7 @@ impl Manifest {
     /// its run is.
     ///
     /// # Errors
-    /// It is not said where a recording lies, or that of `identify`.
+    /// A recording has no pose in the world, or `identify` fails.
     pub fn plan<E: From<FleetError>>(
         path: &Path,
         recordings: &Recordings,

@@ -74,7 +74,7 @@ impl Recordings {
     /// Reads a list.
     ///
     /// # Errors
-    /// It cannot be read, or is none.
+    /// The file cannot be read, or is no list of recordings.
     pub fn read(path: &Path) -> Result<Self, FleetError> {
         let text = std::fs::read_to_string(path).map_err(FleetError::io(path))?;
         toml::from_str(&text).map_err(|error| {

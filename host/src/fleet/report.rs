@@ -1,5 +1,5 @@
-//! What recordings saw, where they went and what has changed: figures, a table of changes and a
-//! picture from above.
+//! Report on recordings: what they saw, where they went and what has changed, as figures, a table
+//! of changes and a picture from above.
 
 use super::coverage::{Coverage, coverage};
 use super::resolve::{ResolvedMap, resolve};

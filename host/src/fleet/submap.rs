@@ -1,4 +1,4 @@
-//! What is kept of a run: its blocks in its own lattice, and the path of its camera.
+//! Submap: the blocks of a run in its own lattice, and the path of its camera.
 //!
 //! Where the camera was lost, a run begins another segment of its map high above, whose place is
 //! not known: only the first segment is kept.

@@ -97,7 +97,7 @@ impl Layout {
 /// Opens the recording at `path`.
 ///
 /// # Errors
-/// What is not there, or cannot be used.
+/// The data set or a file of it is missing, or cannot be used.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, InputError> {
     if !path.exists() {
         return Err(InputError::Absent { path: path.to_path_buf() });

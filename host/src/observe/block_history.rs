@@ -1,4 +1,4 @@
-//! When each block of the static map was last visible, and which of them pruning took:
+//! History of the static map's blocks: when each was last visible, and which of them pruning took:
 //! `blocks.csv`.
 //!
 //! Memory: 12 bytes a slot of the pool. A row is written when a block leaves the pool, and for

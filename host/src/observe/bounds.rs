@@ -1,5 +1,5 @@
-//! How much of each bound of [`Capacity`] a run needed, and the least capacity that would have been
-//! enough for it.
+//! Use of each bound of [`Capacity`] in a run, and the least capacity that would have been enough
+//! for it.
 
 use super::{Finished, FrameContext, FrameRow, ObserveError, ObservedRun, Observer};
 use dynvox_core::scene_flow::FlowReport;

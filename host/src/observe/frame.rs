@@ -1,4 +1,4 @@
-//! What is recorded of every frame.
+//! Record of every frame.
 
 use crate::input::MaskRefusals;
 use dynvox_core::egomotion::icp::IcpStatus;

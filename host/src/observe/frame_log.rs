@@ -73,7 +73,7 @@ impl FrameLog {
     /// Adds a frame.
     ///
     /// # Errors
-    /// Its row cannot be written as text.
+    /// The frame's row cannot be written as text.
     pub fn add(&mut self, row: FrameRow) -> io::Result<()> {
         self.file.append(&frame_row(&row, self.frames == 0)?);
         self.frames += 1;

@@ -76,7 +76,7 @@ impl GrowingFile {
     /// Brings the file back to its state at the checkpoint.
     ///
     /// # Errors
-    /// It is missing, or not as the run left it.
+    /// The file is missing, or not as the run left it.
     pub fn resume(&mut self, folder: &Path) -> Result<(), ObserveError> {
         let path = self.path(folder);
         let failed = |source| ObserveError::Write { path: path.clone(), source };

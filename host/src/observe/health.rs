@@ -1,4 +1,4 @@
-//! What was refused or lost, over a run.
+//! Health of a run: what was refused or lost.
 
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::input::MaskRefusals;

@@ -1,5 +1,5 @@
-//! What is measured during a run. Each observer sees every frame after its step, keeps plain data
-//! that goes into checkpoints, and returns a section of the run's record in the end.
+//! Measurements during a run. Each observer sees every frame after its step, keeps plain data that
+//! goes into checkpoints, and returns a section of the run's record in the end.
 
 mod block_history;
 mod blocks;

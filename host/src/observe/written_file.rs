@@ -21,7 +21,7 @@ impl WrittenFile {
     /// The file as it is now, once it is on the disk.
     ///
     /// # Errors
-    /// It cannot be read, or the disk refuses.
+    /// The file cannot be read, or the disk refuses.
     pub fn synced(folder: &Path, name: String) -> Result<Self, ObserveError> {
         let path = folder.join(&name);
         let known = File::open(&path).and_then(|file| {
@@ -36,7 +36,7 @@ impl WrittenFile {
     /// Checks that the file is unchanged.
     ///
     /// # Errors
-    /// It is missing, or a byte of it has changed.
+    /// The file is missing, or a byte of it has changed.
     pub fn check(&self, folder: &Path) -> Result<(), ObserveError> {
         let path = folder.join(&self.name);
         let changed =

@@ -1,4 +1,4 @@
-//! What a run needed of its capacity: figures, a sentence, and a file to run again with.
+//! Capacity that a run needed: figures, a sentence, and a file to run again with.
 
 use super::text::MIB;
 use crate::formats::{CapacityFile, CapacityTable};

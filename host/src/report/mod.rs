@@ -1,5 +1,5 @@
-//! What a run leaves behind: tables, the summary, the page and the last lines on the console; and
-//! two runs compared by their tables.
+//! Results that a run leaves behind: tables, the summary, the page and the last lines on the
+//! console; and two runs compared by their tables.
 
 pub mod bounds;
 pub mod chart;

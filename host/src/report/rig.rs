@@ -1,4 +1,4 @@
-//! What a run found out about its rig: figures, a sentence, and a file to begin another run with.
+//! Findings of a run about its rig: figures, a sentence, and a file to begin another run with.
 
 use crate::run::RunRecord;
 use dynvox_core::geometry::RowCorrection;

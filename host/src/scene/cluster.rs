@@ -25,7 +25,7 @@ struct Recent {
 }
 
 impl Recent {
-    /// None yet: no mesh has clusters of this number.
+    /// No cluster yet: no mesh has clusters of this number.
     const NONE: Self = Self { vertex: 0, cluster: u32::MAX };
 }
 
@@ -101,7 +101,7 @@ impl VertexClustering {
     /// `None`, or nowhere, does not.
     ///
     /// # Errors
-    /// Those of `vertex`.
+    /// `vertex` fails.
     pub fn add(
         &mut self,
         corners: [u32; 3],

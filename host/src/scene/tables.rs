@@ -55,7 +55,7 @@ pub struct TrackColumns {
 /// Hands the rows of a table to `sink`.
 ///
 /// # Errors
-/// It cannot be read, or a row is not as this program writes it.
+/// The file cannot be read, or a row is not as this program writes it.
 pub fn read_rows<R: DeserializeOwned>(
     path: &Path,
     mut sink: impl FnMut(R),

@@ -1,4 +1,5 @@
-//! Which runs a sweep is made of. Points of different sweeps that mean the same run share it.
+//! Plan of a sweep: the runs it is made of. Points of different sweeps that mean the same run share
+//! it.
 
 use crate::input::depth::DepthChoice;
 use crate::input::masks::MaskChoice;

@@ -19,7 +19,7 @@ impl SweepFolder {
     /// Opens the folder of a plan, or creates it.
     ///
     /// # Errors
-    /// It belongs to another plan, or the disk refuses.
+    /// The folder belongs to another plan, or the disk refuses.
     pub fn open(root: &Path, plan: &Plan) -> Result<Self, SweepError> {
         let folder = Self { root: root.to_path_buf() };
         let runs = folder.root.join("runs");

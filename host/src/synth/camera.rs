@@ -1,4 +1,4 @@
-//! Where the camera is: along the street at constant speed, with a driver's and a car's small
+//! Pose of the camera: along the street at constant speed, with a driver's and a car's small
 //! motions.
 
 use dynvox_core::geometry::{StereoRig, Transform};

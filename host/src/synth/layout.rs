@@ -1,5 +1,5 @@
-//! Where objects are across the street: lateral positions in metres to the right of the camera's
-//! lane's middle, and numbers of cars.
+//! Layout across the street: lateral positions in metres to the right of the camera's lane's
+//! middle, and numbers of cars.
 
 use super::config::{Lane, StreetConfig, Traffic};
 use super::random::hash;

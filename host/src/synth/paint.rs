@@ -1,4 +1,4 @@
-//! What a surface shows at a point: reflectance from noise pictures and box-filtered patterns, all
+//! Paint of a surface at a point: reflectance from noise pictures and box-filtered patterns, all
 //! attached to the surface.
 
 use super::car::{Shape, shape};

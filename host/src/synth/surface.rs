@@ -1,4 +1,4 @@
-//! What covers the street's meshes: a kind and the few figures that tell one wall from the next.
+//! Surfaces of the street's meshes: a kind and the few figures that tell one wall from the next.
 
 /// Linear reflectance of red, green, blue.
 pub type Tone = [f32; 3];

@@ -1,4 +1,4 @@
-//! What the street promises.
+//! Promises of the street.
 
 use std::path::PathBuf;
 

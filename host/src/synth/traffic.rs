@@ -1,4 +1,5 @@
-//! Where every car is at a time: closed forms, so that any frame can be asked for alone.
+//! Traffic: the pose of every car at a time, by closed forms, so that any frame can be asked for
+//! alone.
 
 use dynvox_core::geometry::Transform;
 

@@ -1,5 +1,5 @@
-//! What a run needed of its bounds: the least bounds hold the same run without a refusal, and
-//! smaller ones do not.
+//! Bounds that a run needed: the least bounds hold the same run without a refusal, and smaller ones
+//! do not.
 
 use super::binary::{dynvox, output_text};
 use serde_json::Value;

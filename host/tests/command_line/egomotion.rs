@@ -1,5 +1,5 @@
-//! Where the camera's motion comes from: the depth tracker, a file of poses, and frames that are
-//! tracked but not fused.
+//! Sources of the camera's motion: the depth tracker, a file of poses, and frames that are tracked
+//! but not fused.
 
 use super::binary::{dynvox, output_text};
 use std::fs;

@@ -1,5 +1,4 @@
-//! What a run leaves behind for other programs: meshes, glTF, recordings; completions and the
-//! manual.
+//! Exports of a run for other programs: meshes, glTF, recordings; completions and the manual.
 
 use super::binary::{dynvox, names, output_text, rig};
 use base64::{Engine, engine::general_purpose::STANDARD};

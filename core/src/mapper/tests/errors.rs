@@ -1,4 +1,4 @@
-//! What errors say: each its own sentence, with the figures it was given.
+//! Sentences of the errors: each error has its own, with the figures it was given.
 
 use super::*;
 use crate::{

@@ -17,12 +17,12 @@ use crate::{
     serde(rename_all = "snake_case")
 )]
 pub enum SelfCalibrationMode {
-    /// It is found, reported and taken out.
+    /// The error is found, reported and taken out.
     #[default]
     Apply,
-    /// It is found and reported.
+    /// The error is found and reported.
     Report,
-    /// It is not looked for.
+    /// The error is not looked for.
     Off,
 }
 

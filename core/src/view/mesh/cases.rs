@@ -1,4 +1,4 @@
-//! Which triangles cut a cell, for each of the 256 ways its corners can lie inside or outside.
+//! Triangles that cut a cell, for each of the 256 ways its corners can lie inside or outside.
 //!
 //! The table is worked out at compile time from one rule on faces, not typed in. On each face,
 //! every run of neighbouring inside corners is cut off by one segment: so where two inside corners

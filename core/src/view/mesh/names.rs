@@ -60,7 +60,7 @@ pub(super) struct VertexNames<N> {
 }
 
 impl<N: Copy + Default> VertexNames<N> {
-    /// None yet.
+    /// No vertex has a name yet.
     pub fn new() -> Self {
         Self { layer: [0; ENTRIES], name: [N::default(); ENTRIES] }
     }

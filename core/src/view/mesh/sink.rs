@@ -1,4 +1,4 @@
-//! Who takes a mesh, and what it is made of.
+//! Receiver of a mesh, and the parts of a mesh.
 
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,4 +1,4 @@
-//! What rays meet in the cells that stop them, worked out for many of them at a time.
+//! Hits of rays in the cells that stop them, computed for many rays at a time.
 
 use super::{
     cell::{Faces, Field, along, depths_m, mean, position},

@@ -1,5 +1,5 @@
-//! Which lattice points of a block lie before the surface and which behind, as bits, and from them
-//! the cells it runs through.
+//! Signs of a block: the lattice points before the surface and those behind it, as bits, and from
+//! them the cells it runs through.
 //!
 //! A layer (one z) of a block is a 64-bit word: bit `x + 8 y`.
 

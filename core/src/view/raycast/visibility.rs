@@ -1,4 +1,5 @@
-//! Which cell each pixel's ray meets the surface in: the nearest of those it passes.
+//! Visibility: the cell in which each pixel's ray meets the surface, the nearest of those it
+//! passes.
 //!
 //! Cells are projected into the picture one by one (cell projection: Wilhelms, Van Gelder, *A
 //! Coherent Projection Approach for Direct Volume Rendering*, 1991), and of all that stop a pixel's

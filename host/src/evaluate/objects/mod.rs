@@ -43,11 +43,11 @@ pub const SMALL_PX: i32 = 30;
 /// Part of an object that the image shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Visibility {
-    /// It lies within the image and is not small.
+    /// The object lies within the image and is not small.
     Whole,
     /// Less than [`SMALL_PX`] wide or high.
     Small,
-    /// It touches the image border.
+    /// The object touches the image border.
     Cut,
 }
 

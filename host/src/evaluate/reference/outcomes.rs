@@ -1,5 +1,5 @@
-//! What became of each point of the static map: so that the maps of several runs can be compared on
-//! the points all of them show.
+//! Outcome at each point of the static map, so that the maps of several runs can be compared on the
+//! points all of them show.
 
 use super::{PendingFrame, Region, Rule};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! Where in the world the static map is off: distances of the reference's points from the surface,
-//! cell by cell.
+//! Errors of the static map by place: distances of the reference's points from the surface, cell by
+//! cell.
 //!
 //! Memory: 28 bytes or so for each cell of the surface that was compared.
 

@@ -56,7 +56,7 @@ pub enum StereoSetError {
         /// Folder asked for.
         path: PathBuf,
     },
-    /// None of the layouts.
+    /// The folder has none of the layouts.
     #[error(
         "{path} is not a stereo benchmark. KITTI 2012 has image_0, image_1 (or colored_0, \
          colored_1) and disp_noc, disp_occ; KITTI 2015 has image_2, image_3 and \

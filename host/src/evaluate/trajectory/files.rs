@@ -63,7 +63,7 @@ pub enum TrajectoryError {
 /// Numbers of a run folder's frames in its data set; `None` where `path` is no such folder.
 ///
 /// # Errors
-/// Its table of frames cannot be read.
+/// The run's table of frames cannot be read.
 pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError> {
     let table = path.join(FRAMES_FILE);
     if !table.is_file() {
@@ -111,7 +111,7 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
 /// row.
 ///
 /// # Errors
-/// They cannot be matched, or fewer than two can.
+/// The poses cannot be matched, or fewer than two can.
 pub fn matched(
     first: &Trajectory,
     second: &Trajectory,

@@ -48,7 +48,7 @@ impl LensTable {
     /// The model; missing parameters are those of a typical lens.
     ///
     /// # Errors
-    /// As of [`LensTable::model`], but for missing parameters.
+    /// The name is not known, or a parameter is unknown or of another length.
     pub fn model_or_typical(self) -> Result<LensModel, String> {
         self.read(true)
     }
@@ -89,7 +89,7 @@ impl LensTable {
 /// Writes a model as a table.
 ///
 /// # Errors
-/// Those of the serializer.
+/// A number cannot be written as TOML.
 pub fn serialize<S: Serializer>(model: &LensModel, serializer: S) -> Result<S::Ok, S::Error> {
     let mut parameters: Vec<(&str, Vec<f64>)> = Vec::new();
     let mut copy = *model;

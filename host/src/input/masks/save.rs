@@ -24,7 +24,7 @@ pub fn save_masks(
 /// Saves masks like [`save_masks`]; where masks overlap, the later one is on top.
 ///
 /// # Errors
-/// As of [`save_masks`].
+/// The folder cannot be written.
 pub fn save_masks_in_order(
     folder: &Path,
     stem: &str,

@@ -8,11 +8,11 @@ use std::io;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BlockFate {
-    /// It is in the map at the end.
+    /// The block is in the map at the end.
     Map,
     /// Pruning took it.
     Pruned,
-    /// It was evicted to make space, and may have come back.
+    /// The block was evicted to make space, and may have come back.
     Evicted,
 }
 

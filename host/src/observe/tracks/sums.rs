@@ -1,4 +1,4 @@
-//! What is kept of a track while the run goes on.
+//! Sums of a track while the run goes on.
 
 use super::{TrackRecord, TrackRow, TrackSpan};
 use crate::evaluate::histogram::Histogram;

@@ -1,4 +1,4 @@
-//! What all charts share: the area, the scale of the y axis with its grid, the legend.
+//! Frame of all charts: the area, the scale of the y axis with its grid, the legend.
 
 use maud::{Markup, html};
 

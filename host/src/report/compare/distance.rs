@@ -1,4 +1,4 @@
-//! How far apart the outcomes of two runs are, where their digests only say that they differ.
+//! Distance between the outcomes of two runs, where their digests only say that they differ.
 
 use dynvox_core::geometry::Transform;
 

@@ -176,7 +176,7 @@ impl RunDigests {
 /// Compares two runs in the frames they share.
 ///
 /// # Errors
-/// They share none.
+/// The runs share no frame.
 pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareError> {
     // Frames by number: one run may have begun later or ended earlier.
     let shared =

@@ -1,4 +1,4 @@
-//! What the run found left of the calibration's error.
+//! Section on the rig: the error of the calibration that the run found.
 
 use super::{frames, series};
 use crate::report::chart::{COLOURS, lines};

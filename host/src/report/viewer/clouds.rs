@@ -52,7 +52,7 @@ pub struct Cloud {
 /// The clouds of a scene; those without a point are left out.
 ///
 /// # Errors
-/// None in memory: the encoder's.
+/// The encoder fails, which it does not in memory.
 pub fn clouds(scene: &Scene) -> io::Result<Vec<Cloud>> {
     let blocks = &scene.blocks;
     let pruned: Vec<_> = blocks.pruned_m.iter().map(|&at| (at, PRUNED_COLOUR)).collect();

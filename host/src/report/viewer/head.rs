@@ -1,4 +1,4 @@
-//! What the page's script knows of a run besides its meshes and pictures.
+//! Head of the viewer: what the page's script knows besides meshes and pictures.
 
 use super::clouds::CloudHead;
 use super::tiles::TileHead;

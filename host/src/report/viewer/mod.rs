@@ -37,7 +37,7 @@ const SCRIPT: [&str; 8] = [
 /// The viewer of a run folder, as a part of a page.
 ///
 /// # Errors
-/// The encoder's.
+/// The encoder fails.
 pub fn fragment(folder: &Path, name: &str, scene: &Scene) -> Result<Markup, FormatError> {
     let failed = |source| FormatError::Read { path: folder.to_path_buf(), source };
     let values = SurfaceValues::new(scene);

@@ -57,7 +57,7 @@ struct Surface<'m> {
 /// Divides a mesh; `values` are those of its vertices, `object` is the position of its object.
 ///
 /// # Errors
-/// None in memory: the encoder's.
+/// The encoder fails, which it does not in memory.
 pub fn tiles(
     mesh: &IndexedMesh,
     values: &[ValueBytes],

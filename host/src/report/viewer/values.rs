@@ -1,5 +1,5 @@
-//! What the surface can be coloured by besides its photo: a byte of each value for each vertex, and
-//! what the bytes mean.
+//! Values that the surface can be coloured by besides its photo: a byte of each value for each
+//! vertex, and what the bytes mean.
 
 use crate::scene::{BlockHistory, IndexedMesh, Scene, SceneObject, SurfaceErrorMap};
 use serde::Serialize;

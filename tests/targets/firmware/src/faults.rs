@@ -1,4 +1,4 @@
-//! What must not be, put in on purpose, to see that the proofs notice.
+//! Faults put in on purpose, to see that the proofs notice them.
 
 use core::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! What must not be reachable: the heap and panics. Both end in undefined functions, so that a
+//! Code that must not be reachable: the heap and panics. Both end in undefined functions, so that a
 //! program that could come to one of them cannot be linked.
 
 use core::{

@@ -1,5 +1,5 @@
-//! What the fixture does not come to: every other way into the core, so that the proofs see it, and
-//! its bits are compared from machine to machine as well.
+//! Calls that the fixture does not make: every other way into the core, so that the proofs see it,
+//! and its bits are compared from machine to machine as well.
 
 use crate::fixture;
 use core::hint::black_box;

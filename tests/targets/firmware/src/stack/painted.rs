@@ -1,4 +1,4 @@
-//! How deep the stack has been, by painting what lies below.
+//! Depth of the stack, measured by painting what lies below.
 
 use core::ptr::addr_of_mut;
 

@@ -1,4 +1,4 @@
-//! Where the stack is not ours to paint.
+//! Targets on which the stack is not ours to paint.
 
 /// No paint.
 pub struct Paint;
