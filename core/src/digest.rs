@@ -58,12 +58,35 @@ impl Default for Digest {
 
 impl Digest {
     /// Takes in 64 bits.
+    ///
+    /// ```
+    /// use dynvox_core::digest::Digest;
+    ///
+    /// let of = |values: [u64; 2]| {
+    ///     let mut digest = Digest::default();
+    ///     values.into_iter().for_each(|value| digest.u64(value));
+    ///     digest.finish()
+    /// };
+    /// assert_ne!(of([1, 2]), of([2, 1]), "the order counts");
+    /// ```
     #[inline]
     pub fn u64(&mut self, value: u64) {
         self.state = mixed(self.state ^ value);
     }
 
     /// Takes in a float by its bits; all NaNs are one.
+    ///
+    /// ```
+    /// use dynvox_core::digest::Digest;
+    ///
+    /// let of = |value: f64| {
+    ///     let mut digest = Digest::default();
+    ///     digest.f64(value);
+    ///     digest.finish()
+    /// };
+    /// assert_eq!(of(f64::NAN), of(-f64::NAN), "all NaNs are one");
+    /// assert_ne!(of(1.0), of(1.0 + f64::EPSILON));
+    /// ```
     pub fn f64(&mut self, value: f64) {
         self.u64(if value.is_nan() {
             f64::NAN.to_bits() & 0x7FFF_FFFF_FFFF_FFFF
@@ -81,6 +104,18 @@ impl Digest {
 
     /// Takes in a run of bytes. Its last stripe is filled up with zeros; the length goes in as
     /// well.
+    ///
+    /// ```
+    /// use dynvox_core::digest::Digest;
+    ///
+    /// let of = |bytes: &[u8]| {
+    ///     let mut digest = Digest::default();
+    ///     digest.bytes(bytes);
+    ///     digest.finish()
+    /// };
+    /// assert_eq!(of(b"map"), of(b"map"));
+    /// assert_ne!(of(b"map"), of(b"map\0"), "the length counts");
+    /// ```
     pub fn bytes(&mut self, bytes: &[u8]) {
         let (stripes, rest) = bytes.as_chunks();
         self.stripes(stripes);
@@ -140,6 +175,16 @@ impl Digest {
     }
 
     /// Takes in a run of unsigned 16-bit integers, as [`Digest::i16s`] does.
+    ///
+    /// ```
+    /// use dynvox_core::digest::Digest;
+    ///
+    /// let mut digest = Digest::default();
+    /// digest.u16s(&[1, 2, 3]);
+    /// let before = digest.finish();
+    /// digest.u16s(&[4]);
+    /// assert_ne!(before, digest.finish());
+    /// ```
     pub fn u16s(&mut self, values: &[u16]) {
         // The same size and alignment: it cannot fail.
         self.i16s(bytemuck::try_cast_slice(values).unwrap_or(&[]));

@@ -20,6 +20,13 @@ pub struct Random {
 
 impl Random {
     /// A generator for one purpose. Equal seeds give equal draws on every machine.
+    ///
+    /// ```
+    /// use dynvox_core::random::Random;
+    ///
+    /// let [mut one, mut other] = [Random::new(7), Random::new(7)];
+    /// assert_eq!(one.next_u32(), other.next_u32(), "one seed, one sequence");
+    /// ```
     pub const fn new(seed: u64) -> Self {
         Self { state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0xD1B5_4A32_D192_ED03 }
     }
@@ -41,6 +48,13 @@ impl Random {
 
     /// Uniform in `0..bound`; 0 when `bound` is 0. One draw, by multiplication: the bias is at most
     /// `bound` / 2^32.
+    ///
+    /// ```
+    /// use dynvox_core::random::Random;
+    ///
+    /// let mut random = Random::new(1);
+    /// assert!((0..100).all(|_| random.below(6) < 6));
+    /// ```
     pub fn below(&mut self, bound: u32) -> u32 {
         ((u64::from(self.next_u32()) * u64::from(bound)) >> 32) as u32
     }

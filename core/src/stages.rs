@@ -67,6 +67,14 @@ impl Stage {
     ];
 
     /// The row of this stage in the table of stages.
+    ///
+    /// ```
+    /// use dynvox_core::Stage;
+    ///
+    /// let names = Stage::Fuse.names();
+    /// assert_eq!((names.name, names.folder), ("fuse", "volume"));
+    /// assert_eq!(names.digest, Some("static_map"));
+    /// ```
     pub const fn names(self) -> StageNames {
         let (name, folder, digest) = match self {
             Self::Rectify => ("rectify", "rectify", None),

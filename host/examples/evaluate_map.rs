@@ -30,6 +30,7 @@ fn main() -> anyhow::Result<()> {
     let poses = read_poses(trajectory.as_ref())?.poses;
     let mut map = Averages::of(map.as_ref(), &std::env::temp_dir().join("evaluate_map"))?;
     let blocks = map.blocks as usize;
+    // A volume as large as the map, so that nothing is evicted.
     let capacity =
         Capacity { blocks, visible_blocks: blocks, colour: map.lattice.colour, ..plan.capacity };
     let bytes = Volume::bytes(&capacity) + Raycaster::bytes(&capacity);
@@ -43,6 +44,7 @@ fn main() -> anyhow::Result<()> {
     let mut volume = Volume::new_in(&capacity, &config, &mut carver);
     let mut raycaster = Raycaster::new_in(&capacity, &plan.config.raycast, &mut carver);
     carver.check()?;
+    // All blocks are loaded before the first view.
     for tile in map.store.tiles() {
         for coord in map.store.blocks_of(tile) {
             volume.load(coord, &mut map.store);
@@ -95,6 +97,7 @@ fn scan(
             .as_ref()
             .map(|exact| sample_exact_depth(&exact.depth_m, &plan.config.rig, &field))
     };
+    // Objects are not part of a merged map.
     let region = |u: i32, v: i32| {
         let is_object = images
             .masks

@@ -40,6 +40,7 @@ fn main() -> anyhow::Result<()> {
     };
     let exact = arguments.iter().any(|argument| argument == "exact");
     let width = value("width").unwrap_or(1242.0) as u32;
+    // A static street: the figures are those of the map, not of moving cars.
     let street = Street::new(StreetConfig {
         width,
         height: width * 375 / 1242,
@@ -63,6 +64,7 @@ fn main() -> anyhow::Result<()> {
     let mut config = Config::for_rig(street.rig());
     (config.planning.below_m, config.planning.far_m) = (4.5, FAR_M as f32);
     config.segmentation.enabled = false;
+    // Settings on the command line, to see what each is worth.
     for setting in
         arguments.iter().filter(|argument| argument.contains('.') && argument.contains('='))
     {
@@ -99,6 +101,7 @@ fn main() -> anyhow::Result<()> {
         )?;
         truth.add(&mapper, &street, &frame);
     }
+    // Only the update is timed.
     let begin = std::time::Instant::now();
     let report = mapper.update_planning_maps(0.0);
     println!(
@@ -147,6 +150,7 @@ impl Truth {
             let cell = [0, 1, 2].map(|axis| origin[axis] + cell[axis]);
             let [x, y, z]: [f64; 3] =
                 t_camera_world.transform_point(grid.to_world(cell.map(|c| f64::from(c) + 0.5)));
+            // Beyond this range the planner is not asked.
             if !(0.5..=FAR_M).contains(&z) {
                 continue;
             }
@@ -177,6 +181,7 @@ impl Truth {
                 })
             })
         };
+        // A few stray points do not make a cell occupied.
         let occupied: Vec<Cell> = self
             .points
             .iter()
@@ -267,6 +272,7 @@ impl Truth {
                 .flat_map(|dy| (-2..=2).map(move |dx| (dx, dy)))
                 .filter_map(|(dx, dy)| Some((dx as f32, dy as f32, beside(dx, dy)?)))
                 .collect();
+            // A plane needs its whole surroundings.
             if around.len() < 25 {
                 continue;
             }
@@ -281,6 +287,7 @@ impl Truth {
                 missed += 1;
                 continue;
             };
+            // A step of 10 to 20 cm on otherwise even ground is a kerb.
             if (0.1..0.2).contains(&step) && spread < 0.2 {
                 // A kerb runs through this column or the one beside it.
                 kerbs += 1;

@@ -43,9 +43,11 @@ struct Fields {
 /// it is there.
 fn plan(fields: &Fields, start: [i32; 2], goal: [i32; 2]) -> Option<Vec<[i32; 2]>> {
     let to_goal = |[x, y]: [i32; 2]| f64::from(goal[0] - x).hypot(f64::from(goal[1] - y));
+    // Lengths in thousandths of a cell, because a heap needs whole numbers.
     let mut open = BinaryHeap::from([(Reverse((to_goal(start) * 1e3) as u64), start)]);
     let mut best: HashMap<[i32; 2], (f64, [i32; 2])> = HashMap::from([(start, (0.0, start))]);
     while let Some((_, at)) = open.pop() {
+        // Follow the best predecessors back.
         if at == goal {
             let mut way = vec![goal];
             while way[way.len() - 1] != start {
@@ -55,6 +57,7 @@ fn plan(fields: &Fields, start: [i32; 2], goal: [i32; 2]) -> Option<Vec<[i32; 2]
             return Some(way);
         }
         let length = best[&at].0;
+        // Steps in twelve directions make paths less angular than eight.
         for [dx, dy] in [
             [1, 0],
             [-1, 0],
@@ -71,6 +74,7 @@ fn plan(fields: &Fields, start: [i32; 2], goal: [i32; 2]) -> Option<Vec<[i32; 2]
         ] {
             let (to, further) =
                 ([at[0] + dx, at[1] + dy], length + f64::from(dx).hypot(f64::from(dy)));
+            // The cell must be clear at the time at which the robot comes there.
             if fields.clear_m(to, further * fields.cell_m / SPEED_M_S) >= CLEAR_M
                 && best.get(&to).is_none_or(|(known, _)| further < *known)
             {
@@ -171,6 +175,7 @@ fn street(seed: u64) -> anyhow::Result<Street> {
         start_m: between(from, to),
         profile: SpeedProfile::Constant { speed_m_s: between(slow, fast) },
     };
+    // One car ahead in each lane that the robot may want to use.
     let cars = vec![
         car(Lane::Ego, 12.0, 18.0, 4.0, 6.0),
         car(Lane::Overtaking, 8.0, 18.0, 4.0, 7.0),
@@ -234,6 +239,7 @@ fn map(
 ) -> anyhow::Result<(Fields, Truth, [f64; 2], [f64; 2])> {
     let mut config = Config::for_rig(street.rig());
     config.segmentation.enabled = true;
+    // A planner that must not hit anything takes unknown space for occupied.
     config.planning.unknown_is_obstacle = true;
     for setting in std::env::args().filter(|argument| argument.starts_with("planning.")) {
         let (key, value) = setting.split_once('=').unwrap_or_default();
@@ -267,6 +273,7 @@ fn map(
     }
     let cell_m = mapper.planning().grid().cell_m();
     let mut at = Vec::new();
+    // A field for each time step, with the cars where they will be.
     for step in 0..HORIZON_S {
         mapper.plan_ahead(step as f32 / RATE as f32);
         let planning = mapper.planning();
@@ -302,6 +309,7 @@ fn exact_fields(truth: &Truth, cell_m: f64, origin: [f64; 2]) -> anyhow::Result<
             origin[1] + ((at / SIDE) as f64 + 0.5) * cell_m,
         ]
     };
+    // The window's columns that hold a true wall.
     let mut is_wall = vec![0u8; SIDE * SIDE];
     for wall in &truth.walls {
         let [x, y] = [(wall[0] - origin[0]) / cell_m, (wall[1] - origin[1]) / cell_m]
@@ -313,6 +321,7 @@ fn exact_fields(truth: &Truth, cell_m: f64, origin: [f64; 2]) -> anyhow::Result<
     let mut at_times = Vec::new();
     for step in 0..HORIZON_S {
         let time_s = step as f64 / RATE;
+        // Cars by their true motion.
         let mut is_obstacle = is_wall.clone();
         for (at, obstacle) in is_obstacle.iter_mut().enumerate() {
             *obstacle |=
@@ -386,6 +395,7 @@ fn main() -> anyhow::Result<()> {
         let cell = |at: [f64; 2]| {
             [0, 1].map(|axis| ((at[axis] - origin[axis]) / fields.cell_m).floor() as i32)
         };
+        // Goals alternate: to both sides and straight ahead.
         let [side, ahead] = GOALS[seed as usize % GOALS.len()];
         let start = cell(camera);
         let goal = fields.reachable_goal(start, cell([camera[0] + side, camera[1] + ahead]));
@@ -393,6 +403,7 @@ fn main() -> anyhow::Result<()> {
         let point_of = |cell: [i32; 2]| {
             [0, 1].map(|axis| origin[axis] + (f64::from(cell[axis]) + 0.5) * fields.cell_m)
         };
+        // No path is only a fault where exact geometry has one.
         let Some(way) = plan(&fields, start, goal) else {
             let possible = exact.is_some();
             without += u32::from(possible);
@@ -412,6 +423,7 @@ fn main() -> anyhow::Result<()> {
             .as_ref()
             .map(|exact| length_m(&way, fields.cell_m) / length_m(exact, fields.cell_m));
         ratios.extend(ratio);
+        // Only what went wrong is printed.
         if collides || ratio.is_none_or(|ratio| ratio > 1.1) {
             println!(
                 "street {seed}: nearest {:.2} m after {:.1} s, path {length:.1} m, {:?} times the \

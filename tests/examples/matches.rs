@@ -36,6 +36,7 @@ fn main() {
             view(&frame.right_grey),
             &Serial,
         );
+        // Only the matches that egomotion gets.
         for m in matcher.bucketed() {
             let points = [m.previous_left, m.previous_right, m.current_left, m.current_right];
             let numbers: Vec<String> = points.iter().flatten().map(f32::to_string).collect();

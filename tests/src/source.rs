@@ -23,6 +23,7 @@ pub fn files(extensions: &[&str]) -> Vec<PathBuf> {
         {
             let (path, name) = (entry.path(), entry.file_name());
             let kind = entry.file_type().expect("a known file type");
+            // Hidden folders and links lead out of the sources.
             if name.to_string_lossy().starts_with('.') || kind.is_symlink() {
                 continue;
             }
@@ -36,6 +37,7 @@ pub fn files(extensions: &[&str]) -> Vec<PathBuf> {
             }
         }
     }
+    // One order on every machine.
     found.sort();
     found
 }
@@ -78,6 +80,7 @@ fn next(chars: &[char], at: usize) -> (bool, usize) {
     let rest = &chars[at..];
     let before = at.checked_sub(1).map(|before| chars[before]);
     let in_name = before.is_some_and(|char| char.is_alphanumeric() || char == '_');
+    // Comments and strings are prose; a quote of a character is not the beginning of a string.
     match rest {
         ['/', '/', ..] => {
             (true, at + rest.iter().position(|&char| char == '\n').unwrap_or(rest.len()))

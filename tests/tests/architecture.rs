@@ -375,6 +375,7 @@ const LIB: &str = "pub mod mapper;\npub mod memory;\npub use mapper::{Mapper, Re
 fn faults(layers: Layers, read: &Crate) -> Vec<String> {
     let mut faults = Vec::new();
     for (at, (name, allowed)) in layers.iter().enumerate() {
+        // A folder may only name folders above its own line: then no cycle is possible.
         for below in
             allowed.iter().filter(|below| !layers[..at].iter().any(|(name, _)| name == *below))
         {
@@ -384,6 +385,7 @@ fn faults(layers: Layers, read: &Crate) -> Vec<String> {
             ));
         }
     }
+    // A new folder has to be put into the table.
     for folder in &read.folders {
         if !layers.iter().any(|(name, _)| name == folder) {
             faults.push(format!("{folder} is not in the table"));
@@ -421,11 +423,13 @@ impl Crate {
     fn of<'t>(files: impl IntoIterator<Item = (&'t str, &'t str)>) -> Self {
         let files: Vec<(Vec<String>, &str, Source)> =
             files.into_iter().map(|(path, text)| (module(path), path, Source::new(text))).collect();
+        // Names that lib.rs exports stand for the modules they come from.
         let exported: BTreeMap<&str, &str> = files
             .iter()
             .filter(|(module, ..)| module.is_empty())
             .flat_map(|(.., lib)| lib.exports())
             .collect();
+        // Modules of tests may import anything.
         let only_tests: Vec<Vec<String>> = files
             .iter()
             .flat_map(|(module, _, source)| {
@@ -437,6 +441,7 @@ impl Crate {
             .collect();
         let mut read = Self { folders: BTreeSet::new(), edges: BTreeMap::new() };
         for (module, path, source) in &files {
+            // The crate's root and its program stand above all folders.
             let Some(folder) = module.first().filter(|name| *name != "main") else { continue };
             if only_tests.iter().any(|tests| module.starts_with(tests)) {
                 continue;
@@ -447,6 +452,7 @@ impl Crate {
                     .get(target.as_str())
                     .map_or(target.clone(), |module| (*module).to_owned());
                 if target != *folder {
+                    // One file is enough to find the import.
                     read.edges
                         .entry((folder.clone(), target))
                         .or_insert_with(|| (*path).to_owned());

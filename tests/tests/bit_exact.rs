@@ -96,6 +96,7 @@ fn the_fixtures_give_the_digests_on_file_at_every_vector_level() {
 #[test]
 fn a_changed_pixel_is_named_and_a_blessing_keeps_its_reason() {
     let root = tempfile::TempDir::new().expect("a folder");
+    // A copy, so that the fixture in the repository stays as it is.
     let copy = root.path().join("pairs");
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fixtures/pairs-317x93");
     for folder in ["left", "right"] {
@@ -119,15 +120,18 @@ fn a_changed_pixel_is_named_and_a_blessing_keeps_its_reason() {
         "pairs are matched each by itself"
     );
     assert_eq!(found[0].columns, ["input", "stereo", "digest"]);
+    // A reason of white space is none.
     assert!(matches!(fixtures::bless(&copy, " \n ", &Serial), Err(FixtureError::NoReason)));
     assert_eq!(
         fixtures::bless(&copy, "The image is shown twice", &Serial).expect("a blessing"),
         Blessing::Written
     );
+    // After a blessing nothing differs, and a second one changes nothing.
     assert_eq!(differences(&copy), []);
     assert_eq!(fixtures::bless(&copy, "Again", &Serial).expect("a blessing"), Blessing::Unchanged);
     let log =
         |fixture: &Path| std::fs::read_to_string(fixture.join("blessings.txt")).expect("a log");
+    // The log is added to, never rewritten.
     let added =
         log(&copy).strip_prefix(&log(&from)).map(str::to_owned).expect("what stood there before");
     assert_eq!(added.split_once(' ').map(|(_, reason)| reason), Some("The image is shown twice\n"));

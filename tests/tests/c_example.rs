@@ -145,6 +145,7 @@ fn a_fixture_with_its_own_settings_has_the_same_digests_in_c() {
         }
     }
     fs::copy(from.join("calib.txt"), fixture.join("calib.txt")).expect("a copy");
+    // Bounds and settings that no profile has.
     let budget = 24 << 20;
     let options = BudgetOptions { voxel_size_m: Some(0.1), ..BudgetOptions::default() };
     let capacity = Capacity::for_budget(budget, 320, 96, &options).expect("enough");
@@ -156,6 +157,7 @@ fn a_fixture_with_its_own_settings_has_the_same_digests_in_c() {
     .expect("a file");
     dynvox::fixtures::bless(&fixture, "Made of the street", &dynvox_core::Serial)
         .expect("a blessing");
+    // Other settings, other bits: else the test would prove nothing.
     assert_ne!(on_file(&fixture), on_file(&from));
     // A buffer of C holds the mapper's own fields, too.
     let mut tiny = 0;

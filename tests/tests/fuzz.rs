@@ -17,6 +17,7 @@ fn fuzz(target: &Target) {
     let seconds = std::env::var("DYNVOX_FUZZ_SECONDS").ok().and_then(|text| text.parse().ok());
     let (begin, mut mutator) = (Instant::now(), Mutator::new(1));
     let (mut runs, mut taken) = (0_u32, 0_u32);
+    // By time where it is asked for, else a fixed number of mutations.
     let go_on = |runs: u32| match seconds {
         Some(seconds) => begin.elapsed() < Duration::from_secs(seconds),
         None => runs < MUTATIONS,
@@ -24,6 +25,7 @@ fn fuzz(target: &Target) {
     while go_on(runs) {
         let bytes = mutator.mutate(&seeds);
         let at = Instant::now();
+        // A panic is reported with the bytes that cause it.
         let run = || (target.run)(&bytes);
         match std::panic::catch_unwind(run) {
             Ok(took) => taken += u32::from(took),
@@ -34,6 +36,7 @@ fn fuzz(target: &Target) {
                 &bytes[..bytes.len().min(4_000)]
             ),
         }
+        // No input may take much longer than its size suggests.
         assert!(at.elapsed() < MAX_INPUT, "{} takes {:?} at run {runs}", target.name, at.elapsed());
         runs += 1;
     }

@@ -28,6 +28,7 @@ fn reports(frames: usize, disparity: impl Fn(usize, usize) -> u16) -> Vec<Report
 fn given_disparity_is_fused_in_place_of_the_pairs_own_within_near_and_far() {
     let rig = Clip::street(SIZE.0 as u32, SIZE.1 as u32, 1).config().rig;
     let at_m = |depth_m: f64| (rig.focal_baseline_px_m() / depth_m * 256.0) as u16;
+    // A wall of 40 x 20 px, and nothing else.
     let wall =
         reports(
             1,
@@ -42,6 +43,7 @@ fn given_disparity_is_fused_in_place_of_the_pairs_own_within_near_and_far() {
         "{} blocks: only the wall is there",
         wall.blocks.used
     );
+    // A disparity counts as valid, even where its depth is not fused.
     for (depth_m, why) in [(0.4, "nearer than near"), (25.0, "beyond far")] {
         let beyond = reports(1, |_, _| at_m(depth_m))[0];
         assert_eq!((beyond.stereo.valid > 0, beyond.blocks.used), (true, 0), "{why}");
@@ -97,10 +99,12 @@ fn wrong_sizes_and_poses_that_are_none_are_refused_and_change_nothing() {
             with_pose(Transform::from_translation([f64::NAN, 0.0, 0.0])),
             Some(StepError::PoseNotFinite)
         );
+        // A quaternion of another length is no rotation; squares of these lengths leave the range.
         for length in [0.0, 1e-200, 1e200] {
             let pose = Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
             assert_eq!(with_pose(pose), Some(StepError::PoseNotRotation), "{length}");
         }
+        // Refused frames leave no trace: the next one is the first.
         assert_eq!(mapper.step(&frames[0], &Serial).map(|report| report.frame), Ok(0));
     });
 }
@@ -120,6 +124,7 @@ fn given_poses_are_where_the_camera_is_and_change_what_the_map_holds() {
         });
         steps.collect()
     };
+    // Two speeds, so that the map and not only the pose depends on them.
     let (slow, fast) = (run(0.8), run(0.9));
     assert_eq!(
         slow.iter().map(|report| report.pose).collect::<Vec<_>>(),

@@ -73,6 +73,7 @@ fn detections_objects_and_a_look_at_them_make_no_heap_call() {
     let detections: Vec<Vec<_>> =
         sightings.iter().map(|seen| seen.iter().map(InstanceMask::detection).collect()).collect();
     let (calls, objects, shown, handed) = clip.with_mapper(&Capacity::SMALL, |mapper| {
+        // The counter runs over all steps, pictures included.
         let before = calls();
         let (mut objects, mut shown) = (0, 0);
         for (frame, detections) in clip.stereo().zip(&detections) {
@@ -90,6 +91,7 @@ fn detections_objects_and_a_look_at_them_make_no_heap_call() {
         (calls() - before, objects, shown, handed)
     });
     assert_eq!((calls, shown), (0, 12 * 144));
+    // Without objects the test would prove nothing.
     assert!(
         objects > 10 && handed > 0,
         "and yet there are objects: {objects} fused, {handed} at the end"

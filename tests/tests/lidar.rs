@@ -82,6 +82,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
             detections: &[],
         };
         mapper.step(&stereo, &Serial).unwrap();
+        // The sensor sees its points by the true depth; each compared with map and input.
         let bf = street.rig().focal_baseline_px_m();
         let exact = Image::new(640, 192, frame.depth_m.clone()).unwrap();
         let mut scans = [
@@ -137,6 +138,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
         (near, compared) = (near + large, compared + off.regions[0].total);
         shifted.push(off);
     }
+    // With only one kind of point the shifted map would be all right or all wrong.
     assert!(near > 0 && near < compared, "the scene must have both: {near} of {compared}");
     for (name, frames) in [("scan", &by_scan), ("pixels", &by_pixel)] {
         let fused = ReferenceFigures::from_frames("exact", 0, frames, None).unwrap().still.fused;
@@ -146,6 +148,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
             "{name}: {fused:?}"
         );
     }
+    // A shifted map is complete, and wrong where the shift is too large for the rule.
     let fused = ReferenceFigures::from_frames("exact", 0, &shifted, None).unwrap().still.fused;
     assert_eq!(fused.completeness, Some(1.0));
     let kept = shifted.iter().map(|frame| frame.regions[0].accuracy(1, 0).unwrap()).sum::<f64>()

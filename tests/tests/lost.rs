@@ -84,6 +84,7 @@ fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
         );
         assert_eq!(created, DynvoxStatus::Ok);
     }
+    // Null stands for an image that is not there.
     let no_image = DynvoxImage { pixels: std::ptr::null(), stride: 0 };
     (0..FRAMES)
         .map(|index| {

@@ -69,6 +69,7 @@ fn a_block_takes_the_bytes_promised_and_its_index_few_more() {
             };
             let voxels = bytes(&["volume.voxels", "volume.colour"]);
             assert_eq!(voxels, voxel_bytes * capacity.blocks);
+            // What is kept for each block besides its voxels.
             let beside = bytes(&[
                 "volume.index",
                 "volume.history",

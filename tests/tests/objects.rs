@@ -55,6 +55,7 @@ fn seen(frame: &SynthFrame) -> Vec<Seen> {
                 .filter(|(_, p)| usize::from(**p) == k)
                 .map(|(at, _)| at)
         };
+        // The box of the instance's pixels; an instance without any is not seen.
         let (left, right) = (
             pixels().map(|at| at % frame.width).min()?,
             pixels().map(|at| at % frame.width).max()?,
@@ -122,6 +123,7 @@ impl Sequence {
         let mut mapper = Mapper::new(capacity, &config, slab.bytes()).unwrap();
         for (index, (frame, seen)) in self.frames.iter().enumerate() {
             let mut detections: Vec<_> = seen.iter().map(Seen::detection).collect();
+            // The order in which a detector lists its finds must not matter.
             if backwards {
                 detections.reverse();
             }
@@ -208,6 +210,7 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
             let Some(car) = truth(frame, seen, &track) else { continue };
             states.entry(track.id).or_default().push((car.moving, track.state));
             let distance_m = (frame.t_world_camera.inverse() * car.t_world_object).translation_m[2];
+            // Only the true motion of cars in both frames can be compared.
             let Some(before) = last.objects.iter().find(|other| other.id == car.id) else {
                 continue;
             };
@@ -218,12 +221,15 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
                 * car.t_world_object
                 * before.t_world_object.inverse()
                 * t_map_world.inverse();
+            // Motions are compared at the object's middle, where a turn about a far origin does not
+            // count.
             let [a, b] = [track.motion_world, moved]
                 .map(|motion| motion.transform_point(track.center_world_m));
             errors_m.push((0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt());
             errors_deg.push((track.motion_world.inverse() * moved).angle_rad().to_degrees());
         }
     });
+    // Uncertain is no mistake; the wrong state is.
     for (id, states) in &states {
         let wrong = states.iter().filter(|(moving, state)| {
             (*moving && *state == MotionState::Static)
@@ -231,6 +237,7 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
         });
         assert_eq!(wrong.count(), 0, "track {id}: {states:?}");
     }
+    // Most sightings of moving cars must be recognised as such.
     let known = states
         .values()
         .flatten()
@@ -251,6 +258,7 @@ fn each_cars_state_and_motion_are_true_in_any_order_of_detections() {
     );
     assert!(error_m < 0.05 && error_deg < 0.25, "{error_m} m, {error_deg} deg");
 
+    // A second run with detections in reverse.
     let mut again = Vec::new();
     sequence.run(true, true, |_, report, _| again.push(report.digest));
     assert_eq!(again, digests);
@@ -277,10 +285,12 @@ fn the_composed_picture_shows_the_nearest_surface_and_cars_at_their_poses() {
     let sequence = &*SEQUENCE;
     let (mut cars, mut totals) = (Vec::new(), [0u32; 3]);
     sequence.run(true, false, |index, report, mapper| {
+        // Every third frame is enough; in the first ones no car has a map yet.
         if index < 6 || index % 3 > 0 {
             return;
         }
         let pose = report.t_world_camera;
+        // The composed picture, built from one picture for each layer.
         let mut nearest = picture(mapper.raycast(&pose, &Serial).unwrap());
         let tracks: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
         for (layer, track) in (1..).zip(&tracks) {
@@ -322,6 +332,7 @@ fn the_composed_picture_shows_the_nearest_surface_and_cars_at_their_poses() {
                 shown += u32::from(*layer > 0);
                 right += u32::from(*layer > 0 && (depth_m - true_m).abs() < 0.05 * true_m);
             }
+            // Too few pixels say nothing about a car.
             if all < 500 {
                 continue;
             }
@@ -345,6 +356,7 @@ fn the_composed_picture_shows_the_nearest_surface_and_cars_at_their_poses() {
 #[test]
 fn one_track_and_one_object_are_used_and_the_rest_is_counted() {
     let sequence = &*SEQUENCE;
+    // Fewer slots than cars, down to none at all.
     for (tracks, objects, object_blocks) in [(1, 1, 17), (1, 1, 1), (1, 0, 0)] {
         let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
         let (mut begun, mut refused, mut blocks) = (0, 0, 0);
@@ -407,6 +419,7 @@ fn meshes_of_near_cars_lie_on_their_true_surfaces() {
                 car.t_world_object.inverse() * t_map_world.inverse() * summary.t_world_object;
             sides.entry(summary.id).or_default().add(&view, &truth, &t_truth_object);
         }
+        // Surfaces are compared once, at the end.
         if index + 1 < sequence.frames.len() {
             return;
         }

@@ -140,6 +140,7 @@ fn capacity(random: &mut Random) -> Capacity {
         crop_pixels: 1_500,
         ..Capacity::TINY
     };
+    // Up to four bounds get a size from too small to generous.
     for _ in 0..random.below(4) {
         let size = [0, 1, 2, 7, 33, 300, 5_000][random.below(7) as usize];
         let sizes = sizes(&mut of);
@@ -195,6 +196,7 @@ impl Inputs {
         let noise = |random: &mut Random| {
             (0..SIZE[0] * SIZE[1]).map(|_| random.next_u32() as u8).collect::<Vec<_>>()
         };
+        // Half of the frames are spoilt: exchanged, black, noise, or of another time.
         let mut images = match random.below(12) {
             0 => [right.clone(), left.clone()],
             1 => [vec![0; left.len()], vec![0; left.len()]],
@@ -203,6 +205,7 @@ impl Inputs {
             4 => frames[random.below(frames.len() as u32) as usize].clone(),
             _ => [left.clone(), right.clone()],
         };
+        // One pair in ten is of another size.
         let size = if random.below(10) == 0 {
             [1 + random.below(96) as usize, 1 + random.below(48) as usize]
         } else {
@@ -225,6 +228,7 @@ impl Inputs {
                 height,
                 mask: &[],
             };
+            // Some masks do not have the length that their box asks for.
             let len = if random.below(8) == 0 { random.below(100) } else { width * height };
             (detection, (0..len).map(|_| u8::from(random.below(5) > 0)).collect())
         };
@@ -314,11 +318,13 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
     let mut random = Random::new(seed);
     let (capacity, config) = (capacity(&mut random), config(street, keys, &mut random));
     counts.runs += 1;
+    // Bounds that are refused are an outcome, too.
     if capacity.validate().is_err() || capacity.bytes() > MAX_SLAB {
         counts.refused += 1;
         return;
     }
     let len = capacity.bytes() + SLAB_ALIGN;
+    // Guards at both ends: a byte written outside the slab is found.
     let mut memory = [vec![GUARDED; len + 2 * GUARD], vec![GUARDED; len + 2 * GUARD]];
     {
         let [first, second] = memory.each_mut().map(|memory| &mut memory[GUARD..GUARD + len]);
@@ -331,6 +337,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
         let mut saved = Vec::new();
         let mut after = Vec::new();
         for at in 0..FRAMES {
+            // A snapshot at a random frame; all frames after it are played twice.
             if at == saves {
                 let written: Result<(), ()> = mapper.save(&mut |piece: &[u8]| {
                     saved.extend_from_slice(piece);
@@ -339,6 +346,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
                 assert!(written.is_ok());
             }
             let inputs = Inputs::new(frames, at, &mut random);
+            // What the store saw must be what the report says.
             let before = [store.kept, store.lost, store.returned];
             let report = inputs.step(&mut mapper, &mut store);
             if let Some(report) = &report {
@@ -361,6 +369,7 @@ fn run(street: &Street, frames: &[[Vec<u8>; 2]], keys: &[&str], seed: u64, count
                 after.push((inputs, report.map(|report| report.digest)));
             }
         }
+        // The surface is finite in all of these runs.
         mapper.triangles(&mut |triangle| {
             assert!(
                 triangle.vertices.iter().flat_map(|vertex| vertex.position_m).all(f32::is_finite),
@@ -412,6 +421,7 @@ fn random_runs_end_in_a_sound_map_or_an_error() {
         run(&street, &frames, &keys, seed, &mut counts);
     }
     println!("{counts:?}");
+    // Most runs must get far enough to mean something.
     let Counts { runs, refused, steps, refused_steps, fused, kept, returned, restored } = counts;
     assert!(
         2 * refused < runs && 2 * refused_steps < steps && restored == runs - refused,

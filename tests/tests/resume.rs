@@ -39,6 +39,7 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
     let mut mapper = Mapper::new(&CAPACITY, &config(&clip), slab.bytes()).expect("a mapper");
     let (mut tracks, mut objects, mut waiting) = (0, 0, 0);
     for (at, pair) in pairs.iter().enumerate() {
+        // Snapshots are taken on the way, with tracks and history in flight.
         if STOPS.contains(&at) {
             let mut bytes = Vec::new();
             let mut sink = |piece: &[u8]| -> Result<(), ()> {
@@ -59,6 +60,7 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
     );
     for (stop, bytes) in &snapshots {
         let (mut slab, mut rest) = (HeapSlab::of(&CAPACITY), &bytes[..]);
+        // Rubbish in the slab must not reach the restored mapper.
         slab.bytes().fill(0xA5);
         let mut source = |piece: &mut [u8]| -> Result<(), ()> {
             let (front, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
@@ -68,6 +70,7 @@ fn the_street_stopped_at_any_frame_and_resumed_gives_the_digests_on_file() {
         };
         let mut mapper = Mapper::restore(&CAPACITY, &config(&clip), slab.bytes(), &mut source)
             .expect("a whole snapshot");
+        // All bytes of the snapshot belong to it.
         assert!(rest.is_empty());
         for (at, pair) in pairs.iter().enumerate().skip(*stop) {
             assert_eq!(

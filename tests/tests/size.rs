@@ -25,6 +25,7 @@ fn functions(rust: &str) -> Vec<(String, usize, usize)> {
     let code: Vec<char> = parts(rust).code.chars().collect();
     let line = |at: usize| 1 + code[..at].iter().filter(|&&char| char == '\n').count();
     let in_name = |char: char| char.is_alphanumeric() || char == '_';
+    // A whole word `fn` with a name behind it.
     let starts = (1..code.len().saturating_sub(3)).filter(|&at| {
         code[at..at + 3] == ['f', 'n', ' ']
             && !in_name(code[at - 1])
@@ -38,6 +39,7 @@ fn functions(rust: &str) -> Vec<(String, usize, usize)> {
                 match char {
                     '(' | '[' => depth += 1,
                     ')' | ']' => depth -= 1,
+                    // A declaration without a body does not count.
                     ';' if depth == 0 && braces == 0 => return None,
                     '{' => braces += 1,
                     '}' if braces == 1 && depth == 0 => {

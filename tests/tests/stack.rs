@@ -54,12 +54,14 @@ fn painted<R>(work: impl FnOnce() -> R) -> (R, usize) {
 #[test]
 fn a_mapper_and_its_step_stay_within_32_kib_of_stack() {
     let measured = || {
+        // A thread of its own, so that the stack is painted from a known depth.
         let clip = Clip::street(320, 96, 12);
         let mut slab = HeapSlab::of(&Capacity::TINY);
         let config = clip.config();
         let (mut made, making) = painted(|| Mapper::new(&Capacity::TINY, &config, slab.bytes()));
         let mapper = made.as_mut().expect("a slab that fits");
         let mut step = 0;
+        // With detections, so that objects take their share.
         for (frame, seen) in clip.stereo().zip(clip.sightings()) {
             let detections: Vec<_> = seen.iter().map(InstanceMask::detection).collect();
             let (report, bytes) =
@@ -92,6 +94,7 @@ fn a_mapper_and_its_step_stay_within_32_kib_of_stack() {
         .join()
         .expect("no panic");
     println!("stack, bytes at most: {peaks:?}; the mapper itself: {}", size_of::<Mapper<'_>>());
+    // Zero would mean that the paint was not read.
     for (what, peak) in peaks {
         assert!(peak > 1_000, "{what}: the paint shows something");
         assert!(peak <= 32 * 1024, "{what}: {peak} bytes");

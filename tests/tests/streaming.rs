@@ -52,6 +52,7 @@ fn sum(reports: &[Report], of: fn(&Report) -> u32) -> u32 {
 #[test]
 fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let (clip, config) = (&*STREET, config(&STREET));
+    // First with a pool that holds it all.
     let mut unbounded = Vec::new();
     let mut slab = HeapSlab::of(&LARGE);
     let mut mapper = Mapper::new(&LARGE, &config, slab.bytes()).expect("a slab that fits");
@@ -65,6 +66,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
         unbounded.push(bits(triangle.vertices.map(|corner| (corner.position_m, corner.colour))))
     });
 
+    // Then with a pool that must evict, and a store on disk.
     let folder = tempfile::TempDir::new().expect("a folder for the blocks");
     let (mut store, mut streamed) = (file(&folder), Vec::new());
     let mut slab = HeapSlab::of(&SMALL);
@@ -73,6 +75,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
     let evicted = sum(&reports, |report| report.allocate.eviction.stored);
     assert!(evicted > 1_000, "{evicted} blocks left: the pool is outgrown");
     assert_eq!(sum(&reports, |report| report.allocate.eviction.lost + report.allocate.refused), 0);
+    // The pool's blocks where they are, joined with those on disk.
     let (mut cube, mut in_place) = (HeapSlab::of(&Capacity::TINY), Vec::new());
     let (how, memory) = ((&config.volume, &config.mesh), (cube.bytes(), false));
     let mut source = PoolAndFile::new(mapper.static_map(), &mut store);
@@ -86,6 +89,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
         },
     );
     assert_eq!(count.ok(), Some(in_place.len() as u64));
+    // Then all blocks stored, and the mesh from the disk only.
     mapper.stream_out(&mut store);
     drop(mapper);
     let count = mesh::triangles(
@@ -103,6 +107,7 @@ fn the_streamed_map_equals_the_unbounded_one_triangle_by_triangle() {
         in_place == streamed,
         "the pool's blocks where they are, and stored first, in one order"
     );
+    // The order of blocks differs between the two pools; the triangles may not.
     unbounded.sort_unstable();
     streamed.sort_unstable();
     assert!(unbounded == streamed, "{} triangles against {}", unbounded.len(), streamed.len());
@@ -144,6 +149,7 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
         let reports = map_clip(&clip, &mut mapper, &mut store);
         let pruned = mapper.finish();
         let last = reports.last().expect("frames were taken");
+        // Blocks made are blocks that left or are still there: none is lost uncounted.
         let made = sum(&reports, |report| report.allocate.made);
         let left = sum(&reports, |report| {
             report.allocate.eviction.stored
@@ -167,6 +173,7 @@ fn pools_of_a_few_blocks_count_every_block_they_make_and_lose() {
                 "a history of one frame is cut short, and says so"
             );
         }
+        // A starved map can still be drawn and written.
         let mut triangles = 0;
         assert_eq!(mapper.triangles(&mut |_| triangles += 1), triangles);
         assert!(mapper.raycast(&last.t_world_camera, &Serial).is_ok());

@@ -115,6 +115,7 @@ fn joined(prose: &str) -> (String, Vec<usize>) {
 
 /// Each banned word in a file and the byte where it stands.
 fn banned(path: &Path, content: &str, rules: &[Rule]) -> Vec<(String, usize)> {
+    // In Rust, names are looked for in code, and phrases in comments and strings.
     let (code, prose) = match path.extension().is_some_and(|extension| extension == "rs") {
         true => {
             let parts = parts(content);
@@ -122,6 +123,7 @@ fn banned(path: &Path, content: &str, rules: &[Rule]) -> Vec<(String, usize)> {
         }
         false => (String::new(), content.to_owned()),
     };
+    // Phrases may run over the end of a line.
     let (joined, places) = joined(&prose);
     let code_names: Vec<(usize, &str)> = names(&code).collect();
     let words_of = |(at, name)| words(name).into_iter().map(move |word| (word, at));
@@ -140,6 +142,7 @@ fn banned(path: &Path, content: &str, rules: &[Rule]) -> Vec<(String, usize)> {
             }
             Kind::Phrase => {
                 for phrase in &rule.words {
+                    // Whole words only.
                     let whole = |&(at, _): &(usize, &str)| {
                         let edge = |char: Option<char>| !char.is_some_and(char::is_alphanumeric);
                         edge(joined[..at].chars().next_back())
@@ -174,6 +177,7 @@ fn only_words_of_the_field_are_used() {
     let mut folders: BTreeMap<String, usize> = BTreeMap::new();
     let mut list = Vec::new();
     for path in files(&["rs", "md", "h", "c", "toml", "sh", "py", "txt", "html"]) {
+        // The list itself names what it forbids.
         if EXEMPT.iter().any(|exempt| path == Path::new(exempt))
             || path.starts_with("fixtures") && path.extension().is_some_and(|e| e == "txt")
         {

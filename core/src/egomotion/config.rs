@@ -8,6 +8,14 @@ use crate::settings::{
 
 /// Settings of the motion estimate. One set serves the camera; objects use another copy.
 /// [`EgomotionConfig::SETTINGS`] has the ranges, and DynSLAM's values where they differ.
+///
+/// ```
+/// use dynvox_core::{Problems, egomotion::EgomotionConfig};
+///
+/// let mut problems = Problems::new();
+/// EgomotionConfig { inlier_px: -1.0, ..EgomotionConfig::default() }.validate(&mut problems);
+/// assert_eq!(problems[0].key, "egomotion.inlier_px");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

@@ -113,6 +113,13 @@ pub struct Estimator<'s> {
 
 impl<'s> Estimator<'s> {
     /// Bytes of the slab.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, egomotion::Estimator};
+    ///
+    /// let twice = Capacity { matches: 2 * Capacity::TINY.matches, ..Capacity::TINY };
+    /// assert!(Estimator::bytes(&twice) > Estimator::bytes(&Capacity::TINY));
+    /// ```
     pub const fn bytes(capacity: &Capacity) -> usize {
         Points::bytes(capacity.matches) + region_bytes::<u32>(capacity.matches)
     }

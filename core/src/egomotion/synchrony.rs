@@ -22,6 +22,15 @@ const DETERMINANT_MIN: f64 = 1e-6;
 const MATCHES_MIN: usize = 20;
 
 /// Distance by which the right camera is ahead of its calibrated position.
+///
+/// ```
+/// use dynvox_core::egomotion::RightAhead;
+///
+/// let ahead = RightAhead { distance_m: 1.0, sigma_m: 0.01 };
+/// assert!(!ahead.is_synchronous(0.05, true, false), "the right camera exposes later");
+/// let noise = RightAhead { distance_m: 0.01, sigma_m: 0.01 };
+/// assert!(noise.is_synchronous(0.05, true, false));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

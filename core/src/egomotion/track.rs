@@ -38,6 +38,15 @@ pub struct TimedMatches<M> {
 }
 
 /// Pose of the camera and its last motion.
+///
+/// ```
+/// use dynvox_core::{egomotion::Egomotion, geometry::Transform};
+///
+/// let mut camera = Egomotion::default();
+/// // One metre ahead: what was 1 m away is at the camera now.
+/// camera.advance(Some(Transform::from_translation([0.0, 0.0, -1.0])));
+/// assert_eq!(camera.t_world_camera().translation_m, [0.0, 0.0, 1.0]);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Egomotion {
     t_world_camera: Transform,
@@ -253,6 +262,14 @@ impl Egomotion {
     }
 
     /// Sets the camera's pose to a given one; its motion is the difference from the pose before.
+    ///
+    /// ```
+    /// use dynvox_core::{egomotion::Egomotion, geometry::Transform};
+    ///
+    /// let mut camera = Egomotion::default();
+    /// camera.set_pose(&Transform::from_translation([0.0, 0.0, 2.0]));
+    /// assert_eq!(camera.t_world_camera().distance_m(), 2.0);
+    /// ```
     pub fn set_pose(&mut self, t_world_camera: &Transform) {
         self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
         self.t_world_camera = t_world_camera.normalized();

@@ -69,6 +69,13 @@ impl DisparityCorrection {
     }
 
     /// Returns true if the correction changes nothing.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::DisparityCorrection;
+    ///
+    /// assert!(DisparityCorrection::default().is_zero());
+    /// assert!(!DisparityCorrection { offset_px: 0.1, ..Default::default() }.is_zero());
+    /// ```
     pub fn is_zero(&self) -> bool {
         *self == Self::default()
     }

@@ -49,6 +49,14 @@ pub struct StereoRig {
 }
 
 /// Reason why a rig cannot be used.
+///
+/// ```
+/// use dynvox_core::geometry::{RigProblem, StereoRig};
+///
+/// let rig =
+///     StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.0 };
+/// assert_eq!(rig.validate(), Err(RigProblem::Baseline));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -97,6 +105,15 @@ impl StereoRig {
     }
 
     /// Focal length times baseline: depth in metres of one pixel of disparity.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::StereoRig;
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 700.0, center_u_px: 600.0, center_v_px: 180.0, baseline_m: 0.5 };
+    /// let depth_m = 10.0;
+    /// assert_eq!(rig.focal_baseline_px_m() / depth_m, 35.0); // px of disparity
+    /// ```
     pub fn focal_baseline_px_m(&self) -> f64 {
         self.focal_px * self.baseline_m
     }

@@ -46,12 +46,28 @@ impl Transform {
     pub const IDENTITY: Self = Self::from_translation([0.0; 3]);
 
     /// Moves without rotating.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let t_world_camera = Transform::from_translation([0.0, -1.5, 0.0]);
+    /// assert_eq!(t_world_camera.transform_point([1.0, 2.0, 3.0]), [1.0, 0.5, 3.0]);
+    /// ```
     pub const fn from_translation(translation_m: [f64; 3]) -> Self {
         Self { rotation: [0.0, 0.0, 0.0, 1.0], translation_m }
     }
 
     /// Rotates by a rotation vector (axis times angle, rad), then moves. Arrays and the vectors of
     /// most libraries are taken.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// // A quarter turn about y takes z to x.
+    /// let turn = Transform::new([0.0, std::f64::consts::FRAC_PI_2, 0.0], [0.0; 3]);
+    /// let [x, _, z]: [f64; 3] = turn.rotate([0.0, 0.0, 1.0]);
+    /// assert!((x - 1.0).abs() < 1e-12 && z.abs() < 1e-12);
+    /// ```
     pub fn new(rotation_rad: impl Into<[f64; 3]>, translation_m: impl Into<[f64; 3]>) -> Self {
         let [a, b, c] = rotation_rad.into();
         let angle = libm::sqrt(a * a + b * b + c * c);
@@ -65,6 +81,15 @@ impl Transform {
     }
 
     /// The rotation of a matrix, given row by row, then a translation.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let rows = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    /// let turn = Transform::from_rotation_matrix(&rows, [0.0; 3]);
+    /// let [x, y, _]: [f64; 3] = turn.rotate([1.0, 0.0, 0.0]);
+    /// assert!(x.abs() < 1e-12 && (y - 1.0).abs() < 1e-12);
+    /// ```
     pub fn from_rotation_matrix(rows: &[[f64; 3]; 3], translation_m: [f64; 3]) -> Self {
         let matrix = Rotation3::from_matrix_unchecked(Matrix3::from(*rows).transpose());
         Self {
@@ -82,6 +107,13 @@ impl Transform {
     }
 
     /// Rescales the quaternion to length 1: long products accumulate rounding errors.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let loose = Transform { rotation: [0.0, 0.0, 0.0, 1.001], translation_m: [0.0; 3] };
+    /// assert_eq!(loose.normalized().rotation, [0.0, 0.0, 0.0, 1.0]);
+    /// ```
     #[must_use]
     pub fn normalized(&self) -> Self {
         let [x, y, z, w] = self.rotation;
@@ -105,17 +137,39 @@ impl Transform {
     }
 
     /// Transforms a point, m.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let t_world_camera = Transform::from_translation([0.0, 0.0, 4.0]);
+    /// let point_m: [f64; 3] = t_world_camera.transform_point([0.0, 0.0, 1.0]);
+    /// assert_eq!(point_m, [0.0, 0.0, 5.0]);
+    /// ```
     pub fn transform_point<P: Into<[f64; 3]> + From<[f64; 3]>>(&self, point_m: P) -> P {
         let ([x, y, z], [tx, ty, tz]) = (rotate(self.rotation, point_m.into()), self.translation_m);
         P::from([x + tx, y + ty, z + tz])
     }
 
     /// Rotates a direction, without the translation.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let moved = Transform::from_translation([7.0, 7.0, 7.0]);
+    /// assert_eq!(moved.rotate([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0], "directions do not move");
+    /// ```
     pub fn rotate<V: Into<[f64; 3]> + From<[f64; 3]>>(&self, direction: V) -> V {
         V::from(rotate(self.rotation, direction.into()))
     }
 
     /// The rotation as a matrix, row by row.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let rows = Transform::IDENTITY.rotation_matrix();
+    /// assert_eq!(rows, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    /// ```
     pub fn rotation_matrix(&self) -> [[f64; 3]; 3] {
         let [i, j, k, w] = self.rotation;
         let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
@@ -144,12 +198,25 @@ impl Transform {
     }
 
     /// Returns the distance by which the motion moves the origin, m.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// assert_eq!(Transform::from_translation([3.0, 0.0, 4.0]).distance_m(), 5.0);
+    /// ```
     pub fn distance_m(&self) -> f64 {
         let [x, y, z] = self.translation_m;
         libm::sqrt(x * x + y * y + z * z)
     }
 
     /// The angle of the rotation, 0 to pi rad.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// let turn = Transform::new([0.0, 0.3, 0.0], [0.0; 3]);
+    /// assert!((turn.angle_rad() - 0.3).abs() < 1e-12);
+    /// ```
     pub fn angle_rad(&self) -> f64 {
         let [x, y, z, w] = self.rotation;
         2.0 * libm::atan2(libm::sqrt(x * x + y * y + z * z), libm::fabs(w))
@@ -173,6 +240,13 @@ impl Transform {
     }
 
     /// Returns true if all seven numbers are finite.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// assert!(Transform::IDENTITY.is_finite());
+    /// assert!(!Transform::from_translation([f64::NAN, 0.0, 0.0]).is_finite());
+    /// ```
     pub fn is_finite(&self) -> bool {
         self.rotation.iter().chain(&self.translation_m).all(|value| value.is_finite())
     }

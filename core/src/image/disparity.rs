@@ -46,6 +46,12 @@ impl DisparityQ8 {
     const FILLED: u16 = 1;
 
     /// A disparity of so many 1/256 px.
+    ///
+    /// ```
+    /// use dynvox_core::image::{DISPARITY_ONE_PX, DisparityQ8};
+    ///
+    /// assert_eq!(DisparityQ8::new(3 * DISPARITY_ONE_PX).px(), 3.0);
+    /// ```
     pub const fn new(units: u16) -> Self {
         Self(units)
     }
@@ -56,16 +62,36 @@ impl DisparityQ8 {
     }
 
     /// The disparity, px; 0 where none is known.
+    ///
+    /// ```
+    /// use dynvox_core::image::DisparityQ8;
+    ///
+    /// assert_eq!(DisparityQ8::new(640).px(), 2.5);
+    /// assert_eq!(DisparityQ8::NONE.px(), 0.0);
+    /// ```
     pub fn px(self) -> f32 {
         f32::from(self.0) / f32::from(DISPARITY_ONE_PX)
     }
 
     /// Returns true if there is a disparity.
+    ///
+    /// ```
+    /// use dynvox_core::image::DisparityQ8;
+    ///
+    /// assert!(DisparityQ8::new(512).is_known() && !DisparityQ8::NONE.is_known());
+    /// ```
     pub const fn is_known(self) -> bool {
         self.0 != 0
     }
 
     /// Returns true if the core's own matcher filled this one in between measured ones.
+    ///
+    /// ```
+    /// use dynvox_core::image::DisparityQ8;
+    ///
+    /// assert!(DisparityQ8::new(513).is_filled(), "the lowest bit is the mark");
+    /// assert!(!DisparityQ8::new(512).is_filled());
+    /// ```
     pub const fn is_filled(self) -> bool {
         self.0 & Self::FILLED != 0
     }

@@ -86,6 +86,14 @@ impl<'a, T> View<'a, T> {
     }
 
     /// Row `v`; empty beyond the image.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let image = View::new(&[1, 2, 3, 4, 5, 6], 3, 2).unwrap();
+    /// assert_eq!(image.row(1), [4, 5, 6]);
+    /// assert!(image.row(2).is_empty(), "below the image");
+    /// ```
     pub fn row(&self, v: usize) -> &'a [T] {
         if v >= self.height {
             return &[];
@@ -94,6 +102,13 @@ impl<'a, T> View<'a, T> {
     }
 
     /// The pixels row by row, of an image without padding; empty for one with.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let image = View::new(&[1u8, 2, 3, 4], 2, 2).unwrap();
+    /// assert_eq!(image.pixels().iter().map(|&pixel| u32::from(pixel)).sum::<u32>(), 10);
+    /// ```
     pub fn pixels(&self) -> &'a [T] {
         if self.stride == self.width { clipped(self.data, ..self.width * self.height) } else { &[] }
     }
@@ -104,6 +119,13 @@ impl<'a, T> View<'a, T> {
     }
 
     /// All rows, top to bottom.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let image = View::new(&[1, 2, 3, 4, 5, 6], 3, 2).unwrap();
+    /// assert_eq!(image.rows().map(|row| row[0]).collect::<Vec<_>>(), [1, 4]);
+    /// ```
     pub fn rows(&self) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let this = (self.data, self.width, self.stride);
         (0..self.height).map(move |v| clipped(this.0, v * this.2..v * this.2 + this.1))
@@ -123,6 +145,13 @@ impl<'a, W> View<'a, W> {
 
 impl<'a, T: Copy> View<'a, T> {
     /// Pixel at column `u`, row `v`; `None` beyond the image.
+    ///
+    /// ```
+    /// use dynvox_core::image::View;
+    ///
+    /// let image = View::new(&[1, 2, 3, 4, 5, 6], 3, 2).unwrap();
+    /// assert_eq!((image.get(2, 1), image.get(3, 1)), (Some(6), None));
+    /// ```
     pub fn get(&self, u: usize, v: usize) -> Option<T> {
         self.row(v).get(u).copied()
     }
@@ -172,6 +201,15 @@ impl<'a, T> ViewMut<'a, T> {
     }
 
     /// Returns a read-only view of the image.
+    ///
+    /// ```
+    /// use dynvox_core::image::ViewMut;
+    ///
+    /// let mut data = [0; 6];
+    /// let mut image = ViewMut::new(&mut data, 3, 2).unwrap();
+    /// image.pixels_mut().fill(7);
+    /// assert_eq!(image.as_view().get(0, 1), Some(7));
+    /// ```
     pub fn as_view(&self) -> View<'_, T> {
         View { data: self.data, width: self.width, height: self.height, stride: self.width }
     }

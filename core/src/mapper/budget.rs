@@ -42,6 +42,15 @@ const CROPS_SHARE: usize = 16;
 const VOXEL_SIZE_M: f32 = 0.05;
 
 /// Wishes for a budget besides bytes and image size. The default leaves all to the rules.
+///
+/// ```
+/// use dynvox_core::{BudgetOptions, Capacity};
+///
+/// let grey = BudgetOptions { colour: Some(false), objects: Some(0), ..Default::default() };
+/// let capacity = Capacity::for_budget(32 << 20, 640, 480, &grey)?;
+/// assert!(!capacity.colour && capacity.objects == 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BudgetOptions {
     /// True if voxels have colour; if absent, they have it where 20,000 blocks with colour fit.
@@ -57,6 +66,17 @@ pub struct BudgetOptions {
 }
 
 /// Reason why there is no capacity for a budget.
+///
+/// ```
+/// use dynvox_core::{BudgetError, BudgetOptions, Capacity};
+///
+/// let options = BudgetOptions::default();
+/// let Err(BudgetError::TooSmall { least }) = Capacity::for_budget(1_000, 640, 480, &options)
+/// else {
+///     panic!("a kilobyte is not enough");
+/// };
+/// assert!(Capacity::for_budget(least, 640, 480, &options).is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -99,6 +119,13 @@ impl fmt::Display for BudgetError {
 impl core::error::Error for BudgetError {}
 
 /// A bound that cannot be.
+///
+/// ```
+/// use dynvox_core::Capacity;
+///
+/// let problem = Capacity { blocks: 0, ..Capacity::TINY }.validate().unwrap_err();
+/// assert_eq!((problem.bound, problem.rule), ("blocks", "must be above 0"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CapacityProblem {

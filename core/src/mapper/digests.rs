@@ -13,6 +13,14 @@ use crate::{digest::Digest, objects::MAX_OBJECTS};
 use core::fmt;
 
 /// Outcome with a digest of its own, in the order data flows.
+///
+/// ```
+/// use dynvox_core::Digested;
+///
+/// assert_eq!(Digested::StaticMap.name(), "static_map");
+/// assert_eq!(Digested::Object(7).to_string(), "object 7");
+/// assert!(Digested::Input < Digested::Stereo, "in the order in which data flow");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Digested {
@@ -69,6 +77,14 @@ pub struct ObjectDigest {
 }
 
 /// The digests of all objects that have a volume, by id.
+///
+/// ```
+/// use dynvox_core::{ObjectDigest, ObjectDigests};
+///
+/// let one = ObjectDigest { id: 3, digest: 99 };
+/// let digests = ObjectDigests::from_objects([one].into_iter());
+/// assert_eq!(digests.iter().collect::<Vec<_>>(), [&one]);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -135,6 +151,13 @@ impl StageDigests {
     }
 
     /// One for all that came out of frame `frame`; the input is not in it.
+    ///
+    /// ```
+    /// use dynvox_core::StageDigests;
+    ///
+    /// let digests = StageDigests::default();
+    /// assert_ne!(digests.whole(0), digests.whole(1), "the frame's number counts");
+    /// ```
     pub fn whole(&self, frame: u32) -> u64 {
         let mut digest = Digest::default();
         digest.u64(u64::from(frame));

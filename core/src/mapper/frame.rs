@@ -63,6 +63,16 @@ impl<'a> StereoFrame<'a> {
 
     /// Digest of the images, row by row, of given disparities, pose and time, and of the detections
     /// in any order.
+    ///
+    /// ```
+    /// use dynvox_core::{StereoFrame, image::View};
+    ///
+    /// let (one, other) = ([90; 64 * 32], [91; 64 * 32]);
+    /// let [one, other] = [&one, &other].map(|image| View::new(&image[..], 64, 32).unwrap());
+    /// let frame = StereoFrame::pair(one, one);
+    /// assert_ne!(frame.digest(), StereoFrame::pair(one, other).digest());
+    /// assert_ne!(frame.digest(), StereoFrame { time_ns: Some(1), ..frame }.digest());
+    /// ```
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
         self.left.rows().chain(self.right.rows()).for_each(|row| digest.bytes(row));

@@ -89,6 +89,36 @@ impl<'s> Mapper<'s> {
     }
 
     /// The planner's window, as the last [`Mapper::update_planning_maps`] left it.
+    ///
+    /// ```
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// # for _ in 0..3 {
+    /// #     mapper.step(&frame, &Serial)?;
+    /// # }
+    /// mapper.update_planning_maps(0.0);
+    /// let planning = mapper.planning();
+    /// let camera = planning.grid().of_world([0.0; 3]);
+    /// let cell = planning.grid().cell_at(camera).expect("within the grid");
+    /// assert!((0..3).all(|axis| cell[axis] >= planning.origin()[axis]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn planning(&self) -> &Planning<'s> {
         &self.planning
     }

@@ -49,6 +49,34 @@ impl<'s> Mapper<'s> {
     /// shows the nearest surface (the compositing of Section III-E). [`Raycaster::layer`] is 0 for
     /// the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and one
     /// more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
+    ///
+    /// ```
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// # for _ in 0..3 {
+    /// #     mapper.step(&frame, &Serial)?;
+    /// # }
+    /// let picture = mapper.raycast_composed(&Transform::IDENTITY, &Serial)?;
+    /// let layers = picture.layer().expect("drawn just now");
+    /// assert!(layers.pixels().iter().all(|&layer| layer == 0), "no object, only the map");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn raycast_composed<E: Executor>(
         &mut self,
         view: impl Into<RaycastView>,
@@ -74,6 +102,34 @@ impl<'s> Mapper<'s> {
     }
 
     /// Looks at nothing but the object of a track, where it is now.
+    ///
+    /// ```
+    /// use dynvox_core::view::RaycastError;
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// # for _ in 0..3 {
+    /// #     mapper.step(&frame, &Serial)?;
+    /// # }
+    /// let picture = mapper.raycast_object(1, &Transform::IDENTITY, &Serial);
+    /// assert!(matches!(picture, Err(RaycastError::Object)), "track 1 is not reconstructed");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn raycast_object<E: Executor>(
         &mut self,
         track: u32,

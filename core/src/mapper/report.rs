@@ -36,6 +36,13 @@ pub enum Severity {
 
 impl Severity {
     /// Name in tables and files.
+    ///
+    /// ```
+    /// use dynvox_core::Severity;
+    ///
+    /// assert!(Severity::Info < Severity::MapAffected);
+    /// assert_eq!(Severity::MapAffected.name(), "map affected");
+    /// ```
     pub const fn name(self) -> &'static str {
         match self {
             Self::Info => "info",
@@ -46,6 +53,31 @@ impl Severity {
 }
 
 /// Source of the camera's pose.
+///
+/// ```
+/// use dynvox_core::PoseOrigin;
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// assert_eq!(mapper.step(&frame, &Serial)?.pose, PoseOrigin::First);
+/// assert_eq!(mapper.step(&frame, &Serial)?.pose, PoseOrigin::Given);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -65,6 +97,30 @@ pub enum PoseOrigin {
 }
 
 /// The state of a block pool after a step.
+///
+/// ```
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// let blocks = mapper.step(&frame, &Serial)?.blocks;
+/// assert!(0 < blocks.used && blocks.used <= blocks.peak && blocks.peak <= blocks.capacity);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -133,6 +189,31 @@ pub struct Report {
 impl Report {
     /// The worst event of this step. The map is affected where anything that belongs in a map was
     /// refused or lost: blocks of any map, detections, tracks, objects, masks and crops.
+    ///
+    /// ```
+    /// use dynvox_core::Severity;
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// let report = mapper.step(&frame, &Serial)?;
+    /// assert_eq!(report.severity(), Severity::Info);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn severity(&self) -> Severity {
         // Anything lost for the map counts, however little.
         let allocation = &self.allocate;

@@ -17,6 +17,16 @@ use crate::{
 use core::fmt;
 
 /// Reason why a setting cannot be set. Nothing has changed.
+///
+/// ```
+/// use dynvox_core::{Config, SetError, geometry::StereoRig};
+///
+/// let rig =
+///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut config = Config::for_rig(rig);
+/// assert_eq!(config.set("volume.voxel", "0.1"), Err(SetError::Key));
+/// assert_eq!(config.set("volume.voxel_size_m", "small"), Err(SetError::Value));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -7,6 +7,16 @@ use crate::settings::{
 };
 
 /// Source of the camera's motion, unless a frame brings its pose.
+///
+/// ```
+/// use dynvox_core::{Config, MotionSource, geometry::StereoRig};
+///
+/// let rig =
+///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut config = Config::for_rig(rig);
+/// assert_eq!(config.set("mapper.egomotion", "icp"), Ok(()));
+/// assert_eq!(config.mapper.egomotion, MotionSource::Icp);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

@@ -35,6 +35,23 @@ pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 pub const VERSION: u32 = 5;
 
 /// Reason that a mapper cannot be restored. There is no mapper then; the slab may be used again.
+///
+/// ```
+/// use dynvox_core::{
+///     Capacity, Config, Mapper, RestoreError, geometry::StereoRig, memory::SLAB_ALIGN,
+/// };
+///
+/// let rig =
+///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+/// let mut zeros = |bytes: &mut [u8]| {
+///     bytes.fill(0);
+///     Ok::<(), ()>(())
+/// };
+/// let restored =
+///     Mapper::restore(&Capacity::TINY, &Config::for_rig(rig), &mut slab, &mut zeros);
+/// assert!(matches!(restored, Err(RestoreError::Foreign)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -128,6 +145,44 @@ impl<'s> Mapper<'s> {
     ///
     /// # Errors
     /// See [`RestoreError`]. There is no mapper then: nothing half restored can be used.
+    ///
+    /// ```
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// # for _ in 0..3 {
+    /// #     mapper.step(&frame, &Serial)?;
+    /// # }
+    /// let mut bytes = Vec::new();
+    /// mapper.save(&mut |piece: &[u8]| {
+    ///     bytes.extend_from_slice(piece);
+    ///     Ok::<(), std::io::Error>(())
+    /// })?;
+    /// let mut second_slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// let mut file = &bytes[..];
+    /// let mut restored = Mapper::restore(
+    ///     &capacity, &Config::for_rig(rig), &mut second_slab,
+    ///     &mut |piece: &mut [u8]| std::io::Read::read_exact(&mut file, piece),
+    /// )?;
+    /// let next = [mapper.step(&frame, &Serial)?, restored.step(&frame, &Serial)?];
+    /// assert_eq!(next[0].digest, next[1].digest, "the same bits from here on");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn restore<E>(
         capacity: &Capacity,
         config: &Config,

@@ -41,6 +41,30 @@ struct Outcome {
 impl Mapper<'_> {
     /// Takes one frame: depth, motion, map. Never allocates, never panics; what could not be done
     /// is counted in the report. Blocks that must leave a full pool are lost, and counted.
+    ///
+    /// ```
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// let report = mapper.step(&frame, &Serial)?;
+    /// assert!(report.fused && report.blocks.used > 0 && report.internal_faults == 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn step<E: Executor>(
         &mut self,
         frame: &StereoFrame<'_>,
@@ -51,6 +75,32 @@ impl Mapper<'_> {
 
     /// Steps like [`Mapper::step`], with a store for blocks that are evicted and loaded again when
     /// they are visible, and a sink for objects that retire.
+    ///
+    /// ```
+    /// use dynvox_core::{objects::NoSink, volume::NoStore};
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// // A store and a sink of the caller's would take evicted blocks and retired objects.
+    /// let report = mapper.step_with(&frame, &Serial, &mut NoStore, &mut NoSink)?;
+    /// assert_eq!(report.allocate.eviction.stored, 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     // Never inlined, so that a step's stack can be told from its caller's.
     #[inline(never)]
     pub fn step_with<E: Executor, S: BlockStore, O: ObjectSink>(

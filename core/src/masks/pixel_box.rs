@@ -36,16 +36,37 @@ impl PixelBox {
     }
 
     /// Pixels in the box.
+    ///
+    /// ```
+    /// use dynvox_core::masks::PixelBox;
+    ///
+    /// assert_eq!(PixelBox { left: 10, top: 5, width: 4, height: 3 }.area(), 12);
+    /// ```
     pub fn area(&self) -> i64 {
         i64::from(self.width.max(0)) * i64::from(self.height.max(0))
     }
 
     /// Returns true if the box contains a pixel.
+    ///
+    /// ```
+    /// use dynvox_core::masks::PixelBox;
+    ///
+    /// let pixels = PixelBox { left: 10, top: 5, width: 4, height: 3 };
+    /// assert!(pixels.contains(13, 7) && !pixels.contains(14, 7));
+    /// ```
     pub fn contains(&self, u: i32, v: i32) -> bool {
         u >= self.left && v >= self.top && u - self.left < self.width && v - self.top < self.height
     }
 
     /// Returns the part that both boxes cover; of width or height 0 if they do not meet.
+    ///
+    /// ```
+    /// use dynvox_core::masks::PixelBox;
+    ///
+    /// let one = PixelBox { left: 0, top: 0, width: 4, height: 4 };
+    /// let other = PixelBox { left: 2, top: 3, width: 4, height: 4 };
+    /// assert_eq!(one.intersection(&other).area(), 2);
+    /// ```
     pub fn intersection(&self, other: &Self) -> Self {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
         let right = (self.left + self.width).min(other.left + other.width);
@@ -54,11 +75,26 @@ impl PixelBox {
     }
 
     /// Intersection over union.
+    ///
+    /// ```
+    /// use dynvox_core::masks::PixelBox;
+    ///
+    /// let pixels = PixelBox { left: 0, top: 0, width: 4, height: 4 };
+    /// assert_eq!(pixels.overlap(&pixels), 1.0);
+    /// assert_eq!(pixels.overlap(&pixels.moved([4, 0])), 0.0);
+    /// ```
     pub fn overlap(&self, other: &Self) -> f32 {
         share(self.intersection(other).area(), self.area(), other.area())
     }
 
     /// The box moved.
+    ///
+    /// ```
+    /// use dynvox_core::masks::PixelBox;
+    ///
+    /// let moved = PixelBox { left: 1, top: 2, width: 4, height: 4 }.moved([10, -2]);
+    /// assert_eq!([moved.left, moved.top], [11, 0]);
+    /// ```
     pub fn moved(&self, [u, v]: [i32; 2]) -> Self {
         Self { left: self.left + u, top: self.top + v, ..*self }
     }

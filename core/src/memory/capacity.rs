@@ -163,6 +163,13 @@ impl Capacity {
     ];
 
     /// Pixels of the largest image.
+    ///
+    /// ```
+    /// use dynvox_core::Capacity;
+    ///
+    /// let capacity = Capacity { image_width: 640, image_height: 480, ..Capacity::SMALL };
+    /// assert_eq!(capacity.pixels(), 640 * 480);
+    /// ```
     pub const fn pixels(&self) -> usize {
         self.image_width * self.image_height
     }

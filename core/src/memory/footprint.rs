@@ -6,6 +6,14 @@ use heapless::Vec;
 const MAX_REGIONS: usize = 98;
 
 /// One named region of the slab. All figures in bytes.
+///
+/// ```
+/// use dynvox_core::Capacity;
+///
+/// let footprint = Capacity::TINY.footprint();
+/// let sum: usize = footprint.regions().iter().map(|region| region.bytes).sum();
+/// assert_eq!(sum, footprint.bytes());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// `stage.what`, as `volume.sdf`.

@@ -133,6 +133,14 @@ impl<'s> Carver<'s> {
     ///
     /// # Errors
     /// [`SlabError::TooSmall`]: fewer than `needed` bytes follow the first aligned one.
+    ///
+    /// ```
+    /// use dynvox_core::memory::{Carver, SlabError};
+    ///
+    /// let mut slab = [0; 16];
+    /// let too_short = Carver::new(&mut slab, 4_096);
+    /// assert!(matches!(too_short, Err(SlabError::TooSmall { missing }) if missing >= 4_080));
+    /// ```
     pub fn new(slab: &'s mut [u8], needed: usize) -> Result<Self, SlabError> {
         let skipped = slab.as_ptr().align_offset(SLAB_ALIGN);
         let len = slab.len();
@@ -145,11 +153,31 @@ impl<'s> Carver<'s> {
     }
 
     /// Records regions without memory: every region is empty.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, memory::Carver, stereo::StereoMatcher};
+    ///
+    /// // Counts the bytes of a stage without cutting any.
+    /// let mut carver = Carver::without_slab();
+    /// StereoMatcher::new_in(&Capacity::TINY, &mut carver);
+    /// assert_eq!(carver.footprint().bytes(), StereoMatcher::bytes(&Capacity::TINY));
+    /// ```
     pub fn without_slab() -> Self {
         Self { rest: None, footprint: Footprint::default(), name: None, failure: None }
     }
 
     /// Allocates `count` zeroed items of `T` and records them under `name`.
+    ///
+    /// ```
+    /// use dynvox_core::memory::{Carver, SLAB_ALIGN, region_bytes};
+    ///
+    /// let bytes = region_bytes::<u32>(100);
+    /// let mut slab = vec![1; bytes + SLAB_ALIGN];
+    /// let mut carver = Carver::new(&mut slab, bytes)?;
+    /// assert_eq!(carver.alloc::<u32>("example.numbers", 100), [0; 100], "zeroed");
+    /// carver.check()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn alloc<T: Pod>(&mut self, name: &'static str, count: usize) -> &'s mut [T] {
         let items = self.alloc_as_found(name, count);
         items.fill(T::zeroed());
@@ -232,6 +260,16 @@ impl<'s> Carver<'s> {
     ///
     /// # Errors
     /// The first failure.
+    ///
+    /// ```
+    /// use dynvox_core::memory::{Carver, SLAB_ALIGN};
+    ///
+    /// let mut slab = vec![0; 64 + SLAB_ALIGN];
+    /// let mut carver = Carver::new(&mut slab, 64)?;
+    /// assert!(carver.alloc::<u8>("example.bytes", 4_096).is_empty(), "no space");
+    /// assert!(carver.check().is_err(), "and noticed");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn check(&self) -> Result<(), SlabError> {
         self.failure.map_or(Ok(()), Err)
     }

@@ -14,6 +14,14 @@ const MAX_WEIGHT: u8 = 200;
 
 /// The objects' volumes. [`ObjectsConfig::SETTINGS`] has the ranges, and the original's values
 /// where they differ.
+///
+/// ```
+/// use dynvox_core::{Problems, objects::ObjectsConfig};
+///
+/// let mut problems = Problems::new();
+/// ObjectsConfig { extent_m: -1.0, ..ObjectsConfig::default() }.validate(&mut problems);
+/// assert_eq!(problems[0].key, "objects.extent_m");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

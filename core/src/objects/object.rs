@@ -83,6 +83,19 @@ pub struct RetiredObject<'v, 's> {
 }
 
 /// Takes objects that retire.
+///
+/// ```
+/// use dynvox_core::objects::{ObjectSink, RetiredObject};
+///
+/// /// Counts the objects that left.
+/// struct Count(u32);
+/// impl ObjectSink for Count {
+///     fn retire(&mut self, object: RetiredObject<'_, '_>) {
+///         assert!(object.summary.first_frame <= object.summary.last_frame);
+///         self.0 += 1;
+///     }
+/// }
+/// ```
 pub trait ObjectSink {
     /// Takes one; its volume is empty afterwards.
     fn retire(&mut self, object: RetiredObject<'_, '_>);

@@ -41,6 +41,12 @@ impl Bands {
 }
 
 /// Does the work of all bands. The first two are done together, and the last two.
+///
+/// ```
+/// use dynvox_core::{Serial, parallel::each};
+///
+/// assert_eq!(each(&Serial, [1, 2, 3, 4], |job| 10 * job), [10, 20, 30, 40]);
+/// ```
 pub fn each<E: Executor, J: Send, R: Send>(
     executor: &E,
     [a, b, c, d]: [J; BANDS],

@@ -66,6 +66,12 @@ pub trait Executor: Sync {
 }
 
 /// Runs jobs one after the other, on the caller's thread.
+///
+/// ```
+/// use dynvox_core::{Executor, Serial};
+///
+/// assert_eq!(Serial.join(|| "first", || "second"), ("first", "second"));
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Serial;
 

@@ -60,6 +60,13 @@ impl Vectors {
     pub const BASELINE: Self = Self::PLAIN;
 
     /// The most this machine has: asks the processor, on x86-64.
+    ///
+    /// ```
+    /// use dynvox_core::parallel::Vectors;
+    ///
+    /// // All kinds give the same bits; the caller chooses once, at start.
+    /// assert!(Vectors::available().any(|vectors| vectors == Vectors::detect()));
+    /// ```
     pub fn detect() -> Self {
         #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
         if x86::has_avx2() {

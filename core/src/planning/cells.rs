@@ -54,6 +54,36 @@ const fn shortened(side: usize) -> usize {
 }
 
 /// State of a cell of the window.
+///
+/// ```
+/// use dynvox_core::planning::CellState;
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// # for _ in 0..3 {
+/// #     mapper.step(&frame, &Serial)?;
+/// # }
+/// mapper.update_planning_maps(0.0);
+/// let planning = mapper.planning();
+/// let [x, y, z] = planning.origin();
+/// assert_eq!(planning.cell([x - 1, y, z]), (CellState::Unknown, None), "outside the window");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CellState {

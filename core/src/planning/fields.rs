@@ -24,6 +24,39 @@ pub struct Limits {
 }
 
 /// The distance from a cell's centre to the nearest centre of a cell of the other kind.
+///
+/// ```
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// # for _ in 0..3 {
+/// #     mapper.step(&frame, &Serial)?;
+/// # }
+/// mapper.update_planning_maps(0.0);
+/// let planning = mapper.planning();
+/// let [x, y, z] = planning.origin();
+/// let cells = (0..40).flat_map(|row| (0..40).map(move |column| [x + column, y + row, z]));
+/// let cell_m = planning.grid().cell_m() as f32;
+/// for distance in cells.filter_map(|cell| planning.slice_distance(cell)) {
+///     assert!(distance.squared_cells > 0 && distance.distance_m.abs() >= 0.5 * cell_m);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Distance {
@@ -113,6 +146,29 @@ impl Planning<'_> {
     }
 
     /// Cells along each side: to the right, ahead, upwards.
+    ///
+    /// ```
+    /// # use dynvox_core::{
+    /// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+    /// #     image::View, memory::SLAB_ALIGN,
+    /// # };
+    /// # let rig =
+    /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// # let capacity = Capacity {
+    /// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+    /// # };
+    /// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+    /// # let view = View::new(&grey, 320, 96).unwrap();
+    /// # let frame = StereoFrame {
+    /// #     disparity_q8: View::new(&wall, 320, 96),
+    /// #     t_world_camera: Some(Transform::IDENTITY),
+    /// #     ..StereoFrame::pair(view, view)
+    /// # };
+    /// assert_eq!(mapper.planning().size(), [40, 40, 10]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn size(&self) -> [usize; 3] {
         self.cells.size
     }

@@ -15,6 +15,16 @@ const TURN_ONE: f64 = (1 << TURN_BITS) as f64;
 pub type Cell = [i32; 3];
 
 /// From the world's axes to the grid's.
+///
+/// ```
+/// use dynvox_core::planning::{Grid, PlanningConfig};
+///
+/// let grid = Grid::new(&PlanningConfig { cell_voxels: 4, ..Default::default() }, 0.05);
+/// assert!((grid.cell_m() - 0.2).abs() < 1e-6);
+/// // KITTI's axes: z ahead and y down become y ahead and z up.
+/// let [_, ahead, up] = grid.of_world([0.0, -1.0, 2.0]).map(|cells| cells * grid.cell_m());
+/// assert!((ahead - 2.0).abs() < 1e-3 && (up - 1.0).abs() < 1e-3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Rows: the grid's axes in the world, times 2^14.
@@ -68,6 +78,14 @@ impl Grid {
     }
 
     /// A point of the grid, in cells, in the world, m.
+    ///
+    /// ```
+    /// use dynvox_core::planning::{Grid, PlanningConfig};
+    ///
+    /// let grid = Grid::new(&PlanningConfig::default(), 0.05);
+    /// let [x, y, z] = grid.to_world(grid.of_world([1.0, 2.0, 3.0]));
+    /// assert!((x - 1.0).abs() < 1e-3 && (y - 2.0).abs() < 1e-3 && (z - 3.0).abs() < 1e-3);
+    /// ```
     pub fn to_world(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let [right, ahead, up] = self.turn;
         let along = |axis: usize| {
@@ -91,6 +109,14 @@ impl Grid {
     }
 
     /// The cell that holds a point given in cells; `None` beyond 2^24 cells.
+    ///
+    /// ```
+    /// use dynvox_core::planning::{Grid, PlanningConfig};
+    ///
+    /// let grid = Grid::new(&PlanningConfig::default(), 0.05);
+    /// assert_eq!(grid.cell_at([1.5, -0.5, 0.0]), Some([1, -1, 0]));
+    /// assert_eq!(grid.cell_at([f64::NAN; 3]), None);
+    /// ```
     pub fn cell_at(&self, point: [f64; 3]) -> Option<Cell> {
         let limit = f64::from(1 << 24);
         let within = point.iter().all(|c| c.is_finite() && (-limit..limit).contains(c));

@@ -36,6 +36,13 @@ const FIT_OFFSETS: [i32; 5] = [-4, -2, 0, 2, 4];
 const DRIFT: f32 = 0.1;
 
 /// A column of the height map. Heights are along up, from the world's origin.
+///
+/// ```
+/// use dynvox_core::planning::Column;
+///
+/// let unknown = Column::default();
+/// assert_eq!((unknown.ground_m(), unknown.slope()), (None, None));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Column {

@@ -24,6 +24,37 @@ pub enum PathEnd {
 }
 
 /// Length by which a way is free.
+///
+/// ```
+/// use dynvox_core::planning::PathEnd;
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 60, planning_length: 60, planning_height: 20, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [25 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// # for _ in 0..3 {
+/// #     mapper.step(&frame, &Serial)?;
+/// # }
+/// mapper.update_planning_maps(0.0);
+/// // From 1 m ahead of the camera on; a wall stands at 4 m.
+/// let path = mapper.planning().ray(mapper.static_map(), [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], 9.0);
+/// assert_eq!(path.end, PathEnd::Surface);
+/// assert!((path.free_m - 3.0).abs() < 0.2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FreePath {
@@ -34,6 +65,38 @@ pub struct FreePath {
 }
 
 /// A robot that moves along a path: an upright cylinder.
+///
+/// ```
+/// use dynvox_core::planning::{PathEnd, RobotCylinder};
+/// # use dynvox_core::{
+/// #     Capacity, Config, Mapper, Serial, StereoFrame, geometry::{StereoRig, Transform},
+/// #     image::View, memory::SLAB_ALIGN,
+/// # };
+/// # let rig =
+/// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// # let capacity = Capacity {
+/// #     planning_width: 40, planning_length: 40, planning_height: 10, ..Capacity::TINY
+/// # };
+/// # let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+/// # let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+/// # let (grey, wall) = ([90; 320 * 96], [10 << 8; 320 * 96]);
+/// # let view = View::new(&grey, 320, 96).unwrap();
+/// # let frame = StereoFrame {
+/// #     disparity_q8: View::new(&wall, 320, 96),
+/// #     t_world_camera: Some(Transform::IDENTITY),
+/// #     ..StereoFrame::pair(view, view)
+/// # };
+/// # for _ in 0..3 {
+/// #     mapper.step(&frame, &Serial)?;
+/// # }
+/// mapper.update_planning_maps(0.0);
+/// let robot = RobotCylinder { radius_m: 0.3, low_m: -0.2, high_m: 0.2, unknown_ends: false };
+/// let path_m = [[0.0, 0.0, 2.0], [0.0, 0.0, 12.0]];
+/// let path = mapper.planning().sweep(mapper.static_map(), &path_m, &robot);
+/// assert_eq!(path.end, PathEnd::Surface);
+/// assert!(path.free_m < 8.0, "the rim touches before the middle");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RobotCylinder {

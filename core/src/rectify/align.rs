@@ -52,6 +52,25 @@ pub struct Alignment {
 }
 
 /// Reason why a raw rig cannot be rectified.
+///
+/// ```
+/// use dynvox_core::rectify::{
+///     Lens, LensModel, RawCamera, RawRig, Rectification, RectifyProblem, Sizing,
+/// };
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let lens = Lens::new([450.0; 2], [320.0, 240.0], LensModel::IDEAL)?;
+/// let camera = RawCamera { lens, width: 640, height: 480 };
+/// let rig = RawRig {
+///     left: camera,
+///     right: camera,
+///     r_right_left: Matrix3::identity(),
+///     t_right_left_m: Vector3::new(0.1, 0.0, 0.0), // the right camera on the left
+/// };
+/// let sizing = Sizing::Automatic { max_width: 640, max_height: 480 };
+/// assert_eq!(Rectification::new(&rig, sizing), Err(RectifyProblem::Exchanged));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -109,6 +128,22 @@ pub(super) fn rotation(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, RectifyPro
 
 impl RawRig {
     /// Angle between the two cameras, rad.
+    ///
+    /// ```
+    /// use dynvox_core::rectify::{Lens, LensModel, RawCamera, RawRig};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let lens = Lens::new([450.0; 2], [320.0, 240.0], LensModel::IDEAL)?;
+    /// let camera = RawCamera { lens, width: 640, height: 480 };
+    /// let rig = RawRig {
+    ///     left: camera,
+    ///     right: camera,
+    ///     r_right_left: Matrix3::identity(),
+    ///     t_right_left_m: Vector3::new(-0.1, 0.0, 0.0),
+    /// };
+    /// assert_eq!(rig.angle_rad(), 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn angle_rad(&self) -> f64 {
         let [sine, cosine] = sine_and_cosine(&self.r_right_left);
         libm::atan2(sine, cosine)

@@ -48,6 +48,14 @@ impl Lens {
     }
 
     /// Focal lengths along u and v, px.
+    ///
+    /// ```
+    /// use dynvox_core::rectify::{Lens, LensModel};
+    ///
+    /// let lens = Lens::new([450.0, 455.0], [320.0, 240.0], LensModel::IDEAL)?;
+    /// assert_eq!((lens.focal_px(), lens.center_px()), ([450.0, 455.0], [320.0, 240.0]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn focal_px(&self) -> [f64; 2] {
         self.focal_px
     }
@@ -64,6 +72,15 @@ impl Lens {
 
     /// The raw pixel a ray (any length but 0) meets, px, whether or not it lies in the image.
     /// `None` outside the lens's field of view.
+    ///
+    /// ```
+    /// use dynvox_core::rectify::{Lens, LensModel};
+    ///
+    /// let lens = Lens::new([450.0; 2], [320.0, 240.0], LensModel::IDEAL)?;
+    /// assert_eq!(lens.project([0.0, 0.0, 5.0]), Some([320.0, 240.0]));
+    /// assert_eq!(lens.project([0.0, 0.0, -5.0]), None, "behind the camera");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn project(&self, ray: [f64; 3]) -> Option<[f64; 2]> {
         let [x, y] = self.model.distort(self.limit, ray)?;
         let pixel =

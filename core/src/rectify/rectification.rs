@@ -13,6 +13,24 @@ const WIDEST_TANGENT: f64 = 1.732_050_807_568_877_2;
 const SIDE_POINTS: u32 = 256;
 
 /// Size of the rectified images.
+///
+/// ```
+/// use dynvox_core::rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, Sizing};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let lens = Lens::new([450.0; 2], [320.0, 240.0], LensModel::IDEAL)?;
+/// let camera = RawCamera { lens, width: 640, height: 480 };
+/// let rig = RawRig {
+///     left: camera,
+///     right: camera,
+///     r_right_left: Matrix3::identity(),
+///     t_right_left_m: Vector3::new(-0.1, 0.0, 0.0),
+/// };
+/// let sizing = Sizing::Given { width: 320, height: 240, focal_px: Some(225.0) };
+/// let (rectification, rectified) = Rectification::new(&rig, sizing)?;
+/// assert_eq!((rectification.width, rectified.focal_px), (320, 225.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sizing {
     /// All that both cameras see of one rectangle, up to 120 degrees, at the scale of the raw

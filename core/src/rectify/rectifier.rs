@@ -16,6 +16,15 @@ use crate::{
 };
 
 /// Reason that a rectification does not fit a capacity.
+///
+/// ```
+/// use dynvox_core::{Capacity, rectify::RectifierError};
+///
+/// // TINY has no space for raw images.
+/// assert_eq!(Capacity::TINY.raw_width, 0);
+/// let sentence = RectifierError::RawTooLarge { width: 0, height: 0 }.to_string();
+/// assert!(sentence.contains("set its raw_width and raw_height"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

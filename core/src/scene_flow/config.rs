@@ -12,6 +12,15 @@ pub(crate) const MAX_FEATURES: usize = 20_000;
 
 /// Settings of the scene flow. Defaults are DynSLAM's, with sub-pixel refinement and no more
 /// features than motion gains by; [`SceneFlowConfig::SETTINGS`] has the ranges.
+///
+/// ```
+/// use dynvox_core::scene_flow::SceneFlowConfig;
+///
+/// let config = SceneFlowConfig { features_max: 2_000, ..SceneFlowConfig::default() };
+/// let mut problems = dynvox_core::Problems::new();
+/// config.validate(&mut problems);
+/// assert!(problems.is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

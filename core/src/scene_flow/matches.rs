@@ -5,6 +5,19 @@ use bytemuck::{Pod, Zeroable};
 /// One scene point seen four times. Positions are (u, v) in px from the centre of the top left
 /// pixel; of a refined match those of the middle of its patch, half a pixel above and to the left
 /// of the feature's pixel.
+///
+/// ```
+/// use dynvox_core::scene_flow::Match;
+///
+/// let m = Match {
+///     previous_left: [100.0, 50.0],
+///     previous_right: [90.0, 50.0],
+///     current_left: [104.0, 51.0],
+///     current_right: [92.0, 51.0],
+/// };
+/// // The disparity grew from 10 to 12 px: the point came nearer.
+/// assert!(m.current_left[0] - m.current_right[0] > m.previous_left[0] - m.previous_right[0]);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Match {

@@ -66,6 +66,14 @@ pub const CONSTANTS: &[(&str, &str)] = &[
 ];
 
 /// The value of a key that is a constant now; `None` for other keys.
+///
+/// ```
+/// use dynvox_core::settings::{CONSTANTS, constant};
+///
+/// let (key, value) = CONSTANTS[0];
+/// assert_eq!(constant(key), Some(value));
+/// assert_eq!(constant("volume.voxel_size_m"), None, "still a setting");
+/// ```
 pub fn constant(key: &str) -> Option<&'static str> {
     CONSTANTS.iter().find(|(name, _)| *name == key).map(|(_, value)| *value)
 }

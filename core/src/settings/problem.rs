@@ -68,6 +68,14 @@ pub type Problems = Vec<Problem, MAX_PROBLEMS>;
 
 /// Notes a problem unless `holds`. Beyond [`MAX_PROBLEMS`] the first ones are enough to refuse the
 /// configuration.
+///
+/// ```
+/// use dynvox_core::{Problems, settings::require};
+///
+/// let mut problems = Problems::new();
+/// require(&mut problems, 2 < 1, "example.count", "must be below 1");
+/// assert_eq!(problems[0].to_string(), "example.count must be below 1");
+/// ```
 pub fn require(problems: &mut Problems, holds: bool, key: &'static str, rule: &'static str) {
     if !holds {
         note(problems, Problem::new(key, rule));

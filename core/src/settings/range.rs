@@ -41,6 +41,13 @@ impl Range {
     pub const NOT_NEGATIVE: Self = Self::AtLeast(0.0);
 
     /// Tells whether a number lies in the range.
+    ///
+    /// ```
+    /// use dynvox_core::settings::Range;
+    ///
+    /// assert!(Range::SHARE.contains(1.0) && !Range::SHARE.contains(1.1));
+    /// assert!(!Range::Any.contains(f64::NAN), "no setting is NaN");
+    /// ```
     pub fn contains(self, number: f64) -> bool {
         let at_least = |low: f32| number >= f64::from(low);
         let above = |low: f32| number > f64::from(low);

@@ -76,6 +76,15 @@ impl Value<'_> {
     }
 
     /// Sets the value; `None`, and nothing has changed, where the text is none.
+    ///
+    /// ```
+    /// use dynvox_core::settings::Value;
+    ///
+    /// let mut count = 3;
+    /// assert_eq!(Value::U16(&mut count).set("many"), None);
+    /// assert_eq!(Value::U16(&mut count).set("12"), Some(()));
+    /// assert_eq!(count, 12);
+    /// ```
     pub fn set(&mut self, text: &str) -> Option<()> {
         match self {
             Self::Bool(value) => **value = text.parse().ok()?,

@@ -21,6 +21,13 @@ pub const MAX_PLANE_RADIUS: usize = 16;
 const MAX_GAP: f32 = 4096.0;
 
 /// Filling of a gap whose ends are two surfaces.
+///
+/// ```
+/// use dynvox_core::stereo::{GapEnds, StereoConfig};
+///
+/// assert_eq!(StereoConfig::robotics().gap_ends, GapEnds::Farther, "as published");
+/// assert_eq!(StereoConfig::default().gap_ends, GapEnds::Surface);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -115,6 +122,12 @@ impl StereoConfig {
     }
 
     /// DynSLAM's set: as [`StereoConfig::robotics`], but gaps up to 21 px are filled.
+    ///
+    /// ```
+    /// use dynvox_core::stereo::StereoConfig;
+    ///
+    /// assert!(StereoConfig::dynslam().gap_width > StereoConfig::robotics().gap_width);
+    /// ```
     pub const fn dynslam() -> Self {
         Self { gap_width: 21, ..Self::robotics() }
     }

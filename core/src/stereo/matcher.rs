@@ -99,6 +99,12 @@ const fn max_pixels(capacity: &Capacity) -> usize {
 
 impl<'s> StereoMatcher<'s> {
     /// Bytes of the slab.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, stereo::StereoMatcher};
+    ///
+    /// assert!(StereoMatcher::bytes(&Capacity::TINY) < Capacity::TINY.bytes());
+    /// ```
     pub const fn bytes(capacity: &Capacity) -> usize {
         let (pixels, points, cells) =
             (max_pixels(capacity), max_points(capacity), max_cells(capacity));

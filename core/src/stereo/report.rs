@@ -64,12 +64,27 @@ pub struct StereoReport {
 
 impl StereoReport {
     /// Share of pixels with a disparity.
+    ///
+    /// ```
+    /// use dynvox_core::stereo::StereoReport;
+    ///
+    /// let mut report = StereoReport::default();
+    /// (report.valid, report.pixels) = (30, 120);
+    /// assert_eq!(report.density(), 0.25);
+    /// ```
     pub fn density(&self) -> f32 {
         if self.pixels == 0 { 0.0 } else { self.valid as f32 / self.pixels as f32 }
     }
 }
 
 /// A step of the matcher, as a name for measurements.
+///
+/// ```
+/// use dynvox_core::stereo::StereoStep;
+///
+/// let names = StereoStep::ALL.map(StereoStep::name);
+/// assert_eq!((names[0], names[4]), ("gradients", "dense_matching"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum StereoStep {

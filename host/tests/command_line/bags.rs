@@ -150,6 +150,7 @@ fn a_recorded_street_has_the_folders_digests_and_broken_ones_a_sentence() {
         assert!(run.status.success(), "{path}: {}", output_text(&run));
         serde_json::from_slice::<serde_json::Value>(&run.stdout).unwrap()["digest"].clone()
     };
+    // The same digests from raw and compressed messages, with topics found and topics named.
     let folder = digest("street", "folder", &["--images", "grey"]);
     record(root, "raw.mcap", false);
     record(root, "compressed.mcap", true);
@@ -171,6 +172,7 @@ fn a_recorded_street_has_the_folders_digests_and_broken_ones_a_sentence() {
         "{text}"
     );
 
+    // Recordings that are cut off or of another format.
     let whole = fs::read(root.join("raw.mcap")).unwrap();
     fs::write(root.join("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
     fs::write(root.join("old.db3"), "SQLite").unwrap();
@@ -191,5 +193,6 @@ fn a_recorded_street_has_the_folders_digests_and_broken_ones_a_sentence() {
         let refusal = output_text(&run).replace(&format!("{}/", root.display()), "");
         assert!(refusal.contains(sentence), "{path}: {refusal}");
     }
+    // No refused run leaves a folder.
     assert_eq!(names(root), before);
 }

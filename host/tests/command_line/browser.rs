@@ -48,6 +48,7 @@ impl Visit<'_> {
     /// the console fails the test.
     pub fn report(&self) -> Value {
         let Window(width, height) = self.window;
+        // A profile of its own, so that no earlier visit matters.
         let profile = TempDir::new().unwrap();
         let url = format!("file://{}{}", self.page().display(), self.part);
         let mut command = Command::new(dynvox_needs::browser_program!());
@@ -69,6 +70,7 @@ impl Visit<'_> {
             Running(command.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap());
         let lines = BufReader::new(running.0.stderr.take().unwrap());
         let (sender, receiver) = mpsc::channel();
+        // A thread reads the console, so that waiting can end.
         std::thread::spawn(move || {
             for line in lines.lines().map_while(Result::ok).filter(|line| is_of_the_page(line)) {
                 // The test may have ended.

@@ -61,11 +61,13 @@ const LAG: [&str; 2] = ["--set", "volume.prune_lag=6"];
 fn the_least_bounds_hold_the_same_run() {
     let root = TempDir::new().unwrap();
     let root = root.path();
+    // First with bounds that are more than enough.
     let large = run(root, "large", &[&["--profile", "small"], &LAG[..]].concat());
     assert_eq!((refused(&large), &large["capacity"]["enough"]), (vec![], &true.into()), "{large}");
     let [least, slab] = [&large["capacity"]["least_bytes"], &large["slab_bytes"]]
         .map(|bytes| bytes.as_u64().unwrap());
     assert!(least < slab, "{least} of {slab}");
+    // Then with the least bounds that this run needed, from its own file.
     fs::copy(root.join("large/capacity.toml"), root.join("least.toml")).unwrap();
     let again = run(root, "least", &[&["--capacity", "least.toml"], &LAG[..]].concat());
     assert_eq!((refused(&again), again["slab_bytes"].as_u64()), (vec![], Some(least)));
@@ -80,6 +82,7 @@ fn the_least_bounds_hold_the_same_run() {
     let street = ["street.width=320", "street.height=96", "volume.voxel_size_m=0.2"]
         .map(|set| ["--set", set])
         .concat();
+    // The console says how much would have been enough.
     let console = dynvox(
         root,
         &[

@@ -23,6 +23,7 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
         assert!(text.contains(words), "{words} in {text}");
     }
     assert!(text.contains("no LiDAR scans") && text.contains("no masks"), "{text}");
+    // Paths within a data set lead to its root.
     for (path, words) in [
         ("rig/left", "is a part of the data set rig"),
         ("rig/left/000.png", "is a file"),
@@ -35,6 +36,7 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
             output_text(&printed)
         );
     }
+    // The same as JSON.
     let json = |path: &str| -> serde_json::Value {
         serde_json::from_slice(&dynvox(root.path(), &["inspect", path, "--json"]).stdout).unwrap()
     };
@@ -54,6 +56,7 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
         described["least_bytes"].as_u64().unwrap() > 1 << 20 && described["masks"] == "none",
         "{found}"
     );
+    // The folder of a run is recognised, too.
     fs::create_dir_all(root.path().join("run")).unwrap();
     fs::write(root.path().join("run/summary.json"), "{}").unwrap();
     assert_eq!(
@@ -66,6 +69,7 @@ fn inspect_reports_what_a_data_set_holds_and_how_to_map_it() {
             && printed.contains("dynvox evaluate trajectory run TRUTH"),
         "{printed}"
     );
+    // Without a calibration inspect still says what is there.
     fs::remove_file(root.path().join("rig/calib.txt")).unwrap();
     let printed = dynvox(root.path(), &["inspect", "rig"]);
     assert!(
@@ -142,6 +146,7 @@ fn files_are_evaluated_without_a_run() {
     let truth = |u: u32, _: u32| Luma([if u < 80 { 15 * 256u16 } else { 10 * 256 }]);
     image::ImageBuffer::from_fn(160, 64, truth).save(file_in("disp_noc_0")).unwrap();
     GrayImage::from_fn(160, 64, |u, _| Luma([u8::from(u < 80)])).save(file_in("obj_map")).unwrap();
+    // The background is right, the object wrong by its 5 px.
     let found = json(&["evaluate", "stereo", "set", "--json"]);
     let regions = &found["regions"];
     assert_eq!(
@@ -160,6 +165,7 @@ fn files_are_evaluated_without_a_run() {
         "{found}"
     );
     assert!(regions["occ"].is_null());
+    // The truth itself as an estimate has no error.
     let given =
         json(&["evaluate", "stereo", "set", "--disparity", "set/training/disp_noc_0", "--json"]);
     assert_eq!(
@@ -171,6 +177,7 @@ fn files_are_evaluated_without_a_run() {
         printed.contains("kitti-2015, 1 pairs") && printed.contains("dynvox evaluate stereo set"),
         "{printed}"
     );
+    // A folder that is no benchmark.
     let refused = dynvox(root.path(), &["evaluate", "stereo", "rig"]);
     assert!(
         !refused.status.success() && output_text(&refused).contains("is not a stereo benchmark"),
@@ -208,6 +215,7 @@ fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
         );
         assert!(done.status.success(), "{}", output_text(&done));
     };
+    // All frames, and four of them.
     run(&["--out", "all"]);
     run(&["--out", "some", "--start", "3", "--stride", "2", "--frames", "4"]);
     let evaluate = |folder: &str, truth: &str| {
@@ -225,6 +233,7 @@ fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
     let by_rows = ate_m(&evaluate("some", "all/trajectory_truth_kitti.txt"));
     assert!((by_rows - ate_m(&evaluate("some", "some/trajectory_truth_kitti.txt"))).abs() < 1e-6);
     assert!((by_rows - summary["egomotion"]["ate_m"].as_f64().unwrap()).abs() < 1e-4, "{by_rows}");
+    // A truth that ends too early names the frame it lacks.
     let text = fs::read_to_string(root.path().join("all/trajectory_truth_kitti.txt")).unwrap();
     fs::write(root.path().join("short.txt"), text.lines().take(8).collect::<Vec<_>>().join("\n"))
         .unwrap();

@@ -152,6 +152,7 @@ fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     let root = TempDir::new().unwrap();
     run(root.path(), 14);
     let (page, folder) = (document("docs/run_folder.md"), root.path().join("result"));
+    // Files first, then keys of the summary, then columns of each table.
     let mut written = Vec::new();
     files(&folder, "", &mut written);
     let table = names(section(&page, "# The run folder"));
@@ -175,6 +176,7 @@ fn every_file_key_and_column_of_a_run_folder_is_on_its_page() {
     );
     let summary: Value =
         serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    // A key may be described by the line of its group.
     let (mut found, documented) = (BTreeSet::new(), names(section(&page, "`summary.json`")));
     keys("", &summary, &mut found);
     let missing: Vec<_> = found.iter().filter(|key| !is_documented(key, &documented)).collect();
@@ -257,6 +259,7 @@ fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
 #[test]
 fn every_option_is_described_and_documents_use_options_that_are_there() {
     let root = TempDir::new().unwrap();
+    // Options as the program's own help lists them.
     let known: BTreeMap<&str, BTreeMap<String, String>> =
         COMMANDS.map(|command| (command, options(root.path(), command))).into();
     for (command, options) in &known {
@@ -275,6 +278,7 @@ fn every_option_is_described_and_documents_use_options_that_are_there() {
         "host/python/README.md",
     ];
     for page in pages {
+        // Every command in the documents, found by its first words.
         let text = document(page);
         for line in text.split(['`', '\n', '#', '|']) {
             let words: Vec<&str> =

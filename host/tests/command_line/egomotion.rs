@@ -64,6 +64,7 @@ fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
     );
     assert_eq!(motions, ["first", "tracked", "tracked", "tracked", "tracked"]);
     assert!(slow["ate_m"].as_f64().unwrap() < 0.05, "{slow}");
+    // Nine metres a second are too fast for a tracker of depth.
     let (fast, motions, printed, report) = run("9", &[]);
     assert_eq!(fast["status"], "tracking failure");
     assert_eq!(
@@ -78,6 +79,7 @@ fn the_depth_tracker_tracks_a_slow_camera_and_reports_tracking_failures() {
         printed.contains("tracking failure") && printed.contains("--egomotion stereo"),
         "{printed}"
     );
+    // The failure is in the page as well.
     assert!(report.contains("Tracking failure in"));
 }
 
@@ -97,6 +99,7 @@ fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let stereo = summary(run("stereo", &[]));
+    // Both formats of poses that a run writes can be given again.
     for file in ["trajectory_kitti.txt", "trajectory_tum.txt"] {
         let given = summary(run(file, &["--egomotion", &format!("file:stereo/{file}")]));
         assert_eq!(
@@ -112,6 +115,7 @@ fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
             poses.lines().take(3).collect::<Vec<_>>().join("\n"),
         )
         .unwrap();
+        // A file that ends too early is refused before the run begins.
         let refused = run("x", &["--egomotion", "file:short.txt"]);
         assert!(
             !refused.status.success()
@@ -121,6 +125,7 @@ fn poses_of_a_file_replace_egomotion_and_must_cover_the_frames() {
             output_text(&refused)
         );
     }
+    // Files and words that are no poses.
     fs::write(root.path().join("odd.txt"), "1 2 3\n").unwrap();
     assert!(
         output_text(&run("x", &["--egomotion", "file:odd.txt"])).contains("line 1 is not a pose")
@@ -166,6 +171,7 @@ fn every_kth_frame_alone_is_fused_and_the_map_is_not_affected() {
             .map(|row| (row[motion].to_owned(), row[visible] != "0.0"))
             .collect::<Vec<_>>()
     };
+    // The camera is tracked in every frame, the map fused in every second.
     let (all, second) = (run("1"), run("2"));
     assert!(all.iter().all(|(_, fused)| *fused));
     assert_eq!(

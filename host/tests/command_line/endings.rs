@@ -37,6 +37,7 @@ fn an_unreadable_frame_ends_the_run_with_all_that_was_mapped() {
     let root = TempDir::new().unwrap();
     rig(root.path(), 8);
     let args = ["run", "rig", "--profile", "tiny", "--quiet", "--out"];
+    // A whole run to compare with.
     assert!(dynvox(root.path(), &[&args[..], &["whole"]].concat()).status.success());
     truncate(root.path(), "right/005.png");
     let run = dynvox(root.path(), &[&args[..], &["part"]].concat());
@@ -48,6 +49,7 @@ fn an_unreadable_frame_ends_the_run_with_all_that_was_mapped() {
     );
     assert!(text.contains("What was mapped until then is in part"), "{text}");
     let part = root.path().join("part");
+    // An incomplete run has every file that a complete one has.
     assert_eq!(names(&part), names(&root.path().join("whole")), "every file is there");
     let of = summary(&part);
     assert_eq!(
@@ -61,10 +63,12 @@ fn an_unreadable_frame_ends_the_run_with_all_that_was_mapped() {
         "{of}"
     );
     assert_eq!(lines(&part.join("trajectory_kitti.txt")), 5);
+    // The frames before the damage are the same, bit for bit.
     assert_eq!(digests(&part, 5), digests(&root.path().join("whole"), 5));
     assert!(summary(&root.path().join("whole"))["incomplete"].is_null());
     assert!(fs::read_to_string(part.join("report.html")).unwrap().contains("Incomplete: "));
 
+    // With the option the frame is left out, and the run goes on.
     let run = dynvox(root.path(), &[&args[..], &["skipped", "--skip-bad-frames"]].concat());
     assert!(run.status.success(), "{}", output_text(&run));
     let of = summary(&root.path().join("skipped"));
@@ -154,18 +158,21 @@ fn a_stopped_run_with_snapshots_has_results_and_can_be_resumed() {
     assert!(text.contains("`dynvox run --resume result` resumes the run"), "{text}");
     let result = root.path().join("result");
     let frames = summary(&result)["frames"].as_u64().unwrap() as usize;
+    // All that is needed to resume, and the results so far.
     assert!(
         ["map.ply", "map.blocks", "run.snapshot", "report.html"]
             .iter()
             .all(|file| result.join(file).is_file())
     );
     let before = fs::read(result.join("frames.csv")).unwrap();
+    // A new run does not overwrite what can be resumed.
     let refused = dynvox(root.path(), &["run", "--out", "result"]);
     assert!(
         output_text(&refused).contains("an interrupted run to result has a snapshot"),
         "{}",
         output_text(&refused)
     );
+    // One frame further, then the memory limit ends it again.
     let run =
         dynvox(root.path(), &["run", "--resume", "result", "--quiet", "--rss-limit-mib", "1"]);
     assert_eq!(run.status.code(), INCOMPLETE, "{}", output_text(&run));
@@ -177,6 +184,7 @@ fn a_stopped_run_with_snapshots_has_results_and_can_be_resumed() {
     );
     let after = fs::read_to_string(result.join("frames.csv")).unwrap();
     let known = String::from_utf8(before).unwrap();
+    // The frames from before the interruption are unchanged.
     assert!(
         known
             .lines()

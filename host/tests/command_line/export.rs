@@ -73,6 +73,7 @@ fn a_map_has_its_objects_where_they_were_last_seen() {
     let summary: serde_json::Value =
         serde_json::from_slice(&fs::read(last.join("summary.json")).unwrap()).unwrap();
     assert!(map.len() > 1, "objects: {map:?}");
+    // The summary counts what the mesh holds.
     assert_eq!(summary["map"]["triangles"], map[&0]);
     assert_eq!(summary["map"]["object_triangles"], map.values().sum::<u64>() - map[&0]);
     let files = names(&last.join("objects"));
@@ -88,6 +89,7 @@ fn a_map_has_its_objects_where_they_were_last_seen() {
             read_numbered(&in_folder("_kitti.txt")).unwrap(),
             read_poses(&in_folder("_tum.txt")).unwrap(),
         );
+        // Poses by frame and by time describe the same path.
         assert!(by_frame.len() == by_time.poses.len() && by_time.times_s.is_some());
         let moved = by_frame
             .last()
@@ -95,6 +97,7 @@ fn a_map_has_its_objects_where_they_were_last_seen() {
             .1
             .transform_point(own_bounds.map(|corner| corner.map(f64::from))[0]);
         let reach: f32 = (0..3).map(|axis| own_bounds[1][axis] - own_bounds[0][axis]).sum();
+        // Once as the object is built, once where it was last seen.
         assert!(
             (0..3).all(|axis| (moved[axis] as f32 - world_bounds[0][axis]).abs() <= reach),
             "{name}: {moved:?} {world_bounds:?}"
@@ -106,6 +109,7 @@ fn a_map_has_its_objects_where_they_were_last_seen() {
         );
     }
     assert_eq!(&fs::read(last.join("map.glb")).unwrap()[..4], b"glTF");
+    // Without objects the mesh is the static map only, in the axes asked for.
     run(
         root.path(),
         &[&STREET[..], &["--out", "none", "--map-objects", "none", "--axes", "enu"]].concat(),
@@ -148,6 +152,7 @@ fn ply_objects(path: &Path) -> ObjectCells {
 /// the first camera.
 fn glb_objects(path: &Path) -> ObjectCells {
     let file = fs::read(path).unwrap();
+    // The header gives the length of the JSON; the binary part follows it.
     let json_end = 20 + u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
     let (json, bytes): (serde_json::Value, &[u8]) =
         (serde_json::from_slice(&file[20..json_end]).unwrap(), &file[json_end + 8..]);
@@ -170,6 +175,7 @@ fn glb_objects(path: &Path) -> ObjectCells {
             rotation: numbers(&node["rotation"]).try_into().unwrap(),
         };
         let mesh = &json["nodes"][at(&node["children"][0])];
+        // Positions are quantised: the node's scale and translation undo that.
         let (low_m, size_m) = (numbers(&mesh["translation"]), numbers(&mesh["scale"])[0]);
         let accessor = &json["accessors"]
             [at(&json["meshes"][at(&mesh["mesh"])]["primitives"][0]["attributes"]["POSITION"])];
@@ -280,6 +286,7 @@ fn a_recording_has_every_frame_of_every_topic() {
         let json: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
         let schema: serde_json::Value =
             serde_json::from_slice(&message.channel.schema.as_ref().unwrap().data).unwrap();
+        // Every key that a message has must be in its schema.
         for key in json.as_object().unwrap().keys() {
             assert!(
                 !schema["properties"][key].is_null(),
@@ -288,6 +295,7 @@ fn a_recording_has_every_frame_of_every_topic() {
                 message.channel.topic
             );
         }
+        // The planner's grid, cell by cell.
         if message.channel.topic == "/planning/grid" {
             let number = |key: &str| json[key].as_u64().unwrap();
             assert_eq!(
@@ -302,6 +310,7 @@ fn a_recording_has_every_frame_of_every_topic() {
         times.push(message.log_time);
     }
     assert!(times.is_sorted());
+    // Every frame of every topic; clouds and grids only every tenth.
     let expected = [
         ("/camera/disparity", 12),
         ("/camera/left/calibration", 12),
@@ -315,6 +324,7 @@ fn a_recording_has_every_frame_of_every_topic() {
         ("/trajectory", 1),
     ];
     assert_eq!(counts, expected.map(|(topic, count)| (topic.to_owned(), count)).into());
+    // Recordings cannot be continued from a snapshot.
     let refused = dynvox(root.path(), &["run", "rig", "--mcap", "--snapshot-every", "4"]);
     assert_eq!(refused.status.code(), Some(2), "{}", output_text(&refused));
 }
@@ -356,6 +366,7 @@ fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
     );
     run(root.path(), &[input, &["--out", "without"]].concat());
     assert!(!root.path().join("without/planning").exists());
+    // The digests with and without a window.
     let digests = |name: &str| {
         fs::read_to_string(root.path().join(name).join("summary.json"))
             .unwrap()
@@ -373,6 +384,7 @@ fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
         (fs::read(folder.join("map.pgm")).unwrap(), format!("P5\n{columns} {rows}\n255\n"));
     let (head, pixels) = pgm.split_at(header.len());
     assert_eq!((head, pixels.len()), (header.as_bytes(), (columns * rows) as usize));
+    // The three grey levels of the format.
     let counts = [0, 205, 254].map(|grey| pixels.iter().filter(|pixel| **pixel == grey).count());
     let window: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.join("window.json")).unwrap()).unwrap();
@@ -386,6 +398,7 @@ fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
             && yaml.contains("mode: trinary"),
         "{yaml}"
     );
+    // Pictures of the same size, which agree cell by cell.
     let picture = |name: &str| image::open(folder.join(name)).unwrap().into_luma16();
     let (heights, distances) = (picture("height.png"), picture("distance.png"));
     assert_eq!((heights.dimensions(), distances.dimensions()), ((columns, rows), (columns, rows)));

@@ -80,6 +80,7 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
         fs::read_to_string(root.join("report.xml")).unwrap().contains("tests=\"6\" failures=\"0\"")
     );
 
+    // One grey level of one pixel.
     change_a_pixel(&root.join("pinned/right/000003.png"));
     let golden = fs::read(root.join("pinned/digests.txt")).unwrap();
     let verified =
@@ -102,6 +103,7 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
         report.contains("name=\"frame 3\"><failure message=\"digests differ: input"),
         "{report}"
     );
+    // A dry run says what a blessing would change, and writes nothing.
     let dry = dynvox(root, &["fixtures", "bless", "pinned", "--dry-run", "--json"]);
     let dry: serde_json::Value = serde_json::from_slice(&dry.stdout).unwrap();
     assert!(!dry[0]["differences"].as_array().unwrap().is_empty(), "{dry}");
@@ -115,6 +117,7 @@ fn a_fixture_is_made_verified_found_changed_and_blessed() {
     let blessed = dynvox(root, &["fixtures", "bless", "pinned", "--reason", "another sensor"]);
     assert!(blessed.status.success(), "{}", output_text(&blessed));
     assert!(dynvox(root, &["fixtures", "verify", "pinned"]).status.success());
+    // The log keeps what the fixture was made of, and why it changed.
     let log = fs::read_to_string(root.join("pinned/blessings.txt")).unwrap();
     assert!(
         log.lines().next().unwrap().ends_with("Made of kitti-odometry-00, frames 1 to 6")
@@ -155,6 +158,7 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
         let all = output_text(&verified) + &printed(&verified);
         assert!(!verified.status.success() && all.contains(sentence), "{sentence}: {all}");
     };
+    // Settings and bounds of the fixture decide, not the program's defaults.
     fs::write(&settings, text.replace("voxel_size_m = 0.1", "voxel_size_m = 0.11")).unwrap();
     verify("first divergence: frame 0, static_map");
     fs::write(&settings, text.replace("voxel_size_m", "voxel_sise_m")).unwrap();
@@ -167,6 +171,7 @@ fn settings_and_bounds_belong_to_the_fixture_and_bad_ones_are_named() {
     )
     .unwrap();
     verify("its bounds do not hold images of 320 x 96 px");
+    // An existing folder is not replaced.
     let again = dynvox(root, &["fixtures", "new", "pinned", "--from", "street"]);
     assert!(output_text(&again).contains("pinned exists"), "{}", output_text(&again));
     let refused =

@@ -50,6 +50,7 @@ fn digest(text: &str) -> &str {
 fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
     let root = planned();
     let root = root.path();
+    // One share of two; the rest stays open.
     assert!(done(root, &["fleet", "run", "jobs", "--shard", "1/2"]).contains("second is done"));
     let status: serde_json::Value =
         serde_json::from_str(&done(root, &["fleet", "status", "jobs", "--json"])).unwrap();
@@ -57,11 +58,13 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
         status.as_array().unwrap().iter().map(|job| job["state"].as_str().unwrap()).collect();
     assert_eq!(states, ["open", "done", "open"]);
     assert!(status[0]["bytes"].as_u64().unwrap() > 8 << 20);
+    // A merge needs all jobs.
     let early = dynvox(root, &["fleet", "merge", "jobs", "--out", "early"]);
     assert!(
         output_text(&early).contains("first, third of jobs are not done")
             && !root.join("early").exists()
     );
+    // Only what is open is run.
     let rest = done(root, &["fleet", "run", "jobs"]);
     assert!(
         rest.contains("first is done")
@@ -77,6 +80,7 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
         "{}",
         output_text(&unplaced)
     );
+    // Sums of the world's lattice, again in shares.
     done(root, &["fleet", "resample", "jobs", "--shard", "0/2"]);
     assert!(
         done(root, &["fleet", "resample", "jobs"]).starts_with("second: "),
@@ -85,6 +89,7 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
     let whole = done(root, &["fleet", "merge", "jobs", "--out", "whole"]);
     let maps: Vec<String> =
         names(&root.join("jobs/sums")).iter().map(|id| format!("jobs/sums/{id}")).collect();
+    // In another order and in two steps: the same map.
     done(root, &["fleet", "merge", &maps[2], &maps[0], "--out", "two"]);
     let tree = done(root, &["fleet", "merge", &maps[1], "two", "--out", "tree"]);
     assert_eq!(digest(&whole), digest(&tree));
@@ -95,6 +100,7 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
             && fs::metadata(root.join("world.ply")).unwrap().len() > 10_000,
         "{meshed}"
     );
+    // An existing map is not replaced.
     let again = dynvox(root, &["fleet", "merge", "jobs", "--out", "whole"]);
     assert!(output_text(&again).contains("whole exists"), "{}", output_text(&again));
     assert_eq!(
@@ -140,6 +146,7 @@ fn what_fails_is_named_and_can_be_repeated_alone() {
     let list = "[[recording]]\nname = \"rig\"\narguments = [\"rig\", \"--profile\", \"tiny\"]\n";
     fs::write(root.join("recordings.toml"), list).unwrap();
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    // An image changes after planning: its job must notice.
     let image = root.join("rig/left/003.png");
     let whole = fs::read(&image).unwrap();
     let mut pixels = image::open(&image).unwrap().into_luma8();
@@ -153,6 +160,7 @@ fn what_fails_is_named_and_can_be_repeated_alone() {
         "{}",
         output_text(&changed)
     );
+    // With the image of the plan the job runs.
     fs::write(&image, whole).unwrap();
     done(root, &["fleet", "run", "jobs"]);
     let refused = dynvox(root, &["fleet", "plan", "rig/calib.txt", "--out", "other"]);
@@ -182,6 +190,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
         .replace("\"--profile\"", "\"--set\", \"street.frames=12\", \"--profile\"");
     fs::write(root.join("recordings.toml"), shared + &parts.concat()).unwrap();
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
+    // Alignment needs the maps of all jobs.
     let early = dynvox(root, &["fleet", "align", "jobs"]);
     assert!(
         output_text(&early).contains("from-0, from-4 of jobs are not done"),
@@ -192,6 +201,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     done(root, &["fleet", "resample", "jobs"]);
     let table = done(root, &["fleet", "align", "jobs"]);
     assert!(table.contains("from-4, from-0"), "{table}");
+    // The same jobs give the same alignment.
     let file = root.join("jobs/alignment.json");
     let first = fs::read(&file).unwrap();
     done(root, &["fleet", "align", "jobs"]);
@@ -201,6 +211,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     assert!(along(0).abs() < 1e-8 && alignment["pairs"][0]["refused"].is_null(), "{alignment}");
     // Four frames of 0.8 m lie between the two; nothing was given, so the limit of what poses may
     // be off does not let it find more.
+    // Recordings that moved are resampled again; the others are not.
     let resampled = done(root, &["fleet", "resample", "jobs"]);
     assert!(resampled.contains("from-4: "), "it lies elsewhere now: {resampled}");
     done(root, &["fleet", "merge", "jobs", "--out", "map"]);
@@ -214,6 +225,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
         serde_json::from_slice(&fs::read(root.join("report/report.json")).unwrap()).unwrap();
     assert_eq!(figures["recordings"][1]["frames"], 6);
     assert!(image::open(root.join("report/map.png")).unwrap().width() > 100);
+    // An alignment of other jobs is not applied.
     fs::write(&file, String::from_utf8(first).unwrap().replace("\"id\": \"", "\"id\": \"0"))
         .unwrap();
     let other = dynvox(root, &["fleet", "resample", "jobs"]);

@@ -151,11 +151,13 @@ fn config(program: &mut Program<'_>) -> Option<DynvoxConfig> {
 }
 
 fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMapper) -> DynvoxStatus {
+    // Most images have one size, so that steps succeed now and then.
     let size = if program.byte() % 4 < 3 { (64, 48) } else { (program.size(), program.size()) };
     let [Some(left), Some(right)] = [0, 1].map(|_| caller.image(program, size)) else {
         return DynvoxStatus::Size;
     };
     let (pose, time_ns) = (program.pose(), program.word());
+    // Bits decide which optional parts the frame has.
     let given = program.byte();
     let detection = DynvoxDetection {
         class_code: program.byte(),

@@ -69,6 +69,8 @@ impl Mutator {
     fn change(&mut self, bytes: &mut Vec<u8>, seeds: &[Vec<u8>]) {
         let range = self.range(bytes.len());
         match self.0.below(8) {
+            // Cut off, cut out, repeated, replaced by a word of the format or a piece of another
+            // seed.
             0 => bytes.truncate(range.start),
             1 => drop(bytes.drain(range)),
             2 => {

@@ -66,6 +66,7 @@ impl Source {
 /// The paths that a path with braces stands for, and where it ends.
 pub fn paths(code: &str, at: usize) -> (Vec<Vec<String>>, usize) {
     let rest = &code[at..];
+    // A list in braces: each of its paths in turn.
     if rest.starts_with('{') {
         let (mut all, mut at) = (Vec::new(), at + 1);
         loop {
@@ -80,6 +81,7 @@ pub fn paths(code: &str, at: usize) -> (Vec<Vec<String>>, usize) {
             at = end + code[end..].find([',', '}']).unwrap_or(code.len() - end);
         }
     }
+    // One segment of the path, and what follows it.
     let len =
         rest.find(|char: char| !(char.is_alphanumeric() || char == '_')).unwrap_or(rest.len());
     let (name, end) = (rest[..len].to_owned(), at + len);

@@ -80,6 +80,7 @@ fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
         let (left, right) = (grey("image_0", frame), shifted(&grey("image_1", frame), by_px));
         let images = [left.view(), right.view()];
         matcher.push(&SceneFlowConfig::default(), images[0], images[1], &Serial);
+        // Matches are corrected by what is known so far, as the mapper does.
         matcher.correct(calibration.pixel_correction(&RIG).unwrap_or_default());
         if frame > 0 {
             let estimate = camera.step(

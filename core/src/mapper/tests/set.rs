@@ -60,6 +60,7 @@ fn every_setting_is_set_by_its_key_and_nothing_else_is() {
     let weights = (1..=CLASS_COUNT).map(|weight| weight.to_string()).collect::<Vec<_>>().join(" ,");
     assert!(fields.len() > 120, "{} fields", fields.len());
     for Field { key, value, line } in fields {
+        // Another value than the present one, of the same kind.
         let texts: Vec<&str> = match value.as_str() {
             "true" => vec![" false "],
             "false" => vec!["true"],
@@ -78,6 +79,7 @@ fn every_setting_is_set_by_its_key_and_nothing_else_is() {
             .filter(|lines| !lines.is_empty())
             .collect();
         assert!(!changed.is_empty(), "{key} = {value} was not changed by {texts:?}");
+        // Only the setting's own line of the debug text may change.
         for lines in changed {
             // An array's numbers stand in the lines behind its name.
             let own = if value == "[" { line + 1..line + 1 + CLASS_COUNT } else { line..line + 1 };

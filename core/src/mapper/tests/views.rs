@@ -23,6 +23,7 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
         let t_world_camera = reports[5].t_world_camera;
         let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
         assert_eq!(ids.len(), 1);
+        // The composed picture, made by hand from its two layers.
         let map = depths(mapper, |mapper| mapper.raycast(&t_world_camera, &Serial).map(|_| ()));
         let object = depths(mapper, |mapper| {
             mapper.raycast_object(ids[0], &t_world_camera, &Serial).map(|_| ())
@@ -42,6 +43,7 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
             assert_eq!(composed[at], if is_object { object[at] } else { map[at] }, "pixel {at}");
             assert_eq!(layers[at], u8::from(is_object), "pixel {at}");
         }
+        // A thinned picture shows the same pixels, fewer of them.
         for every in [2, 4] {
             let preview = RaycastView { t_world_camera, every };
             let thinned =
@@ -97,6 +99,7 @@ fn lost(capacity: &Capacity) -> (Report, f64) {
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab[start..]).unwrap();
     let dark = vec![0u8; WIDTH * HEIGHT];
+    // Black images in between: the camera is lost, and then sees the scene again.
     let mut last = Report::default();
     for at in 0..AGAIN + 2 {
         let pair =

@@ -101,12 +101,28 @@ impl LensModel {
     pub const IDEAL: Self = Self::RadialTangential { radial: [0.0; 6], tangential: [0.0; 2] };
 
     /// Name in tables and files.
+    ///
+    /// ```
+    /// use dynvox_core::rectify::{LENS_MODELS, LensModel};
+    ///
+    /// let names: Vec<_> = LENS_MODELS.iter().map(|kind| kind.name).collect();
+    /// assert!(names.contains(&LensModel::IDEAL.name()));
+    /// ```
     pub fn name(&self) -> &'static str {
         let kind = |kind: &&LensKind| discriminant(&kind.typical) == discriminant(self);
         LENS_MODELS.iter().find(kind).map_or("", |kind| kind.name)
     }
 
     /// Visits the parameters in the order of calibration tools, to read or to set them.
+    ///
+    /// ```
+    /// use dynvox_core::rectify::LensModel;
+    ///
+    /// let mut model = LensModel::DoubleSphere { xi: -0.2, alpha: 0.6 };
+    /// let mut keys = Vec::new();
+    /// model.visit_parameters(|parameter, values| keys.push((parameter.key, values.to_vec())));
+    /// assert_eq!(keys, [("xi", vec![-0.2]), ("alpha", vec![0.6])]);
+    /// ```
     pub fn visit_parameters(&mut self, mut visit: impl FnMut(LensParameter, &mut [f64])) {
         match self {
             Self::RadialTangential { radial, tangential } => {
@@ -175,6 +191,13 @@ impl LensModel {
 }
 
 /// Reason why a lens cannot be used.
+///
+/// ```
+/// use dynvox_core::rectify::{Lens, LensModel, LensProblem};
+///
+/// let lens = Lens::new([0.0, 450.0], [320.0, 240.0], LensModel::IDEAL);
+/// assert_eq!(lens, Err(LensProblem::Focal));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

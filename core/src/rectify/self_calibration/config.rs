@@ -29,6 +29,17 @@ pub enum SelfCalibrationMode {
 choices! { SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off } }
 
 /// Settings of the rig in addition to its calibration. [`RigConfig::SETTINGS`] has their ranges.
+///
+/// ```
+/// use dynvox_core::{Config, geometry::StereoRig};
+///
+/// let rig =
+///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let mut config = Config::for_rig(rig);
+/// config.set("rig.self_calibration", "apply")?;
+/// assert!(config.validate().is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",

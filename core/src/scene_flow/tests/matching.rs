@@ -48,6 +48,7 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
         for _ in 0..100 {
             let [u, v] = [random.below(500) as i32 - 50, random.below(250) as i32 - 50];
             let [u_max, v_max] = [u + random.below(90) as i32, v + random.below(60) as i32];
+            // Windows reach beyond the image on all sides.
             let window = Window { u_min: u, u_max, v_min: v, v_max };
             let sought =
                 [(); 2].map(|()| Descriptor(std::array::from_fn(|_| random.next_u32() as u8)));
@@ -65,6 +66,7 @@ fn the_nearest_feature_in_a_window_is_the_one_a_full_search_finds() {
                     .sum()
             };
             let expected = (0..features.len()).filter(inside).min_by_key(|i| (sad(i), *i));
+            // All kernels, each against the full search.
             for vectors in Vectors::available() {
                 compare(vectors, Finds(&features, class, window, sought, expected));
             }
@@ -86,6 +88,7 @@ fn only_circles_that_return_to_their_beginning_close() {
         features.fill(candidates.into_iter().take(1 + usize::from(twin)), &gradient, WIDTH, HEIGHT);
         features
     };
+    // Four positions that make a circle, with a twin of the first.
     let images = [
         position(200, 60, true),
         position(190, 60, false),

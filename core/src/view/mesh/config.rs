@@ -3,6 +3,14 @@
 use crate::settings::{Problems, Range, Rule, Setting, Value::U8, check, rules};
 
 /// Parameters of the mesh.
+///
+/// ```
+/// use dynvox_core::{Problems, view::MeshConfig};
+///
+/// let mut problems = Problems::new();
+/// MeshConfig { min_weight: 0, ..MeshConfig::default() }.validate(&mut problems);
+/// assert_eq!(problems[0].key, "mesh.min_weight");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
