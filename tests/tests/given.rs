@@ -104,6 +104,10 @@ fn wrong_sizes_and_poses_that_are_none_are_refused_and_change_nothing() {
             let pose = Transform { rotation: [0.0, 0.0, 0.0, length], ..Transform::IDENTITY };
             assert_eq!(with_pose(pose), Some(StepError::PoseNotRotation), "{length}");
         }
+        for beyond_m in [1e300, -1e300, 1e18, 2e4] {
+            let pose = Transform::from_translation([0.0, 0.0, beyond_m]);
+            assert_eq!(with_pose(pose), Some(StepError::PoseBeyondMap), "{beyond_m} m");
+        }
         // Refused frames leave no trace: the next one is the first.
         assert_eq!(mapper.step(&frames[0], &Serial).map(|report| report.frame), Ok(0));
     });

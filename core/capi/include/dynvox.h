@@ -13,14 +13,16 @@
 //   dynvox_triangles(mapper, print, NULL, NULL);
 //   dynvox_destroy(mapper);
 //
-// Ownership: the buffer is the mapper's from dynvox_create to dynvox_destroy; nothing else may touch, move or free it meanwhile. All other
+// Ownership: the buffer is the mapper's from dynvox_create to dynvox_destroy; nothing else may touch, move or free it meanwhile. A mapper made
+// or restored at its first byte replaces it; from the first byte of a snapshot on the old one is gone, even if the snapshot is damaged. All other
 // arguments are read, or written, during the call only. Nothing is ever allocated, and nothing of a mapper lies elsewhere.
 // Alignment: the buffer begins at a multiple of dynvox_alignment(); everything else at its type's.
 // Threads: a mapper may move between threads, but one at a time may use it; mappers are independent. There are no globals.
 // Callbacks run on the calling thread and must not call their own mapper.
 // Errors: every function returns DYNVOX_STATUS_OK or the reason; dynvox_status_text turns it into a sentence. Null pointers, misalignment, wrong
-// sizes, numbers that are not finite, and calls from a callback are statuses. Undefined, as everywhere in C: pointers to less memory than they
-// say, handles whose buffer is gone, two threads in one mapper.
+// sizes, numbers that are not finite, and calls of its own mapper from a callback are statuses. Undefined, as everywhere in C: pointers to less
+// memory than they say, handles whose buffer is gone, two threads in one mapper, a mapper made in a part of another's buffer or in that of one
+// whose callback runs.
 //
 // Written by cbindgen from core/capi/src; DYNVOX_BLESS=1 cargo test -p dynvox-capi --test header writes it anew.
 
@@ -35,7 +37,9 @@
 // Bytes of settings that a configuration holds.
 #define DYNVOX_SETTINGS_BYTES 2048
 
-// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing.
+// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing, but for
+// dynvox_restore with DYNVOX_STATUS_SNAPSHOT or DYNVOX_STATUS_CALLBACK, which leaves no mapper in
+// the buffer, and dynvox_save with DYNVOX_STATUS_CALLBACK, which has written a part.
 typedef enum {
   // Done.
   DYNVOX_STATUS_OK = 0,
@@ -46,7 +50,8 @@ typedef enum {
   DYNVOX_STATUS_MISALIGNED,
   // The buffer or an output is too small.
   DYNVOX_STATUS_TOO_SMALL,
-  // The handle is not that of a mapper: never created, or destroyed.
+  // The handle is not that of a mapper: never created, destroyed, replaced without success, or a
+  // copy of a buffer elsewhere.
   DYNVOX_STATUS_NO_MAPPER,
   // The call came from within a callback of the same mapper.
   DYNVOX_STATUS_BUSY,
@@ -57,7 +62,8 @@ typedef enum {
   // The configuration cannot be used: dynvox_config_problem says why. A calibration that is not
   // finite is one reason.
   DYNVOX_STATUS_CONFIG,
-  // A pose is not finite, its rotation is not of length 1, or it lies beyond the map.
+  // A pose is not finite, its rotation is not of length 1, or it lies beyond the map, whose
+  // blocks have 16-bit coordinates: 13 km from the origin at 5 cm.
   DYNVOX_STATUS_POSE,
   // An image is larger than the profile allows, too small to match, or its stride is below its
   // width.
@@ -94,15 +100,15 @@ typedef enum {
 typedef enum {
   // Not known yet.
   DYNVOX_MOTION_STATE_UNCERTAIN = 0,
-  // It stands.
+  // The object stands.
   DYNVOX_MOTION_STATE_STATIC,
-  // It moves.
+  // The object moves.
   DYNVOX_MOTION_STATE_DYNAMIC,
 } DynvoxMotionState;
 
 // End of a ray or a path.
 typedef enum {
-  // It is free as far as was asked.
+  // The way is free as far as was asked.
   DYNVOX_PATH_END_FREE = 0,
   // At a surface of the map.
   DYNVOX_PATH_END_SURFACE,
@@ -660,7 +666,8 @@ DynvoxStatus dynvox_bytes(const DynvoxCapacity *capacity, size_t *bytes);
 
 // Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until
 // dynvox_destroy: nothing else may read, write, move or free it. What it holds before does not
-// matter. Takes less than 32 KiB of stack, as a step does.
+// matter: a mapper that lived there ends, its handle is then the new one's. Takes less than 32 KiB
+// of stack, as a step does.
 //
 // # Safety
 // `capacity` is null or points to a capacity, `config` is null or points to a configuration,
@@ -862,8 +869,10 @@ DynvoxStatus dynvox_retired_triangles(const DynvoxRetired *object,
 DynvoxStatus dynvox_save(DynvoxMapper *mapper, DynvoxWrite write, void *context);
 
 // Creates a mapper like dynvox_create, in the state in which dynvox_save was called: capacity and
-// configuration must be those of the saved one. No mapper is made from a damaged snapshot
-// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
+// configuration must be those of the saved one. From a damaged or foreign snapshot
+// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK), no mapper is made;
+// then `mapper` is as it was, and the buffer holds no mapper at all: one that lived there has
+// ended, and its handle answers DYNVOX_STATUS_NO_MAPPER.
 //
 // # Safety
 // As dynvox_create.

@@ -23,10 +23,14 @@ const ALIVE: u64 = 0x6479_6e76_6f78_2e31;
 #[repr(C)]
 struct HandleHeader {
     alive: u64,
+    /// Address of this head: a copy of a buffer elsewhere is no mapper, because the mapper's
+    /// references lead into the buffer it was made in.
+    own: usize,
     busy: bool,
     /// Bytes of head and slab.
     bytes: usize,
-    mapper: MaybeUninit<Mapper<'static>>,
+    /// Made here by the core: it is some kilobytes, which the stack need not hold.
+    mapper: MaybeUninit<Option<Mapper<'static>>>,
 }
 
 /// Bytes of a buffer before its slab.
@@ -64,7 +68,8 @@ pub unsafe extern "C" fn dynvox_bytes(
 
 /// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until
 /// dynvox_destroy: nothing else may read, write, move or free it. What it holds before does not
-/// matter. Takes less than 32 KiB of stack, as a step does.
+/// matter: a mapper that lived there ends, its handle is then the new one's. Takes less than 32 KiB
+/// of stack, as a step does.
 ///
 /// # Safety
 /// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
@@ -80,13 +85,17 @@ pub unsafe extern "C" fn dynvox_create(
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
-        make((capacity, config), (buffer, len), mapper, |capacity, config, slab| {
-            Mapper::new(capacity, config, slab).map_err(DynvoxStatus::from)
+        make((capacity, config), (buffer, len), mapper, |slot, capacity, config, slab| {
+            Mapper::new_into(slot, capacity, config, slab).map_err(DynvoxStatus::from)
         })
     }
 }
 
 /// Makes a mapper by `new` in a caller's buffer.
+///
+/// Nothing is written before everything that is given was checked. Then the mapper that lived in
+/// the buffer ends, so that its handle cannot reach a slab that is no longer its own, also if
+/// the new one is never made; a callback of `new` cannot reach it either.
 ///
 /// # Safety
 /// The promises of [`dynvox_create`].
@@ -94,7 +103,12 @@ pub unsafe fn make(
     (capacity, config): (*const DynvoxCapacity, *const DynvoxConfig),
     (buffer, len): (*mut u8, usize),
     mapper: *mut *mut DynvoxMapper,
-    new: impl FnOnce(&Capacity, &Config, &'static mut [u8]) -> Result<Mapper<'static>, DynvoxStatus>,
+    new: impl FnOnce(
+        &mut Option<Mapper<'static>>,
+        &Capacity,
+        &Config,
+        &'static mut [u8],
+    ) -> Result<(), DynvoxStatus>,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     let given = unsafe {
@@ -118,20 +132,22 @@ pub unsafe fn make(
     // until it is destroyed.
     let slab: &'static mut [u8] =
         unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
-    // A refused mapper leaves no header: the handle stays what it was.
-    let made = match new(&capacity, &config, slab) {
-        Ok(made) => made,
-        Err(status) => return status,
-    };
+    if let Err(error) = Mapper::check(&capacity, &config, slab) {
+        return error.into();
+    }
     let head = buffer.cast::<HandleHeader>();
-    // SAFETY: the buffer is aligned better than a head, and long enough; the handle was checked.
+    // SAFETY: the buffer is aligned better than a head, and long enough; no reference into it lives
+    // but those of the mapper under construction; the handle was checked.
     unsafe {
-        head.write(HandleHeader {
-            alive: ALIVE,
-            busy: false,
-            bytes: bytes(&capacity),
-            mapper: MaybeUninit::new(made),
-        });
+        ptr::addr_of_mut!((*head).alive).write(0);
+        let slot = (*ptr::addr_of_mut!((*head).mapper)).write(None);
+        if let Err(status) = new(slot, &capacity, &config, slab) {
+            return status;
+        }
+        ptr::addr_of_mut!((*head).own).write(head as usize);
+        ptr::addr_of_mut!((*head).busy).write(false);
+        ptr::addr_of_mut!((*head).bytes).write(bytes(&capacity));
+        ptr::addr_of_mut!((*head).alive).write(ALIVE);
         handle.write(head.cast());
     }
     DynvoxStatus::Ok
@@ -164,12 +180,16 @@ unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut HandleHeader, DynvoxSta
     let head = mapper.cast::<HandleHeader>();
     // SAFETY: only looked at.
     unsafe { output(head)? };
-    // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to either
-    // field is ever made.
-    let (alive, busy) = unsafe {
-        (ptr::addr_of!((*head).alive).read(), ptr::addr_of!((*head).busy).cast::<u8>().read())
+    // SAFETY: not null, aligned, a head's memory by the caller's promise; no reference to any of
+    // these fields is ever made.
+    let (alive, own, busy) = unsafe {
+        (
+            ptr::addr_of!((*head).alive).read(),
+            ptr::addr_of!((*head).own).read(),
+            ptr::addr_of!((*head).busy).cast::<u8>().read(),
+        )
     };
-    if alive != ALIVE {
+    if alive != ALIVE || own != head as usize {
         Err(DynvoxStatus::NoMapper)
     } else if busy != 0 {
         Err(DynvoxStatus::Busy)
@@ -197,8 +217,10 @@ pub unsafe fn with(
     let done = unsafe {
         ptr::addr_of_mut!((*head).busy).write(true);
         let buffer = head as usize..head as usize + ptr::addr_of!((*head).bytes).read();
-        let mapper = &mut *ptr::addr_of_mut!((*head).mapper).cast::<Mapper<'static>>();
-        let done = work(mapper, &buffer);
+        let done = match (*ptr::addr_of_mut!((*head).mapper)).assume_init_mut() {
+            Some(mapper) => work(mapper, &buffer),
+            None => Err(DynvoxStatus::NoMapper),
+        };
         ptr::addr_of_mut!((*head).busy).write(false);
         done
     };

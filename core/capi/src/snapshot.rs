@@ -43,8 +43,10 @@ pub unsafe extern "C" fn dynvox_save(
 }
 
 /// Creates a mapper like dynvox_create, in the state in which dynvox_save was called: capacity and
-/// configuration must be those of the saved one. No mapper is made from a damaged snapshot
-/// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK).
+/// configuration must be those of the saved one. From a damaged or foreign snapshot
+/// (DYNVOX_STATUS_SNAPSHOT), or when `read` refused (DYNVOX_STATUS_CALLBACK), no mapper is made;
+/// then `mapper` is as it was, and the buffer holds no mapper at all: one that lived there has
+/// ended, and its handle answers DYNVOX_STATUS_NO_MAPPER.
 ///
 /// # Safety
 /// As dynvox_create.
@@ -68,11 +70,13 @@ pub unsafe extern "C" fn dynvox_restore(
     };
     // SAFETY: the caller's promise.
     unsafe {
-        make((capacity, config), (buffer, len), mapper, |capacity, config, slab| {
-            Mapper::restore(capacity, config, slab, &mut source).map_err(|error| match error {
-                RestoreError::New(error) => error.into(),
-                RestoreError::Source(status) => status,
-                _ => DynvoxStatus::Snapshot,
+        make((capacity, config), (buffer, len), mapper, |slot, capacity, config, slab| {
+            Mapper::restore_into(slot, capacity, config, slab, &mut source).map_err(|error| {
+                match error {
+                    RestoreError::New(error) => error.into(),
+                    RestoreError::Source(status) => status,
+                    _ => DynvoxStatus::Snapshot,
+                }
             })
         })
     }

@@ -3,7 +3,9 @@
 use core::ffi::{CStr, c_char};
 use dynvox_core::{NewError, StepError, view::RaycastError};
 
-/// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing.
+/// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing, but for
+/// dynvox_restore with DYNVOX_STATUS_SNAPSHOT or DYNVOX_STATUS_CALLBACK, which leaves no mapper in
+/// the buffer, and dynvox_save with DYNVOX_STATUS_CALLBACK, which has written a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum DynvoxStatus {
@@ -16,7 +18,8 @@ pub enum DynvoxStatus {
     Misaligned,
     /// The buffer or an output is too small.
     TooSmall,
-    /// The handle is not that of a mapper: never created, or destroyed.
+    /// The handle is not that of a mapper: never created, destroyed, replaced without success, or a
+    /// copy of a buffer elsewhere.
     NoMapper,
     /// The call came from within a callback of the same mapper.
     Busy,
@@ -27,7 +30,8 @@ pub enum DynvoxStatus {
     /// The configuration cannot be used: dynvox_config_problem says why. A calibration that is not
     /// finite is one reason.
     Config,
-    /// A pose is not finite, its rotation is not of length 1, or it lies beyond the map.
+    /// A pose is not finite, its rotation is not of length 1, or it lies beyond the map, whose
+    /// blocks have 16-bit coordinates: 13 km from the origin at 5 cm.
     Pose,
     /// An image is larger than the profile allows, too small to match, or its stride is below its
     /// width.
@@ -119,7 +123,9 @@ impl From<StepError> for DynvoxStatus {
             | StepError::TooLarge { .. }
             | StepError::TooSmall { .. } => Self::Size,
             StepError::TimeNotLater => Self::Time,
-            StepError::PoseNotFinite | StepError::PoseNotRotation => Self::Pose,
+            StepError::PoseNotFinite | StepError::PoseNotRotation | StepError::PoseBeyondMap => {
+                Self::Pose
+            }
             _ => Self::Unknown,
         }
     }

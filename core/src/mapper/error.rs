@@ -98,6 +98,9 @@ pub enum StepError {
     PoseNotFinite,
     /// The quaternion of the frame's pose does not have length 1.
     PoseNotRotation,
+    /// The frame's pose lies where the map has no blocks: their coordinates have 16 bits, which end
+    /// 13 km from the origin at 5 cm.
+    PoseBeyondMap,
     /// The frame's time is not after that of the frame before.
     TimeNotLater,
 }
@@ -134,6 +137,9 @@ impl fmt::Display for StepError {
             Self::PoseNotRotation => {
                 f.write_str("the quaternion of the frame's pose does not have length 1")
             }
+            Self::PoseBeyondMap => f.write_str(
+                "the frame's pose lies beyond the map: give poses relative to the first one",
+            ),
         }
     }
 }

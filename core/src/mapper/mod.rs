@@ -49,7 +49,7 @@ use crate::{
     stereo::StereoMatcher,
     tracking::{InstanceAt, TrackReport, Tracker},
     view::Triangle,
-    volume::{BlockStore, EvictionReport, PruneReport, Volume},
+    volume::{BlockStore, EvictionReport, PruneReport, Volume, is_within_map},
 };
 
 /// A stereo mapper in a slab.
@@ -151,6 +151,63 @@ impl<'s> Mapper<'s> {
     // Never inlined: what it needs of the stack must not stay in its caller's frame.
     #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
+        Self::check(capacity, config, slab)?;
+        let mut carver = Carver::new(slab, capacity.bytes())?;
+        let mut mapper = Self::new_in(capacity, config, &mut carver);
+        mapper.prepare(config, &carver)?;
+        Ok(mapper)
+    }
+
+    /// Makes a mapper like [`Mapper::new`], in `slot`: what it holds is dropped first, and it is
+    /// empty after an error. For callers that keep a mapper in memory of their own and have little
+    /// stack.
+    ///
+    /// # Errors
+    /// Those of [`Mapper::new`].
+    #[inline(never)]
+    pub fn new_into(
+        slot: &mut Option<Self>,
+        capacity: &Capacity,
+        config: &Config,
+        slab: &'s mut [u8],
+    ) -> Result<(), NewError> {
+        *slot = None;
+        Self::check(capacity, config, slab)?;
+        let mut carver = Carver::new(slab, capacity.bytes())?;
+        let mapper = slot.insert(Self::new_in(capacity, config, &mut carver));
+        let prepared = mapper.prepare(config, &carver);
+        if prepared.is_err() {
+            *slot = None;
+        }
+        prepared
+    }
+
+    /// Fills what a new mapper needs, once all its regions were cut.
+    fn prepare(&mut self, config: &Config, carver: &Carver<'s>) -> Result<(), NewError> {
+        carver.check()?;
+        let rectification = config.rectification.as_ref();
+        rectification
+            .map_or(Ok(()), |raw| self.rectifier.prepare(raw, &config.rig))
+            .map_err(NewError::Rectification)
+    }
+
+    /// Checks all that [`Mapper::new`] needs, without a write to the slab: for callers that keep
+    /// something in it until a mapper is made there.
+    ///
+    /// # Errors
+    /// Those of [`Mapper::new`].
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let (capacity, config) = (Capacity::TINY, Config::for_rig(rig));
+    /// assert!(Mapper::check(&capacity, &config, &vec![7; capacity.bytes() + SLAB_ALIGN]).is_ok());
+    /// assert!(Mapper::check(&capacity, &config, &[7; 100]).is_err());
+    /// ```
+    #[inline(never)]
+    pub fn check(capacity: &Capacity, config: &Config, slab: &[u8]) -> Result<(), NewError> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
         }
@@ -158,18 +215,9 @@ impl<'s> Mapper<'s> {
         if !capacity.is_countable(usize::MAX as u64) {
             return Err(NewError::Slab(SlabError::TooSmall { missing: usize::MAX }));
         }
-        let mut carver = Carver::new(slab, capacity.bytes())?;
-        // The regions are cut first and checked once: a slab too short leaves empty ones.
-        let mut mapper = Self::new_in(capacity, config, &mut carver);
-        carver.check()?;
-        // Maps are filled only now that the memory for them exists.
-        if let Some(rectification) = &config.rectification {
-            mapper
-                .rectifier
-                .prepare(rectification, &config.rig)
-                .map_err(NewError::Rectification)?;
-        }
-        Ok(mapper)
+        Carver::check_fit(slab, capacity.bytes())?;
+        let rectification = config.rectification.as_ref();
+        rectification.map_or(Ok(()), |raw| raw.check_fit(capacity)).map_err(NewError::Rectification)
     }
 
     fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
@@ -239,6 +287,11 @@ impl<'s> Mapper<'s> {
         }
         if !frame.t_world_camera.is_none_or(|pose| pose.is_rotation()) {
             return Err(StepError::PoseNotRotation);
+        }
+        // A camera out there would see nothing that could be fused, in every frame.
+        let voxel_size_m = self.config.volume.voxel_size_m;
+        if !frame.t_world_camera.is_none_or(|pose| is_within_map(&pose, voxel_size_m)) {
+            return Err(StepError::PoseBeyondMap);
         }
         // Motions are divided by time: a clock that stands or runs back is refused.
         if !self.clock.may_follow(frame.time_ns) {

@@ -193,17 +193,36 @@ impl<'s> Mapper<'s> {
         // again.
         let mut made = Self::new(capacity, config, slab);
         if let Ok(mapper) = &mut made {
-            mapper.read(capacity, config, source)?;
+            mapper.read(source)?;
         }
         made.map_err(RestoreError::New)
+    }
+
+    /// Restores like [`Mapper::restore`], into `slot`: what it holds is dropped first, and it is
+    /// empty after an error. For callers that keep a mapper in memory of their own and have little
+    /// stack.
+    ///
+    /// # Errors
+    /// Those of [`Mapper::restore`].
+    pub fn restore_into<E>(
+        slot: &mut Option<Self>,
+        capacity: &Capacity,
+        config: &Config,
+        slab: &'s mut [u8],
+        source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+    ) -> Result<(), RestoreError<E>> {
+        Self::new_into(slot, capacity, config, slab).map_err(RestoreError::New)?;
+        let read = slot.as_mut().map_or(Ok(()), |mapper| mapper.read(source));
+        if read.is_err() {
+            *slot = None;
+        }
+        read
     }
 
     /// Reads what [`Mapper::save`] wrote into a new mapper.
     #[inline(never)]
     fn read<E>(
         &mut self,
-        capacity: &Capacity,
-        config: &Config,
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<(), RestoreError<E>> {
         let mut reader = Reader::new(source);
@@ -221,11 +240,10 @@ impl<'s> Mapper<'s> {
         }
         reader.u64s(&mut prints);
         reader.check()?;
-        // Capacity and configuration are not in the file; only their fingerprints are.
-        if prints[0] != fingerprint(capacity) {
+        if prints[0] != fingerprint(&self.capacity) {
             return Err(RestoreError::Capacity);
         }
-        if prints[1] != fingerprint(config) {
+        if prints[1] != fingerprint(&self.config) {
             return Err(RestoreError::Config);
         }
         // One description reads, writes and hashes the state.

@@ -142,13 +142,20 @@ impl<'s> Carver<'s> {
     /// assert!(matches!(too_short, Err(SlabError::TooSmall { missing }) if missing >= 4_080));
     /// ```
     pub fn new(slab: &'s mut [u8], needed: usize) -> Result<Self, SlabError> {
+        let skipped = Self::check_fit(slab, needed)?;
+        Ok(Self { rest: slab.get_mut(skipped..), ..Self::without_slab() })
+    }
+
+    /// Returns the number of bytes of `slab` before its first aligned one, if `needed` bytes follow.
+    ///
+    /// # Errors
+    /// [`SlabError::TooSmall`]: fewer do.
+    pub(crate) fn check_fit(slab: &[u8], needed: usize) -> Result<usize, SlabError> {
         let skipped = slab.as_ptr().align_offset(SLAB_ALIGN);
-        let len = slab.len();
-        match slab.get_mut(skipped..) {
-            Some(aligned) if aligned.len() >= needed => {
-                Ok(Self { rest: Some(aligned), ..Self::without_slab() })
-            }
-            _ => Err(SlabError::TooSmall { missing: skipped.saturating_add(needed) - len }),
+        let end = skipped.saturating_add(needed);
+        match end.checked_sub(slab.len()) {
+            None | Some(0) => Ok(skipped),
+            Some(missing) => Err(SlabError::TooSmall { missing }),
         }
     }
 

@@ -45,6 +45,28 @@ pub enum RectifierError {
     },
 }
 
+impl Rectification {
+    /// Checks that raw and rectified images are within the bounds of a capacity.
+    ///
+    /// # Errors
+    /// The first bound that is too small.
+    pub(crate) fn check_fit(&self, capacity: &Capacity) -> Result<(), RectifierError> {
+        // A map's entry has bits for MAX_RAW_SIDE columns and rows.
+        let [width, height] =
+            [capacity.raw_width, capacity.raw_height].map(|side| side.min(MAX_RAW_SIDE as usize));
+        for raw in [&self.left.raw, &self.right.raw] {
+            if raw.width as usize > width || raw.height as usize > height {
+                return Err(RectifierError::RawTooLarge { width, height });
+            }
+        }
+        let Capacity { image_width: width, image_height: height, .. } = *capacity;
+        if self.width as usize > width || self.height as usize > height {
+            return Err(RectifierError::RectifiedTooLarge { width, height });
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for RectifierError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -199,23 +221,8 @@ impl<'s> Rectifier<'s> {
         rectification: &Rectification,
         rig: &StereoRig,
     ) -> Result<(), RectifierError> {
-        let Capacity { image_width, image_height, .. } = self.capacity;
-        // A map's entry has bits for MAX_RAW_SIDE columns and rows.
-        let [raw_width, raw_height] = [self.capacity.raw_width, self.capacity.raw_height]
-            .map(|side| side.min(MAX_RAW_SIDE as usize));
+        rectification.check_fit(&self.capacity)?;
         let [width, height] = [rectification.width as usize, rectification.height as usize];
-        for raw in [&rectification.left.raw, &rectification.right.raw] {
-            if raw.width as usize > raw_width || raw.height as usize > raw_height {
-                return Err(RectifierError::RawTooLarge { width: raw_width, height: raw_height });
-            }
-        }
-        if width > image_width || height > image_height {
-            return Err(RectifierError::RectifiedTooLarge {
-                width: image_width,
-                height: image_height,
-            });
-        }
-        // All that can fail is behind: an error leaves the maps as they were.
         for (camera, turned) in
             [(&mut self.left, &rectification.left), (&mut self.right, &rectification.right)]
         {

@@ -23,6 +23,7 @@ use super::{
     request::{Band, Rays},
 };
 use crate::{
+    geometry::Transform,
     image::View,
     parallel::{Executor, each},
 };
@@ -64,9 +65,7 @@ impl Volume<'_> {
 
         // Block coordinates relative to the camera's block keep their precision however far the
         // camera has come.
-        let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
-        let half_voxel = 0.5 / BLOCK_SIDE as f64;
-        let camera = view.t_world_camera.translation() / block_m + Vector3::repeat(half_voxel);
+        let camera = camera_in_blocks(&view.t_world_camera, self.config.voxel_size_m);
         let Some(base) = base_block(&camera) else {
             report.beyond = depth_m.rows().flatten().filter(|&&depth| depth > 0.0).count() as u32;
             return report;
@@ -177,6 +176,19 @@ impl Volume<'_> {
             }
         }
     }
+}
+
+/// Returns true if a camera at that pose is in a block that the map can have: elsewhere nothing it
+/// sees is fused.
+pub(crate) fn is_within_map(t_world_camera: &Transform, voxel_size_m: f32) -> bool {
+    base_block(&camera_in_blocks(t_world_camera, voxel_size_m)).is_some()
+}
+
+/// The camera's place in blocks, from the lower corner of the first block's cells.
+fn camera_in_blocks(t_world_camera: &Transform, voxel_size_m: f32) -> Vector3<f64> {
+    let block_m = f64::from(voxel_size_m) * BLOCK_SIDE as f64;
+    let half_voxel = 0.5 / BLOCK_SIDE as f64;
+    t_world_camera.translation() / block_m + Vector3::repeat(half_voxel)
 }
 
 /// The block the camera is in; `None` beyond the map.

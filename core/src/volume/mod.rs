@@ -31,6 +31,7 @@ mod visible;
 mod visit;
 
 pub use allocate::AllocationReport;
+pub(crate) use allocate::is_within_map;
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
 pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;

@@ -160,6 +160,9 @@ pub fn step_reason(error: StepError) -> String {
             "the quaternion of its pose does not have length 1".to_owned()
         }
         StepError::PoseNotFinite => "its pose is not finite".to_owned(),
+        StepError::PoseBeyondMap => {
+            "its pose lies beyond the map: give poses relative to the first one".to_owned()
+        }
         StepError::TooLarge { width, height } => {
             format!("its images are larger than {width} x {height} px")
         }

@@ -34,6 +34,7 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
         StepError::RawSizeDiffers { width: 752, height: 480 },
         StepError::PoseNotFinite,
         StepError::PoseNotRotation,
+        StepError::PoseBeyondMap,
         StepError::TimeNotLater,
     ]);
     assert!(
@@ -42,7 +43,10 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
             && texts[4].contains("752 x 480 px")
     );
     assert!(
-        texts[5].contains("finite") && texts[6].contains("length 1") && texts[7].contains("time")
+        texts[5].contains("finite")
+            && texts[6].contains("length 1")
+            && texts[7].contains("beyond the map")
+            && texts[8].contains("time")
     );
 }
 
