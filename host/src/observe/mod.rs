@@ -19,6 +19,7 @@ mod overview;
 pub mod pictures;
 mod planning;
 mod planning_layers;
+mod planning_maps;
 mod recording;
 mod reference;
 pub mod tables;

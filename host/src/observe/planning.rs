@@ -1,15 +1,14 @@
 //! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a
 //! picture of them.
 
+use super::planning_maps::{MapMode, MapPlace};
 use super::{EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer};
-use crate::scene::{FREE_GREY, OCCUPIED_GREY, PLANNING_FOLDER, WindowScales};
+use crate::scene::{PLANNING_FOLDER, WindowScales};
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Nav2's grey level of what is unknown, in trinary mode.
-const UNKNOWN_GREY: u8 = 205;
 /// Value in `distance.png` of a distance of 0; the values are centimetres.
 const DISTANCE_ZERO: f32 = 32_768.0;
 
@@ -137,8 +136,11 @@ pub fn write_folder(
     };
     let columns = Columns { planning };
     let description = describe(&columns, frame, camera_world, report);
-    write("map.pgm", &columns.pgm())?;
-    write("map.yaml", columns.yaml().as_bytes())?;
+    let states = columns.states();
+    for mode in MapMode::ALL {
+        write(mode.picture(), &mode.encode(&states, columns.size()))?;
+        write(mode.description(), mode.yaml(&columns.place()).as_bytes())?;
+    }
     write("height.png", &png(columns.heights(&description)))?;
     write("distance.png", &png(columns.distances()))?;
     write("window.png", &png(columns.picture(&description)))?;
@@ -201,26 +203,15 @@ impl Columns<'_, '_> {
         (0..length).flat_map(move |v| (0..width).map(move |u| self.at(u, v)))
     }
 
-    /// The slice as a binary PGM.
-    fn pgm(&self) -> Vec<u8> {
-        let (width, length) = self.size();
-        let mut bytes = format!("P5\n{width} {length}\n255\n").into_bytes();
-        bytes.extend(self.all().map(|cell| match self.planning.slice_state(cell) {
-            CellState::Free => FREE_GREY,
-            CellState::Occupied => OCCUPIED_GREY,
-            _ => UNKNOWN_GREY,
-        }));
-        bytes
+    /// State of each column between the limits of the slice, in the order of the pictures.
+    fn states(&self) -> Vec<CellState> {
+        self.all().map(|cell| self.planning.slice_state(cell)).collect()
     }
 
-    /// Returns the YAML that Nav2's map server reads with the picture.
-    fn yaml(&self) -> String {
+    /// Scale and corner of the pictures.
+    fn place(&self) -> MapPlace {
         let (cell_m, [x, y, _]) = (self.planning.grid().cell_m(), self.planning.origin());
-        let [x, y] = [x, y].map(|c| f64::from(c) * cell_m);
-        format!(
-            "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{x}, {y}, 0.0]\nnegate: \
-             0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
-        )
+        MapPlace { cell_m, corner_m: [x, y].map(|c| f64::from(c) * cell_m) }
     }
 
     /// Heights of the ground in millimetres above the lowest.
@@ -303,7 +294,7 @@ fn covers(moving: &MovingBox, [x, y, _]: Cell, cell_m: f32) -> bool {
 }
 
 /// A picture as a PNG file.
-fn png<P>(picture: ImageBuffer<P, Vec<P::Subpixel>>) -> Vec<u8>
+pub(super) fn png<P>(picture: ImageBuffer<P, Vec<P::Subpixel>>) -> Vec<u8>
 where
     P: image::Pixel + image::PixelWithColorType,
     [P::Subpixel]: image::EncodableLayout,

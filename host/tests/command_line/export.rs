@@ -378,7 +378,18 @@ fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
     let folder = root.path().join("with/planning");
     assert_eq!(
         names(&folder),
-        ["distance.png", "height.png", "map.pgm", "map.yaml", "window.json", "window.png"]
+        [
+            "distance.png",
+            "height.png",
+            "map.pgm",
+            "map.yaml",
+            "map_raw.pgm",
+            "map_raw.yaml",
+            "map_scale.png",
+            "map_scale.yaml",
+            "window.json",
+            "window.png",
+        ]
     );
     let (pgm, header) =
         (fs::read(folder.join("map.pgm")).unwrap(), format!("P5\n{columns} {rows}\n255\n"));
@@ -395,7 +406,8 @@ fn window(input: &[&str], columns: u32, rows: u32) -> [usize; 3] {
     assert!(
         yaml.contains("image: map.pgm")
             && yaml.contains(&format!("origin: [{origin}, "))
-            && yaml.contains("mode: trinary"),
+            && yaml.contains("mode: trinary")
+            && yaml.contains("free_thresh: 0.196\n"),
         "{yaml}"
     );
     // Pictures of the same size, which agree cell by cell.
