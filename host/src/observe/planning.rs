@@ -1,7 +1,7 @@
 //! The planner's window after the last frame, as files: a map for Nav2, heights, distances, a
 //! picture of them.
 
-use super::planning_maps::{MapMode, MapPlace};
+use super::planning_maps::{MapGeometry, MapMode, png};
 use super::{EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::scene::{PLANNING_FOLDER, WindowScales};
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
@@ -139,7 +139,7 @@ pub fn write_folder(
     let states = columns.states();
     for mode in MapMode::ALL {
         write(mode.picture(), &mode.encode(&states, columns.size()))?;
-        write(mode.description(), mode.yaml(&columns.place()).as_bytes())?;
+        write(mode.description(), mode.yaml(&columns.geometry()).as_bytes())?;
     }
     write("height.png", &png(columns.heights(&description)))?;
     write("distance.png", &png(columns.distances()))?;
@@ -209,9 +209,9 @@ impl Columns<'_, '_> {
     }
 
     /// Scale and corner of the pictures.
-    fn place(&self) -> MapPlace {
+    fn geometry(&self) -> MapGeometry {
         let (cell_m, [x, y, _]) = (self.planning.grid().cell_m(), self.planning.origin());
-        MapPlace { cell_m, corner_m: [x, y].map(|c| f64::from(c) * cell_m) }
+        MapGeometry { cell_m, corner_m: [x, y].map(|c| f64::from(c) * cell_m) }
     }
 
     /// Heights of the ground in millimetres above the lowest.
@@ -291,16 +291,4 @@ fn covers(moving: &MovingBox, [x, y, _]: Cell, cell_m: f32) -> bool {
     let [cos, sin] = moving.heading;
     (cos * dx + sin * dy).abs() <= moving.half_m[0]
         && (cos * dy - sin * dx).abs() <= moving.half_m[1]
-}
-
-/// A picture as a PNG file.
-pub(super) fn png<P>(picture: ImageBuffer<P, Vec<P::Subpixel>>) -> Vec<u8>
-where
-    P: image::Pixel + image::PixelWithColorType,
-    [P::Subpixel]: image::EncodableLayout,
-{
-    let mut bytes = Vec::new();
-    // Writing to memory cannot fail for a picture with pixels.
-    let written = picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png);
-    if written.is_ok() { bytes } else { Vec::new() }
 }

@@ -2,13 +2,12 @@
 //!
 //! Both servers compute an occupancy from a pixel's brightness, `1 - grey / 255`, and compare it
 //! with the two thresholds of the YAML file. Each mode has its own way to say "unknown": a grey
-//! between the thresholds (trinary), a transparent pixel (scale), a value above 100 (raw). A picture
-//! written for one mode is wrong in another, so each has its own.
+//! between the thresholds (trinary), a transparent pixel (scale), a value above 100 (raw). A
+//! picture written for one mode is wrong in another, so each has its own.
 
-use super::planning::png;
 use crate::scene::{FREE_GREY, OCCUPIED_GREY};
 use dynvox_core::planning::CellState;
-use image::{Rgba, RgbaImage};
+use image::{ImageBuffer, Rgba, RgbaImage};
 
 /// Grey level of unknown cells in trinary mode, the one that the map savers write.
 const UNKNOWN_GREY: u8 = 205;
@@ -35,7 +34,7 @@ pub enum MapMode {
 
 /// Scale and corner of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MapPlace {
+pub struct MapGeometry {
     /// Side of a cell, m.
     pub cell_m: f64,
     /// Lower left corner of the picture, m to the right and ahead of the world's origin.
@@ -65,8 +64,8 @@ impl MapMode {
     }
 
     /// Writes the YAML file that belongs to the picture.
-    pub fn yaml(self, place: &MapPlace) -> String {
-        let MapPlace { cell_m, corner_m: [x, y] } = place;
+    pub fn yaml(self, geometry: &MapGeometry) -> String {
+        let MapGeometry { cell_m, corner_m: [x, y] } = geometry;
         let mode = match self {
             Self::Trinary => "trinary",
             Self::Scale => "scale",
@@ -104,6 +103,18 @@ impl MapMode {
             })),
         }
     }
+}
+
+/// A picture as a PNG file.
+pub(super) fn png<P>(picture: ImageBuffer<P, Vec<P::Subpixel>>) -> Vec<u8>
+where
+    P: image::Pixel + image::PixelWithColorType,
+    [P::Subpixel]: image::EncodableLayout,
+{
+    let mut bytes = Vec::new();
+    // Writing to memory cannot fail for a picture with pixels.
+    let written = picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png);
+    if written.is_ok() { bytes } else { Vec::new() }
 }
 
 #[cfg(test)]
@@ -174,14 +185,14 @@ mod tests {
 
     #[test]
     fn map_servers_load_each_cell_as_it_is_in_every_mode() {
-        let place = MapPlace { cell_m: 0.2, corner_m: [-6.4, 3.6] };
+        let geometry = MapGeometry { cell_m: 0.2, corner_m: [-6.4, 3.6] };
         for seed in 0..100 {
             let (size, states) = random_window(seed);
             for mode in MapMode::ALL {
                 let picture = image::load_from_memory(&mode.encode(&states, size)).unwrap();
                 let (has_alpha, pixels) = (picture.color().has_alpha(), picture.to_rgba8());
                 assert_eq!(pixels.dimensions(), size);
-                let yaml = keys(&mode.yaml(&place));
+                let yaml = keys(&mode.yaml(&geometry));
                 for (pixel, state) in pixels.pixels().zip(&states) {
                     let expected = match state {
                         CellState::Free => 0,
@@ -197,7 +208,8 @@ mod tests {
 
     #[test]
     fn the_rule_of_the_servers_takes_unknown_for_free_above_its_occupancy() {
-        let mut yaml = keys(&MapMode::Trinary.yaml(&MapPlace { cell_m: 0.1, corner_m: [0.0; 2] }));
+        let mut yaml =
+            keys(&MapMode::Trinary.yaml(&MapGeometry { cell_m: 0.1, corner_m: [0.0; 2] }));
         let grey = [UNKNOWN_GREY, UNKNOWN_GREY, UNKNOWN_GREY, 255];
         assert_eq!(loaded(&yaml, grey, false, true), -1);
         yaml.insert("free_thresh".into(), "0.25".into());

@@ -2,7 +2,7 @@
 //! dynvox's own lists of a frame.
 
 use super::{DetectedBox, DetectionSource, Detections};
-use crate::input::masks::format::{MaskFormat, OpenedMasks, frames_of};
+use crate::input::masks::format::{MaskFormat, OpenedMasks, all_if_any, frames_of};
 use crate::input::masks::{Frames, class_of, read_text};
 use crate::input::source::{FrameMasks, InputError, StereoImages};
 use dynvox_core::tracking::Class;
@@ -38,7 +38,8 @@ pub static FORMAT: MaskFormat = MaskFormat {
     open: |path, dataset| {
         let frames = frames_of(dataset);
         if path.is_file() {
-            return OpenedMasks::boxes(BoxTable::open(path, frames)?, dataset.len(), dataset);
+            let (table, there) = BoxTable::open(path, frames)?;
+            return OpenedMasks::boxes(table, all_if_any(there, dataset), dataset);
         }
         let (lists, there) = BoxFiles::open(path, frames);
         OpenedMasks::boxes(lists, there, dataset)
@@ -52,8 +53,9 @@ pub(in super::super) struct BoxTable {
 }
 
 impl BoxTable {
-    /// Reads the file. Frames it does not name are such in which nothing is seen.
-    pub fn open(path: &Path, frames: Frames) -> Result<Self, InputError> {
+    /// Reads the file, and counts the frames it has boxes for. Nothing is seen in frames that it
+    /// does not name.
+    pub fn open(path: &Path, frames: Frames) -> Result<(Self, usize), InputError> {
         let text = read_text(path)?.unwrap_or_default();
         let mut rows = BTreeMap::<usize, Detections>::new();
         for (line, row) in numbered(&text) {
@@ -64,9 +66,12 @@ impl BoxTable {
                 InputError::masks(path, format!("line {line} is neither {formats}"))
             })?;
             let Some((Some(frame), ..)) = parsed else { continue };
-            add(rows.entry(frame).or_default(), parsed);
+            add(rows.entry(frame).or_default(), parsed)
+                .map_err(|reason| InputError::masks(path, format!("line {line} {reason}")))?;
         }
-        Ok(Self { frames, rows })
+        let is_named = |index: &usize| rows.contains_key(&frames.number(*index));
+        let there = (0..frames.stems.len()).filter(is_named).count();
+        Ok((Self { frames, rows }, there))
     }
 }
 
@@ -105,7 +110,8 @@ impl DetectionSource for BoxFiles {
                                y1 x2 y2 ...` (KITTI)";
                 InputError::masks(&path, format!("line {line} is neither {formats}"))
             })?;
-            add(&mut found, parsed);
+            add(&mut found, parsed)
+                .map_err(|reason| InputError::masks(&path, format!("line {line} {reason}")))?;
         }
         Ok(found)
     }
@@ -119,10 +125,28 @@ fn numbered(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// Adds a row's box.
-fn add(found: &mut Detections, row: Row) {
-    let Some((_, class, score, edges)) = row else { return };
+///
+/// # Errors
+/// Its edges cannot be px from the image's corner. The reason completes a sentence that begins with
+/// the line's number.
+fn add(found: &mut Detections, row: Row) -> Result<(), String> {
+    let Some((_, class, score, edges)) = row else { return Ok(()) };
+    let [left, top, right, bottom] = edges;
+    if right <= left || bottom <= top {
+        return Err(format!(
+            "has a box without area, from {left} {top} to {right} {bottom} px. The last numbers \
+             may be width and height, or the order another: see docs/inputs.md"
+        ));
+    }
+    if edges.iter().all(|edge| (-1.0..=2.0).contains(edge)) && right - left < 1.0 {
+        return Err(format!(
+            "has a box from {left} {top} to {right} {bottom} px. The numbers may be shares of the \
+             image's size: multiply by width and height, or give them as yolo:DIR"
+        ));
+    }
     found.masks.refusals.unknown_class += u32::from(class.is_none());
     found.boxes.push(DetectedBox { class: class.unwrap_or_default(), score, edges });
+    Ok(())
 }
 
 /// Numbers, all finite.
@@ -171,13 +195,16 @@ fn own(row: &str) -> Option<Row> {
 }
 
 /// `frame,id,left,top,width,height,score[,class,...]`, frames and pixels counted from 1. A score of
-/// 0 marks a region to ignore.
+/// 0 marks a region to ignore. A box without a class (7 columns, or -1) is a moving object's.
 fn mot(row: &str) -> Option<Row> {
     let values = numbers(&row.split(',').collect::<Vec<_>>())?;
     let &[frame, _, left, top, width, height] = values.get(..6)? else { return None };
     let frame = (frame as usize).checked_sub(1)?;
     let given = values.get(6).copied();
-    let class = values.get(7).and_then(|&class| MOT.get((class as usize).checked_sub(1)?)).copied();
+    let class = match values.get(7) {
+        None | Some(-1.0) => Some(Class::MovingObject),
+        Some(&class) => (class as usize).checked_sub(1).and_then(|at| MOT.get(at)).copied(),
+    };
     let [left, top] = [left - 1.0, top - 1.0];
     Some(
         (given != Some(0.0))
@@ -213,7 +240,13 @@ mod tests {
         assert_eq!(mot("1,-1,11,21,5,6,0,3,1"), Some(None), "a region to ignore");
         assert_eq!(
             mot("2,-1,11,21,5,6,57.3,-1,-1,-1").flatten().map(|row| (row.1, row.2)),
-            Some((None, 1.0))
+            Some((Some(Class::MovingObject), 1.0)),
+            "detections without classes are of what may move"
+        );
+        assert_eq!(
+            ["1,1,268,91,19,15,0.9", "1,1,268,91,19,15,0.9,2", "1,1,268,91,19,15,0.9,99"]
+                .map(|row| mot(row).flatten().map(|row| row.1)),
+            [Some(Some(Class::MovingObject)), Some(Some(Class::Rider)), Some(None)]
         );
         assert_eq!(
             own("2 traffic light 0.7 1 2 3.5 4"),
@@ -226,5 +259,12 @@ mod tests {
             );
         }
         assert!(kitti_tracking("3 7 Van 0 1 -1.5 10.0 20.0").is_none(), "a label cut off");
+        for (row, expected) in [
+            ("1 car 0.9 0.2 0.3 0.4 0.5", "shares of the image's size"),
+            ("1 car 0.9 200 300 40 50", "width and height"),
+        ] {
+            let reason = add(&mut Detections::default(), own(row).unwrap()).unwrap_err();
+            assert!(reason.contains(expected), "{row}: {reason}");
+        }
     }
 }

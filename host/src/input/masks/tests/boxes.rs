@@ -101,10 +101,34 @@ fn yolo_text_has_boxes_and_polygons_of_cocos_or_its_own_classes() {
     fs::write(root.path().join("classes.txt"), "car\ntram\n").unwrap();
     let masks = first(root.path(), &MaskChoice::Files(&yolo::FORMAT, folder)).unwrap();
     assert_eq!((masks.instances[0].class, masks.refusals.unknown_class), (Class::Train, 1));
-    for wrong in ["2 0.5 0.5 0.25", "car 0.5 0.5 0.2 0.2", "2 0.5 0.5 0.2 nan", "2 0 0 1 0 1 1 0"] {
+    for (wrong, reason) in [
+        ("2 0.5 0.5 0.25", "line 1 is neither"),
+        ("2 0.5 0.5 0.2 nan", "line 1 is neither"),
+        ("2 0 0 1 0 1 1 7.5", "line 1 has a score of 7.5"),
+    ] {
         let message = refusal_of(of_folder("000000.txt", wrong, &yolo::FORMAT));
-        assert!(message.contains("line 1 is neither"), "{message}");
+        assert!(message.contains(reason), "{message}");
     }
+}
+
+#[test]
+fn boxes_that_ultralytics_tracked_are_the_same_boxes() {
+    let row = "2 0.225 0.5555556 0.25 0.5555556";
+    for (end, score) in [("", 1.0), (" 7", 1.0), (" 0.5", 0.5), (" 0.5 7", 0.5), (" 0.5 1", 0.5)] {
+        let masks = of_folder("000000.txt", &format!("{row}{end}\n"), &yolo::FORMAT).unwrap();
+        assert_eq!(found(&masks), [(Class::Car, score, SHRUNK_CAR)], "{end}");
+    }
+}
+
+#[test]
+fn boxes_without_classes_are_of_moving_objects() {
+    for text in ["1,-1,5,11,10,20,0.9\n", "1,-1,5,11,10,20,0.9,-1,-1,-1\n"] {
+        let masks = of_file("mot.txt", text, &super::super::boxes::FORMAT).unwrap();
+        assert_eq!(found(&masks), [(Class::MovingObject, 0.9, SHRUNK_CAR)]);
+        assert_eq!(masks.refusals, MaskRefusals::default());
+    }
+    let none = of_file("mot.txt", "900,-1,5,11,10,20,0.9\n", &super::super::boxes::FORMAT);
+    assert!(refusal_of(none).contains("nothing for any frame"));
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! YOLO text: for each image `STEM.txt`, a row an object, coordinates as shares of width and
-//! height: `class cx cy w h [score]`, a box; or `class x1 y1 x2 y2 x3 y3 ...`, a polygon. Names of
-//! the classes are the lines of `classes.txt` in the folder or the one above it, else COCO's.
+//! height: `class cx cy w h`, a box; or `class x1 y1 x2 y2 x3 y3 ...`, a polygon; behind either
+//! a score, the number of a track, or both, as Ultralytics writes them. Names of the classes are
+//! the lines of `classes.txt` in the folder or the one above it, else COCO's.
+
+mod row;
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
 use super::format::{MaskFormat, OpenedMasks, all_if_any, frames_of};
@@ -8,6 +11,7 @@ use super::shapes::Polygons;
 use super::{Frames, class_of, coco_class, read_text};
 use crate::input::source::{InputError, StereoImages};
 use dynvox_core::tracking::Class;
+use row::{Row, Shape};
 use std::path::{Path, PathBuf};
 
 /// YOLO text.
@@ -27,6 +31,8 @@ pub(super) struct Yolo {
     frames: Frames,
     /// Classes of `classes.txt`, where there is one.
     classes: Option<Vec<Option<Class>>>,
+    /// Rows end in a score and the number of a track.
+    has_tracks: bool,
 }
 
 impl Yolo {
@@ -40,51 +46,45 @@ impl Yolo {
             .find(|path| path.is_file());
         let text = named.map(|path| read_text(&path)).transpose()?.flatten();
         let classes = text.map(|text| text.lines().map(|name| class_of(name.trim())).collect());
-        Ok((Self { folder: folder.to_path_buf(), frames, classes }, there))
+        let mut has_tracks = None;
+        for stem in &frames.stems {
+            let text = read_text(&folder.join(format!("{stem}.txt")))?;
+            let one = text.as_deref().and_then(row::ends_in_tracks);
+            has_tracks = one.map(|one| one && has_tracks != Some(false)).or(has_tracks);
+        }
+        let has_tracks = has_tracks.unwrap_or_default();
+        Ok((Self { folder: folder.to_path_buf(), frames, classes, has_tracks }, there))
     }
 
-    /// Adds a row's object; `None` where it is not one.
-    fn add(&self, row: &str, found: &mut Detections) -> Option<()> {
-        let (class, rest) = row.split_once(char::is_whitespace)?;
-        let number: usize = class.parse().ok()?;
-        let class = self
-            .classes
-            .as_ref()
-            .map_or_else(|| coco_class(number), |classes| classes.get(number).copied().flatten());
-        let values: Option<Vec<f64>> = rest
-            .split_whitespace()
-            .map(|word| word.parse().ok().filter(|value: &f64| value.is_finite()))
-            .collect();
-        let (values, (width, height)) = (values?, self.frames.size);
-        let (width_px, height_px) = (width as f64, height as f64);
+    /// Adds a row's object.
+    fn add(&self, row: Row, found: &mut Detections) {
+        let class = self.classes.as_ref().map_or_else(
+            || coco_class(row.class),
+            |classes| classes.get(row.class).copied().flatten(),
+        );
         found.masks.refusals.unknown_class += u32::from(class.is_none());
         let class = class.unwrap_or_default();
-        match values[..] {
-            [u, v, w, h] | [u, v, w, h, _] => {
-                let score = values.get(4).map_or(1.0, |score| *score as f32);
-                let edges = [
-                    (u - w / 2.0) * width_px,
-                    (v - h / 2.0) * height_px,
-                    (u + w / 2.0) * width_px,
-                    (v + h / 2.0) * height_px,
-                ];
-                found.boxes.push(DetectedBox { class, score, edges });
-            }
-            ref corners if corners.len() >= 6 && corners.len().is_multiple_of(2) => {
-                let polygon = [corners
-                    .as_chunks::<2>()
-                    .0
-                    .iter()
-                    .map(|[u, v]| [u * width_px, v * height_px])
-                    .collect()];
+        let (width_px, height_px) = (self.frames.size.0 as f64, self.frames.size.1 as f64);
+        match row.shape {
+            Shape::Box([u, v, width, height]) => found.boxes.push(DetectedBox {
+                class,
+                score: row.score,
+                edges: [
+                    (u - width / 2.0) * width_px,
+                    (v - height / 2.0) * height_px,
+                    (u + width / 2.0) * width_px,
+                    (v + height / 2.0) * height_px,
+                ],
+            }),
+            Shape::Polygon(corners) => {
+                let corners = corners.iter().map(|[u, v]| [u * width_px, v * height_px]).collect();
+                let polygon = [corners];
                 let polygon = Polygons::new(&polygon, self.frames.size);
                 if found.masks.reserve(polygon.pixels.area() as usize) {
-                    found.masks.push(polygon.mask(class, 1.0));
+                    found.masks.push(polygon.mask(class, row.score));
                 }
             }
-            _ => return None,
         }
-        Some(())
     }
 }
 
@@ -99,11 +99,9 @@ impl DetectionSource for Yolo {
             return Ok(found);
         };
         for (line, row) in (1..).zip(text?.lines()).filter(|(_, row)| !row.trim().is_empty()) {
-            self.add(row.trim(), &mut found).ok_or_else(|| {
-                let formats = "`class cx cy w h [score]` nor `class x1 y1 x2 y2 x3 y3 ...`, in \
-                               shares of the image's size";
-                InputError::masks(&path, format!("line {line} is neither {formats}"))
-            })?;
+            let row = row::parse(row.trim(), self.has_tracks)
+                .map_err(|reason| InputError::masks(&path, format!("line {line} {reason}")))?;
+            self.add(row, &mut found);
         }
         Ok(found)
     }
