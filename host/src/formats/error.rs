@@ -1,6 +1,7 @@
 //! What can be wrong with a file.
 
 use super::bounds::{TABLE_TEXT, TextBound, check_bytes, most_text};
+use super::text::decoded;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -56,7 +57,7 @@ impl FormatError {
 /// The text of a file within the bounds of a table.
 ///
 /// # Errors
-/// It cannot be read, is not UTF-8, or is beyond the bounds.
+/// It cannot be read, is neither UTF-8 nor UTF-16, or is beyond the bounds.
 pub fn read_text(path: &Path) -> Result<String, FormatError> {
     read_text_within(path, &TABLE_TEXT)
 }
@@ -65,15 +66,12 @@ pub fn read_text(path: &Path) -> Result<String, FormatError> {
 /// read; of one without a length, such as a pipe, no more than the bound is read.
 ///
 /// # Errors
-/// It cannot be read, is not UTF-8, or is beyond the bounds.
+/// It cannot be read, is neither UTF-8 nor UTF-16, or is beyond the bounds.
 pub fn read_text_within(path: &Path, bound: &TextBound) -> Result<String, FormatError> {
     let refuse = |reason: String| FormatError::content(path, reason, FETCH_ANEW);
     let bytes = read_bytes_within(path, bound.what, bound.bytes)?;
     bound.check_lines(&bytes).map_err(refuse)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let source = std::io::Error::new(std::io::ErrorKind::InvalidData, error.utf8_error());
-        FormatError::read(path)(source)
-    })
+    decoded(bytes).map_err(|reason| FormatError::content(path, reason, "Save it as text in UTF-8"))
 }
 
 /// The bytes of a file that may have `most` of them; `what` names their kind in a message.

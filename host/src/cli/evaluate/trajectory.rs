@@ -1,17 +1,17 @@
 //! `dynvox evaluate trajectory`.
 
 use crate::evaluate::trajectory::{
-    self, TrajectoryErrors, WithoutBoresight, frames_of_run, matched, read_trajectory,
-    truth_of_frames,
+    self, MatchedPoses, TrajectoryErrors, WithoutBoresight, frames_of_run, matched,
+    read_trajectory, truth_of_frames,
 };
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct TrajectoryArgs {
-    /// Estimated poses: a file in KITTI's or TUM's format, or a run folder
+    /// Estimated poses: a file of KITTI's, TUM's, EuRoC's or KITTI-360's format, or a run folder
     estimate: PathBuf,
-    /// True poses, in either format; joined by time where both have times, by the numbers of a run
-    /// folder's frames where they are more than those, row by row otherwise
+    /// True poses, in any of these formats; joined one to one by time where both have times, by the
+    /// frames' numbers where rows or a run folder have them, row by row otherwise
     truth: PathBuf,
     /// Write the figures to standard output as JSON
     #[arg(long)]
@@ -24,7 +24,12 @@ pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
     if let Some(frames) = frames_of_run(&args.estimate)? {
         truth = truth_of_frames(truth, &frames)?;
     }
-    let (estimate, truth) = matched(&read_trajectory(&args.estimate)?, &truth)?;
+    let estimate = read_trajectory(&args.estimate)?;
+    let matched = matched(&estimate, &truth)?;
+    for note in estimate.notes.iter().chain(&truth.notes) {
+        eprintln!("note: {note}");
+    }
+    let MatchedPoses { first: estimate, second: truth, of: [of_estimate, of_truth] } = matched;
     let found = trajectory::errors(&truth, &estimate)
         .ok_or_else(|| anyhow::anyhow!("two poses are needed. Give longer trajectories"))?;
     if args.json {
@@ -32,7 +37,13 @@ pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
         return Ok(());
     }
     let length_m = trajectory::travelled_m(&truth).last().copied().unwrap_or_default();
-    outln!("{:<28}{} over {length_m:.1} m", "poses", truth.len());
+    let count = truth.len();
+    let of = if count == of_estimate && count == of_truth {
+        String::new()
+    } else {
+        format!(" of {of_estimate} poses, and of {of_truth} true ones,")
+    };
+    outln!("{:<28}{count}{of} over {length_m:.1} m", "poses");
     print_figures(&found);
     Ok(())
 }

@@ -1,11 +1,13 @@
 //! Two trajectories, matched: by time, or row by row.
 
+use super::association::{SAME_TIME_S, associated};
+use super::travelled::travelled_m;
 use crate::formats::{FRAMES_FILE, FormatError, TIMED_TRAJECTORY_FILE, Trajectory, read_poses};
 use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
 
-/// Two poses are of the same frame when their times differ by at most this, s (as `evo` has it).
-const SAME_TIME_S: f64 = 0.01;
+/// A true path shorter than this has no direction to align and no length to measure by, m.
+const STANDING_M: f64 = 1e-3;
 
 #[derive(serde::Deserialize)]
 struct FrameNumber {
@@ -49,6 +51,15 @@ pub enum TrajectoryError {
         /// Rows there are.
         rows: usize,
     },
+    /// The true path stands still.
+    #[error(
+        "the true path is {length_m} m long: it stands still, and nothing can be aligned or \
+         measured by its length. Give the poses of a camera that moves"
+    )]
+    Standing {
+        /// Length, m.
+        length_m: f64,
+    },
     /// Fewer than two pairs.
     #[error(
         "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} \
@@ -85,17 +96,15 @@ pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError>
 /// # Errors
 /// There is no row for a frame.
 pub fn truth_of_frames(truth: Trajectory, frames: &[usize]) -> Result<Trajectory, TrajectoryError> {
-    if truth.times_s.is_some() || truth.poses.len() == frames.len() {
+    let by_row = truth.numbers.is_none();
+    if truth.times_s.is_some() || (by_row && truth.poses.len() == frames.len()) {
         return Ok(truth);
     }
     let row = |&frame: &usize| {
-        truth
-            .poses
-            .get(frame)
-            .copied()
-            .ok_or(TrajectoryError::NoRow { frame, rows: truth.poses.len() })
+        truth.of_frame(frame).ok_or(TrajectoryError::NoRow { frame, rows: truth.poses.len() })
     };
-    Ok(Trajectory { times_s: None, poses: frames.iter().map(row).collect::<Result<_, _>>()? })
+    let poses = frames.iter().map(row).collect::<Result<_, _>>()?;
+    Ok(Trajectory { poses, notes: truth.notes, ..Trajectory::default() })
 }
 
 /// Reads a file of either format; of a run folder its own trajectory.
@@ -107,47 +116,54 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     Ok(read_poses(&path)?)
 }
 
-/// The poses of both that are of the same frame: by time where both have times, otherwise row by
-/// row.
+/// Poses of two trajectories that are of the same frames.
+#[derive(Clone, Debug, Default)]
+pub struct MatchedPoses {
+    /// Poses of the first.
+    pub first: Vec<Transform>,
+    /// Poses of the second, one for each.
+    pub second: Vec<Transform>,
+    /// Poses that each of the trajectories has.
+    pub of: [usize; 2],
+}
+
+/// The poses of both that are of the same frame: by time where both have times, by number where
+/// both have numbers, otherwise row by row.
 ///
 /// # Errors
-/// The poses cannot be matched, or fewer than two can.
-pub fn matched(
-    first: &Trajectory,
-    second: &Trajectory,
-) -> Result<(Vec<Transform>, Vec<Transform>), TrajectoryError> {
-    let pairs: Vec<(Transform, Transform)> = match (&first.times_s, &second.times_s) {
-        (Some(times), Some(others)) => {
-            let nearest = |time: &f64| {
-                let at = others
-                    .iter()
-                    .enumerate()
-                    .min_by(|a, b| (a.1 - time).abs().total_cmp(&(b.1 - time).abs()))?;
-                // A pose farther away in time belongs to another frame.
-                ((at.1 - time).abs() <= SAME_TIME_S)
-                    .then(|| second.poses.get(at.0).copied())
-                    .flatten()
-            };
-            times
-                .iter()
-                .zip(&first.poses)
-                .filter_map(|(time, pose)| Some((*pose, nearest(time)?)))
-                .collect()
-        }
-        // Without times the files must correspond row by row.
-        _ if first.poses.len() == second.poses.len() => {
-            first.poses.iter().copied().zip(second.poses.iter().copied()).collect()
-        }
-        _ => {
-            return Err(TrajectoryError::Lengths {
-                first: first.poses.len(),
-                second: second.poses.len(),
-            });
-        }
+/// They cannot be matched, fewer than two can, or the second, the true one, does not move.
+pub fn matched(first: &Trajectory, second: &Trajectory) -> Result<MatchedPoses, TrajectoryError> {
+    let of = [first.poses.len(), second.poses.len()];
+    let pairs: Vec<(usize, usize)> = match (&first.times_s, &second.times_s) {
+        (Some(times_s), Some(others_s)) => associated(times_s, others_s),
+        _ => match [&first.numbers, &second.numbers] {
+            [Some(numbers), Some(others)] => (0..)
+                .zip(numbers)
+                .filter_map(|(at, number)| Some((at, others.binary_search(number).ok()?)))
+                .collect(),
+            // Rows without numbers are numbered from 0.
+            [Some(numbers), None] if of[0] != of[1] => {
+                (0..).zip(numbers.iter().copied()).filter(|(_, row)| *row < of[1]).collect()
+            }
+            [None, Some(numbers)] if of[0] != of[1] => {
+                numbers.iter().copied().zip(0..).filter(|(row, _)| *row < of[0]).collect()
+            }
+            _ if of[0] == of[1] => (0..of[0]).map(|at| (at, at)).collect(),
+            _ => return Err(TrajectoryError::Lengths { first: of[0], second: of[1] }),
+        },
     };
     // One pose has no motion to compare.
     if pairs.len() < 2 {
         return Err(TrajectoryError::Few { pairs: pairs.len() });
     }
-    Ok(pairs.into_iter().unzip())
+    let matched = MatchedPoses {
+        first: pairs.iter().filter_map(|&(at, _)| first.poses.get(at).copied()).collect(),
+        second: pairs.iter().filter_map(|&(_, at)| second.poses.get(at).copied()).collect(),
+        of,
+    };
+    let length_m = travelled_m(&matched.second).last().copied().unwrap_or_default();
+    if length_m < STANDING_M {
+        return Err(TrajectoryError::Standing { length_m });
+    }
+    Ok(matched)
 }

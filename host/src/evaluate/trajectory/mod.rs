@@ -9,11 +9,16 @@
 //! 50 m from every frame on, and the result lists its lengths.
 
 mod align;
+mod association;
 mod boresight;
 mod files;
+mod travelled;
 
 pub use boresight::WithoutBoresight;
-pub use files::{TrajectoryError, frames_of_run, matched, read_trajectory, truth_of_frames};
+pub use files::{
+    MatchedPoses, TrajectoryError, frames_of_run, matched, read_trajectory, truth_of_frames,
+};
+pub use travelled::travelled_m;
 
 use align::aligned_error_m;
 use boresight::boresight;
@@ -115,19 +120,6 @@ fn without_boresight(segments: &[Segment], steps: &[Segment]) -> Option<WithoutB
             .percent,
         rpe_t_m: rms(steps.iter().map(|step| turned(step).error().distance_m())),
     })
-}
-
-/// Distance travelled up to each frame, m.
-pub fn travelled_m(poses: &[Transform]) -> Vec<f64> {
-    let steps = poses.windows(2).map(|pair| {
-        (Vector3::from(pair[1].translation_m) - Vector3::from(pair[0].translation_m)).norm()
-    });
-    std::iter::once(0.0)
-        .chain(steps.scan(0.0, |sum, step| {
-            *sum += step;
-            Some(*sum)
-        }))
-        .collect()
 }
 
 /// A motion from one frame to another.

@@ -143,7 +143,7 @@ fn agrees_with_evo() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
     let [estimate, truth] =
         ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
-    let (estimate, truth) = matched(&estimate, &truth).unwrap();
+    let MatchedPoses { first: estimate, second: truth, .. } = matched(&estimate, &truth).unwrap();
     let found = errors(&truth, &estimate).unwrap();
     let evo: serde_json::Value = serde_json::from_str(include_str!("evo/figures.json")).unwrap();
     let close = |name: &str, value: f64, expected: &serde_json::Value| {
@@ -182,16 +182,17 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
     let kitti = read_trajectory(&write("kitti.txt", &kitti_lines)).unwrap();
     let tum = read_trajectory(&write("trajectory_tum.txt", &tum_lines)).unwrap();
     assert_eq!((&kitti.times_s, tum.times_s.as_deref()), (&None, Some(&times[..])));
-    let (a, b) = matched(&kitti, &tum).unwrap();
+    let MatchedPoses { first: a, second: b, .. } = matched(&kitti, &tum).unwrap();
     assert!(errors(&a, &b).unwrap().ate_m < 1e-9, "one trajectory in two formats");
     assert_eq!(read_trajectory(folder.path()).unwrap(), tum, "a run folder's own");
     // Every second pose, by another clock that is 4 ms late.
     let half = Trajectory {
         times_s: Some(times.iter().step_by(2).map(|time| time + 0.004).collect()),
         poses: poses.iter().step_by(2).copied().collect(),
+        ..Trajectory::default()
     };
-    let (a, b) = matched(&half, &tum).unwrap();
-    assert!(a.len() == 6 && errors(&a, &b).unwrap().ate_m < 1e-9);
+    let MatchedPoses { first: a, second: b, of } = matched(&half, &tum).unwrap();
+    assert!(of == [6, 12] && a.len() == 6 && errors(&a, &b).unwrap().ate_m < 1e-9);
     assert!(matched(&half, &kitti).unwrap_err().to_string().contains("has 6 poses, the second 12"));
     let late = Trajectory {
         times_s: half
@@ -202,6 +203,20 @@ fn both_formats_are_read_and_poses_are_joined_by_time() {
         ..half
     };
     assert!(matched(&late, &tum).unwrap_err().to_string().contains("same clock"));
+    let still = Trajectory { poses: vec![poses[0]; 12], ..Trajectory::default() };
+    assert!(matched(&kitti, &still).unwrap_err().to_string().contains("stands still"));
+    // The numbered rows of some frames, and those of all of them.
+    let numbered = Trajectory {
+        numbers: Some((3..9).collect()),
+        poses: poses[3..9].to_vec(),
+        ..Trajectory::default()
+    };
+    let MatchedPoses { first: a, second: b, .. } = matched(&numbered, &kitti).unwrap();
+    assert!(a.len() == 6 && errors(&b, &a).unwrap().ate_m < 1e-9);
+    let twice: Vec<String> =
+        tum_lines.iter().flat_map(|line| [line.clone(), line.clone()]).collect();
+    let refused = read_trajectory(&write("twice.txt", &twice)).unwrap_err().to_string();
+    assert!(refused.contains("has a time that is not after"), "{refused}");
     let mixed = write("mixed.txt", &[kitti_lines[0].clone(), tum_lines[0].clone()]);
     assert!(
         read_trajectory(&mixed).unwrap_err().to_string().contains("line 3 is of another format")

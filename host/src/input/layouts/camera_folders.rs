@@ -3,6 +3,7 @@
 use super::names::{pictures_in, stem_of};
 use super::pairing::CameraFiles;
 use super::sequence::stamps_in_names;
+use super::tables::TableFrames;
 use crate::formats::{read_stamped_names, read_times};
 use crate::input::source::InputError;
 use std::collections::BTreeMap;
@@ -53,7 +54,7 @@ pub fn camera_in(folder: &Path) -> Result<CameraFiles, InputError> {
     let stamps_ns =
         match (table("data.csv"), table("timestamps.txt").or_else(|| table("times.txt"))) {
             (Some(path), _) => stamps_by_name(&path, &files)?,
-            (None, Some(path)) => stamps_by_row(&read_times(&path)?, &files),
+            (None, Some(path)) => Some(stamps_by_row(&path, &files)?),
             (None, None) => stamps_in_names(&files),
         };
     Ok(CameraFiles { files, stamps_ns })
@@ -70,11 +71,10 @@ fn stamps_by_name(table: &Path, files: &[PathBuf]) -> Result<Option<Vec<u64>>, I
 }
 
 /// One row an image, or rows by the images' numbers where some images are missing.
-fn stamps_by_row(rows: &[u64], files: &[PathBuf]) -> Option<Vec<u64>> {
-    if rows.len() == files.len() {
-        return Some(rows.to_vec());
-    }
-    files.iter().map(|path| rows.get(stem_of(path).parse::<usize>().ok()?).copied()).collect()
+fn stamps_by_row(path: &Path, files: &[PathBuf]) -> Result<Vec<u64>, InputError> {
+    let positions: Vec<usize> = (0..files.len()).collect();
+    let frames = TableFrames { files, positions: &positions, numbered: false };
+    frames.times(path, &read_times(path)?, &mut Vec::new())
 }
 
 /// Splits the images of one folder by a prefix or suffix that names the camera: `left_0008`,

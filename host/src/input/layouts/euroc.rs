@@ -4,12 +4,15 @@
 use super::camera_folders::camera_in;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
 use crate::formats::calibration::{CameraGeometry, beside};
+use crate::formats::read_poses;
 use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
 /// Folder of all sensors.
 const SENSORS: &str = "mav0";
+/// Ground truth of EuRoC, of the body.
+const TRUTH: &str = "state_groundtruth_estimate0/data.csv";
 
 /// EuRoC and TUM VI.
 pub const DATA_SET: Layout = Layout::new(&DataSet {
@@ -41,6 +44,9 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
             beside(&sensors).ok_or_else(|| InputError::Unrectified { path: path.to_path_buf() })?
         }
     };
+    let truth = sensors.join(TRUTH);
+    let poses =
+        truth.is_file().then(|| read_poses(&truth).map(|read| (truth, read))).transpose()?;
     let root = sensors.parent().filter(|root| *root != Path::new("")).unwrap_or(&sensors);
     Sequence::from_parts(Parts {
         name: super::folder::name_of(root),
@@ -49,7 +55,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         rectified: options.rectified,
         cameras: CameraGeometry::read(&cameras_from, None)?,
         times: None,
-        poses: None,
+        poses,
         numbered: false,
         notes: Vec::new(),
         instances: path.join("instances"),

@@ -51,7 +51,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
             .map(|file| read_times(&file).map(|times| (file, times)))
             .transpose()?,
         poses: file("poses.txt")
-            .map(|file| read_poses(&file).map(|read| (file, read.poses)))
+            .map(|file| read_poses(&file).map(|read| (file, read)))
             .transpose()?,
         numbered: false,
         notes: Vec::new(),

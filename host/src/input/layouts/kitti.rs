@@ -70,12 +70,11 @@ fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         // its own place.
         Some(path) => {
             let t_camera_zero = Transform::from_translation(calibration.offset_m(left)?.into());
-            let poses = read_poses(&path)?
-                .poses
-                .iter()
-                .map(|pose| t_camera_zero * pose * t_camera_zero.inverse())
-                .collect();
-            Some((path, poses))
+            let mut read = read_poses(&path)?;
+            for pose in &mut read.poses {
+                *pose = t_camera_zero * *pose * t_camera_zero.inverse();
+            }
+            Some((path, read))
         }
         None => None,
     };
@@ -154,11 +153,7 @@ fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         rectified: options.rectified,
         cameras: options.cameras_or(|| calibration.rig(2, 3))?,
         times: None,
-        poses: if poses.is_file() {
-            Some((poses.clone(), read_poses(&poses)?.poses))
-        } else {
-            None
-        },
+        poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?)) } else { None },
         numbered: true,
         notes: Vec::new(),
         instances: split.join("instances").join(&name),

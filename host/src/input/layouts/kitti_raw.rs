@@ -6,12 +6,16 @@ use super::folder::name_of;
 use super::kitti::{chosen, sequences};
 use super::sequence::{ImageFiles, Parts, Sequence, present};
 use crate::formats::calibration::KittiCalibration;
+use crate::formats::read_poses;
 use crate::input::data_set::{CameraPair, DataSet, Layout, OpenOptions};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
 /// Folder of all drives of KITTI-360.
 const DRIVES_360: &str = "data_2d_raw";
+/// Folder of KITTI-360's poses, a folder a drive, and the file of camera 0 in it.
+const POSES_360: &str = "data_poses";
+const POSES_FILE_360: &str = "cam0_to_world.txt";
 
 /// KITTI's raw drives.
 pub const KITTI_RAW: Layout = Layout::new(&DataSet {
@@ -55,7 +59,8 @@ fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
     } else {
         options
     };
-    open_drive(&drive, found, "kitti-raw", options)
+    let files = DriveFiles { calibration: found.clone(), poses: None };
+    open_drive(&drive, &files, "kitti-raw", options)
 }
 
 /// Opens a drive of KITTI-360. `path` is the root of the data set or one drive in `data_2d_raw`.
@@ -67,12 +72,23 @@ fn open_360(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
         ),
         None => (path.join("../.."), path.to_path_buf()),
     };
-    open_drive(&drive, &root.join("calibration/perspective.txt"), "kitti-360", options)
+    let files = DriveFiles {
+        calibration: root.join("calibration/perspective.txt"),
+        poses: Some(root.join(POSES_360).join(name_of(&drive)).join(POSES_FILE_360)),
+    };
+    open_drive(&drive, &files, "kitti-360", options)
+}
+
+/// Files of a drive apart from its folder.
+struct DriveFiles {
+    calibration: PathBuf,
+    /// Poses of camera 0, there or not.
+    poses: Option<PathBuf>,
 }
 
 fn open_drive(
     drive: &Path,
-    calibration: &Path,
+    files: &DriveFiles,
     prefix: &str,
     options: &OpenOptions,
 ) -> Result<Sequence, InputError> {
@@ -90,7 +106,8 @@ fn open_drive(
     let camera =
         |number: usize| camera_in(&present(drive.join(format!("image_{number:02}")), action)?);
     let cameras = [camera(left)?, camera(right)?];
-    let own = || KittiCalibration::read(calibration)?.rig(left, right);
+    let own = || KittiCalibration::read(&files.calibration)?.rig(left, right);
+    let poses = files.poses.as_ref().filter(|poses| left == 0 && poses.is_file());
     Sequence::from_parts(Parts {
         name: format!("{prefix}-{}", name_of(drive)),
         images: ImageFiles::Cameras(cameras),
@@ -98,7 +115,7 @@ fn open_drive(
         rectified: options.rectified,
         cameras: options.cameras_or(own)?,
         times: None,
-        poses: None,
+        poses: poses.map(|path| read_poses(path).map(|read| (path.clone(), read))).transpose()?,
         numbered: true,
         notes: Vec::new(),
         instances: drive.join("instances"),

@@ -15,6 +15,7 @@ mod pairing;
 mod raw_tests;
 mod sequence;
 mod street;
+mod tables;
 #[cfg(test)]
 mod tests;
 

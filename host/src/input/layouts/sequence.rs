@@ -4,13 +4,15 @@
 use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
 use super::pairing::{CameraFiles, Pairing};
+use super::tables::TableFrames;
 use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
-use crate::formats::{Decoded, picture_size, read_picture, significant_bits};
+use crate::formats::{
+    Decoded, TimeTable, Trajectory, picture_size, read_picture, significant_bits,
+};
 use crate::input::source::{
     ASSUMED_HZ, AvailableMasks, FrameInfo, FrameSource, InputError, LidarScan, ObjectsTruth,
     SourceInfo, Stacking, StereoImages, StreamState, require_size,
 };
-use dynvox_core::geometry::Transform;
 use std::path::{Path, PathBuf};
 
 /// Pictures whose largest value tells how many bits of 16 are significant.
@@ -73,10 +75,9 @@ pub(super) struct Parts {
     pub cameras: CameraGeometry,
     /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
-    /// Times (ns) and poses as read: one row for each image of the left folder or frame number, or
-    /// `None` without a file.
-    pub times: Option<(PathBuf, Vec<u64>)>,
-    pub poses: Option<(PathBuf, Vec<Transform>)>,
+    /// Times and poses as read, or `None` without a file.
+    pub times: Option<(PathBuf, TimeTable)>,
+    pub poses: Option<(PathBuf, Trajectory)>,
     /// True if file names are frame numbers, as in KITTI: row `n` of the tables then belongs to
     /// file `n`.
     pub numbered: bool,
@@ -108,25 +109,18 @@ impl Sequence {
             if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at }
         };
         let numbers: Vec<usize> = positions.iter().map(number).collect();
+        let tables =
+            TableFrames { files: &left.files, positions: &positions, numbered: parts.numbered };
         let stamps_ns = match parts.times {
-            Some((path, times)) => Some(times_of(path, &times, &numbers)?),
+            Some((path, times)) => Some(tables.times(&path, &times, &mut notes)?),
             None => left.stamps_ns.as_ref().and_then(|stamps| rows_of(stamps, &positions)),
         };
         if stamps_ns.is_none() {
             notes.push(format!("no times of the images: {ASSUMED_HZ} frames a second are assumed"));
         }
-        let truth = parts.poses.and_then(|(path, poses)| {
-            let found = rows_of(&poses, &numbers);
-            if found.is_none() {
-                notes.push(format!(
-                    "{} has only {} poses for {} images: not used",
-                    path.display(),
-                    poses.len(),
-                    numbers.len()
-                ));
-            }
-            found
-        });
+        let truth = parts
+            .poses
+            .and_then(|(path, read)| tables.poses(&path, &read, stamps_ns.as_deref(), &mut notes));
         let masks = Some(parts.instances).filter(|folder| folder.is_dir());
         let masks = masks.map_or(AvailableMasks::Absent, AvailableMasks::Folder);
         let objects = numbers.iter().map_while(|&row| parts.objects.get(row).cloned()).collect();
@@ -235,21 +229,6 @@ fn detected_bits(
         ));
     }
     Ok(bits)
-}
-
-/// The times of frames by their numbers, of a table in a file.
-fn times_of(path: PathBuf, times: &[u64], numbers: &[usize]) -> Result<Vec<u64>, InputError> {
-    rows_of(times, numbers).ok_or_else(|| InputError::Table {
-        reason: format!(
-            "it has {} times, but there are images up to number {}",
-            times.len(),
-            numbers.iter().max().unwrap_or(&0)
-        ),
-        action: format!(
-            "Give one line per image, or move the file away: {ASSUMED_HZ} Hz are then assumed"
-        ),
-        path,
-    })
 }
 
 /// The chosen rows of a table; `None` where one is missing.

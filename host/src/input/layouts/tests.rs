@@ -286,7 +286,8 @@ fn calibrations_times_and_poses_that_do_not_fit_are_refused_or_said() {
     let file = |name: &str| root.path().join("sequences/06").join(name);
     fs::write(file("times.txt"), "0\n0.1\n").unwrap();
     assert!(
-        refusal(root.path(), None).contains("it has 2 times, but there are images up to number 2")
+        refusal(root.path(), None)
+            .contains("it has 2 rows for 3 images, and there are images up to")
     );
     fs::write(file("times.txt"), "0\n0.1\n0.1\n").unwrap();
     assert!(refusal(root.path(), None).contains("the time on line 3 is not after"));
@@ -297,7 +298,7 @@ fn calibrations_times_and_poses_that_do_not_fit_are_refused_or_said() {
     let dataset = open(root.path(), &OpenOptions::default()).unwrap();
     assert!(
         dataset.truth().is_none()
-            && dataset.notes().iter().any(|note| note.contains("only 1 poses for 3 images"))
+            && dataset.notes().iter().any(|note| note.contains("it has 1 rows for 3 images"))
     );
     fs::write(file("calib.txt"), CALIB.lines().next().unwrap()).unwrap();
     assert!(

@@ -1,7 +1,7 @@
 //! Poses from a file, to be used instead of egomotion.
 
 use super::{FrameSource, InputError};
-use crate::formats::{Trajectory, read_poses};
+use crate::formats::read_poses;
 use dynvox_core::geometry::Transform;
 use std::path::Path;
 
@@ -19,7 +19,8 @@ pub fn read_given_poses(
     source: &dyn FrameSource,
     indices: &[usize],
 ) -> Result<Vec<Transform>, InputError> {
-    let Trajectory { times_s, poses } = read_poses(path)?;
+    let read = read_poses(path)?;
+    let poses = &read.poses;
     let refuse = |reason: String| InputError::Table {
         path: path.to_path_buf(),
         reason,
@@ -31,28 +32,22 @@ pub fn read_given_poses(
         source
             .stem(index)
             .and_then(|stem| stem.parse().ok())
-            .filter(|_| poses.len() != source.len())
+            .filter(|_| read.numbers.is_some() || poses.len() != source.len())
             .unwrap_or(index)
     };
     let find = |&index: &usize| {
-        let Some(times_s) = &times_s else {
+        if read.times_s.is_none() {
             let missing = || {
                 refuse(format!(
-                    "it has {} poses, but frame {} is to be mapped",
+                    "it has {} poses, but none for frame {}, which is to be mapped",
                     poses.len(),
                     number(index)
                 ))
             };
-            return poses.get(number(index)).copied().ok_or_else(missing);
-        };
+            return read.of_frame(number(index)).ok_or_else(missing);
+        }
         let time_s = source.time_s(index);
-        let apart = |(row_s, _): &(&f64, &Transform)| (*row_s - time_s).abs();
-        let nearest = times_s
-            .iter()
-            .zip(&poses)
-            .min_by(|a, b| apart(a).total_cmp(&apart(b)))
-            .filter(|row| apart(row) <= NEAR_S);
-        nearest.map(|(_, pose)| *pose).ok_or_else(|| {
+        read.near(time_s, NEAR_S).ok_or_else(|| {
             refuse(format!("it has no pose within {NEAR_S} s of frame {index}, at {time_s} s"))
         })
     };

@@ -98,3 +98,54 @@ fn images_of_one_camera_are_refused_without_an_option_that_they_hold_both() {
     let options = OpenOptions { stacking: Some(Stacking::SideBySide), ..OpenOptions::default() };
     assert_eq!(open(root.path(), &options).unwrap().size(), (20, 32));
 }
+
+/// A folder of frames 0 to 11 without frame 5, with a row of times and poses for each of the 12.
+fn without_the_sixth(times: impl Fn(u32) -> String) -> TempDir {
+    let root = TempDir::new().unwrap();
+    for at in (0..12).filter(|at| *at != 5) {
+        for (side, image) in ["left", "right"].into_iter().zip(&pair(at)) {
+            save(image, root.path().join(format!("{side}/{at:06}.png")));
+        }
+    }
+    fs::write(root.path().join("calib.txt"), CALIB).unwrap();
+    fs::write(root.path().join("times.txt"), (0..12).map(times).collect::<String>()).unwrap();
+    let pose = |at: u32| format!("1 0 0 0 0 1 0 0 0 0 1 {at}\n");
+    fs::write(root.path().join("poses.txt"), (0..12).map(pose).collect::<String>()).unwrap();
+    root
+}
+
+#[test]
+fn a_missing_image_does_not_move_the_rows_of_the_others() {
+    for (times, unit) in [
+        (&(|at| format!("{}\n", 0.1 * f64::from(at))) as &dyn Fn(u32) -> String, None),
+        (&|at| format!("{}\r\n", 100 * at), Some("ms")),
+        (&|at| format!("{}{}\n", if at == 0 { "\u{feff}" } else { "" }, 100_000 * at), Some("us")),
+        (
+            &|at| format!("{}\n", 1_403_636_579_763_555_584 + u64::from(at) * 100_000_000),
+            Some("ns"),
+        ),
+    ] {
+        let root = without_the_sixth(times);
+        let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+        let truth = dataset.truth().unwrap();
+        for (frame, number) in (0..12).filter(|at| *at != 5).enumerate() {
+            let since_s = dataset.time_s(frame) - dataset.time_s(0);
+            assert!((since_s - 0.1 * f64::from(number)).abs() < 1e-6, "{unit:?}: {since_s}");
+            assert_eq!(truth[frame].translation_m[2], f64::from(number));
+        }
+        let noted = |words: &str| dataset.notes().iter().any(|note| note.contains(words));
+        assert!(noted("12 rows for 11 images: matched by the numbers"), "{:?}", dataset.notes());
+        assert!(unit.is_none_or(|unit| noted(&format!("times are in {unit}"))));
+    }
+}
+
+#[test]
+fn tables_that_fit_no_frames_are_refused_or_not_used() {
+    let root = without_the_sixth(|at| format!("{}\n", 0.1 * f64::from(at)));
+    fs::write(root.path().join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(7)).unwrap();
+    let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+    assert!(dataset.truth().is_none());
+    assert!(dataset.notes().iter().any(|note| note.contains("7 rows for 11 images")));
+    fs::write(root.path().join("times.txt"), "0\n0.1\n0.2\n").unwrap();
+    assert!(refusal(root.path(), None).contains("it has 3 rows for 11 images"));
+}
