@@ -7,6 +7,7 @@ pub mod fleet;
 pub mod formats;
 pub mod input;
 pub mod observe;
+pub mod owned;
 pub mod report;
 pub mod request;
 pub mod run;

@@ -2,6 +2,7 @@
 
 use super::rectified::RectifiedArgs;
 use crate::formats::calibration::{RectifiedSize, StereoCalibration, lens_table, to_toml};
+use crate::owned::write_whole;
 use crate::request::ImageSize;
 use anyhow::Context;
 use dynvox_core::geometry::StereoRig;
@@ -49,19 +50,10 @@ pub fn run(args: &CalibrationArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes a file beside its place and moves it there, so that nothing half-written stays.
+/// Writes a new file; one that is there is left alone.
 fn write_new(path: &Path, text: &str) -> anyhow::Result<()> {
     let hint = || format!("{} cannot be written. Give another path with --out", path.display());
-    let partial = path.with_extension("toml.partial");
-    let mut file = std::fs::File::create(&partial).with_context(hint)?;
-    let written = file
-        .write_all(text.as_bytes())
-        .and_then(|()| file.sync_all())
-        .and_then(|()| std::fs::rename(&partial, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&partial);
-    }
-    written.with_context(hint)
+    write_whole(path, |file| file.write_all(text.as_bytes())).with_context(hint)
 }
 
 fn print(calibration: &StereoCalibration, rectification: &Rectification, rig: &StereoRig) {

@@ -2,8 +2,9 @@
 
 use crate::fixtures::{self, Blessing, Verdict};
 use crate::input::masks::MaskChoice;
+use crate::owned::check_overlap;
 use crate::request::{Bytes, Options, Request, RequestError};
-use crate::run::write_whole;
+use crate::run::replace_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
 use serde_json::json;
@@ -132,6 +133,7 @@ const DEFAULT_MEMORY: Bytes = Bytes(32 << 20);
 
 fn new(args: &NewArgs) -> anyhow::Result<()> {
     let plan = args.request()?.resolve()?;
+    check_overlap(&args.folder, &plan.request.inputs())?;
     let frames = fixtures::create(&args.folder, &plan, &Serial)?;
     if args.json {
         outln!(
@@ -151,7 +153,7 @@ fn new(args: &NewArgs) -> anyhow::Result<()> {
 fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
     let verdicts = verdicts(path)?;
     if let Some(file) = junit {
-        write_whole(file, |out| out.write_all(fixtures::junit(&verdicts).as_bytes()))?;
+        replace_whole(file, |out| out.write_all(fixtures::junit(&verdicts).as_bytes()))?;
     }
     if json {
         outln!("{}", serde_json::to_string_pretty(&verdicts)?);
@@ -208,9 +210,9 @@ pub fn run(args: &FixturesArgs) -> anyhow::Result<()> {
             let bytes = fixtures::pack(fixture)?;
             if let Some(rust) = rust {
                 let text = fixtures::constants(fixture, &bytes)?;
-                write_whole(rust, |file| file.write_all(text.as_bytes()))?;
+                replace_whole(rust, |file| file.write_all(text.as_bytes()))?;
             }
-            write_whole(out, |file| file.write_all(&bytes))?;
+            replace_whole(out, |file| file.write_all(&bytes))?;
             outln!("{} bytes in {}", bytes.len(), out.display());
         }
     }

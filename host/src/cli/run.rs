@@ -6,8 +6,9 @@ mod resume;
 
 pub use finish::{IncompleteRun, record, write};
 
+use crate::owned::check_overlap;
 use crate::request::{Options, Request};
-use crate::run::RunFolder;
+use crate::run::{RunFolder, check_outputs};
 use finish::{finish, print_header};
 use std::path::{Path, PathBuf};
 
@@ -112,6 +113,8 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
         args.target.out.clone().unwrap_or_else(|| {
             RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name())
         });
+    check_outputs(&plan, &target)?;
+    check_overlap(&target, args.options.config.as_slice())?;
     let folder = RunFolder::begin(&target, args.target.overwrite)?;
     if plan.progress {
         print_header(&plan);

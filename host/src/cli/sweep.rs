@@ -5,6 +5,7 @@ use super::run;
 use crate::fleet::{Job, Manifest};
 use crate::input::depth::DepthChoice;
 use crate::input::{self, OpenOptions};
+use crate::owned::check_overlap;
 use crate::request::{Memory, Reference, Request, Settings, Source};
 use crate::sweep::{Data, Kind, Plan, Results, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
@@ -86,6 +87,8 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
     let plan = args.plan_of(&data)?;
+    let inputs: Vec<PathBuf> = data.iter().filter_map(|data| data.path.clone()).collect();
+    check_overlap(&args.out, &inputs)?;
     let folder = SweepFolder::open(&args.out, &plan)?;
     let keys = plan.keys();
     let request = |key: &str| -> anyhow::Result<Request> {

@@ -2,7 +2,7 @@
 
 use crate::formats::SUMMARY_FILE;
 use crate::report::{html::page, viewer};
-use crate::run::write_whole;
+use crate::run::replace_whole;
 use crate::scene::{MAX_TRIANGLES, Scene};
 use anyhow::{Context, bail};
 use maud::html;
@@ -41,7 +41,7 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
     let viewer = viewer::fragment(folder, name, &Scene::read(folder, args.triangles)?)?;
     let page = page(&format!("dynvox: {name}"), &html! { h1 { (name) } (viewer) }).into_string();
     let out = args.out.clone().unwrap_or_else(|| folder.join(VIEWER_FILE));
-    write_whole(&out, |file| std::io::Write::write_all(file, page.as_bytes()))?;
+    replace_whole(&out, |file| std::io::Write::write_all(file, page.as_bytes()))?;
     outln!("{}", out.display());
     if !args.no_open {
         open::that_detached(&out).with_context(|| {

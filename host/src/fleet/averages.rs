@@ -5,7 +5,7 @@ use super::resolve::resolve;
 use super::submap::not_stored;
 use super::tile_file::{Lattice, TileReader};
 use super::tile_folder::tiles;
-use crate::formats::DraftFolder;
+use crate::owned::DraftFolder;
 use crate::run::BLOCKS_FILE;
 use crate::run::store::BlockFile;
 use dynvox_core::volume::{BlockStore, EvictedBlock};
@@ -37,8 +37,8 @@ impl Averages {
             None => return Err(FleetError::content(folder, "has no tile: nothing was mapped")),
         };
         // The averages may be larger than memory: they go to a file next to the result.
-        let scratch = DraftFolder::of(&out.with_extension("blocks"));
-        std::fs::create_dir_all(scratch.path()).map_err(FleetError::io(scratch.path()))?;
+        let scratch = DraftFolder::begin(&out.with_extension("blocks"));
+        let scratch = scratch.map_err(FleetError::io(out))?;
         let path = scratch.path().join(BLOCKS_FILE);
         let (mut store, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
         let resolved = resolve(folder, |resolved| {

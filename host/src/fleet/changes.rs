@@ -223,6 +223,7 @@ mod tests {
     #[test]
     fn a_box_that_came_is_shown_and_one_seen_too_rarely_is_not() {
         let root = tempfile::TempDir::new().unwrap();
+        drop(crate::owned::OwnedFolder::create(root.path()).unwrap());
         write(root.path(), 0, false, 20);
         write(root.path(), 1, true, 6);
         let (blocks, changes) = resolved(root.path());

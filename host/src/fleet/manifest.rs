@@ -3,6 +3,7 @@
 //! folder.
 
 use super::{FleetError, Recording, Recordings, submap, tile_file};
+use crate::owned::OwnedFolder;
 use crate::request::Request;
 use crate::run::{self, write_whole};
 use dynvox_core::digest::Digest;
@@ -159,7 +160,8 @@ impl Manifest {
     /// # Errors
     /// The disk refuses.
     pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
-        std::fs::create_dir_all(folder).map_err(FleetError::io(folder))?;
+        let _owned = OwnedFolder::open_or_create(folder)
+            .map_err(|error| FleetError::io(folder)(error.into()))?;
         let path = folder.join(MANIFEST_FILE);
         let text = serde_json::to_string_pretty(self)
             .map_err(|error| FleetError::content(&path, error.to_string()))?;
@@ -273,8 +275,11 @@ mod tests {
         let path = root.path().join("recordings.toml");
         std::fs::write(&path, RECORDINGS_EXAMPLE).unwrap();
         let manifest = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap();
-        manifest.write(root.path()).unwrap();
-        assert_eq!(Manifest::read(root.path()).unwrap(), manifest);
+        let refused = manifest.write(root.path()).unwrap_err().to_string();
+        assert!(refused.contains("has no marker"), "a folder of the user's: {refused}");
+        let folder = root.path().join("fleet");
+        manifest.write(&folder).unwrap();
+        assert_eq!(Manifest::read(&folder).unwrap(), manifest);
         let [monday, tuesday] = &manifest.jobs[..] else { panic!("{manifest:?}") };
         assert_eq!(
             monday.request.input.sequence.as_deref(),
@@ -287,9 +292,9 @@ mod tests {
         );
         assert!(monday.is_of(5) && !monday.is_of(4) && monday.id != tuesday.id);
         assert_eq!(manifest.shard(1, 2).collect::<Vec<_>>(), [tuesday]);
-        assert_eq!(tuesday.state(root.path()), JobState::Open);
-        std::fs::create_dir_all(tuesday.submap(root.path())).unwrap();
-        assert_eq!(tuesday.state(root.path()), JobState::Done);
+        assert_eq!(tuesday.state(&folder), JobState::Open);
+        std::fs::create_dir_all(tuesday.submap(&folder)).unwrap();
+        assert_eq!(tuesday.state(&folder), JobState::Done);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::FleetError;
 use super::block_sums::BlockSums;
 use super::tile_file::{self, Lattice, TileReader};
 use super::tile_folder::{WorldTile, tiles};
-use crate::formats::DraftFolder;
+use crate::owned::DraftFolder;
 use dynvox_core::digest::Digest;
 use dynvox_core::volume::BlockCoord;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,8 +35,7 @@ pub fn merge(inputs: &[PathBuf], out: &Path) -> Result<Merged, FleetError> {
     let folders = inputs.iter().map(|folder| tiles(folder)).collect::<Result<Vec<_>, _>>()?;
     // All tiles of all inputs, in order.
     let all: BTreeSet<WorldTile> = folders.iter().flat_map(BTreeMap::keys).copied().collect();
-    let draft = DraftFolder::of(out);
-    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let draft = DraftFolder::begin(out).map_err(FleetError::io(out))?;
     let mut merged = Merged { tiles: 0, blocks: 0, lattice: None };
     // A tile's blocks are merged as streams: one block of each input is in memory.
     for tile in all {

@@ -5,7 +5,7 @@ use super::coverage::{Coverage, coverage};
 use super::resolve::{ResolvedMap, resolve};
 use super::submap::Submap;
 use super::{Change, FleetError, Manifest, changes, distance_m, poses};
-use crate::formats::DraftFolder;
+use crate::owned::{self, DraftFolder};
 use crate::run::write_whole;
 use dynvox_core::volume::BLOCK_SIDE;
 use image::{Rgb, RgbImage};
@@ -112,8 +112,7 @@ impl Report {
             return Err(FleetError::Exists { path: out.to_path_buf() });
         }
         // The folder appears under its name only when it is whole.
-        let draft = DraftFolder::of(out);
-        std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+        let draft = DraftFolder::begin(out).map_err(FleetError::io(out))?;
         let file = |name: &str, text: String| {
             let path: PathBuf = draft.path().join(name);
             write_whole(&path, |file| file.write_all(text.as_bytes()))
@@ -122,9 +121,11 @@ impl Report {
         file("report.json", serde_json::to_string_pretty(self).unwrap_or_default() + "\n")?;
         file("changes.csv", self.table())?;
         let path = draft.path().join("map.png");
+        let mut png = std::io::Cursor::new(Vec::new());
         self.picture()
-            .save(&path)
+            .write_to(&mut png, image::ImageFormat::Png)
             .map_err(|error| FleetError::content(&path, error.to_string()))?;
+        owned::write(&path, png.get_ref()).map_err(FleetError::io(&path))?;
         draft.rename(out).map_err(FleetError::io(out))
     }
 

@@ -11,7 +11,7 @@ use super::block_sums::BlockSums;
 use super::submap::{Source, Submap, lattice_point, voxel_of};
 use super::tile_file::{self, Lattice};
 use super::tile_folder::WorldTile;
-use crate::formats::DraftFolder;
+use crate::owned::{self, DraftFolder};
 use crate::run::store::BlockFile;
 use dynvox_core::geometry::Transform;
 use dynvox_core::volume::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord};
@@ -58,8 +58,7 @@ pub fn resample(
     // Blocks of the world in the order of tiles, so that each tile is written once.
     let (targets, beyond) = targets(source.store, &way, lattice, epoch);
     // The folder appears under its name only when it is whole.
-    let draft = DraftFolder::of(out);
-    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let draft = DraftFolder::begin(out).map_err(FleetError::io(out))?;
     let mut resampled = Resampled { tiles: 0, blocks: 0, beyond };
     for of_tile in targets.chunk_by(|a, b| a.0 == b.0) {
         let path = draft.path().join(of_tile[0].0.file_name());
@@ -69,7 +68,7 @@ pub fn resample(
         })?;
         // A tile without any sums leaves no file.
         if blocks == 0 {
-            std::fs::remove_file(&path).map_err(FleetError::io(&path))?;
+            owned::remove_file(&path).map_err(FleetError::io(&path))?;
             continue;
         }
         resampled = Resampled {

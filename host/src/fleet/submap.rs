@@ -12,7 +12,7 @@ use super::distance_field::DistanceField;
 use super::free_space::{Camera, CameraPose, free_blocks};
 use super::manifest::{rows_of, transform};
 use super::tile_file::Lattice;
-use crate::formats::DraftFolder;
+use crate::owned::DraftFolder;
 use crate::run::store::{BlockFile, Position};
 use crate::run::{BLOCKS_FILE, write_whole};
 use dynvox_core::volume::{
@@ -135,8 +135,7 @@ pub fn keep(
     if out.exists() {
         return Err(FleetError::Exists { path: out.to_path_buf() });
     }
-    let draft = DraftFolder::of(out);
-    std::fs::create_dir_all(draft.path()).map_err(FleetError::io(draft.path()))?;
+    let draft = DraftFolder::begin(out).map_err(FleetError::io(out))?;
     let path = draft.path().join(BLOCKS_FILE);
     let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
     // Segments after a loss stand apart, above the first: only the first is kept.

@@ -2,6 +2,7 @@
 
 use super::FleetError;
 use super::tile_file::Lattice;
+use crate::owned::MARKER_FILE;
 use dynvox_core::volume::{BLOCK_SIDE, BlockCoord};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -54,6 +55,9 @@ pub fn tiles(folder: &Path) -> Result<BTreeMap<WorldTile, PathBuf>, FleetError> 
     for entry in folder.read_dir().map_err(FleetError::io(folder))? {
         let path = entry.map_err(FleetError::io(folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if name == MARKER_FILE {
+            continue;
+        }
         let tile = WorldTile::parse(&name).ok_or_else(|| {
             FleetError::content(&path, "is no tile. Give folders that `dynvox fleet` wrote")
         })?;

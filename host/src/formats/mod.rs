@@ -10,7 +10,6 @@ pub mod calibration;
 mod capacity;
 mod checksum;
 mod decode;
-mod draft;
 mod error;
 mod gnss;
 mod image;
@@ -30,7 +29,6 @@ mod times;
 
 pub use capacity::{CapacityFile, CapacityTable};
 pub use checksum::checksum_of;
-pub use draft::DraftFolder;
 pub use error::{FormatError, read_bytes_within, read_text, read_text_within};
 pub use gnss::{Fix, LocalPlane, read_gnss};
 pub use image::{Image, luma};

@@ -2,7 +2,9 @@
 
 use super::decode::{self, plain};
 use super::{FormatError, Image};
-use image::{DynamicImage, ExtendedColorType};
+use crate::owned::write;
+use image::codecs::png::PngEncoder;
+use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -59,16 +61,15 @@ pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
 /// The file cannot be written.
 pub fn write_png_deep(path: &Path, image: &Image<u16>) -> Result<(), FormatError> {
     let bytes: Vec<u8> = image.pixels().iter().copied().flat_map(u16::to_ne_bytes).collect();
-    image::save_buffer(
-        path,
-        &bytes,
-        image.width() as u32,
-        image.height() as u32,
-        ExtendedColorType::L16,
-    )
-    .map_err(|error| {
-        FormatError::content(path, plain(&error), "Check the folder, and whether the disk is full")
-    })
+    let mut png = Vec::new();
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    PngEncoder::new(&mut png)
+        .write_image(&bytes, width, height, ExtendedColorType::L16)
+        .map_err(|error| plain(&error))
+        .and_then(|()| write(path, &png).map_err(|error| error.to_string()))
+        .map_err(|reason| {
+            FormatError::content(path, reason, "Check the folder, and whether the disk is full")
+        })
 }
 
 fn decode(path: &Path) -> Result<DynamicImage, FormatError> {

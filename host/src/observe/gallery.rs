@@ -5,6 +5,7 @@ use super::{
     EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, frame_pictures::Shown,
     pictures, spread,
 };
+use crate::owned;
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PICTURES_INDEX, PictureIndex, PictureKind};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -48,11 +49,11 @@ impl Observer for GalleryObserver {
         for entry in folder.read_dir().map_err(failed)? {
             let entry = entry.map_err(failed)?;
             if !known.iter().any(|name| entry.file_name() == name.as_str()) {
-                std::fs::remove_file(entry.path()).map_err(failed)?;
+                owned::remove_file(&entry.path()).map_err(failed)?;
             }
         }
         // An empty folder would show a gallery without pictures.
-        if self.taken.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
+        if self.taken.is_empty() { owned::remove_folder(&folder).map_err(failed) } else { Ok(()) }
     }
 
     fn frame(
@@ -123,7 +124,7 @@ impl GalleryObserver {
                 // One that stays behind is not in the list of pictures.
                 PictureKind::ALL
                     .iter()
-                    .for_each(|kind| drop(std::fs::remove_file(folder.join(kind.file(frame)))));
+                    .for_each(|kind| drop(owned::remove_file(&folder.join(kind.file(frame)))));
             }
             stays
         });
@@ -136,7 +137,7 @@ fn folder(run: &ObservedRun<'_>) -> PathBuf {
 
 /// Writes the pictures of a frame. One that cannot be made leaves no file.
 fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), ObserveError> {
-    std::fs::create_dir_all(folder)
+    owned::create_folder(folder)
         .map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
     let disparity_q8 = frame.view.mapper().disparity_q8();
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
@@ -153,6 +154,6 @@ fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), Ob
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), ObserveError> {
-    std::fs::write(path, bytes)
+    owned::write(path, bytes)
         .map_err(|source| ObserveError::Write { path: path.to_path_buf(), source })
 }

@@ -4,6 +4,7 @@
 
 use super::ObserveError;
 use crate::formats::checksum_of;
+use crate::owned;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{ErrorKind, Write};
@@ -110,7 +111,7 @@ impl GrowingFile {
         let path = self.path(folder);
         let failed = |source| ObserveError::Write { path: path.clone(), source };
         if self.file.is_none() {
-            self.file = Some(File::create(&path).map_err(failed)?);
+            self.file = Some(owned::create_file(&path).map_err(failed)?);
         }
         let Some(file) = &mut self.file else { return Ok(()) };
         while !self.pending.is_empty() {

@@ -3,6 +3,7 @@
 use super::{FrameContext, ObserveError, ObservedRun, Observer};
 use crate::input::masks::save_masks;
 use crate::input::{FrameSource, InstanceMask};
+use crate::owned::create_folder;
 use dynvox_core::Mapper;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::tracking::Class;
@@ -27,7 +28,7 @@ impl Observer for InstancesObserver {
     ) -> Result<(), ObserveError> {
         let Some(folder) = run.instances_folder.as_deref() else { return Ok(()) };
         let motion_folder = folder.join(MOTION_FOLDER);
-        std::fs::create_dir_all(&motion_folder)
+        create_folder(&motion_folder)
             .map_err(|source| ObserveError::Write { path: motion_folder.clone(), source })?;
         let (stem, size) =
             (stem(run.plan.dataset.as_ref(), frame.row.frame), run.plan.dataset.size());

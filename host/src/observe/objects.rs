@@ -11,6 +11,7 @@ use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
 use crate::formats::{Axes, Mesh, PlyWriter, tum_line, write_numbered};
+use crate::owned;
 use crate::scene::OBJECTS_FOLDER;
 use dynvox_core::geometry::Transform;
 use dynvox_core::objects::ObjectSummary;
@@ -115,11 +116,11 @@ impl Observer for ObjectsObserver {
                 files(&one.name).iter().any(|file| entry.file_name() == file.as_str())
             };
             if !self.retired.iter().any(known) {
-                std::fs::remove_file(entry.path()).map_err(failed)?;
+                owned::remove_file(&entry.path()).map_err(failed)?;
             }
         }
         // Where none is left there is no folder either.
-        if self.retired.is_empty() { std::fs::remove_dir(&folder).map_err(failed) } else { Ok(()) }
+        if self.retired.is_empty() { owned::remove_folder(&folder).map_err(failed) } else { Ok(()) }
     }
 
     fn frame(
@@ -223,7 +224,7 @@ impl ObjectsObserver {
             let name = self.name_of(one);
             if let Err(error) = self.write(run, one, &name) {
                 files(&name).iter().for_each(|file| {
-                    drop(std::fs::remove_file(run.folder.join(OBJECTS_FOLDER).join(file)))
+                    drop(owned::remove_file(&run.folder.join(OBJECTS_FOLDER).join(file)))
                 });
                 self.unwritten.push(name);
                 self.failure.get_or_insert_with(|| error.to_string());
@@ -329,8 +330,8 @@ fn write_files(
         let path = path.to_path_buf();
         move |source| ObserveError::Write { path, source }
     };
-    std::fs::create_dir_all(folder).map_err(failed(folder))?;
     // In the world the mesh stands where the object was last.
+    owned::create_folder(folder).map_err(failed(folder))?;
     let last = poses.last().map(|pose| pose.t_world_object).unwrap_or_default();
     let own = MeshFrame {
         name: "the object's own frame: the camera's when it was first seen",
@@ -344,11 +345,11 @@ fn write_files(
     let mut by_frame = Vec::new();
     let numbered: Vec<_> = poses.iter().map(|pose| (pose.frame, pose.t_world_object)).collect();
     write_numbered(&mut by_frame, &numbered)
-        .and_then(|()| std::fs::write(&kitti, by_frame))
+        .and_then(|()| owned::write(&kitti, &by_frame))
         .map_err(failed(&kitti))?;
     let by_time: String =
         poses.iter().map(|pose| tum_line(pose.time_ns, &pose.t_world_object)).collect();
-    std::fs::write(&tum, by_time).map_err(failed(&tum))
+    owned::write(&tum, by_time.as_bytes()).map_err(failed(&tum))
 }
 
 /// Writes an object's mesh in a frame of reference.

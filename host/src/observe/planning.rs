@@ -3,6 +3,7 @@
 
 use super::planning_maps::{MapGeometry, MapMode, png};
 use super::{EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer};
+use crate::owned;
 use crate::scene::{PLANNING_FOLDER, WindowScales};
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
@@ -128,11 +129,11 @@ pub fn write_folder(
     report: PlanningReport,
     planning: &Planning<'_>,
 ) -> Result<(), ObserveError> {
-    std::fs::create_dir_all(folder)
+    owned::create_folder(folder)
         .map_err(|source| ObserveError::Write { path: folder.to_path_buf(), source })?;
     let write = |name: &str, bytes: &[u8]| {
         let path: PathBuf = folder.join(name);
-        std::fs::write(&path, bytes).map_err(|source| ObserveError::Write { path, source })
+        owned::write(&path, bytes).map_err(|source| ObserveError::Write { path, source })
     };
     let columns = Columns { planning };
     let description = describe(&columns, frame, camera_world, report);

@@ -1,6 +1,6 @@
 //! Paths of a request, which are absolute: a request means the same in every folder.
 
-use super::{Poses, Request, Source};
+use super::{Exports, Poses, Request, Source};
 use crate::input::depth::DepthChoice;
 use crate::input::masks::MaskChoice;
 use std::path::PathBuf;
@@ -11,16 +11,30 @@ impl Request {
     /// # Errors
     /// The current folder is unknown.
     pub fn absolute(mut self) -> std::io::Result<Self> {
-        for path in self.paths_mut() {
+        for path in self.inputs_mut() {
+            *path = std::path::absolute(&*path)?;
+        }
+        let Exports { instances, map_disparity, .. } = &mut self.exports;
+        for path in instances.iter_mut().chain(map_disparity) {
             *path = std::path::absolute(&*path)?;
         }
         Ok(self)
     }
 
-    /// Every path that is read or written.
-    fn paths_mut(&mut self) -> Vec<&mut PathBuf> {
-        // All parts are named: a new path does not compile until it is decided here.
-        let Self { input, depth, masks, poses, exports, .. } = self;
+    /// Every path that is read: no output may contain one or lie within one.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        self.clone().inputs_mut().into_iter().map(|path| path.clone()).collect()
+    }
+
+    /// Every path that is written besides the run folder.
+    pub fn saved_folders(&self) -> impl Iterator<Item = &PathBuf> {
+        self.exports.instances.iter().chain(&self.exports.map_disparity)
+    }
+
+    /// Every path that is read.
+    fn inputs_mut(&mut self) -> Vec<&mut PathBuf> {
+        // A path that is read is added here, and no output may contain it.
+        let Self { input, depth, masks, poses, exports: _, .. } = self;
         let mut paths: Vec<&mut PathBuf> = input.calibration.iter_mut().collect();
         if let Source::Recording(path) = &mut input.source {
             paths.push(path);
@@ -41,8 +55,28 @@ impl Request {
         if let Poses::File(path) = poses {
             paths.push(path);
         }
-        paths.extend(&mut exports.instances);
-        paths.extend(&mut exports.map_disparity);
         paths
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_path_that_is_read_is_an_input_and_no_other() {
+        let mut request = Request::default();
+        request.input.source = Source::Recording("recording".into());
+        request.input.calibration = vec!["left.yaml".into(), "right.yaml".into()];
+        request.depth = "files:depth".parse().unwrap();
+        request.masks.source = "files:masks".parse().unwrap();
+        request.poses = Poses::File("poses.txt".into());
+        request.exports.instances = Some("saved".into());
+        let inputs = request.inputs();
+        for name in ["recording", "left.yaml", "right.yaml", "depth", "masks", "poses.txt"] {
+            assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
+        }
+        assert_eq!(inputs.len(), 6, "{inputs:?}");
+        assert_eq!(request.saved_folders().count(), 1);
     }
 }

@@ -5,6 +5,7 @@ use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
 use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter};
 use crate::observe::StoreStats;
+use crate::owned;
 use crate::request::{MapObjects, Streaming};
 use crate::slab::HostSlab;
 use dynvox_core::memory::SlabError;
@@ -176,7 +177,7 @@ impl MeshOutput {
         let path = folder.file(MAP_FILE);
         let written = written.map_err(|source| {
             // It may not exist.
-            let _ = std::fs::remove_file(&path);
+            let _ = owned::remove_file(&path);
             FolderError::Write { path, source }
         });
         (written, stats)

@@ -3,6 +3,7 @@
 use super::{FolderError, ResumeError};
 use crate::input::InputError;
 use crate::observe::ObserveError;
+use crate::owned::Overlap;
 use crate::request::RequestError;
 use crate::run::store::StoreError;
 use dynvox_core::memory::SlabError;
@@ -29,6 +30,9 @@ pub enum RunError {
         /// The option that names it.
         option: &'static str,
     },
+    /// An output and an input that overlap.
+    #[error(transparent)]
+    Overlap(#[from] Overlap),
     /// No memory for the slab.
     #[error(
         "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give \

@@ -11,11 +11,13 @@ use super::state::RunState;
 use super::{RunFolder, resident_bytes};
 use crate::formats::{MAP_FILE, Mesh};
 use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections};
+use crate::owned::check_overlap;
 use crate::request::Plan;
 use crate::scene::PICTURES_FOLDER;
 use crate::slab::HostSlab;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Maps the planned frames, or of an interrupted run those that are left, and writes the mesh into
@@ -30,6 +32,7 @@ pub fn run(
     checkpoint: Option<Checkpoint>,
 ) -> Result<RunRecord, RunError> {
     plan.check()?;
+    check_outputs(&plan, folder.target())?;
     let slab_bytes = plan.capacity.bytes();
     let mut slab = HostSlab::map(slab_bytes)
         .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
@@ -76,6 +79,17 @@ pub fn run(
         rss_peak_bytes: resident_bytes().map(|(_, peak)| peak),
         plan,
     })
+}
+
+/// Refuses outputs that contain an input of the plan or lie within one.
+///
+/// # Errors
+/// The first such input.
+pub fn check_outputs(plan: &Plan, target: &Path) -> Result<(), RunError> {
+    let inputs = plan.request.inputs();
+    let saved = plan.request.saved_folders().map(PathBuf::as_path);
+    saved.chain([target]).try_for_each(|output| check_overlap(output, &inputs))?;
+    Ok(())
 }
 
 /// Writes the last rows; files that the disk refuses are missing.

@@ -2,40 +2,35 @@
 //! ended. A snapshot in it, of a run that was killed or ended early, is what resumes the run.
 
 mod error;
+mod reserve;
+mod target;
 #[cfg(test)]
 mod tests;
+mod whole;
 
 pub use error::FolderError;
+pub use target::{PREVIOUS_SNAPSHOT_FILE, SNAPSHOT_FILE, has_snapshot};
+pub use whole::{replace_whole, write_whole};
 
 use crate::formats::SUMMARY_FILE;
-use std::fs::{File, TryLockError};
+use crate::owned::{self, NotOwned, OwnedFolder, is_taken, sibling};
+use reserve::Reserve;
 use std::io::ErrorKind;
-use std::path::{Component, Path, PathBuf};
-
-/// Name of the snapshot in the folder of a run that can be resumed.
-pub const SNAPSHOT_FILE: &str = "run.snapshot";
-/// Name of the snapshot before it.
-pub const PREVIOUS_SNAPSHOT_FILE: &str = "run.snapshot.previous";
-/// Name of a file that keeps disk space for trajectory, rows and summary, should the disk become
-/// full during the run.
-const RESERVE_FILE: &str = ".reserve";
-/// Size of the file, bytes.
-const RESERVE_BYTES: usize = 2 << 20;
+use std::path::{Path, PathBuf};
+use target::{check_target, move_away, recover, remove_condemned, resolved, take_target};
 
 /// A folder under construction, locked against other runs. Unless [`RunFolder::commit`] is reached
 /// or there is a snapshot, nothing of it remains.
 #[derive(Debug)]
 pub struct RunFolder {
     target: PathBuf,
-    partial: PathBuf,
+    partial: OwnedFolder,
     overwrite: bool,
     /// True if the folder stays when this is dropped.
     keep: bool,
     /// True if the folder belongs to a run that ended early; it goes back to its target unless the
     /// run ends anew.
     reopened: bool,
-    /// Locked while this exists; `None` where the system cannot lock a folder.
-    _lock: Option<File>,
 }
 
 impl RunFolder {
@@ -45,18 +40,25 @@ impl RunFolder {
     /// The target is taken or cannot be replaced, another run writes to it, or the disk refuses.
     pub fn begin(target: &Path, overwrite: bool) -> Result<Self, FolderError> {
         let target = resolved(target)?;
+        recover(&target);
         check_target(&target, overwrite)?;
-        let partial = sibling(&target, "partial");
-        let failed = |source| FolderError::Write { path: partial.clone(), source };
-        std::fs::create_dir_all(&partial).map_err(failed)?;
-        let lock = lock(&partial, &target)?;
-        if has_snapshot(&partial) && !overwrite {
+        let path = sibling(&target, "partial");
+        let partial = OwnedFolder::open_or_create(&path).map_err(in_the_way(&target))?;
+        if has_snapshot(&path) && !overwrite {
             return Err(FolderError::Interrupted { path: target });
         }
-        let folder = Self { partial, overwrite, keep: false, reopened: false, _lock: lock, target };
-        clear(&folder.partial)?;
+        // Results of a run that could not move them, or was killed before it did.
+        if path.join(SUMMARY_FILE).is_file() && !overwrite {
+            return Err(FolderError::Unmoved { partial: path, path: target });
+        }
+        if let Some(file) = partial.foreign_entry().map_err(in_the_way(&target))? {
+            return Err(FolderError::ForeignFile { path, file });
+        }
+        let mut folder = Self { partial, overwrite, keep: false, reopened: false, target };
+        folder.partial.clear().map_err(in_the_way(&folder.target))?;
+        remove_condemned(&folder.target);
         folder.try_rename()?;
-        folder.reserve()?;
+        Reserve::take(folder.path())?;
         Ok(folder)
     }
 
@@ -67,6 +69,7 @@ impl RunFolder {
     /// There is no such run, or another process resumes it.
     pub fn reopen(target: &Path) -> Result<Self, FolderError> {
         let target = resolved(target)?;
+        recover(&target);
         let partial = sibling(&target, "partial");
         let nothing = |reason| FolderError::NothingToResume { path: target.clone(), reason };
         let killed = has_snapshot(&partial);
@@ -80,21 +83,15 @@ impl RunFolder {
                 (false, false) => "there is no such run. Give the --out of the interrupted run",
             }));
         }
-        let lock = lock(if killed { &partial } else { &target }, &target)?;
+        let mut owned = OwnedFolder::open(if killed { &partial } else { &target })
+            .map_err(in_the_way(&target))?;
         if ended_early {
-            std::fs::rename(&target, &partial)
-                .map_err(|source| FolderError::Fixed { path: target.clone(), source })?;
+            owned.rename(&partial).map_err(fixed(&target))?;
         }
-        let folder = Self {
-            target,
-            partial,
-            overwrite: false,
-            keep: false,
-            reopened: ended_early,
-            _lock: lock,
-        };
-        folder.reserve()?;
-        match std::fs::remove_file(sibling(&folder.snapshot(), "partial")) {
+        let folder =
+            Self { target, partial: owned, overwrite: false, keep: false, reopened: ended_early };
+        Reserve::take(folder.path())?;
+        match owned::remove_file(&sibling(&folder.snapshot(), "partial")) {
             Err(source) if source.kind() != ErrorKind::NotFound => {
                 Err(FolderError::Write { path: folder.snapshot(), source })
             }
@@ -114,17 +111,14 @@ impl RunFolder {
             })
     }
 
-    /// Takes disk space for what is written last.
-    fn reserve(&self) -> Result<(), FolderError> {
-        let path = self.file(RESERVE_FILE);
-        std::fs::write(&path, vec![0; RESERVE_BYTES])
-            .map_err(|source| FolderError::Write { path, source })
+    /// Gives the disk space back that was kept for rows and tables.
+    pub fn release_reserve(&self) {
+        Reserve::release(self.path());
     }
 
-    /// Gives the disk space back that was kept for what is written last.
-    pub fn release_reserve(&self) {
-        // Without it there is nothing to give back.
-        let _ = std::fs::remove_file(self.file(RESERVE_FILE));
+    /// Gives the disk space back that was kept for the summary, which is written last.
+    pub fn release_last_reserve(&self) {
+        Reserve::release_last(self.path());
     }
 
     /// Lets the folder stay where it is when this is dropped.
@@ -134,13 +128,10 @@ impl RunFolder {
 
     /// Tries the renaming of the end with what is at the target now.
     fn try_rename(&self) -> Result<(), FolderError> {
-        if !self.target.exists() {
-            return Ok(());
-        }
-        let old = unused(&self.target, "replaced");
-        let there_and_back =
-            std::fs::rename(&self.target, &old).and_then(|()| std::fs::rename(&old, &self.target));
-        there_and_back.map_err(|source| FolderError::Fixed { path: self.target.clone(), source })
+        let Some(mut old) = take_target(&self.target)? else { return Ok(()) };
+        move_away(&mut old, &self.target)
+            .and_then(|()| old.rename(&self.target))
+            .map_err(fixed(&self.target))
     }
 
     /// Decides whether a resumed run may replace its target, and tries it.
@@ -165,7 +156,7 @@ impl RunFolder {
 
     /// Returns true if there is a snapshot, or the one before.
     pub fn has_snapshot(&self) -> bool {
-        has_snapshot(&self.partial)
+        has_snapshot(self.path())
     }
 
     /// Returns the path that the finished run will have.
@@ -175,7 +166,7 @@ impl RunFolder {
 
     /// The next free folder `parent/name-NNN`.
     pub fn next_name(parent: &Path, name: &str) -> PathBuf {
-        let taken = |path: &PathBuf| path.exists() || sibling(path, "partial").exists();
+        let taken = |path: &PathBuf| is_taken(path) || is_taken(&sibling(path, "partial"));
         (1u32..)
             .map(|number| parent.join(format!("{name}-{number:03}")))
             .find(|path| !taken(path))
@@ -184,12 +175,12 @@ impl RunFolder {
 
     /// Returns the path of the folder while the run lasts.
     pub fn path(&self) -> &Path {
-        &self.partial
+        self.partial.path()
     }
 
     /// Returns the path of a file of that name in the partial folder.
     pub fn file(&self, name: &str) -> PathBuf {
-        self.partial.join(name)
+        self.path().join(name)
     }
 
     /// Creates a file and hands a buffered writer to `write`. What cannot be written leaves no
@@ -200,14 +191,13 @@ impl RunFolder {
         write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
     ) -> Result<(), FolderError> {
         let path = self.file(name);
-        let made =
-            std::fs::File::create(&path).map(std::io::BufWriter::new).and_then(|mut file| {
-                write(&mut file)?;
-                std::io::Write::flush(&mut file)
-            });
+        let made = owned::create_file(&path).map(std::io::BufWriter::new).and_then(|mut file| {
+            write(&mut file)?;
+            std::io::Write::flush(&mut file)
+        });
         made.map_err(|source| {
             // It may not exist.
-            let _ = std::fs::remove_file(&path);
+            let _ = owned::remove_file(&path);
             FolderError::Write { path, source }
         })
     }
@@ -221,38 +211,40 @@ impl RunFolder {
     pub fn commit(mut self, temporary: &[&str]) -> Result<PathBuf, FolderError> {
         self.keep = true;
         self.release_reserve();
+        self.release_last_reserve();
+        let (partial, target) = (self.path().to_path_buf(), self.target.clone());
         let not_moved = |reason: String| FolderError::NotMoved {
-            partial: self.partial.clone(),
-            path: self.target.clone(),
+            partial: partial.clone(),
+            path: target.clone(),
             reason,
         };
-        check_target(&self.target, self.overwrite).map_err(|error| not_moved(error.to_string()))?;
-        let old = unused(&self.target, "replaced");
-        let replaced = self.target.exists();
-        if replaced {
-            std::fs::rename(&self.target, &old).map_err(|source| not_moved(source.to_string()))?;
+        check_target(&target, self.overwrite).map_err(|error| not_moved(error.to_string()))?;
+        let mut old = take_target(&target).map_err(|error| not_moved(error.to_string()))?;
+        if let Some(old) = &mut old {
+            move_away(old, &target).map_err(|error| not_moved(error.to_string()))?;
         }
-        if let Err(source) = std::fs::rename(&self.partial, &self.target) {
-            if replaced {
-                // Should this fail as well, the earlier results are in `old`.
-                let _ = std::fs::rename(&old, &self.target);
+        if let Err(error) = self.partial.rename(&target) {
+            if let Some(mut old) = old {
+                // Should this fail as well, the next run finds the earlier results.
+                let _ = old.rename(&target);
             }
-            return Err(not_moved(source.to_string()));
+            return Err(not_moved(error.to_string()));
         }
-        if replaced {
-            std::fs::remove_dir_all(&old)
-                .map_err(|source| FolderError::Write { path: old, source })?;
+        if let Some(mut old) = old {
+            let path = old.path().to_path_buf();
+            target::condemn(&mut old, &target)
+                .map_err(|source| FolderError::Write { path, source: source.into() })?;
         }
         for name in temporary {
-            let path = self.target.join(name);
-            match std::fs::remove_file(&path) {
+            let path = target.join(name);
+            match owned::remove_file(&path) {
                 Err(source) if source.kind() != ErrorKind::NotFound => {
                     return Err(FolderError::Write { path, source });
                 }
                 _ => {}
             }
         }
-        Ok(self.target.clone())
+        Ok(target)
     }
 }
 
@@ -263,111 +255,31 @@ impl Drop for RunFolder {
         }
         // A failure here changes nothing: the run has failed already.
         if !self.has_snapshot() {
-            let _ = std::fs::remove_dir_all(&self.partial);
+            let _ = self.partial.remove();
             return;
         }
         self.release_reserve();
+        self.release_last_reserve();
         if self.reopened {
-            let _ = std::fs::rename(&self.partial, &self.target);
+            let _ = self.partial.rename(&self.target);
         }
     }
 }
 
-/// The target as a path whose last part is a name.
-fn resolved(target: &Path) -> Result<PathBuf, FolderError> {
-    let failed = |source| FolderError::Write { path: target.to_path_buf(), source };
-    let current = std::env::current_dir().map_err(failed)?;
-    let named = matches!(target.components().next_back(), Some(Component::Normal(_)));
-    let path = if named { target.to_path_buf() } else { target.canonicalize().map_err(failed)? };
-    let is_current = path
-        .canonicalize()
-        .is_ok_and(|path| current.canonicalize().is_ok_and(|current| path == current));
-    if is_current || path.file_name().is_none() {
-        Err(FolderError::Current { path: target.to_path_buf() })
-    } else {
-        Ok(path)
+/// The error of a partial folder that cannot be used.
+fn in_the_way(target: &Path) -> impl FnOnce(NotOwned) -> FolderError {
+    let target = target.to_path_buf();
+    move |error| match error {
+        NotOwned::InUse { .. } => FolderError::InUse { path: target },
+        NotOwned::Foreign { path, reason } => {
+            FolderError::InTheWay { partial: path, path: target, reason }
+        }
+        NotOwned::Io { path, source } => FolderError::Write { path, source },
     }
 }
 
-/// Locks a folder; the lock ends with the process. Systems that cannot lock a folder have no lock.
-fn lock(partial: &Path, target: &Path) -> Result<Option<File>, FolderError> {
-    let in_use = || FolderError::InUse { path: target.to_path_buf() };
-    let Ok(folder) = File::open(partial) else { return Ok(None) };
-    match folder.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(in_use()),
-        Err(TryLockError::Error(_)) => Ok(None),
-        // Another run may have renamed it in the meantime.
-        Ok(()) if !partial.is_dir() => Err(in_use()),
-        Ok(()) => Ok(Some(folder)),
-    }
-}
-
-/// Removes what an earlier run left.
-fn clear(folder: &Path) -> Result<(), FolderError> {
-    let failed = |source| FolderError::Write { path: folder.to_path_buf(), source };
-    for entry in folder.read_dir().map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        let is_dir = entry.file_type().map_err(failed)?.is_dir();
-        let removed = if is_dir {
-            std::fs::remove_dir_all(entry.path())
-        } else {
-            std::fs::remove_file(entry.path())
-        };
-        removed.map_err(failed)?;
-    }
-    Ok(())
-}
-
-/// Returns true if a run left a snapshot in a folder.
-pub fn has_snapshot(folder: &Path) -> bool {
-    [SNAPSHOT_FILE, PREVIOUS_SNAPSHOT_FILE].iter().any(|name| folder.join(name).is_file())
-}
-
-/// Refuses a target that is taken.
-fn check_target(target: &Path, overwrite: bool) -> Result<(), FolderError> {
-    if !overwrite && has_snapshot(target) {
-        return Err(FolderError::Interrupted { path: target.to_path_buf() });
-    }
-    let empty =
-        !target.exists() || target.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    match (overwrite || empty, empty || target.join(SUMMARY_FILE).is_file()) {
-        (true, true) => Ok(()),
-        (true, false) => Err(FolderError::Foreign { path: target.to_path_buf() }),
-        (false, _) => Err(FolderError::Exists { path: target.to_path_buf() }),
-    }
-}
-
-/// `a/b` becomes `a/.b.suffix`: on the same disk, so that renaming is one step.
-fn sibling(target: &Path, suffix: &str) -> PathBuf {
-    let name = target.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    target.with_file_name(format!(".{name}.{suffix}"))
-}
-
-/// The first unused name among `a/.b.suffix`, `a/.b.suffix-2` and so on.
-fn unused(target: &Path, suffix: &str) -> PathBuf {
-    let first = sibling(target, suffix);
-    let numbered = (2u32..).map(|number| sibling(target, &format!("{suffix}-{number}")));
-    std::iter::once(first.clone())
-        .chain(numbered)
-        .find(|path| path.symlink_metadata().is_err())
-        .unwrap_or(first)
-}
-
-/// Writes a file atomically: under another name first, renamed when it is synced to the disk.
-pub fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
-) -> Result<(), FolderError> {
-    let draft = sibling(path, "partial");
-    let written =
-        std::fs::File::create(&draft).map(std::io::BufWriter::new).and_then(|mut file| {
-            write(&mut file)?;
-            file.into_inner()?.sync_all()?;
-            std::fs::rename(&draft, path)
-        });
-    written.map_err(|source| {
-        // The draft may not exist.
-        let _ = std::fs::remove_file(&draft);
-        FolderError::Write { path: path.to_path_buf(), source }
-    })
+/// The error of a target that cannot be renamed.
+fn fixed(target: &Path) -> impl FnOnce(NotOwned) -> FolderError {
+    let path = target.to_path_buf();
+    move |error| FolderError::Fixed { path, source: error.into() }
 }

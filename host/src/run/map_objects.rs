@@ -49,6 +49,7 @@ mod tests {
     #[test]
     fn objects_stand_where_they_were_last_seen_and_say_which_they_are() {
         let folder = tempfile::TempDir::new().unwrap();
+        drop(crate::owned::OwnedFolder::create(folder.path()).unwrap());
         let objects = folder.path().join(OBJECTS_FOLDER);
         std::fs::create_dir(&objects).unwrap();
         let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]

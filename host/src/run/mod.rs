@@ -29,9 +29,10 @@ pub use checkpoint::{Checkpoint, ResumeError, RunManifest, fingerprint};
 pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};
 pub use error::{RunError, step_reason};
-pub use execute::run;
+pub use execute::{check_outputs, run};
 pub use folder::{
-    FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, write_whole,
+    FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, replace_whole,
+    write_whole,
 };
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};

@@ -150,6 +150,7 @@ mod tests {
     #[test]
     fn a_mesh_keeps_most_of_the_triangles_that_may_stay_and_no_crack_opens() {
         let folder = TempDir::new().unwrap();
+        drop(crate::owned::OwnedFolder::create(folder.path()).unwrap());
         let path = folder.path().join("map.ply");
         for (side_m, most) in [(0.01, 20_000), (0.05, 20_000), (0.4, 20_000), (0.05, 700)] {
             let squares = 300;
@@ -188,6 +189,7 @@ mod tests {
     #[test]
     fn a_small_mesh_stays_as_it_is_and_none_has_no_triangle() {
         let folder = TempDir::new().unwrap();
+        drop(crate::owned::OwnedFolder::create(folder.path()).unwrap());
         let path = folder.path().join("map.ply");
         write(&path, 10, 0.05);
         let (mesh, on_disk) = simplified(&path, true, 1_000).unwrap();

@@ -1,6 +1,7 @@
 //! A sweep's folder: the plan, a file for each finished run, tables and page of the results so far.
 
 use super::{Plan, RunResult, SweepError, page, table};
+use crate::owned::{OwnedFolder, create_folder};
 use crate::run::{FolderError, write_whole};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -23,8 +24,9 @@ impl SweepFolder {
     pub fn open(root: &Path, plan: &Plan) -> Result<Self, SweepError> {
         let folder = Self { root: root.to_path_buf() };
         let runs = folder.root.join("runs");
-        std::fs::create_dir_all(&runs)
-            .map_err(|source| FolderError::Write { path: runs, source })?;
+        let failed = |source| FolderError::Write { path: root.to_path_buf(), source };
+        drop(OwnedFolder::open_or_create(root).map_err(|error| failed(error.into()))?);
+        create_folder(&runs).map_err(|source| FolderError::Write { path: runs, source })?;
         let path = folder.root.join("plan.json");
         // A folder continues only the plan it was made for.
         if path.is_file() {

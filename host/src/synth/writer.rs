@@ -9,12 +9,14 @@ use std::path::Path;
 
 use dynvox_core::geometry::Transform;
 use image::ExtendedColorType::{L8, L16, Rgb8};
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
 
 use super::frame::SynthFrame;
 use super::street::{Street, SynthError};
-use crate::formats::DraftFolder;
 use crate::formats::calibration::{to_kalibr, to_toml};
+use crate::owned::{self, DraftFolder, create_folder};
 
 /// The calibration of raw images, in dynvox's own format.
 const CALIBRATION_FILE: &str = "calibration.toml";
@@ -48,12 +50,8 @@ pub fn write_kitti(
     if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) || folder.is_file() {
         return Err(SynthError::NotEmpty(folder.to_path_buf()));
     }
-    let draft = DraftFolder::of(folder);
+    let draft = DraftFolder::begin(folder).map_err(at(folder))?;
     write_all(street, draft.path(), &mut progress)?;
-    // An empty folder of that name may be in the way.
-    if folder.is_dir() {
-        fs::remove_dir(folder).map_err(at(folder))?;
-    }
     draft.rename(folder).map_err(at(folder))
 }
 
@@ -72,9 +70,9 @@ fn write_all(
         ["image_0", "image_1", "image_2", "image_3", "depth", "disp", "velodyne", "instances"]
     {
         let path = sequence.join(name);
-        fs::create_dir_all(&path).map_err(at(&path))?;
+        create_folder(&path).map_err(at(&path))?;
     }
-    fs::create_dir_all(folder.join("poses")).map_err(at(folder))?;
+    create_folder(&folder.join("poses")).map_err(at(folder))?;
     let count = street.config().frames;
     // Tables are collected and written last: an interrupted run leaves no table that looks
     // complete.
@@ -118,7 +116,7 @@ fn write_all(
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
-    fs::write(path, bytes).map_err(at(path))
+    owned::write(path, bytes).map_err(at(path))
 }
 
 /// The upper three rows of a motion, row by row.
@@ -170,8 +168,11 @@ fn write_frame(
     // Encoding PNG takes longest: all images of a frame at the same time.
     pictures.par_iter().try_for_each(|(name, bytes, colour, [width, height])| {
         let path = sequence.join(name).join(format!("{index:06}.png"));
-        image::save_buffer(&path, bytes, *width as u32, *height as u32, *colour)
-            .map_err(|error| SynthError::Write { path, source: std::io::Error::other(error) })
+        let mut png = Vec::new();
+        PngEncoder::new(&mut png)
+            .write_image(bytes, *width as u32, *height as u32, *colour)
+            .map_err(|error| at(&path)(std::io::Error::other(error)))?;
+        write(&path, &png)
     })?;
     write(&sequence.join(format!("instances/{index:06}.txt")), instance_list(frame).as_bytes())?;
     let points: Vec<u8> = scan.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();

@@ -19,11 +19,12 @@ pub fn output_text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Names in the folder, hidden ones included, sorted.
+/// Names in the folder, hidden ones but the marker included, sorted.
 pub fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .filter(|name| name != ".dynvox")
         .collect();
     names.sort();
     names

@@ -19,6 +19,7 @@ mod fixtures;
 mod fleet;
 mod layouts;
 mod masks;
+mod ownership;
 mod requests;
 mod resume;
 mod run_folder;

@@ -5,6 +5,7 @@ use crate::evaluate::stereo::{
 };
 use crate::formats::{Image, read_picture, read_png_deep, read_png_u16, write_png_deep};
 use crate::observe::pictures;
+use crate::owned::{self, create_folder};
 use crate::request::Settings;
 use crate::run::Threads;
 use crate::slab::HostSlab;
@@ -13,7 +14,6 @@ use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::stereo::{StereoConfig, StereoMatcher};
 use serde::Serialize;
-use std::fs::create_dir_all;
 use std::path::{Path, PathBuf};
 
 /// Names of the regions: what both cameras see and all, each whole, its background and its
@@ -171,7 +171,7 @@ fn count(
 
 /// Writes a pair's disparities, and its errors over the left image.
 fn write(folder: &Path, pair: &StereoPair, given: &Image<u16>, marked: bool) -> anyhow::Result<()> {
-    create_dir_all(folder)
+    create_folder(folder)
         .with_context(|| format!("{} cannot be made. Check --out", folder.display()))?;
     let path = |ending: &str| folder.join(format!("{}{ending}.png", pair.name));
     write_png_deep(&path(""), given)?;
@@ -180,7 +180,7 @@ fn write(folder: &Path, pair: &StereoPair, given: &Image<u16>, marked: bool) -> 
     let left = read_picture(&pair.images[0])?.to_8_bit(None).grey;
     if let (Some(left), Some(truth), Some(given)) = (left.view(), truth.view(), given.view()) {
         let path = path("_errors");
-        std::fs::write(&path, pictures::disparity_errors(&left, &truth, &given, marked))
+        owned::write(&path, &pictures::disparity_errors(&left, &truth, &given, marked))
             .with_context(|| format!("{} cannot be written. Check --out", path.display()))?;
     }
     Ok(())

@@ -8,6 +8,7 @@ use crate::fleet::{
 };
 use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
 use crate::observe::tables::read_frame_digests;
+use crate::owned::{self, check_overlap, create_folder};
 use crate::report::text::counted;
 use crate::request::{Plan, Request};
 use crate::run::store::BlockFile;
@@ -62,6 +63,7 @@ pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
 
 /// Writes jobs, and says what to do with them.
 pub fn write(manifest: &Manifest, out: &Path) -> anyhow::Result<()> {
+    manifest.jobs.iter().try_for_each(|job| check_overlap(out, &job.request.inputs()))?;
     manifest.write(out)?;
     outln!(
         "{} jobs in {}. Do them with: dynvox fleet run {}",
@@ -154,9 +156,9 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
     let (mut store, _) = BlockFile::open(&blocks, lattice.voxel_size_m, lattice.truncation_m)?;
     let camera =
         Camera { rig: plan.config.rig, size: plan.dataset.size(), poses: cameras(&run_folder)? };
-    std::fs::create_dir_all(folder.join("submaps"))?;
+    create_folder(&folder.join("submaps"))?;
     fleet::keep(&mut store, &lattice, &camera, &job.submap(folder))?;
-    std::fs::remove_file(&blocks)?;
+    owned::remove_file(&blocks)?;
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use super::{Shard, each};
 use crate::fleet::{self, Alignment, Averages, JobState, Manifest, Report, Submap, Uncertainty};
 use crate::formats::Axes;
+use crate::owned::{check_overlap, create_folder};
 use crate::report::text::{counted, grouped};
 use anyhow::bail;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,7 @@ pub fn align(folder: &Path, uncertainty: &Uncertainty) -> anyhow::Result<()> {
 pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
     let manifest = Manifest::read(folder)?;
     let poses = fleet::poses(&manifest, folder)?;
-    std::fs::create_dir_all(folder.join("sums"))?;
+    create_folder(&folder.join("sums"))?;
     let posed = manifest.jobs.iter().zip(poses).skip(shard.index).step_by(shard.of);
     each(posed, "in the world", |job, t_world_map| {
         let t_world_map = &t_world_map?;
@@ -127,6 +128,7 @@ pub fn merge(maps: &[PathBuf], out: &Path) -> anyhow::Result<()> {
             inputs.push(map.clone());
         }
     }
+    check_overlap(out, &inputs)?;
     let merged = fleet::merge(&inputs, out)?;
     let digest = fleet::digest(out)?;
     outln!(

@@ -9,10 +9,11 @@
 
 use super::Axes;
 use super::records::Records;
+use crate::owned;
 use dynvox_core::view::{MeshSink, Triangle, Vertex};
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Vertices remembered for sharing.
 const WINDOW: usize = 1 << 19;
@@ -59,7 +60,6 @@ type Recent = [u32; 5];
 pub struct PlyWriter {
     vertices: Records,
     faces: BufWriter<File>,
-    faces_path: PathBuf,
     axes: Axes,
     vertex_count_at: u64,
     face_count_at: u64,
@@ -77,7 +77,7 @@ pub struct PlyWriter {
 }
 
 impl PlyWriter {
-    /// Begins the file. Faces wait in a second file beside it, since they stand after all vertices.
+    /// Begins the file. Faces wait in a second file without a name: they stand after all vertices.
     ///
     /// # Errors
     /// The disk refuses.
@@ -91,9 +91,7 @@ impl PlyWriter {
     /// # Errors
     /// The disk refuses.
     pub fn begin_in(path: &Path, frame: &str, axes: Axes) -> io::Result<Self> {
-        let options =
-            || File::options().read(true).write(true).create(true).truncate(true).to_owned();
-        let mut file = BufWriter::new(options().open(path)?);
+        let mut file = BufWriter::new(owned::create_file(path)?);
         write!(
             file,
             "ply\nformat binary_little_endian 1.0\ncomment metres; {} of {frame}\n",
@@ -109,12 +107,10 @@ impl PlyWriter {
         file.write_all(b"property list uchar uint vertex_indices\nend_header\n")?;
         let start = file.stream_position()?;
         let file = file.into_inner().map_err(|error| error.into_error())?;
-        let faces_path = path.with_extension("faces");
-        let faces = options().open(&faces_path)?;
+        let faces = owned::create_unnamed(&path.with_extension("faces"))?;
         Ok(Self {
             vertices: Records::new(file, start, 0, VERTEX_BYTES),
             faces: BufWriter::with_capacity(FACES, faces),
-            faces_path,
             axes,
             vertex_count_at,
             face_count_at,
@@ -195,20 +191,11 @@ impl PlyWriter {
         Ok(next - 1)
     }
 
-    /// Appends the faces and fills in the counts. After a failure the file of faces is removed, and
-    /// what is at the path is not a PLY.
+    /// Appends the faces and fills in the counts. After a failure what is at the path is not a PLY.
     ///
     /// # Errors
     /// The disk refused, now or before.
-    pub fn finish(self) -> io::Result<Mesh> {
-        let faces_path = self.faces_path.clone();
-        self.complete().inspect_err(|_| {
-            // The disk has failed already.
-            let _ = std::fs::remove_file(&faces_path);
-        })
-    }
-
-    fn complete(mut self) -> io::Result<Mesh> {
+    pub fn finish(mut self) -> io::Result<Mesh> {
         if let Some(error) = self.failed {
             return Err(error);
         }
@@ -220,7 +207,6 @@ impl PlyWriter {
         faces.seek(SeekFrom::Start(0))?;
         io::copy(&mut faces, &mut file)?;
         drop(faces);
-        std::fs::remove_file(&self.faces_path)?;
         for (at, count) in
             [(self.vertex_count_at, self.mesh.vertices), (self.face_count_at, self.mesh.triangles)]
         {

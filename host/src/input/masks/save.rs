@@ -2,6 +2,9 @@
 
 use crate::formats::FormatError;
 use crate::input::source::{InputError, InstanceMask};
+use crate::owned;
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -77,21 +80,19 @@ fn save(
     }
     let picture = folder.join(format!("{stem}.png"));
     let bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_ne_bytes()).collect();
-    image::save_buffer(
-        &picture,
-        &bytes,
-        width as u32,
-        height as u32,
-        image::ExtendedColorType::L16,
-    )
-    .map_err(|error| {
-        InputError::masks_format(FormatError::content(
-            &picture,
-            error.to_string(),
-            "Free the disk or choose another folder",
-        ))
-    })?;
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png)
+        .write_image(&bytes, width as u32, height as u32, image::ExtendedColorType::L16)
+        .map_err(|error| error.to_string())
+        .and_then(|()| owned::write(&picture, &png).map_err(|error| error.to_string()))
+        .map_err(|reason| {
+            InputError::masks_format(FormatError::content(
+                &picture,
+                reason,
+                "Free the disk or choose another folder",
+            ))
+        })?;
     let list_path = folder.join(format!("{stem}.txt"));
-    std::fs::write(&list_path, list)
+    owned::write(&list_path, list.as_bytes())
         .map_err(|error| InputError::masks(&list_path, format!("it cannot be written ({error})")))
 }

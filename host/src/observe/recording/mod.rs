@@ -9,6 +9,7 @@ use super::{
     EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, PlanningLayers,
     frame_pictures, frame_pictures::Shown, pictures,
 };
+use crate::owned;
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::RaycastView;
 use mcap::records::MessageHeader;
@@ -54,7 +55,7 @@ struct Recording {
 
 impl Recording {
     fn begin(run: &ObservedRun<'_>) -> Result<Self, mcap::McapError> {
-        let file = BufWriter::new(File::create(run.folder.join(RECORDING_FILE))?);
+        let file = BufWriter::new(owned::create_file(&run.folder.join(RECORDING_FILE))?);
         let mut writer = mcap::WriteOptions::new().library("dynvox").create(file)?;
         let mut channels = [0; TOPICS.len()];
         for (channel, topic) in channels.iter_mut().zip(TOPICS) {
@@ -168,7 +169,7 @@ impl RecordingObserver {
             self.recording = None;
             self.failure = Some(error.to_string());
             // It may not exist.
-            let _ = std::fs::remove_file(run.folder.join(RECORDING_FILE));
+            let _ = owned::remove_file(&run.folder.join(RECORDING_FILE));
         }
     }
 }

@@ -30,6 +30,7 @@ pub use manifest::{RunManifest, fingerprint};
 use super::state::RunState;
 use super::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, write_whole};
 use crate::formats::checksum_of;
+use crate::owned::rename_file;
 use crate::request::Plan;
 use crate::run::store::Position;
 use dynvox_core::Mapper;
@@ -78,7 +79,7 @@ pub(super) fn write(
         mapper.save(&mut write)?;
         file.write_all(&checksum.finalize().to_le_bytes())?;
         if last.is_file() {
-            std::fs::rename(&last, folder.file(PREVIOUS_SNAPSHOT_FILE))
+            rename_file(&last, &folder.file(PREVIOUS_SNAPSHOT_FILE))
         } else {
             Ok(())
         }

@@ -11,14 +11,66 @@ pub enum FolderError {
         /// The folder asked for.
         path: PathBuf,
     },
-    /// Existing file or folder that is not a run folder.
+    /// Existing file or folder without the proof that a run made it.
     #[error(
-        "{path} is not a run folder (it has no summary.json), so --overwrite leaves it alone. Give \
-         another --out"
+        "{path} is not a run folder: it has no marker (.dynvox; run folders of earlier versions \
+         have none), so --overwrite leaves it alone. Remove it yourself, or give another --out"
     )]
     Foreign {
         /// The folder asked for.
         path: PathBuf,
+    },
+    /// A file in a run folder that no run made.
+    #[error(
+        "{file} is in the folder {path}, but was not made by dynvox, so the folder is left alone. \
+         Move the file elsewhere, or give another --out"
+    )]
+    ForeignFile {
+        /// The run folder.
+        path: PathBuf,
+        /// The file, folder or link.
+        file: PathBuf,
+    },
+    /// A link at the target.
+    #[error("{path} is a link. Give the folder that it leads to as --out, or another")]
+    Link {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// Something has the name of the partial folder.
+    #[error(
+        "{partial} is in the way of a run to {path}: {reason}. It is left alone; move it, remove \
+         it yourself, or give another --out"
+    )]
+    InTheWay {
+        /// File, folder or link that has the name.
+        partial: PathBuf,
+        /// The folder asked for.
+        path: PathBuf,
+        /// Fact that is against it.
+        reason: &'static str,
+    },
+    /// Results of an earlier run were not moved to the target.
+    #[error(
+        "the results of an earlier run are complete in {partial}, and were not moved to {path}. \
+         Move that folder, or start again with --overwrite"
+    )]
+    Unmoved {
+        /// Folder that holds the results.
+        partial: PathBuf,
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// No disk space for the end of the run.
+    #[error(
+        "{path} cannot be written: {source}. It keeps disk space for the end of the run. Free disk \
+         space and files, or give another --out"
+    )]
+    NoReserve {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
     },
     /// An interrupted run has a snapshot there.
     #[error(

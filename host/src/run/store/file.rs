@@ -10,6 +10,7 @@
 
 use super::block_index::{BlockIndexOnDisk, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
+use crate::owned;
 use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
 use hashbrown::HashMap;
 use serde::{Deserialize, Serialize};
@@ -134,13 +135,12 @@ impl BlockFile<File> {
         truncation_m: f32,
     ) -> Result<(Self, Opened), StoreError> {
         let at = |source| StoreError::Io { path: path.to_owned(), source };
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(path)
-            .map_err(at)?;
+        let file = match path.symlink_metadata() {
+            Ok(found) if found.is_file() => OpenOptions::new().read(true).write(true).open(path),
+            // A link is refused: its target belongs to someone else.
+            _ => owned::create_file(path),
+        };
+        let file = file.map_err(at)?;
         let len = file.metadata().map_err(at)?.len();
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
