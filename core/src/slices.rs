@@ -111,3 +111,10 @@ mod tests {
         clipped_mut(&mut [1, 2, 3], ..4);
     }
 }
+
+/// Moves the items behind `at` up by one; the last stays where it is.
+pub(crate) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
+    let Some(behind) = items.get_mut(at..) else { return };
+    let Some(mut carried) = behind.last().copied() else { return };
+    behind.iter_mut().rev().for_each(|slot| core::mem::swap(slot, &mut carried));
+}

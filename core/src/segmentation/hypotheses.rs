@@ -8,7 +8,11 @@ use super::{
     hypothesis::{Hypothesis, Observed, RECENT},
     trail::Trail,
 };
-use crate::{geometry::Transform, slices::clipped, state::Visitor, tracking::remove_at};
+use crate::{
+    geometry::Transform,
+    slices::{clipped, remove_at},
+    state::Visitor,
+};
 use nalgebra::Vector3;
 
 /// Most groups followed over frames.

@@ -1,6 +1,6 @@
 //! Reports of detections and tracks, as plain values.
 
-use super::{Class, DetectionCount, MotionState, TrackCount, Tracker, motions::motion_world};
+use super::{Class, DetectionCount, MotionState, Track, TrackCount};
 use crate::{geometry::Transform, masks::PixelBox};
 
 /// A track as it stands after a frame.
@@ -61,34 +61,27 @@ pub struct TrackingReport {
     pub mask_words: u32,
 }
 
-impl Tracker<'_> {
-    /// The tracks of this frame, by age; without tentative ones, which are too small to be
-    /// reconstructed and never had a measured motion. Volumes are not known here:
-    /// [`TrackReport::blocks`] is 0.
-    pub fn tracks(&self) -> impl Iterator<Item = TrackReport> + '_ {
-        let interval_s = f64::from(self.config.frame_interval_s);
-        self.tracks.all().iter().filter(|track| !track.is_tentative()).map(move |track| {
-            TrackReport {
-                id: track.id,
-                class: track.class(),
-                state: track.motion_state.state(),
-                score: track.score,
-                detected: track.instance.is_some(),
-                first_frame: track.first_frame,
-                last_frame: track.last_frame,
-                sightings: track.sightings,
-                pixels: track.mask.pixels,
-                speed_m_s: track
-                    .has_speed()
-                    .then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
-                measured: track.measured.get(),
-                center_world_m: track.filter.center_world().coords.into(),
-                motion_world: motion_world(track, interval_s),
-                t_world_object: (track.segment_len > 0).then_some(track.t_world_object),
-                matches: track.matches,
-                inliers: track.inliers,
-                blocks: 0,
-            }
-        })
+impl TrackReport {
+    /// A track as it stands after a frame. Volumes are not known here: `blocks` is 0.
+    pub(super) fn new(track: &Track, interval_s: f64) -> Self {
+        Self {
+            id: track.id,
+            class: track.class(),
+            state: track.motion_state.state(),
+            score: track.score,
+            detected: track.instance.is_some(),
+            first_frame: track.first_frame,
+            last_frame: track.last_frame,
+            sightings: track.sightings,
+            pixels: track.mask.pixels,
+            speed_m_s: track.has_speed().then(|| [track.filter.speed()[0] as f32, track.sigma_m_s]),
+            measured: track.measured.get(),
+            center_world_m: track.filter.center_world().coords.into(),
+            motion_world: track.motion_world(interval_s),
+            t_world_object: (track.segment_len > 0).then_some(track.t_world_object),
+            matches: track.matches,
+            inliers: track.inliers,
+            blocks: 0,
+        }
     }
 }

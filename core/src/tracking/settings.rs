@@ -49,27 +49,29 @@ impl TrackingConfig {
             "A detection's box must be larger than this to be tracked, and kept out of the static \
              map once it is known to move. The default is what 18 matches take, 7 px apart.",
         ),
-        Row::expert("tracking.overlap", "", |c| Choice(&mut c.overlap)).published("box").text(
-            "Intersection over union by which a detection is associated with a track: that of \
-             masks or of boxes.",
-        ),
-        Row::expert("tracking.association_min", "", |c| F32(&mut c.association_min))
+        Row::expert("tracking.tracks.overlap", "", |c| Choice(&mut c.tracks.overlap))
+            .published("box")
+            .text(
+                "Intersection over union by which a detection is associated with a track: that of \
+                 masks or of boxes.",
+            ),
+        Row::expert("tracking.tracks.association_min", "", |c| F32(&mut c.tracks.association_min))
             .range(Range::SHARE)
             .text(
                 "Overlap times the geometric mean of both scores times the discount for frames \
                  missed must be above this.",
             ),
-        Row::expert("tracking.extent_frames", "frames", |c| U16(&mut c.extent_frames))
+        Row::expert("tracking.tracks.extent_frames", "frames", |c| U16(&mut c.tracks.extent_frames))
             .range(Range::Within(0.0, 1000.0))
             .published("0")
             .text(
                 "Frames without a detection over which a track is found again by how far it \
                  reached when it was last seen whole; 0 never.",
             ),
-        Row::user("tracking.forget_frames", "frames", |c| U16(&mut c.forget_frames))
+        Row::user("tracking.tracks.forget_frames", "frames", |c| U16(&mut c.tracks.forget_frames))
             .range(Range::Within(1.0, 10_000.0))
             .text("Frames after which a track not detected again is forgotten."),
-        Row::expert("tracking.large_share", "", |c| F32(&mut c.large_share))
+        Row::expert("tracking.matches.large_share", "", |c| F32(&mut c.matches.large_share))
             .range(Range::SHARE)
             .published("1")
             .text(

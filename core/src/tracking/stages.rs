@@ -1,25 +1,10 @@
 //! The stages of tracking in a frame, each a value that the next one takes.
 
 use super::{
-    CameraMotion, Class, Detection, EgomotionMask, FrameMatches, GuidedMatching, Instance,
-    MotionInput, OwnerCode, Tracker, TrackingReport,
+    CameraMotion, Class, EgomotionMask, FrameMatches, GuidedMatching, Instance, MotionInput,
+    OwnerCode, Tracker, TrackingReport,
 };
 use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut, masks::PixelBox};
-
-impl<'s> Tracker<'s> {
-    /// Begins frame `frame` of images of that size: validates its detections and associates them
-    /// with tracks, which move in the image as the matches of the scene flow say.
-    pub(crate) fn detect<'m>(
-        &mut self,
-        frame: u32,
-        detections: &[Detection<'_>],
-        size: [usize; 2],
-        matches: FrameMatches<'m>,
-    ) -> Detected<'_, 'm, 's> {
-        self.ingest(frame, detections, size, &matches);
-        Detected { tracker: self, matches }
-    }
-}
 
 /// A frame's detections are associated with tracks.
 #[derive(Debug)]
@@ -30,6 +15,10 @@ pub(crate) struct Detected<'t, 'm, 's> {
 }
 
 impl<'t, 'm, 's> Detected<'t, 'm, 's> {
+    pub(super) fn new(tracker: &'t mut Tracker<'s>, matches: FrameMatches<'m>) -> Self {
+        Self { tracker, matches }
+    }
+
     /// Assigns the matches to instances.
     pub(crate) fn assign_matches(self) -> Assigned<'t, 'm, 's> {
         let Self { tracker, matches } = self;
@@ -59,7 +48,7 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
 
     /// Returns the owners of the refined and of the sparse matches.
     pub(crate) fn match_owners(&self) -> [&[OwnerCode]; 2] {
-        [self.tracker.refined_owner, self.tracker.sparse_owner]
+        self.tracker.matches.match_owners()
     }
 
     /// The instances of the frame.
@@ -96,18 +85,7 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
     /// Associates the instances from position `first` on with tracks, and assigns to them the
     /// matches that no instance has.
     pub(crate) fn associate_from(&mut self, first: usize) {
-        let tracker = &mut *self.tracker;
-        if tracker.instances.all().len() > first {
-            tracker.tracks.associate_from(
-                first,
-                &tracker.config,
-                tracker.frame,
-                tracker.instances.all_mut(),
-                &tracker.masks,
-                &mut tracker.report.tracks,
-            );
-            tracker.assign_from(first, &self.matches);
-        }
+        self.tracker.associate_from(first, &self.matches);
     }
 
     /// Estimates each track's motion, state and pose. `search` is where more matches are searched
@@ -146,7 +124,7 @@ pub struct Tracked<'t, 's> {
 impl<'s> Tracked<'_, 's> {
     /// Sets the depth of what moves or may move to 0, so that the static map does not get it.
     pub(crate) fn mask_dynamic_depth(&mut self, depth_m: &mut ViewMut<'_, f32>) {
-        self.tracker.report.pixels_masked = self.tracker.mask_dynamic_depth(depth_m);
+        self.tracker.mask_dynamic_depth(depth_m);
     }
 
     /// The tracks with their instances and masks.
@@ -156,8 +134,6 @@ impl<'s> Tracked<'_, 's> {
 
     /// Ends the frame: masks are kept for the next one.
     pub(crate) fn commit(self) -> TrackingReport {
-        self.tracker.commit();
-        self.tracker.report.mask_words = self.tracker.masks.current().peak() as u32;
-        self.tracker.report
+        self.tracker.commit()
     }
 }

@@ -48,7 +48,7 @@ fn config(seed: u64) -> Config {
     config.mapper.fuse_every = 1 + u32::from(seed.is_multiple_of(5));
     (config.tracking.motion.matches_min, config.tracking.motion.matches_again) = (6, 6);
     // Some of the patches are tracked only.
-    (config.tracking.forget_frames, config.tracking.instances.area_min_px) = (2, 12_000);
+    (config.tracking.tracks.forget_frames, config.tracking.instances.area_min_px) = (2, 12_000);
     config
 }
 

@@ -94,7 +94,8 @@ fn full_volumes_are_handed_over_but_not_in_the_frame_they_grow() {
 
 #[test]
 fn the_forgotten_and_the_last_are_handed_over_too() {
-    with(&CAPACITY, &TrackingConfig { forget_frames: 3, ..any_size() }, |instances, estimator| {
+    let tracks = TracksConfig { forget_frames: 3, ..TracksConfig::default() };
+    with(&CAPACITY, &TrackingConfig { tracks, ..any_size() }, |instances, estimator| {
         let mut run = Run::new(instances, estimator);
         for frame in 0..16 {
             let [camera, car] = at(frame);
@@ -119,6 +120,19 @@ fn people_are_tracked_but_not_reconstructed() {
         for frame in 0..6 {
             let [camera, t_world_walker] = at(frame);
             run.step(camera, &[(&walker, Some(t_world_walker))]);
+        }
+        assert_eq!(run.track(1).unwrap().state, MotionState::Dynamic);
+        assert_eq!(run.instances.objects().count(), 0);
+    });
+}
+
+#[test]
+fn a_small_object_that_moves_is_tracked_but_not_reconstructed() {
+    with(&CAPACITY, &tracked_only(), |instances, estimator| {
+        let mut run = Run::new(instances, estimator);
+        for frame in 0..8 {
+            let [camera, car] = at(frame);
+            run.step(camera, &[(&Board::CAR, Some(car))]);
         }
         assert_eq!(run.track(1).unwrap().state, MotionState::Dynamic);
         assert_eq!(run.instances.objects().count(), 0);

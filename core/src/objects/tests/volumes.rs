@@ -327,11 +327,14 @@ fn crops_equal_those_cut_pixel_by_pixel() {
 
 #[test]
 fn an_object_without_depth_leaves_no_crop() {
-    let mask = [1; 3600];
-    let car =
-        detection(Class::Car, 0.9, &PixelBox { left: 100, top: 30, width: 60, height: 60 }, &mask);
     with(&CAPACITY, &any_size(), |instances, estimator| {
-        take_frame(instances, estimator, 0, &[car], [&[], &[]]);
+        let mut shot = Scene::default().shoot(
+            Transform::IDENTITY,
+            &[(&Board::CAR, Some(shift(0.0, 0.0, 9.0)))],
+            &[],
+        );
+        shot.disparity_q8.fill(0);
+        instances.take(&shot, true, estimator, &mut NoSink);
         assert_eq!((instances.tracks().count(), instances.objects.crops.len()), (1, 0));
     });
 }

@@ -20,6 +20,8 @@ mod config;
 mod detection;
 mod index;
 mod instance;
+#[cfg(test)]
+mod tests;
 
 pub use class::{Class, Treatment};
 pub use config::InstancesConfig;
