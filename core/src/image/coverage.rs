@@ -61,6 +61,8 @@ pub(crate) struct MaskedPair<'a> {
     pub right: View<'a, u8>,
     /// Pixels not to be used; `None` where all are.
     pub invalid: Option<&'a InvalidPair<'a>>,
+    /// True if the right image's rows are moved otherwise than in the pair before.
+    pub right_moved: bool,
 }
 
 #[cfg(test)]

@@ -22,6 +22,9 @@ pub(super) struct Localization<'s> {
     pub camera: Egomotion,
     pub self_calibration: SelfCalibration,
     pub estimator: Estimator<'s>,
+    /// True if the right image's rows are moved otherwise in the next frame than in this one: it
+    /// then differs from this one's even where the camera stands.
+    pub rows_moved: bool,
 }
 
 /// The camera's pose in a frame.
@@ -70,15 +73,19 @@ impl<'s> Localization<'s> {
             camera: Egomotion::default(),
             self_calibration: SelfCalibration::new(&config.rig_settings),
             estimator: Estimator::new_in(capacity, carver),
+            rows_moved: false,
         }
     }
 
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         // Estimates keep nothing.
-        let Self { camera, self_calibration, estimator: _ } = self;
+        let Self { camera, self_calibration, estimator: _, rows_moved } = self;
         camera.visit(visitor);
         self_calibration.visit(visitor);
+        let mut moved = u8::from(*rows_moved);
+        visitor.u8(&mut moved);
+        *rows_moved = moved != 0;
     }
 
     /// Sets the pose the frame brings, or estimates it.

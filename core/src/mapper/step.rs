@@ -214,10 +214,15 @@ impl Mapper<'_> {
         frame: &StereoFrame<'_>,
         executor: &E,
     ) -> (StereoReport, FlowReport) {
+        let Self { config, rectifier, stereo, scene_flow, localization, .. } = self;
         // Pixels that no raw pixel covers take no part.
-        let Self { config, rectifier, stereo, scene_flow, .. } = self;
         let invalid = rectifier.invalid();
-        let pair = MaskedPair { left: frame.left, right: frame.right, invalid: invalid.as_ref() };
+        let pair = MaskedPair {
+            left: frame.left,
+            right: frame.right,
+            invalid: invalid.as_ref(),
+            right_moved: localization.rows_moved,
+        };
         let compute_disparity = || match frame.disparity_q8 {
             Some(given) => stereo.take(given),
             None => stereo.compute_within(&config.stereo, &pair, executor),
@@ -237,7 +242,9 @@ impl Mapper<'_> {
         let Self { config, localization, stereo, scene_flow, .. } = self;
         let self_calibration = &mut localization.self_calibration;
         let correction = self_calibration.pixel_correction(&config.rig);
+        let rows_before = self_calibration.row_shift(&config.rig);
         self_calibration.update_rows(&config.rig, scene_flow.bucketed().map(Match::row_difference));
+        localization.rows_moved = self_calibration.row_shift(&config.rig) != rows_before;
         if let Some(correction) = correction {
             executor.stage(Stage::Stereo, || stereo.correct(correction, executor));
             executor.stage(Stage::SceneFlow, || scene_flow.correct(correction));

@@ -288,7 +288,8 @@ impl<'s> FlowMatcher<'s> {
         right: View<'_, u8>,
         executor: &E,
     ) -> FlowReport {
-        self.push_within(config, &MaskedPair { left, right, invalid: None }, executor)
+        let pair = MaskedPair { left, right, invalid: None, right_moved: false };
+        self.push_within(config, &pair, executor)
     }
 
     /// Takes in and matches, as [`FlowMatcher::push`] does, a frame with invalid pixels: no feature
@@ -296,7 +297,7 @@ impl<'s> FlowMatcher<'s> {
     pub(crate) fn push_within<E: Executor>(
         &mut self,
         config: &SceneFlowConfig,
-        &MaskedPair { left, right, invalid }: &MaskedPair<'_>,
+        &MaskedPair { left, right, invalid, right_moved }: &MaskedPair<'_>,
         executor: &E,
     ) -> FlowReport {
         // The next frame cannot be matched with a refused one: there is no last pair then.
@@ -325,6 +326,8 @@ impl<'s> FlowMatcher<'s> {
         // An image that repeats the last one means a frozen camera, or one that stands.
         match [self.left.is_repeated(size), self.right.is_repeated(size)] {
             [false, false] => {}
+            // Rows of the right image that are moved anew make it differ where the camera stands.
+            [true, false] if right_moved => report.status = FlowStatus::Repeated,
             [true, true] => report.status = FlowStatus::Repeated,
             _ => return FlowReport { status: FlowStatus::Frozen, ..report },
         }

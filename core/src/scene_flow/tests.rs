@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     geometry::Transform,
-    image::View,
+    image::{MaskedPair, View},
     memory::{Capacity, Carver, Slab},
     parallel::{Serial, TwoThreads, Vectors},
     random::Random,
@@ -102,6 +102,26 @@ fn another_size_or_too_large_a_frame_begins_anew() {
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Refused);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
     assert_eq!(push([WIDTH + 1, HEIGHT], [WIDTH + 1, HEIGHT]), FlowStatus::Refused);
+}
+
+#[test]
+fn a_standing_camera_whose_right_rows_are_moved_anew_is_not_frozen() {
+    let [left, right] = see(&Transform::IDENTITY);
+    let other = see(&forward(0.4, 0.01));
+    for (left_after, right_moved, status) in [
+        (&left, false, FlowStatus::Frozen),
+        (&left, true, FlowStatus::Repeated),
+        (&other[0], true, FlowStatus::Matched),
+    ] {
+        let mut slab = slab();
+        let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
+        let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut carver);
+        let config = SceneFlowConfig::default();
+        matcher.push(&config, view(&left), view(&right), &Serial);
+        let (left, right) = (view(left_after), view(&other[1]));
+        let pair = MaskedPair { left, right, invalid: None, right_moved };
+        assert_eq!(matcher.push_within(&config, &pair, &Serial).status, status, "{right_moved}");
+    }
 }
 
 #[test]

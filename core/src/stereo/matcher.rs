@@ -201,7 +201,7 @@ impl<'s> StereoMatcher<'s> {
         executor: &E,
         done: impl FnMut(StereoStep),
     ) -> StereoReport {
-        let pair = MaskedPair { left, right, invalid: None };
+        let pair = MaskedPair { left, right, invalid: None, right_moved: false };
         self.compute_steps(config, &pair, executor, done)
     }
 
@@ -212,7 +212,7 @@ impl<'s> StereoMatcher<'s> {
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
-        let &MaskedPair { left, right, invalid } = pair;
+        let &MaskedPair { left, right, invalid, right_moved: _ } = pair;
         // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
         let mut report = StereoReport {
