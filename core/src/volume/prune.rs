@@ -67,15 +67,20 @@ impl Volume<'_> {
         {
             self.history.expire();
         }
-        self.visit_due(self.config.prune_blocks_per_frame, &mut report);
+        self.visit_due(self.config.prune_blocks_per_frame, self.rule(), &mut report);
         report
     }
 
-    /// Prunes everything still in the window, as at the end of a run.
+    /// Prunes everything still in the window, as at the end of a run. A voxel cannot have been seen
+    /// more often than there were frames: of a map of one frame nothing goes.
     pub(crate) fn finish(&mut self) -> PruneReport {
         let mut report = PruneReport::default();
         while self.history.expire().is_some() {}
-        self.visit_due(u32::MAX, &mut report);
+        let frames = u8::try_from(self.visible.frame()).unwrap_or(u8::MAX);
+        let expected = frames.saturating_sub(1);
+        let PruneRule { weight, distance } = self.rule();
+        let weight = if weight < expected { weight } else { expected };
+        self.visit_due(u32::MAX, PruneRule { weight, distance }, &mut report);
         report
     }
 
@@ -97,18 +102,15 @@ impl Volume<'_> {
         PruneRule { weight: self.config.prune_weight, distance: self.config.prune_distance }
     }
 
-    /// Visits blocks that are due. Those visible in the window will be due again, and do not go for
-    /// their distance.
-    fn visit_due(&mut self, most: u32, report: &mut PruneReport) {
+    /// Visits at most so many blocks that are due, by a rule. Those visible in the window will be due
+    /// again, and do not go for their distance.
+    fn visit_due(&mut self, most: u32, rule: PruneRule, report: &mut PruneReport) {
         let mut from = 0;
         while report.visited < most
             && let Some(slot) = self.history.take_due(from)
         {
             let in_window = self.history.covers(self.visible.last_visible(slot));
-            let rule = PruneRule {
-                distance: if in_window { 0.0 } else { self.config.prune_distance },
-                ..self.rule()
-            };
+            let rule = PruneRule { distance: if in_window { 0.0 } else { rule.distance }, ..rule };
             let (reset, freed) = self.prune_block(slot, rule);
             report.add(reset, freed);
             from = slot.get() + 1;

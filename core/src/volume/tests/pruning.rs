@@ -97,6 +97,22 @@ fn frees_low_weight_blocks_lag_frames_after_they_were_seen_and_no_others() {
 }
 
 #[test]
+fn a_map_of_one_frame_keeps_what_it_saw() {
+    for (frames, left) in [(1, 1), (2, 0)] {
+        with_volume(&CAPACITY, &pruning(1, 200), |volume| {
+            volume.visible.begin_frame();
+            let slot = plant(volume, BlockCoord::default(), |_| 1);
+            volume.visible.mark(slot).unwrap();
+            volume.visible.sort(volume.pool.high_water());
+            volume.prune();
+            (1..frames).for_each(|_| drop(frame(volume, &[])));
+            volume.finish();
+            assert_eq!(volume.pool.len(), left, "{frames} frames");
+        });
+    }
+}
+
+#[test]
 fn a_half_noisy_block_keeps_its_good_voxels() {
     with_volume(&CAPACITY, &pruning(1, 1), |volume| {
         volume.visible.begin_frame();
