@@ -1,6 +1,6 @@
 //! Blocks of the map over a run: made, pruned, evicted, stored.
 
-use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
+use super::{DepthTotals, Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::formats::Mesh;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::EvictionReport;
@@ -61,6 +61,8 @@ pub struct BlocksSection {
     pub totals: BlockTotals,
     /// The slab, region by region, at the end.
     pub regions: Vec<Region>,
+    /// Depth of all frames, by what the map shows of it.
+    pub depth: DepthTotals,
     /// Blocks in memory at the end.
     pub blocks: usize,
     /// The mesh written.
@@ -89,6 +91,7 @@ impl BlocksSection {
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct BlocksObserver {
     totals: BlockTotals,
+    depth: DepthTotals,
 }
 
 impl Observer for BlocksObserver {
@@ -114,6 +117,7 @@ impl Observer for BlocksObserver {
         totals.carried_over_most = totals.carried_over_most.max(prune.carried_over);
         totals.early += u64::from(prune.early);
         totals.voxels_erased += u64::from(prune.voxels_erased);
+        self.depth.add(&row.depth);
         totals.history_frames_most = totals.history_frames_most.max(row.history_frames);
         Ok(())
     }
@@ -128,6 +132,7 @@ impl Observer for BlocksObserver {
         self.totals.blocks_freed += u64::from(finished.pruned.blocks_freed);
         Ok(BlocksSection {
             totals: self.totals,
+            depth: self.depth,
             regions: finished.regions.clone(),
             blocks: finished.blocks,
             mesh: finished.mesh,

@@ -1,5 +1,6 @@
 //! Record of every frame.
 
+use super::DepthCensus;
 use crate::input::MaskRefusals;
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::egomotion::{MotionStatus, RightAhead};
@@ -45,8 +46,8 @@ pub struct FrameRow {
     pub track_states: [u32; 3],
     /// Masks of the source that could not be used.
     pub mask_refusals: MaskRefusals,
-    /// Mean disparity of the pixels that have one, px.
-    pub disparity_mean_px: Option<f64>,
+    /// Pixels with a depth, by what the map shows of it.
+    pub depth: DepthCensus,
     /// Invalid values of a given depth image: not finite, negative, or no disparity of this rig.
     pub depth_refused: u32,
     /// Wall time of the whole step, ms.

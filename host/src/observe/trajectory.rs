@@ -7,6 +7,7 @@ use crate::formats::{TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, kitti_line, tum_lin
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Points kept of the path, at most.
 const MAX_POINTS: usize = 4096;
@@ -35,6 +36,8 @@ pub struct TrajectorySection {
     pub errors: Option<TrajectoryErrors>,
     /// Frames whose pose was extrapolated at constant velocity.
     pub extrapolated_frames: usize,
+    /// Reasons why they were, with the number of frames each, the most frequent first.
+    pub extrapolated_because: Vec<(String, usize)>,
     /// Segments of the map: 1 where the camera was never lost.
     pub segments: u32,
     /// Frames the depth tracker lost, where it is used.
@@ -89,6 +92,7 @@ pub struct TrajectoryObserver {
     /// Number and pose of each frame, where true poses are known.
     compared: Vec<(usize, Transform)>,
     extrapolated_frames: usize,
+    extrapolated_because: BTreeMap<String, usize>,
     segments: u32,
     /// Frames the depth tracker lost, and number and cause of the first.
     lost_frames: usize,
@@ -103,6 +107,7 @@ impl Default for TrajectoryObserver {
             path: ThinnedPath::default(),
             compared: Vec::new(),
             extrapolated_frames: 0,
+            extrapolated_because: BTreeMap::new(),
             segments: 1,
             lost_frames: 0,
             first_lost: None,
@@ -132,7 +137,10 @@ impl Observer for TrajectoryObserver {
         if run.plan.dataset.truth().is_some() && row.report.segment == 0 {
             self.compared.push((row.frame, pose));
         }
-        self.extrapolated_frames += usize::from(row.is_extrapolated());
+        if row.is_extrapolated() {
+            self.extrapolated_frames += 1;
+            *self.extrapolated_because.entry(row.motion().replace('_', " ")).or_default() += 1;
+        }
         self.segments = row.report.segment + 1;
         // Only depth registration reports its failures as a status.
         if let Some(status) =
@@ -151,12 +159,15 @@ impl Observer for TrajectoryObserver {
     ) -> Result<TrajectorySection, ObserveError> {
         let (frames, poses): (Vec<usize>, Vec<Transform>) = self.compared.into_iter().unzip();
         let truth = run.plan.dataset.truth().map(|truth| from_first(truth, &frames));
+        let mut because: Vec<_> = self.extrapolated_because.into_iter().collect();
+        because.sort_by_key(|(_, frames)| std::cmp::Reverse(*frames));
         Ok(TrajectorySection {
             source: run.plan.motion_source(),
             path: self.path,
             errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,
             extrapolated_frames: self.extrapolated_frames,
+            extrapolated_because: because,
             segments: self.segments,
             failures: self.first_lost.map(|(first, status)| TrackingFailures {
                 frames: self.lost_frames,

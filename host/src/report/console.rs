@@ -1,6 +1,7 @@
 //! The last lines of a run on the console.
 
 use super::bounds;
+use super::poor_map;
 use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
@@ -38,6 +39,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     }
     lines.extend(tracks.masks.iter().map(|masks| ("moving objects", moving_masks(masks))));
     lines.extend(block_lines(run));
+    lines.extend(poor_map::sentence(run).map(|sentence| ("map WARNING", sentence)));
     lines.push(("memory", bounds::sentence(run)));
     lines.extend(pose_lines(run));
     // A miscalibrated rig is the one finding that makes all others doubtful.
@@ -166,6 +168,15 @@ fn block_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// Reasons with their numbers of frames: "6 frozen image, 2 too few matches".
+fn reasons(counted: &[(String, usize)]) -> String {
+    counted
+        .iter()
+        .map(|(reason, frames)| format!("{frames} {reason}"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
 fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
     let trajectory = &run.sections.trajectory;
     match trajectory.failures {
@@ -182,8 +193,8 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
         }
         None if trajectory.extrapolated_frames > 0 => {
             let frames = trajectory.extrapolated_frames;
-            let extrapolated =
-                ("poses extrapolated", format!("in {frames} frames: too few matches"));
+            let reasons = reasons(&trajectory.extrapolated_because);
+            let extrapolated = ("poses extrapolated", format!("in {frames} frames: {reasons}"));
             let apart = format!(
                 "{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above \
                                  the one before",

@@ -87,6 +87,9 @@ struct EgomotionSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     without_boresight: Option<WithoutBoresight>,
     extrapolated_frames: usize,
+    /// Reasons of these frames, with their numbers.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    extrapolated_because: BTreeMap<String, usize>,
     segments: u32,
     /// `stereo`, `icp` or `file`.
     source: &'static str,
@@ -159,6 +162,9 @@ struct MapSummary {
     /// Triangles of the static map in the volume that moving objects swept.
     #[serde(skip_serializing_if = "Option::is_none")]
     swept_triangles: Option<u64>,
+    /// Reason why the map is empty or poor, with the next step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    warning: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -250,6 +256,7 @@ impl Summary {
                 triangles: sections.blocks.mesh.static_triangles(),
                 object_triangles: sections.blocks.mesh.object_triangles,
                 swept_triangles: sections.objects.swept_triangles,
+                warning: super::poor_map::sentence(run),
             },
             prune: PruneSummary::new(&sections.blocks.totals),
             evict: EvictSummary::new(&sections.blocks),
@@ -274,6 +281,7 @@ impl EgomotionSummary {
             ate_m: errors.map(|errors| errors.ate_m),
             without_boresight: errors.and_then(|errors| errors.without_boresight),
             extrapolated_frames: trajectory.extrapolated_frames,
+            extrapolated_because: trajectory.extrapolated_because.iter().cloned().collect(),
             segments: trajectory.segments,
             source: trajectory.source,
             status: if failures.is_some() { "tracking failure" } else { "ok" },

@@ -12,12 +12,11 @@ use super::{
 };
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
-    EndContext, FrameContext, FramePictures, FrameRow, ObserveError, ObservedRun, Observer,
-    RetiredVolume, StepTimes, from_first, overview,
+    DepthCensus, EndContext, FrameContext, FramePictures, FrameRow, ObserveError, ObservedRun,
+    Observer, RetiredVolume, StepTimes, from_first, overview,
 };
 use crate::request::Plan;
 use dynvox_core::geometry::Transform;
-use dynvox_core::image::View;
 use dynvox_core::tracking::{Detection, MotionState};
 use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Report, Severity, Stage, StereoFrame};
@@ -328,7 +327,7 @@ impl<'p, 's> Session<'p, 's> {
             history_frames: self.mapper.static_map().history().len(),
             track_states: [MotionState::Uncertain, MotionState::Static, MotionState::Dynamic]
                 .map(tracks_in),
-            disparity_mean_px: mean_px(self.mapper.disparity_q8()),
+            depth: DepthCensus::new(self.mapper.disparity_q8(), self.mapper.config()),
             mask_refusals: images.masks.refusals,
             depth_refused: images.depth.as_ref().map_or(0, |depth| depth.refused.count())
                 + report.stereo.refused,
@@ -391,12 +390,4 @@ impl<'p, 's> Session<'p, 's> {
         observers.end(self.observed, &mut context)?;
         Ok(pruned)
     }
-}
-
-/// Mean of the disparities that are known, px.
-fn mean_px(disparity_q8: View<'_, u16>) -> Option<f64> {
-    let known = disparity_q8.rows().flatten().filter(|disparity| **disparity > 0);
-    let (sum, count) = known
-        .fold((0u64, 0u64), |(sum, count), disparity| (sum + u64::from(*disparity), count + 1));
-    (count > 0).then(|| sum as f64 / count as f64 / 256.0)
 }

@@ -1,5 +1,6 @@
 //! The head of the page: what was run, and the figures first looked for.
 
+use crate::report::poor_map;
 use crate::report::text::{MIB, counted, grouped};
 use crate::run::RunRecord;
 use maud::{Markup, html};
@@ -15,6 +16,7 @@ pub fn section(run: &RunRecord) -> Markup {
         }
         @if let Some(incomplete) = &run.incomplete { p { b { "Incomplete: " (incomplete.reason) } } }
         @for warning in &plan.warnings { p { b { "Warning: " (warning) } } }
+        @if let Some(warning) = poor_map::sentence(run) { p { b { "Warning: " (warning) } } }
         @if !plan.dataset.notes().is_empty() {
             ul.soft.small { @for note in plan.dataset.notes() { li { (note) } } }
         }

@@ -98,7 +98,7 @@ static INPUT: &[FrameColumn] = &[
         Cell::rounded(f64::from(row.report.stereo.density()), 4)
     }),
     column("disparity_mean_px", "px", "mean disparity of these pixels", |row| {
-        Cell::if_known(row.disparity_mean_px, 4)
+        Cell::if_known(row.depth.disparity_mean_px, 4)
     }),
     column("depth_refused", "", "invalid values of given depth", |row| row.depth_refused.into()),
     charted("rss_bytes", "bytes", "resident memory of the process", |row| row.rss_bytes.into()),
