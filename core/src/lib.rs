@@ -48,7 +48,7 @@ pub mod volume;
 pub use mapper::{
     BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, Mapper,
     MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
-    RestoreError, SetError, Severity, StageDigests, StepError, StereoFrame,
+    RestoreError, Scale, SetError, Severity, StageDigests, StepError, StereoFrame,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial};

@@ -75,7 +75,7 @@ impl Config {
     }
 
     /// Borrows the field of a key.
-    fn value(&mut self, key: &str) -> Option<Value<'_>> {
+    pub(super) fn value(&mut self, key: &str) -> Option<Value<'_>> {
         let (section, _) = key.split_once('.')?;
         match section {
             "rig" => find(RigConfig::CHECKS, &mut self.rig_settings, key),

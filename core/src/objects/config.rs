@@ -110,6 +110,9 @@ impl ObjectsConfig {
     /// The settings of one object's volume. It refuses blocks above its bound, because an evicted
     /// one could not be loaded again.
     pub(super) fn volume(&self) -> VolumeConfig {
+        let map = VolumeConfig::default();
+        // Lengths without a setting of their own are as many voxels as the map's are.
+        let lengths = self.voxel_size_m / map.voxel_size_m;
         VolumeConfig {
             voxel_size_m: self.voxel_size_m,
             truncation_m: self.truncation_m,
@@ -118,7 +121,10 @@ impl ObjectsConfig {
             max_weight: MAX_WEIGHT,
             when_full: WhenFull::Refuse,
             prune_weight: 0,
-            ..VolumeConfig::default()
+            near_m: map.near_m * lengths,
+            behind_m: map.behind_m * lengths,
+            allocation_m: map.allocation_m * lengths,
+            ..map
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::fixtures::{self, Blessing, Verdict};
 use crate::input::masks::MaskChoice;
 use crate::owned::check_overlap;
-use crate::request::{Bytes, Options, Request, RequestError};
+use crate::request::{Bytes, Options, Request, RequestError, ScaleWord};
 use crate::run::replace_whole;
 use anyhow::bail;
 use dynvox_core::Serial;
@@ -114,7 +114,7 @@ impl NewArgs {
             path: Some(self.from.clone()),
             frames: Some(self.frames),
             start: self.start,
-            scale: self.scale,
+            scale: self.scale.map(ScaleWord::Images).into_iter().collect(),
             memory,
             profile: self.profile.clone(),
             sequence: self.sequence.clone(),

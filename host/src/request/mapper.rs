@@ -34,12 +34,13 @@ impl Request {
         interval_s: Option<f64>,
     ) -> Result<MapperPlan, RequestError> {
         let threads = self.check_mapper()?;
+        let scaled = self.scaled_settings(&cameras.rig, cameras.size.0)?;
         let (profile, capacity) = self.bounds.resolve(
             cameras.size,
             cameras.rectification.as_ref(),
-            self.settings.volume.voxel_size_m,
+            scaled.street_voxel_size_m,
         )?;
-        let settings = self.fitted_settings(&capacity, interval_s);
+        let settings = self.fitted_settings(scaled.settings, &capacity, interval_s);
         // Without a data set no file of poses can be read row by row.
         if matches!(self.poses, Poses::File(_)) {
             return Err(RequestError::invalid(

@@ -26,6 +26,7 @@ mod paths;
 mod plan;
 mod poses;
 mod resolve;
+mod scale;
 mod settings;
 mod sizes;
 mod storage;
@@ -47,6 +48,7 @@ pub use masks::Masks;
 pub use options::Options;
 pub use plan::Plan;
 pub use poses::Poses;
+pub use scale::{ScaleWord, SceneScale, sentence as scale_sentence};
 pub use settings::Settings;
 pub(crate) use settings::leaves;
 pub use sizes::{Bytes, ImageSize, WindowSize};
@@ -97,6 +99,8 @@ pub struct Request {
     /// Settings of the mapper; stored are those that differ from the defaults.
     #[serde(with = "overrides")]
     pub settings: Settings,
+    /// Lengths of the map that no setting names.
+    pub scale: SceneScale,
     /// Files kept on disk during the run.
     pub storage: Storage,
     /// Evaluation of the map.

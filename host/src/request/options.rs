@@ -3,8 +3,8 @@
 use super::poses::Egomotion;
 use super::{
     Bounds, Bytes, Evaluation, Exports, Frames, ImageSize, Input, Limits, MapObjects, Masks,
-    Memory, PlanningWindow, Poses, Reference, Request, RequestError, Settings, Source, Storage,
-    WindowSize, words,
+    Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneScale,
+    Settings, Source, Storage, WindowSize, words,
 };
 use crate::formats::Axes;
 use crate::formats::calibration::RectifiedSize;
@@ -114,9 +114,11 @@ pub struct Options {
     /// Take every N-th frame [default: 1]
     #[arg(long, value_name = "N", help_heading = "Frames")]
     pub stride: Option<usize>,
-    /// Shrink the images, above 0 and up to 1 [default: 1]
-    #[arg(long, value_name = "S", help_heading = "Frames")]
-    pub scale: Option<f64>,
+    /// Lengths of the map by the scene: desk, room, street or field [default: by the cameras'
+    /// baseline and focal length]; or a factor up to 1 that shrinks the images. May be given twice
+    #[arg(long, value_name = "SCENE|FACTOR", help_heading = "Frames")]
+    #[serde(deserialize_with = "words::list")]
+    pub scale: Vec<ScaleWord>,
     /// Source of depth: elas (stereo matching), files:DIR (PNG, PFM or OpenCV XML named as the
     /// images; depth where DIR's name says depth and not disparity), disparity:DIR, depth:DIR, or
     /// exact (the synthetic street) [default: elas]
@@ -138,7 +140,7 @@ pub struct Options {
     pub instances_every: Option<NonZeroUsize>,
     /// Save every frame's instance masks to a new folder, for --instances files:DIR; those found by
     /// motion go to DIR/motion
-    #[arg(long, value_name = "DIR", conflicts_with = "scale", help_heading = "Mapping")]
+    #[arg(long, value_name = "DIR", help_heading = "Mapping")]
     pub save_instances: Option<PathBuf>,
     /// Mask objects out of the static map and reconstruct them separately; off fuses everything
     /// into one map [default: on]
@@ -228,6 +230,7 @@ impl Options {
             poses: self.poses(),
             bounds: self.bounds()?,
             settings: self.settings()?,
+            scale: self.scene_scale(),
             storage: Storage {
                 lose_evicted: self.no_stream,
                 most_mib: self.stream_mib,
@@ -286,10 +289,27 @@ impl Options {
             start: self.start.unwrap_or(default.start),
             most: self.frames,
             stride: self.stride.unwrap_or(default.stride),
-            scale: self.scale.unwrap_or(default.scale),
+            scale: self.images_scale().unwrap_or(default.scale),
             skip_bad: self.skip_bad_frames,
             force: self.force,
         }
+    }
+
+    /// Factor on the images' sides; the last one given counts.
+    fn images_scale(&self) -> Option<f64> {
+        self.scale.iter().rev().find_map(|word| match word {
+            ScaleWord::Images(factor) => Some(*factor),
+            ScaleWord::Scene(_) => None,
+        })
+    }
+
+    /// Scale of the map; the last one given counts.
+    fn scene_scale(&self) -> SceneScale {
+        let found = self.scale.iter().rev().find_map(|word| match word {
+            ScaleWord::Scene(scene) => Some(*scene),
+            ScaleWord::Images(_) => None,
+        });
+        found.unwrap_or_default()
     }
 
     fn masks(&self) -> Masks {

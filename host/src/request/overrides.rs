@@ -1,10 +1,12 @@
-//! Settings in a stored request: those that differ from the defaults, in their sections.
+//! Settings in a stored request: those that differ from the defaults or that somebody set to
+//! them, in their sections.
 
 use super::Settings;
+use super::settings::{insert, leaves};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 use toml::{Table, Value};
 
-/// Writes the settings that differ from the defaults.
+/// Writes the settings that differ from the defaults, and those that somebody set.
 pub fn serialize<S: Serializer>(settings: &Settings, to: S) -> Result<S::Ok, S::Error> {
     changed(settings).map_err(ser::Error::custom)?.serialize(to)
 }
@@ -19,7 +21,14 @@ pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Er
 fn changed(settings: &Settings) -> anyhow::Result<Table> {
     // By way of text, in which an f32 has as few digits as tell it from its neighbours.
     let table = |of: &Settings| Ok::<Table, anyhow::Error>(of.to_toml(true)?.parse()?);
-    Ok(difference(&table(settings)?, &table(&Settings::default())?))
+    let all = table(settings)?;
+    let mut changed = difference(&all, &table(&Settings::default())?);
+    for (key, value) in leaves("", &all) {
+        if settings.asked().contains(&key) {
+            insert(&mut changed, &key, value);
+        }
+    }
+    Ok(changed)
 }
 
 /// Entries of `table` that `base` lacks or has otherwise.

@@ -4,11 +4,20 @@ use super::examine::{Examined, examine};
 use super::resident_limit_bytes;
 use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Source, input};
 use crate::input::{StopRequest, read_given_poses};
-use dynvox_core::Capacity;
+use dynvox_core::geometry::StereoRig;
+use dynvox_core::{Capacity, Scale};
 
 const MIB: u64 = 1 << 20;
 /// Threads at most.
 const MAX_THREADS: usize = 256;
+
+/// Settings whose lengths follow from a rig.
+pub(super) struct Scaled {
+    /// The settings.
+    pub settings: Settings,
+    /// Voxel size of a map of a street with as many blocks in view, m.
+    pub street_voxel_size_m: f32,
+}
 
 impl Request {
     /// Opens the data set and works out frames, bounds and settings.
@@ -30,13 +39,14 @@ impl Request {
         // Before networks, which would run on every image that is examined.
         let Examined { warnings, interval_s } = examine(self, recorded.as_ref())?;
         let dataset = input::dress(self, recorded)?;
+        let scaled = self.scaled_settings(&dataset.rig(), dataset.size().0)?;
         let (profile, capacity) = self.bounds.resolve(
             dataset.size(),
             dataset.rectification(),
-            self.settings.volume.voxel_size_m,
+            scaled.street_voxel_size_m,
         )?;
         // Settings that depend on the rate need the recording's own.
-        let settings = self.fitted_settings(&capacity, interval_s);
+        let settings = self.fitted_settings(scaled.settings, &capacity, interval_s);
         let frames = FrameNumbers::new(dataset.as_ref(), &self.frames)?;
         let poses = match &self.poses {
             Poses::Estimated => None,
@@ -62,9 +72,27 @@ impl Request {
         })
     }
 
-    /// The settings with what depends on bounds and data set.
-    pub(super) fn fitted_settings(&self, bounds: &Capacity, interval_s: Option<f64>) -> Settings {
+    /// The settings with the lengths that follow from the rig.
+    pub(super) fn scaled_settings(
+        &self,
+        rig: &StereoRig,
+        width_px: usize,
+    ) -> Result<Scaled, RequestError> {
+        let scale = self.scale.lengths(rig, width_px);
         let mut settings = self.settings.clone();
+        settings.adapt(&scale).map_err(|error| RequestError::Invalid(format!("{error:#}")))?;
+        let shrunk = scale.far_m() / Scale::STREET.far_m();
+        let street_voxel_size_m = settings.volume.voxel_size_m / shrunk;
+        Ok(Scaled { settings, street_voxel_size_m })
+    }
+
+    /// The settings with what depends on bounds and data set.
+    pub(super) fn fitted_settings(
+        &self,
+        mut settings: Settings,
+        bounds: &Capacity,
+        interval_s: Option<f64>,
+    ) -> Settings {
         settings.fit(bounds);
         if let Some(finds_motion) = self.masks.source.finds_motion() {
             settings.segmentation.enabled = finds_motion;

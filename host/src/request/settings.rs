@@ -18,8 +18,9 @@ use dynvox_core::stereo::StereoConfig;
 use dynvox_core::tracking::TrackingConfig;
 use dynvox_core::view::{MeshConfig, RaycastConfig};
 use dynvox_core::volume::VolumeConfig;
-use dynvox_core::{Capacity, Config};
+use dynvox_core::{Capacity, Config, Scale};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -60,6 +61,10 @@ pub struct Settings {
     /// data.
     #[serde(skip_serializing_if = "Option::is_none")]
     street: Option<StreetConfig>,
+    /// Keys that somebody set to their defaults: what follows from the rig does not replace them.
+    /// Other values tell by themselves that somebody set them.
+    #[serde(skip)]
+    asked: BTreeSet<String>,
 }
 
 impl Settings {
@@ -131,6 +136,7 @@ impl Settings {
             mesh,
             planning,
             street: _,
+            asked: _,
         } = self;
         Config {
             rig,
@@ -161,6 +167,29 @@ impl Settings {
         }
     }
 
+    /// Lengths that follow from the rig, but for those that somebody set.
+    ///
+    /// # Errors
+    /// A length is not a value of its setting.
+    pub fn adapt(&mut self, scale: &Scale) -> anyhow::Result<()> {
+        let street = Scale::STREET.settings();
+        let mut layers = Layers::over(self.clone())?;
+        for ((key, value), (_, default)) in scale.settings().into_iter().zip(street) {
+            let default = Value::Float(f64::from(default));
+            if at(&layers.table, key) == Some(&default) && !self.asked.contains(key) {
+                layers.set(key, Value::Float(f64::from(value)))?;
+            }
+        }
+        let asked = std::mem::take(&mut self.asked);
+        *self = Self { asked, ..layers.finish() };
+        Ok(())
+    }
+
+    /// Keys that somebody set to their defaults.
+    pub(super) fn asked(&self) -> &BTreeSet<String> {
+        &self.asked
+    }
+
     /// The street's configuration.
     pub fn street(&self) -> StreetConfig {
         self.street.clone().unwrap_or_default()
@@ -178,17 +207,24 @@ impl Settings {
     }
 }
 
-/// Settings under construction: the same as a table and as values.
+/// Settings under construction: as a table and as values.
 struct Layers {
     table: Table,
     settings: Settings,
+    defaults: Table,
 }
 
 impl Layers {
     /// The defaults, those of the street among them.
     fn defaults() -> anyhow::Result<Self> {
-        let settings = Settings { street: Some(StreetConfig::default()), ..Settings::default() };
-        Ok(Self { table: Table::try_from(&settings)?, settings })
+        Self::over(Settings { street: Some(StreetConfig::default()), ..Settings::default() })
+    }
+
+    /// Layers over settings that are there.
+    fn over(settings: Settings) -> anyhow::Result<Self> {
+        let street = Some(StreetConfig::default());
+        let defaults = Table::try_from(Settings { street, ..Settings::default() })?;
+        Ok(Self { table: Table::try_from(&settings)?, settings, defaults })
     }
 
     /// The settings; equal ones are equal values.
@@ -214,12 +250,20 @@ impl Layers {
             }
             Some(_) => insert(&mut self.table, key, value),
         }
+        let mut asked = std::mem::take(&mut self.settings.asked);
         self.settings = self.table.clone().try_into().map_err(|error| {
             anyhow::anyhow!(
                 "`{key}`: {}. The config.toml of a run lists all keys with their values",
                 one_line(&error)
             )
         })?;
+        // Compared as settings have it: a file may say 1 where the setting is 1.0.
+        if at(&Table::try_from(&self.settings)?, key) == at(&self.defaults, key) {
+            asked.insert(key.to_owned());
+        } else {
+            asked.remove(key);
+        }
+        self.settings.asked = asked;
         Ok(())
     }
 }
@@ -237,7 +281,15 @@ pub(crate) fn leaves(prefix: &str, table: &Table) -> Vec<(String, Value)> {
     found
 }
 
-fn insert(table: &mut Table, key: &str, value: Value) {
+/// The value at a dotted key.
+fn at<'t>(table: &'t Table, key: &str) -> Option<&'t Value> {
+    let mut names = key.split('.');
+    let first = table.get(names.next()?);
+    names.try_fold(first?, |inner, name| inner.as_table()?.get(name))
+}
+
+/// Sets the value at a dotted key, and makes the tables on the way.
+pub(super) fn insert(table: &mut Table, key: &str, value: Value) {
     match key.split_once('.') {
         None => drop(table.insert(key.to_owned(), value)),
         Some((first, rest)) => {
@@ -283,6 +335,34 @@ mod tests {
         let settings = Settings::resolve(Some(&file), &["volume.voxel_size_m=0.1".into()]).unwrap();
         let volume = settings.config(any_rig(), None).volume;
         assert_eq!((volume.voxel_size_m, volume.far_m, volume.near_m), (0.1, 12.5, 0.5));
+    }
+
+    #[test]
+    fn lengths_adapt_to_the_rig_but_for_those_that_somebody_set() {
+        let desk = StereoRig { focal_px: 754.7, baseline_m: 0.063, ..any_rig() };
+        let scale = Scale::for_rig(&desk, 960);
+        let adapted = |given: &[&str]| {
+            let mut settings = sets(given).unwrap();
+            settings.adapt(&scale).unwrap();
+            settings.config(desk, None).volume
+        };
+        let volume = adapted(&[]);
+        assert_eq!((volume.voxel_size_m, volume.near_m, volume.far_m), (0.004, 0.04, 3.36));
+        // Set to the default, which a desk would not have.
+        let volume = adapted(&["volume.voxel_size_m=0.05", "volume.far_m=9"]);
+        assert_eq!((volume.voxel_size_m, volume.near_m, volume.far_m), (0.05, 0.04, 9.0));
+    }
+
+    #[test]
+    fn a_default_that_somebody_set_outlives_storing() {
+        let request = super::super::Request {
+            settings: sets(&["volume.far_m=20", "volume.near_m=1"]).unwrap(),
+            ..Default::default()
+        };
+        let stored = serde_json::to_string(&request).unwrap();
+        assert!(stored.contains("\"far_m\":20.0"), "{stored}");
+        assert_eq!(serde_json::from_str::<super::super::Request>(&stored).unwrap(), request);
+        assert_ne!(request.settings, sets(&["volume.near_m=1"]).unwrap());
     }
 
     #[test]

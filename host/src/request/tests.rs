@@ -11,7 +11,7 @@ fn unlike_the_default() -> Request {
         "path": "rig", "sequence": "06", "dataset": "kitti-360", "images": "colour", "bits": 12,
         "topics": "/left,/right", "top_bottom": true, "calibration": ["left.yaml", "right.yaml"],
         "faults": "freeze:right@20..,noise=0.1@5,seed=3", "start": 3, "frames": 40, "stride": 2,
-        "scale": 0.3, "skip_bad_frames": true, "force": true, "depth": "disparity:depth",
+        "scale": [0.3, "room"], "skip_bad_frames": true, "force": true, "depth": "disparity:depth",
         "instances": "onnx:a.onnx,b.onnx", "instances_every": 3, "egomotion": "file:poses.txt",
         "memory": "48MiB", "planning": "200x100x20", "planning_3d": true,
         "set": { "volume.voxel_size_m": 0.1, "street.seed": 7, "volume.observation_weight": "depth" },

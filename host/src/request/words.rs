@@ -28,6 +28,20 @@ pub fn paths<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PathBuf>, D::Erro
     })
 }
 
+/// Reads one value that the command line parses from a word, or a list of them.
+pub fn list<'de, D, T>(from: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: FromStr<Err: Display>,
+{
+    let words = match Value::deserialize(from)? {
+        Value::Null => Vec::new(),
+        Value::Array(list) => list,
+        one => vec![one],
+    };
+    words.iter().map(|one| word(one).parse().map_err(de::Error::custom)).collect()
+}
+
 /// Reads settings: a table of keys and values, one `KEY=VALUE`, or a list of them.
 pub fn settings<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     Ok(match Value::deserialize(from)? {

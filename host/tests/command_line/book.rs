@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 17] = [
+const PAGES: [&str; 18] = [
     "README.md",
     "docs/bits.md",
     "docs/fleet.md",
@@ -23,6 +23,7 @@ const PAGES: [&str; 17] = [
     "docs/quick_start.md",
     "docs/run_folder.md",
     "docs/rust.md",
+    "docs/scale.md",
 ];
 
 /// The lines of a page's shell blocks, continued ones as one, without comments.

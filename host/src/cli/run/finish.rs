@@ -3,7 +3,7 @@
 use super::{RunArgs, results};
 use crate::formats::MAP_FILE;
 use crate::report::{self, Summary, text::counted};
-use crate::request::{Plan, RequestError};
+use crate::request::{Plan, RequestError, scale_sentence};
 use crate::run::{
     self, BLOCKS_FILE, Checkpoint, Incomplete, PREVIOUS_SNAPSHOT_FILE, RunError, RunFolder,
     RunRecord, SNAPSHOT_FILE, has_snapshot,
@@ -149,6 +149,7 @@ pub fn print_header(plan: &Plan) {
         .count()
         .map_or_else(|| "a stream".to_owned(), |count| format!("{count} frames"));
     eprintln!("{name}: {frames} of {width} x {height} px, profile {}, {threads}", plan.profile);
+    eprintln!("{}", scale_sentence(&plan.config));
     plan.dataset.notes().iter().for_each(|note| eprintln!("note: {note}"));
     plan.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
 }
