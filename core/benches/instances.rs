@@ -220,16 +220,12 @@ fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) 
                 .zip(timed.0.into_inner().unwrap())
                 .for_each(|(sum, time)| *sum += time);
             if by_motion {
-                assert!(
-                    report.instances.segmentation.instances >= 4,
-                    "frame {at}: {:?}",
-                    report.instances
-                );
+                assert!(report.segmentation.instances >= 4, "frame {at}: {:?}", report.objects);
             } else {
                 assert_eq!(
-                    report.instances.objects.fused as usize, count,
+                    report.objects.fused as usize, count,
                     "frame {at}: {:?}",
-                    report.instances
+                    report.objects
                 );
             }
         }

@@ -81,7 +81,7 @@ fn detections_objects_and_a_look_at_them_make_no_heap_call() {
             let Ok(report) = mapper.step_with(&frame, &Serial, &mut NoStore, &mut NoSink) else {
                 continue;
             };
-            objects += report.instances.objects.fused;
+            objects += report.objects.fused;
             shown += mapper
                 .raycast_composed(&report.t_world_camera, &Serial)
                 .map_or(0, |seen| seen.layer().map_or(0, |image| image.height()));

@@ -361,16 +361,16 @@ fn one_track_and_one_object_are_used_and_the_rest_is_counted() {
         let capacity = Capacity { tracks, objects, object_blocks, ..CAPACITY };
         let (mut begun, mut refused, mut blocks) = (0, 0, 0);
         sequence.run_within(&capacity, true, false, |_, report, mapper| {
-            let seen = &report.instances;
+            let (tracks, seen) = (&report.tracking.tracks, &report.objects);
             assert!(
-                seen.tracks.tracks <= 1
+                tracks.tracks <= 1
                     && mapper.tracks().count() <= 1
-                    && seen.objects.objects as usize <= objects
+                    && seen.objects as usize <= objects
             );
-            assert!(seen.objects.blocks as usize <= objects * object_blocks);
-            refused += seen.tracks.refused;
-            begun += seen.objects.begun;
-            blocks += seen.objects.blocks_refused;
+            assert!(seen.blocks as usize <= objects * object_blocks);
+            refused += tracks.refused;
+            begun += seen.begun;
+            blocks += seen.blocks_refused;
         });
         assert!(refused > 0, "cars beyond the first are counted");
         assert_eq!(

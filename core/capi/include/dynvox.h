@@ -385,7 +385,7 @@ typedef struct {
   // Blocks evicted and lost in this step.
   uint32_t blocks_lost;
   // Voxels that pruning reset.
-  uint32_t voxels_pruned;
+  uint32_t voxels_reset;
   // Digest of what went in: the same pictures give the same number everywhere.
   uint64_t input_digest;
   // Digest of all that came of the step: the same frames and configuration give the same number

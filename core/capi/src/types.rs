@@ -136,7 +136,7 @@ pub struct DynvoxReport {
     /// Blocks evicted and lost in this step.
     pub blocks_lost: u32,
     /// Voxels that pruning reset.
-    pub voxels_pruned: u32,
+    pub voxels_reset: u32,
     /// Digest of what went in: the same pictures give the same number everywhere.
     pub input_digest: u64,
     /// Digest of all that came of the step: the same frames and configuration give the same number
@@ -165,7 +165,7 @@ impl From<&Report> for DynvoxReport {
             blocks_refused: allocation.refused + allocation.beyond + allocation.unlisted,
             blocks_stored: allocation.eviction.stored,
             blocks_lost: allocation.eviction.lost,
-            voxels_pruned: report.prune.voxels_reset,
+            voxels_reset: report.prune.voxels_reset,
             input_digest: report.digests.input,
             digest: report.digest,
         }

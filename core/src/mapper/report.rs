@@ -5,11 +5,13 @@ use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
     geometry::Transform,
-    objects::InstancesReport,
+    objects::ObjectsReport,
     rectify::RectifyReport,
     rectify::self_calibration::{CalibrationState, SelfCalibrationReport},
     scene_flow::FlowReport,
+    segmentation::SegmentationReport,
     stereo::StereoReport,
+    tracking::TrackingReport,
     volume::{AllocationReport, PruneReport},
 };
 
@@ -166,8 +168,12 @@ pub struct Report {
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
     pub self_calibration: SelfCalibrationReport,
-    /// Counts of objects and detections; [`crate::Mapper::tracks`] has the tracks one by one.
-    pub instances: InstancesReport,
+    /// Counts of detections and tracks; [`crate::Mapper::tracks`] has the tracks one by one.
+    pub tracking: TrackingReport,
+    /// Counts of objects that were found by their motion.
+    pub segmentation: SegmentationReport,
+    /// Counts of the objects' volumes.
+    pub objects: ObjectsReport,
     /// True if the frame was fused. A frame whose pose was extrapolated is not, because it would
     /// smear the map; nor is one between two turns of `mapper.fuse_every`.
     pub fused: bool,
@@ -219,7 +225,11 @@ impl Report {
         let allocation = &self.allocate;
         let blocks =
             allocation.refused + allocation.beyond + allocation.unlisted + allocation.eviction.lost;
-        let refused = blocks + self.instances.refused() + self.internal_faults;
+        let refused = blocks
+            + self.tracking.refused()
+            + self.segmentation.refused
+            + self.objects.refusals()
+            + self.internal_faults;
         if self.pose == PoseOrigin::Extrapolated
             || self.segment > 0
             || refused > 0

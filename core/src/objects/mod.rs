@@ -21,7 +21,7 @@ pub use object::{
 };
 pub use posed::PosedObject;
 pub(crate) use reconstruct::ObjectFrame;
-pub use report::{InstancesReport, ObjectsReport};
+pub use report::ObjectsReport;
 
 use crate::{
     memory::{Capacity, Carver, Footprint},

@@ -1,10 +1,7 @@
-//! Reports of a frame's instances, as plain values.
+//! Report of a frame's objects, as plain values.
 
 use super::{Object, ObjectSummary, Objects};
-use crate::{
-    segmentation::SegmentationReport,
-    tracking::{DetectionCount, TrackCount, TrackReport, Tracker, TrackingReport},
-};
+use crate::tracking::{TrackReport, Tracker};
 
 /// Counts of volumes in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,60 +32,11 @@ pub struct ObjectsReport {
     pub crop_pixels: u32,
 }
 
-/// One frame's instances.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct InstancesReport {
-    /// Counts of detections.
-    pub detections: DetectionCount,
-    /// Counts of objects that were found by their motion.
-    pub segmentation: SegmentationReport,
-    /// Counts of associations with tracks.
-    pub tracks: TrackCount,
-    /// Counts of volumes.
-    pub objects: ObjectsReport,
-    /// Matches excluded from the camera's own motion.
-    pub matches_excluded: u32,
-    /// Pixels whose depth was kept out of the static map.
-    pub pixels_masked: u32,
-    /// Most words of masks in use: what `capacity.mask_words` bounds.
-    pub mask_words: u32,
-}
-
-impl InstancesReport {
-    /// The report of a frame, from those of its stages. `matches_excluded` is the camera's.
-    pub(crate) fn of(
-        tracking: &TrackingReport,
-        segmentation: SegmentationReport,
-        objects: ObjectsReport,
-        matches_excluded: u32,
-    ) -> Self {
-        let &TrackingReport { detections, tracks, pixels_masked, mask_words } = tracking;
-        Self {
-            detections,
-            segmentation,
-            tracks,
-            objects,
-            matches_excluded,
-            pixels_masked,
-            mask_words,
-        }
-    }
-
-    /// Returns the number of items that should have been used and were refused: detections, tracks,
-    /// masks, objects, their blocks and crops.
-    pub(crate) fn refused(&self) -> u32 {
-        let ObjectsReport { refused, blocks_refused, crops_dropped, .. } = self.objects;
-        let segmentation = self.segmentation.refused;
-        self.detections.refused()
-            + segmentation
-            + self.tracks.refused
-            + self.tracks.masks_lost
-            + refused
-            + blocks_refused
-            + crops_dropped
+impl ObjectsReport {
+    /// Returns the number of items that should have been used and were refused: objects, their
+    /// blocks and crops.
+    pub fn refusals(&self) -> u32 {
+        self.refused + self.blocks_refused + self.crops_dropped
     }
 }
 

@@ -59,6 +59,16 @@ pub struct TrackingReport {
     pub pixels_masked: u32,
     /// Most words of masks in use: what `capacity.mask_words` bounds.
     pub mask_words: u32,
+    /// Matches excluded from the camera's own motion, because they may move.
+    pub matches_excluded: u32,
+}
+
+impl TrackingReport {
+    /// Returns the number of items that should have been used and were refused: detections, tracks
+    /// and masks.
+    pub fn refused(&self) -> u32 {
+        self.detections.refused() + self.tracks.refused + self.tracks.masks_lost
+    }
 }
 
 impl TrackReport {

@@ -67,28 +67,26 @@ impl BoundUses {
         self.visible_blocks
             .add((blocks.visible + allocation.unlisted) as usize, allocation.unlisted);
         self.history_frames.add(row.history_frames, report.prune.early);
-        let instances = &report.instances;
-        let found = &instances.detections;
+        let tracking = &report.tracking;
+        let found = &tracking.detections;
         let detections = found.accepted
             + found.tracked_only
             + found.covered
             + found.bad_mask
-            + instances.segmentation.instances;
+            + report.segmentation.instances;
         self.detections.add(
             (detections + found.over_capacity + found.mask_store_full) as usize,
             found.over_capacity,
         );
-        self.mask_words.add(
-            instances.mask_words as usize,
-            found.mask_store_full + instances.tracks.masks_lost,
-        );
+        self.mask_words
+            .add(tracking.mask_words as usize, found.mask_store_full + tracking.tracks.masks_lost);
         // An evicted track gave its slot to another: both were needed.
-        let tracks = &instances.tracks;
+        let tracks = &tracking.tracks;
         self.tracks.add(
             (tracks.tracks + tracks.evicted + tracks.refused) as usize,
             tracks.evicted + tracks.refused,
         );
-        let objects = &instances.objects;
+        let objects = &report.objects;
         self.objects.add((objects.objects + objects.refused) as usize, objects.refused);
         let most = mapper
             .objects()

@@ -137,7 +137,7 @@ impl FrameRow {
     pub fn cause(&self) -> String {
         let (allocation, motion, masks) =
             (&self.report.allocate, self.motion(), &self.mask_refusals);
-        let instances = &self.report.instances;
+        let Report { tracking, segmentation, objects, .. } = &self.report;
         // A frame may have several causes, the gravest first.
         let lost = (self.report.segment > 0).then(|| {
             format!(
@@ -155,12 +155,12 @@ impl FrameRow {
             (allocation.eviction.lost, "blocks evicted and not stored"),
             (masks.missing, "frame without masks"),
             (masks.beyond, "masks beyond the source's limits"),
-            (instances.detections.refused() + instances.segmentation.refused, "detections refused"),
-            (instances.tracks.refused, "tracks refused, the table is full"),
-            (instances.tracks.masks_lost, "masks of unseen tracks lost"),
-            (instances.objects.refused, "objects refused, all volumes are in use"),
-            (instances.objects.blocks_refused, "blocks of objects refused"),
-            (instances.objects.crops_dropped, "crops of objects dropped"),
+            (tracking.detections.refused() + segmentation.refused, "detections refused"),
+            (tracking.tracks.refused, "tracks refused, the table is full"),
+            (tracking.tracks.masks_lost, "masks of unseen tracks lost"),
+            (objects.refused, "objects refused, all volumes are in use"),
+            (objects.blocks_refused, "blocks of objects refused"),
+            (objects.crops_dropped, "crops of objects dropped"),
             (self.report.internal_faults, "internal faults: please report them"),
             (
                 u32::from(self.report.self_calibration.is_uncorrected()),

@@ -40,12 +40,12 @@ impl Observer for HealthObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let (sums, row) = (&mut self.sums, frame.row);
-        let instances = &row.report.instances;
+        let (tracking, objects) = (&row.report.tracking, &row.report.objects);
         sums.matches_dropped += u64::from(row.report.dropped_features());
         sums.depth_values_refused += u64::from(row.depth_refused);
         sums.mask_refusals.add(&row.mask_refusals);
-        sums.detections = sum(sums.detections, &instances.detections);
-        sums.tracks_refused += u64::from(instances.tracks.refused + instances.objects.refused);
+        sums.detections = sum(sums.detections, &tracking.detections);
+        sums.tracks_refused += u64::from(tracking.tracks.refused + objects.refused);
         sums.internal_faults += u64::from(row.report.internal_faults);
         sums.worst = sums.worst.max(row.severity());
         Ok(())

@@ -92,11 +92,11 @@ struct Coverage {
 impl Coverage {
     fn note(&mut self, report: &Report, mapper: &Mapper<'_>) {
         self.measured += mapper.tracks().filter(|track| track.inliers > 0).count() as u32;
-        self.objects += report.instances.objects.objects;
-        self.waiting += report.instances.objects.caught_up;
+        self.objects += report.objects.objects;
+        self.waiting += report.objects.caught_up;
         self.extrapolated += u32::from(report.pose == PoseOrigin::Extrapolated);
-        self.missed += report.instances.tracks.tracks - report.instances.tracks.detected;
-        self.tracked_only += report.instances.detections.tracked_only;
+        self.missed += report.tracking.tracks.tracks - report.tracking.tracks.detected;
+        self.tracked_only += report.tracking.detections.tracked_only;
         self.evicted += report.allocate.eviction.lost;
         self.pruned += report.prune.visited;
     }

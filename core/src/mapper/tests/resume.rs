@@ -69,7 +69,7 @@ fn a_run_resumed_anywhere_has_the_digests_of_one_that_never_stopped() {
     for capacity in [CAPACITY, CROWDED] {
         let (reports, snapshots) = uninterrupted(&walk, &capacity, |_| true);
         let last = reports.last().unwrap();
-        assert!(last.instances.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
+        assert!(last.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
         let left: u32 = reports
             .iter()
             .map(|report| report.allocate.eviction.lost + report.allocate.refused)
@@ -124,7 +124,7 @@ fn a_small_track_stays_small_when_resumed_and_missed() {
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut mapper = Mapper::new(&CAPACITY, &Walk::config(), &mut slab[start..]).unwrap();
     let seen: Vec<Report> = (0..SEEN).map(|at| step(at, &mut mapper)).collect();
-    assert_eq!(seen[SEEN - 1].instances.detections.tracked_only, 1);
+    assert_eq!(seen[SEEN - 1].tracking.detections.tracked_only, 1);
     let bytes = saved(&mut mapper);
     let missed = |mapper: &mut Mapper<'_>| -> Vec<Report> {
         (SEEN..SEEN + 2).map(|at| step(at, mapper)).collect()
@@ -133,7 +133,7 @@ fn a_small_track_stays_small_when_resumed_and_missed() {
         (missed(&mut mapper), restored(&CAPACITY, &Walk::config(), &bytes, missed).unwrap());
     for (report, expected) in resumed.iter().zip(&went_on) {
         assert_eq!(
-            report.instances.pixels_masked, expected.instances.pixels_masked,
+            report.tracking.pixels_masked, expected.tracking.pixels_masked,
             "frame {}",
             report.frame
         );
@@ -304,7 +304,7 @@ impl Window {
 fn a_flip_of_any_byte_is_refused_by_name() {
     let (mut bytes, last) = Window::snapshot(9);
     assert!(
-        last.instances.objects.blocks > 0 && last.blocks.used > 0 && last.prune.visited > 0,
+        last.objects.blocks > 0 && last.blocks.used > 0 && last.prune.visited > 0,
         "it holds something of everything: {last:?}"
     );
     let (len, config) = (bytes.len(), Window::config());

@@ -19,7 +19,7 @@ fn depths(
 fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
     let walk = Walk::new(6);
     with_mapper(&walk, 6, |mapper, reports| {
-        assert_eq!(reports[5].instances.objects.objects, 1);
+        assert_eq!(reports[5].objects.objects, 1);
         let t_world_camera = reports[5].t_world_camera;
         let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
         assert_eq!(ids.len(), 1);

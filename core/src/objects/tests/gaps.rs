@@ -55,7 +55,7 @@ fn without_a_motion_a_parked_car_is_fused_and_a_moving_one_not() {
             for frame in 0..8 {
                 let [camera, car] = poses(frame);
                 let board = if frame == 6 { &silent } else { &Board::CAR };
-                count.push(run.step(camera, &[(board, Some(car))]).objects.fused);
+                count.push(run.step(camera, &[(board, Some(car))]).fused);
             }
             assert_eq!(count[5..], fused);
         });
@@ -69,7 +69,7 @@ fn nothing_is_kept_for_a_volume_while_the_camera_is_lost() {
         for frame in 0..10 {
             run.known = frame >= 6;
             let [camera, car] = ahead(frame);
-            let report = run.step(camera, &[(&Board::CAR, Some(car))]).objects;
+            let report = run.step(camera, &[(&Board::CAR, Some(car))]);
             assert_eq!(
                 (run.instances.objects.crops.len(), report.fused),
                 (0, u32::from(frame >= 6)),

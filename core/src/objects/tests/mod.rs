@@ -7,14 +7,7 @@ mod settings;
 mod volumes;
 
 use super::*;
-use crate::{
-    Serial,
-    image::View,
-    memory::SLAB_ALIGN,
-    segmentation::SegmentationReport,
-    tracking::tests::*,
-    tracking::{TrackCount, TrackReport},
-};
+use crate::{Serial, image::View, memory::SLAB_ALIGN, tracking::tests::*};
 use std::{vec, vec::Vec};
 
 /// Objects that were handed to a sink.
@@ -53,7 +46,7 @@ impl<'s> Instances<'s> {
         known: bool,
         estimator: &mut Estimator<'_>,
         sink: &mut impl ObjectSink,
-    ) -> InstancesReport {
+    ) -> ObjectsReport {
         let grey = vec![128u8; WIDTH * HEIGHT];
         let frame_of_objects = ObjectFrame {
             rig: &RIG,
@@ -68,12 +61,8 @@ impl<'s> Instances<'s> {
             detected.assign_matches().estimate_motions(&RIG, &shot.camera, None, estimator);
         let shown = known.then_some(&frame_of_objects);
         self.objects.reconstruct(&tracked, shown, &Serial, sink);
-        InstancesReport::of(
-            &tracked.commit(),
-            SegmentationReport::default(),
-            self.objects.report(),
-            0,
-        )
+        tracked.commit();
+        self.objects.report()
     }
 
     pub fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
@@ -134,7 +123,7 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
         &mut self,
         t_world_camera: Transform,
         boards: &[(&Board, Option<Transform>)],
-    ) -> InstancesReport {
+    ) -> ObjectsReport {
         self.step_behind(t_world_camera, boards, &[])
     }
 
@@ -144,7 +133,7 @@ impl<'i, 's, 't> Run<'i, 's, 't> {
         t_world_camera: Transform,
         seen: &[(&Board, Option<Transform>)],
         unseen: &[(&Board, Option<Transform>)],
-    ) -> InstancesReport {
+    ) -> ObjectsReport {
         let shot = self.scene.shoot(t_world_camera, seen, unseen);
         self.instances.take(&shot, self.known, self.estimator, &mut self.sink)
     }

@@ -14,7 +14,7 @@ fn what_was_seen_before_the_motion_was_known_is_fused_when_it_is() {
         let reports: Vec<_> = (0..5)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                run.step(camera, &[(&Board::CAR, Some(car))]).objects
+                run.step(camera, &[(&Board::CAR, Some(car))])
             })
             .collect();
         let begun: Vec<u32> = reports.iter().map(|report| report.begun).collect();
@@ -68,11 +68,7 @@ fn full_volumes_are_handed_over_but_not_in_the_frame_they_grow() {
         for frame in 0..8 {
             let boards = [(&near, parked(-3.5)), (&near, parked(0.0)), (&near, parked(3.5))];
             let report = run.step(camera(frame), &boards);
-            assert_eq!(
-                report.objects.refused,
-                u32::from(frame >= 2),
-                "three stand, two have volumes"
-            );
+            assert_eq!(report.refused, u32::from(frame >= 2), "three stand, two have volumes");
         }
         // One of the two goes out of sight: its volume goes to the third.
         let id = run.instances.objects().next().unwrap().0.id;
@@ -146,7 +142,7 @@ fn an_object_larger_than_its_blocks_refuses_the_rest_and_says_so() {
         let refused: u32 = (0..6)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                run.step(camera, &[(&Board::CAR, Some(car))]).objects.blocks_refused
+                run.step(camera, &[(&Board::CAR, Some(car))]).blocks_refused
             })
             .sum();
         assert!(refused > 0);
@@ -161,7 +157,7 @@ fn a_short_ring_of_crops_keeps_the_latest_and_counts_the_rest() {
         let reports: Vec<_> = (0..4)
             .map(|frame| {
                 let [camera, car] = at(frame);
-                run.step(camera, &[(&Board::CAR, Some(car))]).objects
+                run.step(camera, &[(&Board::CAR, Some(car))])
             })
             .collect();
         assert_eq!(reports.iter().map(|report| report.crops_dropped).sum::<u32>(), 2);

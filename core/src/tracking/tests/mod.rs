@@ -1,5 +1,6 @@
 //! Harness: a tracker in a slab, and scenes of boards with closed answers.
 
+mod report;
 mod scene;
 mod settings;
 

@@ -159,27 +159,23 @@ static MAP: &[FrameColumn] = &[
 /// Detections, tracks, objects.
 static OBJECTS: &[FrameColumn] = &[
     column("detections_given", "", "detections given with the frame", |row| {
-        row.report.instances.detections.given.into()
+        row.report.tracking.detections.given.into()
     }),
     column("detections_accepted", "", "detections accepted", |row| {
-        row.report.instances.detections.accepted.into()
+        row.report.tracking.detections.accepted.into()
     }),
     column("detections_refused", "", "detections refused", |row| {
-        row.report.instances.detections.refused().into()
+        row.report.tracking.detections.refused().into()
     }),
-    column("tracks", "", "tracks", |row| row.report.instances.tracks.tracks.into()),
+    column("tracks", "", "tracks", |row| row.report.tracking.tracks.tracks.into()),
     column("uncertain", "", "tracks seen whose motion state is uncertain", |row| {
         row.track_states[0].into()
     }),
     column("static", "", "static tracks seen", |row| row.track_states[1].into()),
     column("dynamic", "", "dynamic tracks seen", |row| row.track_states[2].into()),
-    column("objects", "", "objects with a volume", |row| {
-        row.report.instances.objects.objects.into()
-    }),
-    column("object_blocks", "", "blocks of all objects", |row| {
-        row.report.instances.objects.blocks.into()
-    }),
+    column("objects", "", "objects with a volume", |row| row.report.objects.objects.into()),
+    column("object_blocks", "", "blocks of all objects", |row| row.report.objects.blocks.into()),
     column("matches_excluded", "", "matches excluded from egomotion", |row| {
-        row.report.instances.matches_excluded.into()
+        row.report.tracking.matches_excluded.into()
     }),
 ];
