@@ -147,7 +147,7 @@ typedef struct {
   // DYNVOX_LENS_...
   DynvoxLensModel model;
   // Parameters of the model; those that it does not have are not read.
-  double parameters[8];
+  double parameters[15];
 } DynvoxRawCamera;
 
 // Two cameras as they are, the motion between them, and the size their images are rectified to.
@@ -607,6 +607,10 @@ typedef bool (*DynvoxRead)(void *context, uint8_t *bytes, size_t len);
 
 // Extended unified; parameters alpha, beta.
 #define DYNVOX_LENS_EXTENDED_UNIFIED 3
+
+// Mei's sphere with OpenCV's whole distortion; parameters xi, k1 to k6, p1, p2, s1 to s4, tilt
+// about x and y.
+#define DYNVOX_LENS_GENERAL 4
 
 #ifdef __cplusplus
 extern "C" {

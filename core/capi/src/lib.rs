@@ -50,8 +50,8 @@ pub use plan::{
 };
 pub use raw::{
     DYNVOX_LENS_DOUBLE_SPHERE, DYNVOX_LENS_EQUIDISTANT, DYNVOX_LENS_EXTENDED_UNIFIED,
-    DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel, DynvoxRawCamera, DynvoxRawRig,
-    dynvox_config_raw,
+    DYNVOX_LENS_GENERAL, DYNVOX_LENS_RADIAL_TANGENTIAL, DynvoxLensModel, DynvoxRawCamera,
+    DynvoxRawRig, dynvox_config_raw,
 };
 pub use retired::{DynvoxObjectSink, DynvoxRetired, dynvox_retired_triangles};
 pub use snapshot::{DynvoxRead, DynvoxWrite, dynvox_restore, dynvox_save};

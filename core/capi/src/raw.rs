@@ -17,6 +17,9 @@ pub const DYNVOX_LENS_EQUIDISTANT: DynvoxLensModel = 1;
 pub const DYNVOX_LENS_DOUBLE_SPHERE: DynvoxLensModel = 2;
 /// Extended unified; parameters alpha, beta.
 pub const DYNVOX_LENS_EXTENDED_UNIFIED: DynvoxLensModel = 3;
+/// Mei's sphere with OpenCV's whole distortion; parameters xi, k1 to k6, p1, p2, s1 to s4, tilt
+/// about x and y.
+pub const DYNVOX_LENS_GENERAL: DynvoxLensModel = 4;
 
 /// A camera as it is: its lens and the size of its images.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +36,7 @@ pub struct DynvoxRawCamera {
     /// DYNVOX_LENS_...
     pub model: DynvoxLensModel,
     /// Parameters of the model; those that it does not have are not read.
-    pub parameters: [f64; 8],
+    pub parameters: [f64; 15],
 }
 
 impl DynvoxRawCamera {
@@ -43,7 +46,7 @@ impl DynvoxRawCamera {
         focal_px: [0.0; 2],
         center_px: [0.0; 2],
         model: 0,
-        parameters: [0.0; 8],
+        parameters: [0.0; 15],
     };
 
     fn camera(&self) -> Result<RawCamera, DynvoxStatus> {

@@ -11,6 +11,15 @@ use std::ptr;
 
 const RAW: [usize; 2] = [176, 80];
 const RECTIFIED: [u32; 2] = [160, 64];
+/// k1 to k6, p1, p2; a radial-tangential lens has no more.
+const PARAMETERS: [f64; 15] = {
+    let mut parameters = [0.0; 15];
+    parameters[0] = -0.1;
+    parameters[1] = 0.02;
+    parameters[6] = 0.001;
+    parameters[7] = -0.001;
+    parameters
+};
 
 fn camera() -> DynvoxRawCamera {
     DynvoxRawCamera {
@@ -19,7 +28,7 @@ fn camera() -> DynvoxRawCamera {
         focal_px: [100.0, 101.0],
         center_px: [88.0, 40.0],
         model: DYNVOX_LENS_RADIAL_TANGENTIAL,
-        parameters: [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.001, -0.001],
+        parameters: PARAMETERS,
     }
 }
 

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::{vec, vec::Vec};
 
 /// One of each model, with parameters as real lenses have them.
-fn lenses() -> [Lens; 6] {
+fn lenses() -> [Lens; 9] {
     let lens = |focal: f64, model| Lens::new([focal, 1.01 * focal], [310.0, 236.0], model).unwrap();
     [
         lens(400.0, LensModel::IDEAL),
@@ -33,7 +33,55 @@ fn lenses() -> [Lens; 6] {
         lens(290.0, LensModel::Equidistant { radial: [-0.013, 0.02, -0.012, 0.002] }),
         lens(280.0, LensModel::DoubleSphere { xi: -0.18, alpha: 0.59 }),
         lens(300.0, LensModel::ExtendedUnified { alpha: 0.6, beta: 1.1 }),
+        lens(400.0, general(0.0, [-0.28, 0.07, 0.003, 0.0, 0.0, 0.0])),
+        lens(720.0, general(0.8, [-0.34, 0.17, 0.0, 0.0, 0.0, 0.0])),
+        lens(2138.0, general(3.63, [1.176, 15.49, 0.0, 0.0, 0.0, 0.0])),
     ]
+}
+
+/// A lens of the general model with a little of everything.
+fn general(xi: f64, radial: [f64; 6]) -> LensModel {
+    LensModel::General {
+        xi,
+        radial,
+        tangential: [-7e-4, 7e-4],
+        prism: [1e-3, -4e-4, 5e-4, 2e-4],
+        tilt: [0.01, -0.02],
+    }
+}
+
+#[test]
+fn the_general_model_without_sphere_prism_and_tilt_is_the_radial_one() {
+    let (radial, tangential) = ([0.9, 0.2, 0.01, 1.2, 0.4, 0.05], [1e-4, -2e-4]);
+    let plain = LensModel::RadialTangential { radial, tangential };
+    let general =
+        LensModel::General { xi: 0.0, radial, tangential, prism: [0.0; 4], tilt: [0.0; 2] };
+    let [plain, general] =
+        [plain, general].map(|model| Lens::new([400.0; 2], [310.0, 236.0], model).unwrap());
+    for ray in [[0.3, -0.2, 1.0], [0.0, 0.0, 2.0], [-0.9, 0.7, 1.0]] {
+        let [a, b] = [plain, general].map(|lens| lens.project(ray).unwrap());
+        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-10, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn a_sphere_seen_from_its_rim_is_the_unified_model() {
+    // Mei's model without distortion is the extended unified one with other names.
+    let xi = 0.8;
+    let sphere = LensModel::General {
+        xi,
+        radial: [0.0; 6],
+        tangential: [0.0; 2],
+        prism: [0.0; 4],
+        tilt: [0.0; 2],
+    };
+    let unified = LensModel::ExtendedUnified { alpha: xi / (1.0 + xi), beta: 1.0 };
+    let sphere = Lens::new([720.0; 2], [310.0, 236.0], sphere).unwrap();
+    let unified = Lens::new([720.0 / (1.0 + xi); 2], [310.0, 236.0], unified).unwrap();
+    for ray in [[0.3, -0.2, 1.0], [1.5, 0.5, 1.0], [-2.0, 0.7, 0.3]] {
+        let [a, b] = [sphere, unified].map(|lens| lens.project(ray).unwrap());
+        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9, "{a:?} {b:?}");
+    }
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! The cameras.
 
 use super::error::{raise, refuse};
-use dynvox::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
+use dynvox::formats::calibration::{
+    CalibrationFiles, CalibrationHints, CameraGeometry, Cameras, FittedGeometry, RectifiedSize,
+};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::Rectification;
 use pyo3::prelude::*;
@@ -104,14 +106,18 @@ pub fn read_calibration(
             "no file of a calibration is given. Name one file with both cameras, or one for each",
         ));
     }
-    let cameras = CameraGeometry::read(&files, image.map(|(width, height)| [width, height]))
-        .map_err(raise)?;
-    let raw = match &cameras {
-        CameraGeometry::Rectified(rig) => {
-            return Rig::new(rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m);
-        }
-        CameraGeometry::Raw { calibration, .. } => &calibration.left,
-    };
+    let image = image.map(|(width, height)| [width, height]);
+    let read = CalibrationFiles::read(&files, CalibrationHints::default()).map_err(raise)?;
+    let read = read.cameras(image).map_err(raise)?;
+    if let Cameras::Rectified(cameras) = &read.cameras
+        && cameras.offset_px == 0.0
+    {
+        let rig = cameras.rig;
+        return Rig::new(rig.focal_px, rig.center_u_px, rig.center_v_px, rig.baseline_m);
+    }
+    let calibration = Box::new(read.raw(image).map_err(raise)?);
+    let raw = calibration.left;
+    let cameras = CameraGeometry::Raw { calibration, path: read.path };
     let size = RectifiedSize {
         width_px: rectified.map(|(width, _)| width),
         height_px: rectified.map(|(_, height)| height),

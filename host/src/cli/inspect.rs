@@ -1,14 +1,15 @@
 //! `dynvox inspect`.
 
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
+use crate::formats::calibration::CalibrationHints;
 use crate::formats::{SETTINGS_FILE, SUMMARY_FILE};
 use crate::input::diagnosis;
-use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout};
+use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout, OpenOptions};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use serde::{Serialize, Serializer};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
@@ -17,13 +18,24 @@ pub struct InspectArgs {
     /// Layout of the data set; guessed from the path unless given
     #[arg(long, value_enum)]
     dataset: Option<Layout>,
+    /// Calibration instead of the recording's own, once or for each camera
+    #[arg(long, value_name = "FILE")]
+    calibration: Vec<PathBuf>,
+    #[command(flatten)]
+    hints: CalibrationHints,
     /// Write what is found to standard output as JSON
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
-    let (layout, found) = match input::survey(&args.path, args.dataset) {
+    let options = OpenOptions {
+        layout: args.dataset,
+        calibration: args.calibration.clone(),
+        hints: args.hints,
+        ..OpenOptions::default()
+    };
+    let (layout, found) = match input::survey(&args.path, &options) {
         // A folder that cannot be mapped may be of another kind.
         Err(error @ InputError::Layout { .. }) => return other(args).unwrap_or(Err(error.into())),
         survey => survey?,
@@ -45,7 +57,7 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
             described: one
                 .opened
                 .as_ref()
-                .map(|dataset| Description::of(dataset.as_ref(), &command(&args.path, one)))
+                .map(|dataset| Description::of(dataset.as_ref(), &command(args, one)))
                 .map_err(ToString::to_string),
         };
         // Line by line as they are examined, which takes its time.
@@ -109,13 +121,16 @@ fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
     }
 }
 
-fn command(path: &Path, found: &Found) -> String {
+/// Command that maps a sequence, with what was said of its calibration.
+fn command(args: &InspectArgs, found: &Found) -> String {
     let sequence = found
         .sequence
         .as_ref()
         .map(|sequence| format!(" --sequence {sequence}"))
         .unwrap_or_default();
-    format!("dynvox run {}{sequence}", path.display())
+    let files = args.calibration.iter().map(|file| format!(" --calibration {}", file.display()));
+    let hints = args.hints.options();
+    format!("dynvox run {}{sequence}{}{hints}", args.path.display(), files.collect::<String>())
 }
 
 /// One sequence, or why it cannot be used.

@@ -5,7 +5,7 @@
 
 use super::source::{FrameSource, InputError, Stacking};
 use crate::formats::FormatError;
-use crate::formats::calibration::{CameraGeometry, RectifiedSize};
+use crate::formats::calibration::{CalibrationHints, CameraGeometry, RectifiedSize};
 use dynvox_core::geometry::StereoRig;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -100,6 +100,8 @@ pub struct OpenOptions {
     pub topics: Option<Topics>,
     /// Files of a calibration to use instead of the recording's own; empty for its own.
     pub calibration: Vec<PathBuf>,
+    /// Answers of a person to what the files of a calibration leave open.
+    pub hints: CalibrationHints,
     /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
 }
@@ -116,8 +118,17 @@ impl OpenOptions {
         if self.calibration.is_empty() {
             own().map(CameraGeometry::Rectified)
         } else {
-            CameraGeometry::read(&self.calibration, None)
+            self.cameras_of(&self.calibration)
         }
+    }
+
+    /// The cameras of calibration files.
+    ///
+    /// # Errors
+    /// See [`CameraGeometry::read`].
+    pub fn cameras_of(&self, files: &[PathBuf]) -> Result<CameraGeometry, FormatError> {
+        let colour = self.hints.colour || self.cameras == CameraPair::Colour;
+        CameraGeometry::read(files, CalibrationHints { colour, ..self.hints })
     }
 }
 

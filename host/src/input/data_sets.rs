@@ -122,18 +122,15 @@ pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputErr
     (layout.row().sequences)(path)
 }
 
-/// Opens everything at `path`.
-pub fn survey(path: &Path, layout: Option<Layout>) -> Result<(Layout, Vec<Found>), InputError> {
-    let layout = layout.map_or_else(|| Layout::guess(path), Ok)?;
+/// Opens everything at `path`; the options' sequence is not looked at.
+pub fn survey(path: &Path, options: &OpenOptions) -> Result<(Layout, Vec<Found>), InputError> {
+    let layout = options.layout.map_or_else(|| Layout::guess(path), Ok)?;
     let names = sequences_at(path, layout)?;
     let names: Vec<Option<String>> =
         if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };
     let found = |sequence: Option<String>| {
-        let options = OpenOptions {
-            layout: Some(layout),
-            sequence: sequence.clone(),
-            ..OpenOptions::default()
-        };
+        let options =
+            OpenOptions { layout: Some(layout), sequence: sequence.clone(), ..options.clone() };
         Found { opened: open(path, &options), sequence }
     };
     Ok((layout, names.into_iter().map(found).collect()))

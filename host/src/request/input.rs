@@ -1,6 +1,7 @@
 //! Source of the images.
 
 use super::{Request, RequestError, stream};
+use crate::formats::calibration::CalibrationHints;
 use crate::input::Topics;
 use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
@@ -35,6 +36,8 @@ pub struct Input {
     pub when_late: Option<WhenLate>,
     /// Calibration files instead of the recording's own: one, or one for each camera.
     pub calibration: Vec<PathBuf>,
+    /// Answers of a person to what the files of a calibration leave open.
+    pub hints: CalibrationHints,
     /// Faults to inject.
     pub faults: Option<Faults>,
 }
@@ -87,6 +90,7 @@ fn options(request: &Request) -> OpenOptions {
         stacking: input.stacking,
         topics: input.topics.clone(),
         calibration: input.calibration.clone(),
+        hints: input.hints,
         rectified: request.settings.rectify,
     }
 }

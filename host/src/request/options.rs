@@ -7,7 +7,7 @@ use super::{
     Settings, Source, Storage, WindowSize, words,
 };
 use crate::formats::Axes;
-use crate::formats::calibration::RectifiedSize;
+use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
 use crate::input::Topics;
 use crate::input::depth::DepthChoice;
 use crate::input::faults::Faults;
@@ -76,6 +76,27 @@ pub struct Options {
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     #[serde(deserialize_with = "words::paths")]
     pub calibration: Vec<PathBuf>,
+    /// Unit of the calibration's translations: m, cm, mm, inch, or the side of the board's squares
+    /// in metres (0.025) [default: the format's own]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub calibration_unit: Option<LengthUnit>,
+    /// Lenses that four coefficients without a name are of [default: told from the images, and
+    /// said]
+    #[arg(long, value_enum, value_name = "KIND", help_heading = "Input")]
+    pub lens_model: Option<LensFamily>,
+    /// Exchange the cameras: in the calibration and the images (both, also without a word), or in
+    /// one of them
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHAT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "both",
+        help_heading = "Input"
+    )]
+    pub swap: Option<Swap>,
     /// Size raw pairs are rectified to
     /// [default: the calibration's own, else all that both cameras see, at most 1920x1088]
     #[arg(long, value_name = "WxH", help_heading = "Input")]
@@ -279,6 +300,12 @@ impl Options {
             rate_hz: self.rate,
             when_late: self.when_late,
             calibration: self.calibration.clone(),
+            hints: CalibrationHints {
+                unit: self.calibration_unit,
+                lens_model: self.lens_model,
+                swap: self.swap,
+                colour: false,
+            },
             faults: self.faults.clone(),
         })
     }

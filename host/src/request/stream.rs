@@ -28,7 +28,7 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
     }
     let options = StreamOptions {
         name: "stream".to_owned(),
-        cameras: CameraGeometry::read(&input.calibration, None).map_err(InputError::from)?,
+        cameras: CameraGeometry::read(&input.calibration, input.hints).map_err(InputError::from)?,
         rectified: request.settings.rectify,
         rate_hz: input.rate_hz,
         when_late: input.when_late.unwrap_or_default(),

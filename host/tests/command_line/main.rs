@@ -6,6 +6,7 @@ mod bags;
 mod binary;
 mod book;
 mod browser;
+mod calibration;
 mod capacity;
 mod cli;
 mod commands;

@@ -6,6 +6,7 @@
 mod double_sphere;
 mod equidistant;
 mod extended_unified;
+mod general;
 mod radial_tangential;
 
 pub use radial_tangential::MAX_STEPS;
@@ -13,10 +14,16 @@ pub use radial_tangential::MAX_STEPS;
 use core::fmt;
 use core::mem::discriminant;
 use core::slice::from_mut;
+use radial_tangential::Plane;
 
 /// All models. Positions are stable: other languages number models by them.
-pub static LENS_MODELS: &[LensKind] =
-    &[radial_tangential::KIND, equidistant::KIND, double_sphere::KIND, extended_unified::KIND];
+pub static LENS_MODELS: &[LensKind] = &[
+    radial_tangential::KIND,
+    equidistant::KIND,
+    double_sphere::KIND,
+    extended_unified::KIND,
+    general::KIND,
+];
 
 /// Row of the table of models.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +59,16 @@ impl LensParameter {
     /// Parameter above a bound.
     const fn above(key: &'static str, above: f64) -> Self {
         Self { above, ..Self::any(key, key) }
+    }
+
+    /// Parameter from 0.
+    const fn from_zero(key: &'static str) -> Self {
+        Self { above: 0.0, closed: true, ..Self::any(key, key) }
+    }
+
+    /// Angle of a sensor that still faces its lens, rad.
+    const fn angle(key: &'static str, label: &'static str) -> Self {
+        Self { above: -1.0, at_most: 1.0, ..Self::any(key, label) }
     }
 
     /// Parameter from 0 to 1.
@@ -93,6 +110,20 @@ pub enum LensModel {
         alpha: f64,
         /// Shape of the projection surface, above 0.
         beta: f64,
+    },
+    /// Unified model of Mei with OpenCV's whole distortion: radial, tangential, thin prism, tilted
+    /// sensor.
+    General {
+        /// Distance of the viewpoint from the middle of the unit sphere, from 0 (pinhole).
+        xi: f64,
+        /// k1 to k6, as of [`LensModel::RadialTangential`].
+        radial: [f64; 6],
+        /// p1, p2.
+        tangential: [f64; 2],
+        /// s1 to s4.
+        prism: [f64; 4],
+        /// Tilt of the sensor about x, then y, rad.
+        tilt: [f64; 2],
     },
 }
 
@@ -138,6 +169,13 @@ impl LensModel {
                 visit(LensParameter::share("alpha"), from_mut(alpha));
                 visit(LensParameter::above("beta", 0.0), from_mut(beta));
             }
+            Self::General { xi, radial, tangential, prism, tilt } => {
+                visit(LensParameter::from_zero("xi"), from_mut(xi));
+                visit(LensParameter::any("radial", "k1 to k6"), radial);
+                visit(LensParameter::any("tangential", "p1 p2"), tangential);
+                visit(LensParameter::any("prism", "s1 to s4"), prism);
+                visit(LensParameter::angle("tilt", "tx ty"), tilt);
+            }
         }
     }
 
@@ -159,7 +197,9 @@ impl LensModel {
     /// Largest ray radius up to which the distortion grows with the ray.
     pub(super) fn limit(&self) -> f64 {
         match self {
-            Self::RadialTangential { radial, .. } => radial_tangential::limit(radial),
+            Self::RadialTangential { radial, .. } | Self::General { radial, .. } => {
+                radial_tangential::limit(radial)
+            }
             Self::Equidistant { radial } => equidistant::limit(radial),
             _ => f64::INFINITY,
         }
@@ -169,11 +209,15 @@ impl LensModel {
     pub(super) fn distort(&self, limit: f64, ray: [f64; 3]) -> Option<[f64; 2]> {
         match self {
             Self::RadialTangential { radial, tangential } => {
-                radial_tangential::distort(radial, tangential, limit, ray)
+                let plane = Plane { radial, tangential, prism: &[0.0; 4] };
+                radial_tangential::distort(&plane, limit, ray)
             }
             Self::Equidistant { radial } => equidistant::distort(radial, limit, ray),
             Self::DoubleSphere { xi, alpha } => double_sphere::distort(*xi, *alpha, ray),
             Self::ExtendedUnified { alpha, beta } => extended_unified::distort(*alpha, *beta, ray),
+            Self::General { xi, radial, tangential, prism, tilt } => {
+                general::distort(&Plane { radial, tangential, prism }, *xi, tilt, limit, ray)
+            }
         }
     }
 
@@ -181,11 +225,15 @@ impl LensModel {
     pub(super) fn undistort(&self, limit: f64, at: [f64; 2]) -> Option<[f64; 3]> {
         match self {
             Self::RadialTangential { radial, tangential } => {
-                radial_tangential::undistort(radial, tangential, limit, at)
+                let plane = Plane { radial, tangential, prism: &[0.0; 4] };
+                radial_tangential::undistort(&plane, limit, at)
             }
             Self::Equidistant { radial } => equidistant::undistort(radial, limit, at),
             Self::DoubleSphere { xi, alpha } => double_sphere::undistort(*xi, *alpha, at),
             Self::ExtendedUnified { alpha, beta } => extended_unified::undistort(*alpha, *beta, at),
+            Self::General { xi, radial, tangential, prism, tilt } => {
+                general::undistort(&Plane { radial, tangential, prism }, *xi, tilt, limit, at)
+            }
         }
     }
 }

@@ -1,87 +1,22 @@
 //! The cameras of a recording, from whichever files say it.
 
-use super::{StereoCalibration, read_rig};
-use crate::formats::{FormatError, read_text};
+use super::raw::{CalibrationFiles, CalibrationRead, Cameras};
+use super::{CalibrationHints, LensFamily, RectifiedSize, StereoCalibration, other_size};
+use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::{Rectification, Sizing};
-use dynvox_core::settings::{Range, Setting, Value::Number};
-use serde::{Deserialize, Serialize};
+use dynvox_core::rectify::Rectification;
 use std::path::{Path, PathBuf};
 
-/// Widest and highest image that raw pairs are rectified to unless a size is given: wider and
-/// higher ones cost time and show nothing that was not seen.
-pub const LARGEST_PX: [u32; 2] = [1_920, 1_088];
-
-/// Size to which raw pairs are rectified. Without one it is the calibration's own, else the largest
-/// rectangle that both cameras see whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RectifiedSize {
-    /// Width, px; with `height_px` or not at all.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub width_px: Option<u32>,
-    /// Height, px.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub height_px: Option<u32>,
-    /// Focal length, px, with a size only; the least that leaves no pixel without image when
-    /// absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub focal_px: Option<f64>,
-}
-
-type Row = Setting<RectifiedSize>;
-
-impl RectifiedSize {
-    /// Least side, px.
-    const LEAST_PX: u32 = 32;
-    /// Largest side, px.
-    const MAX_PX: u32 = 4_096;
-
-    /// One row per setting.
-    pub const SETTINGS: &'static [Row] = &[
-        Row::user("rectify.width_px", "px", |c| Number(c.width_px.map(f64::from)))
-            .range(Range::Within(Self::LEAST_PX as f32, Self::MAX_PX as f32))
-            .text("Width of rectified images; with `height_px` or not at all."),
-        Row::user("rectify.height_px", "px", |c| Number(c.height_px.map(f64::from)))
-            .range(Range::Within(Self::LEAST_PX as f32, Self::MAX_PX as f32))
-            .text("Height of rectified images."),
-        Row::user("rectify.focal_px", "px", |c| Number(c.focal_px)).range(Range::POSITIVE).text(
-            "Focal length of rectified images, with a size only; the least that leaves no pixel \
-             without image when absent.",
-        ),
-    ];
-
-    /// The core's own, or what is wrong, in one sentence.
-    ///
-    /// # Errors
-    /// Sizes out of range, or one figure without the other.
-    pub fn sizing(&self) -> Result<Sizing, String> {
-        let sides = Self::LEAST_PX..=Self::MAX_PX;
-        match (self.width_px, self.height_px, self.focal_px) {
-            (None, None, None) => {
-                let [max_width, max_height] = LARGEST_PX;
-                Ok(Sizing::Automatic { max_width, max_height })
-            }
-            (Some(width), Some(height), _)
-                if !(sides.contains(&width) && sides.contains(&height)) =>
-            {
-                Err(format!(
-                    "the rectified size {width} x {height} px must lie within {} to {} px a side",
-                    Self::LEAST_PX,
-                    Self::MAX_PX
-                ))
-            }
-            (Some(_), Some(_), Some(focal_px)) if !(focal_px.is_finite() && focal_px > 0.0) => {
-                Err(format!("the rectified focal length {focal_px} px must be a positive number"))
-            }
-            (Some(width), Some(height), focal_px) => Ok(Sizing::Given { width, height, focal_px }),
-            (None, None, Some(_)) => {
-                Err("a rectified focal length needs a rectified size".to_owned())
-            }
-            _ => Err("a rectified size needs width and height".to_owned()),
-        }
-    }
-}
+/// Largest distance of a principal point from the middle of an image, as a share of its side, that
+/// is no cause for doubt.
+const CENTRAL: f64 = 0.2;
+/// Distance from the middle, as a share of the side, at which both coordinates of a principal point
+/// tell that the images had another size.
+const OFF_CENTER: f64 = 0.15;
+/// Largest difference of the two shares where images were only scaled.
+const SAME_SCALE: f64 = 0.1;
+/// Share by which rows agree better under another lens for it to be taken instead of the guess.
+const BETTER: f64 = 0.8;
 
 /// The cameras of a recording.
 #[derive(Clone, Debug)]
@@ -95,7 +30,22 @@ pub enum CameraGeometry {
         /// The first file that says so, to name it.
         path: PathBuf,
     },
+    /// Files, which are read when the size of the images is known.
+    Files(Box<CalibrationFiles>),
 }
+
+/// Cameras for images of a size, and what is to be said about them.
+#[derive(Clone, Debug)]
+pub struct SettledCameras {
+    /// The cameras, rectified or raw.
+    pub cameras: CameraGeometry,
+    /// Sentences: what was understood, and what was guessed.
+    pub notes: Vec<String>,
+}
+
+/// Function that measures how far rows differ where pairs are rectified by a calibration, px;
+/// `None` where nothing can be told.
+pub type RowDifference<'f> = &'f dyn Fn(&StereoCalibration) -> Option<f64>;
 
 /// The cameras for images of a known size: rig and size of what is mapped.
 #[derive(Clone, Copy, Debug)]
@@ -109,27 +59,91 @@ pub struct FittedGeometry {
 }
 
 impl CameraGeometry {
-    /// Reads a calibration of either kind. `image_size` is the images' where it is known.
+    /// Reads a calibration of either kind. What only the size of the images tells is read when the
+    /// cameras are settled.
     ///
     /// # Errors
-    /// See [`StereoCalibration::read`] and [`read_rig`].
-    pub fn read(paths: &[PathBuf], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
-        if let [path] = paths
-            && path.extension().is_none_or(|ending| ending == "txt")
-            && !read_text(path)?.contains("P_rect_")
-        {
-            return Ok(Self::Rectified(read_rig(path)?));
+    /// What is wrong with which file, and what to do.
+    pub fn read(paths: &[PathBuf], hints: CalibrationHints) -> Result<Self, FormatError> {
+        let files = CalibrationFiles::read(paths, hints)?;
+        match files.cameras(None) {
+            Err(error) if !files.lacks_size() => Err(error),
+            _ => Ok(Self::Files(Box::new(files))),
         }
-        let files: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
-        let calibration = Box::new(StereoCalibration::read(&files, image_size)?);
-        Ok(Self::Raw { calibration, path: paths.first().cloned().unwrap_or_default() })
     }
 
-    /// Principal point of the left camera's images, px.
-    pub fn center_px(&self) -> [f64; 2] {
+    /// Tells whether the cameras may have taken images of a size.
+    pub fn suits(&self, size: (usize, usize)) -> bool {
+        let central = |[u, v]: [f64; 2]| {
+            let off = |center_px: f64, side: usize| (center_px / side as f64 - 0.5).abs();
+            off(u, size.0) <= CENTRAL && off(v, size.1) <= CENTRAL
+        };
+        let raw = |calibration: &StereoCalibration| central(calibration.left.lens.center_px());
         match self {
-            Self::Rectified(rig) => [rig.center_u_px, rig.center_v_px],
-            Self::Raw { calibration, .. } => calibration.left.lens.center_px(),
+            Self::Rectified(rig) => central([rig.center_u_px, rig.center_v_px]),
+            Self::Raw { calibration, .. } => raw(calibration),
+            Self::Files(files) => {
+                files.cameras(Some(sides(size))).is_ok_and(|read| match &read.cameras {
+                    Cameras::Rectified(cameras) => {
+                        central([cameras.rig.center_u_px, cameras.rig.center_v_px])
+                    }
+                    Cameras::Raw(calibration) => raw(calibration),
+                })
+            }
+        }
+    }
+
+    /// The cameras for images of a size. `rows` decides between lenses that files do not tell
+    /// apart.
+    ///
+    /// # Errors
+    /// The calibration is for images of another size, or cannot be used.
+    pub fn settled(
+        self,
+        size: (usize, usize),
+        rows: Option<RowDifference<'_>>,
+    ) -> Result<SettledCameras, FormatError> {
+        let Self::Files(files) = self else {
+            return Ok(SettledCameras { cameras: self, notes: Vec::new() });
+        };
+        let size = sides(size);
+        let mut read = files.cameras(Some(size))?;
+        let by_rows = read.guessed_lens.zip(rows);
+        if let Some((note, other)) =
+            by_rows.and_then(|(guess, rows)| by_images(&files, &read, guess, size, rows))
+        {
+            read = other.unwrap_or(read);
+            read.guesses = vec![note];
+        }
+        let mut notes = vec![read.sentence()];
+        notes.append(&mut read.guesses.clone());
+        let path = read.path.clone();
+        let cameras = match &read.cameras {
+            Cameras::Rectified(cameras) => {
+                if let Some(known) = cameras.size.filter(|known| *known != size) {
+                    return Err(other_size(&path, known, size));
+                }
+                central(&path, [cameras.rig.center_u_px, cameras.rig.center_v_px], size)?;
+                if cameras.offset_px == 0.0 {
+                    Self::Rectified(cameras.rig)
+                } else {
+                    Self::Raw { calibration: Box::new(read.raw(Some(size))?), path }
+                }
+            }
+            Cameras::Raw(calibration) => {
+                calibration.fits(&path, size)?;
+                central(&path, calibration.left.lens.center_px(), size)?;
+                Self::Raw { calibration: Box::new(*calibration), path }
+            }
+        };
+        Ok(SettledCameras { cameras, notes })
+    }
+
+    /// Answers of a person; none where the cameras are not of files.
+    pub fn hints(&self) -> CalibrationHints {
+        match self {
+            Self::Files(files) => files.hints(),
+            _ => CalibrationHints::default(),
         }
     }
 
@@ -145,11 +159,9 @@ impl CameraGeometry {
     ) -> Result<FittedGeometry, FormatError> {
         match self {
             Self::Rectified(rig) => Ok(FittedGeometry { rig: *rig, size, rectification: None }),
+            Self::Files(_) => self.clone().settled(size, None)?.cameras.fitted(size, rectified),
             Self::Raw { calibration, path } => {
-                calibration.fits(
-                    path,
-                    [size.0, size.1].map(|side| u32::try_from(side).unwrap_or(u32::MAX)),
-                )?;
+                calibration.fits(path, sides(size))?;
                 let sizing = rectified.sizing().map_err(|reason| {
                     FormatError::content(
                         path,
@@ -171,18 +183,56 @@ impl CameraGeometry {
     }
 }
 
-/// The calibration of a raw pair that lies in a recording's folder: our own `calibration.toml`,
-/// Kalibr's `camchain.yaml`, EuRoC's `sensor.yaml` of each camera, or KITTI raw's
-/// `calib_cam_to_cam.txt`, there or a folder up.
-pub fn beside(folder: &Path) -> Option<Vec<PathBuf>> {
-    let one = |path: PathBuf| path.is_file().then(|| vec![path]);
-    let euroc = || {
-        let pair = ["cam0", "cam1"].map(|camera| folder.join(camera).join("sensor.yaml"));
-        pair.iter().all(|path| path.is_file()).then(|| pair.to_vec())
+fn sides((width, height): (usize, usize)) -> [u32; 2] {
+    [width, height].map(|side| u32::try_from(side).unwrap_or(u32::MAX))
+}
+
+/// Refuses a principal point whose both coordinates say that the images had another size.
+fn central(path: &Path, [u, v]: [f64; 2], [width, height]: [u32; 2]) -> Result<(), FormatError> {
+    let [share_u, share_v] = [u / f64::from(width), v / f64::from(height)];
+    let off = |share: f64| (share - 0.5).abs() > OFF_CENTER;
+    if !(off(share_u) && off(share_v) && (share_u - share_v).abs() < SAME_SCALE) {
+        return Ok(());
+    }
+    let scale = 1.0 / (share_u + share_v);
+    Err(FormatError::content(
+        path,
+        format!(
+            "its principal point ({u:.1}, {v:.1}) px is that of images of about {:.0} x {:.0} px, \
+             but these are {width} x {height} px",
+            2.0 * u,
+            2.0 * v
+        ),
+        format!(
+            "Give the calibration of these images; if they were only scaled, multiply its focal \
+             length and principal point by {scale:.4}"
+        ),
+    ))
+}
+
+/// The lens by which rows agree better, as a note and, if it is not the guessed one, the cameras.
+fn by_images(
+    files: &CalibrationFiles,
+    read: &CalibrationRead,
+    guess: LensFamily,
+    size: [u32; 2],
+    rows: RowDifference<'_>,
+) -> Option<(String, Option<CalibrationRead>)> {
+    let guessed_px = rows(&read.raw(Some(size)).ok()?)?;
+    let other = files.of_family(guess.other()).cameras(Some(size)).ok()?;
+    let other_px = rows(&other.raw(Some(size)).ok()?);
+    let better = other_px.is_some_and(|other_px| other_px < BETTER * guessed_px);
+    let (family, px, against) = match (better, other_px) {
+        (true, Some(other_px)) => (guess.other(), other_px, Some(guessed_px)),
+        (_, other_px) => (guess, guessed_px, other_px),
     };
-    one(folder.join("calibration.toml"))
-        .or_else(|| one(folder.join("camchain.yaml")))
-        .or_else(euroc)
-        .or_else(|| one(folder.join("calib_cam_to_cam.txt")))
-        .or_else(|| one(folder.canonicalize().ok()?.parent()?.join("calib_cam_to_cam.txt")))
+    let against = against.map_or("none match".to_owned(), |px| format!("{px:.2} px"));
+    let note = format!(
+        "guess: {} lenses (rows agree to {px:.2} px, by {} ones {against}); --lens-model {} says \
+         otherwise",
+        family.name(),
+        family.other().name(),
+        family.other().name()
+    );
+    Some((note, better.then_some(other)))
 }

@@ -3,7 +3,7 @@
 //! KITTI's rectified camera k projects with `P_k = K [I | t_k]`, so the two cameras of a pair share
 //! `K` and their baseline is `(P_left[0,3] - P_right[0,3]) / focal`.
 
-use super::{checked, unusable};
+use super::{RectifiedCameras, checked, unusable};
 use crate::formats::{FormatError, read_text};
 use dynvox_core::geometry::StereoRig;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
@@ -77,17 +77,22 @@ impl KittiCalibration {
 
     /// The rig of the pair `left`, `right` (0, 1 grey; 2, 3 colour).
     pub fn rig(&self, left: usize, right: usize) -> Result<StereoRig, FormatError> {
-        let ([p_left, p_right], path) = ([self.camera(left)?, self.camera(right)?], &self.path);
+        let cameras = self.cameras(left, right)?;
+        if cameras.offset_px != 0.0 {
+            return Err(self.differ(left, right));
+        }
+        checked(cameras.rig, &self.path)
+    }
+
+    /// The rectified cameras of a pair, whose principal points may lie apart along the rows. What
+    /// the rig says is not checked.
+    pub fn cameras(&self, left: usize, right: usize) -> Result<RectifiedCameras, FormatError> {
+        let [p_left, p_right] = [self.camera(left)?, self.camera(right)?];
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-        let shared = [0, 5, 2, 6].iter().all(|&at| near(p_left[at], p_right[at]))
-            && near(p_left[0], p_left[5]);
+        let shared =
+            [0, 5, 6].iter().all(|&at| near(p_left[at], p_right[at])) && near(p_left[0], p_left[5]);
         if !shared {
-            return Err(unusable(
-                path,
-                format!("P{left} and P{right} differ in focal length or principal point"),
-                "The images must be rectified to one pinhole camera: use the benchmark's rectified \
-                 images and their calibration",
-            ));
+            return Err(self.differ(left, right));
         }
         let rig = StereoRig {
             focal_px: p_left[0],
@@ -95,7 +100,18 @@ impl KittiCalibration {
             center_v_px: p_left[6],
             baseline_m: (p_left[3] - p_right[3]) / p_left[0],
         };
-        checked(rig, path)
+        let offset_px = p_right[2] - p_left[2];
+        let offset_px = if near(p_left[2], p_right[2]) { 0.0 } else { offset_px };
+        Ok(RectifiedCameras { rig, offset_px, size: None })
+    }
+
+    fn differ(&self, left: usize, right: usize) -> FormatError {
+        unusable(
+            &self.path,
+            format!("P{left} and P{right} differ in focal length or principal point"),
+            "The images must be rectified to one pinhole camera: use the benchmark's rectified \
+             images and their calibration",
+        )
     }
 
     /// Returns the position of camera 0 in camera `camera`: `t` of `P = K [I | t]`, m.

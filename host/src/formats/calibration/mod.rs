@@ -1,18 +1,24 @@
 //! Calibration files of stereo cameras.
 
+mod beside;
 mod geometry;
+mod hints;
 mod kitti;
 pub mod lens_table;
 mod plain;
 mod raw;
+mod rectified_size;
 
-pub use geometry::{CameraGeometry, FittedGeometry, LARGEST_PX, RectifiedSize, beside};
+pub use beside::beside;
+pub use geometry::{CameraGeometry, FittedGeometry, RowDifference, SettledCameras};
+pub use hints::{CalibrationHints, LengthUnit, LensFamily, Swap};
 pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
 pub use raw::{
-    CALIBRATION_FORMATS, CalibrationFormat, LONGEST_BASELINE_M, Placement, SHORTEST_BASELINE_M,
-    StereoCalibration, to_kalibr, to_toml,
+    CALIBRATION_FORMATS, CalibrationFiles, CalibrationFormat, CalibrationRead, Cameras, Placement,
+    RectifiedCameras, StereoCalibration, to_kalibr, to_toml,
 };
+pub use rectified_size::{LARGEST_PX, RectifiedSize};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::{RigProblem, StereoRig};
@@ -21,6 +27,22 @@ use std::path::Path;
 /// A calibration that cannot be used.
 fn unusable(path: &Path, reason: String, action: impl Into<String>) -> FormatError {
     FormatError::content(path, reason, action)
+}
+
+/// Refuses images of another size than a calibration's.
+fn other_size(
+    path: &Path,
+    [known_width, known_height]: [u32; 2],
+    [width, height]: [u32; 2],
+) -> FormatError {
+    FormatError::content(
+        path,
+        format!(
+            "it is for images of {known_width} x {known_height} px, but these are {width} x \
+             {height} px"
+        ),
+        "Give the calibration of these images, or the images as the camera delivers them",
+    )
 }
 
 /// The rig, if it can be one.

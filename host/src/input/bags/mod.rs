@@ -19,10 +19,12 @@ use super::source::{
     FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState,
     require_size,
 };
-use crate::formats::calibration::{CameraGeometry, StereoCalibration};
+use crate::formats::calibration::{
+    CalibrationFiles, CameraGeometry, SettledCameras, StereoCalibration, Swap,
+};
 use crate::formats::significant_bits;
+use crate::input::diagnosis;
 use cdr::CameraInfo;
-use dynvox_core::geometry::StereoRig;
 use file::BagFile;
 use std::path::{Path, PathBuf};
 
@@ -46,6 +48,8 @@ pub struct Bag {
     pairs: Vec<[Entry; 2]>,
     image_size: (usize, usize),
     bits: Option<u32>,
+    /// True if the right camera's images are on the first topic.
+    exchanged: bool,
 }
 
 /// The MCAP file at a path: itself, or the one in the folder of a recording.
@@ -129,13 +133,20 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
         notes.push(format!("{left} left and {right} right images have no partner: skipped"));
     }
     let bits = options.bits.or_else(|| images[0].largest_sample().map(significant_bits));
-    let geometry =
-        cameras(&file, &topics, options, &mut notes)?.fitted(image_size, &options.rectified)?;
+    let cameras = cameras(&file, &topics, options, &mut notes)?;
+    let exchanged = cameras.hints().swap.is_some_and(Swap::images);
+    let first = images.clone().map(|picture| picture.to_8_bit(bits).grey);
+    let rows = |calibration: &StereoCalibration| {
+        diagnosis::row_difference_px(std::slice::from_ref(&first), calibration)
+    };
+    let SettledCameras { cameras, notes: found } = cameras.settled(image_size, Some(&rows))?;
+    notes.extend(found);
+    let geometry = cameras.fitted(image_size, &options.rectified)?;
     let name = path
         .file_stem()
         .map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
     let info = SourceInfo { notes, ..SourceInfo::new(name, pairs.len(), &geometry) };
-    Ok(Bag { info, file, topics, pairs, image_size, bits })
+    Ok(Bag { info, file, topics, pairs, image_size, bits, exchanged })
 }
 
 /// The cameras as they are given, else by the bag's `CameraInfo`.
@@ -146,7 +157,7 @@ fn cameras(
     notes: &mut Vec<String>,
 ) -> Result<CameraGeometry, InputError> {
     if !options.calibration.is_empty() {
-        return Ok(CameraGeometry::read(&options.calibration, None)?);
+        return Ok(options.cameras_of(&options.calibration)?);
     }
     let mut infos = Vec::new();
     for topic in topics {
@@ -165,33 +176,13 @@ fn cameras(
     let [left, right] = infos.as_slice() else {
         return Err(InputError::bag(file.path(), "two calibrations are needed"));
     };
-    if topics.iter().all(|topic| topic.contains("rect"))
-        || [left, right].iter().all(|info| info.is_undistorted())
-    {
-        return rectified(file.path(), left, right).map(CameraGeometry::Rectified);
-    }
+    let rectified = topics.iter().all(|topic| topic.contains("rect"))
+        || [left, right].iter().all(|info| info.is_undistorted());
     let texts = [left, right].map(CameraInfo::as_yaml);
-    let calibration = Box::new(StereoCalibration::of_camera_infos(file.path(), &texts)?);
-    Ok(CameraGeometry::Raw { calibration, path: file.path().to_path_buf() })
-}
-
-/// The rig of two projection matrices.
-fn rectified(path: &Path, left: &CameraInfo, right: &CameraInfo) -> Result<StereoRig, InputError> {
-    let rig = StereoRig {
-        focal_px: left.projection[0],
-        center_u_px: left.projection[2],
-        center_v_px: left.projection[6],
-        baseline_m: (left.projection[3] - right.projection[3]) / left.projection[0],
-    };
-    rig.validate().map(|()| rig).map_err(|_| {
-        InputError::bag(
-            path,
-            format!(
-                "its CameraInfo says {rig:?}, which is no stereo rig. Give \
-                                       the calibration with --calibration FILE"
-            ),
-        )
-    })
+    let files = CalibrationFiles::from_camera_infos(file.path(), &texts, rectified, options.hints);
+    // What is wrong with them is said here, and what only the images tell later.
+    files.cameras(None)?;
+    Ok(CameraGeometry::Files(Box::new(files)))
 }
 
 impl FrameSource for Bag {
@@ -210,7 +201,11 @@ impl FrameSource for Bag {
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
         let pair = self.pairs.get(index).ok_or(InputError::PastEnd { frames: self.pairs.len() })?;
-        let pair = self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
+        let mut pair =
+            self.file.pair(&self.topics, pair)?.map(|picture| picture.to_8_bit(self.bits));
+        if self.exchanged {
+            pair.reverse();
+        }
         require_size(&pair, self.image_size, |_| {
             format!("{} frame {index}", self.file.path().display()).into()
         })?;

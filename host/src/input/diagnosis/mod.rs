@@ -6,6 +6,7 @@
 //! makes a map meaningless is refused, what is doubtful is a warning. Too few matches give no
 //! verdict.
 
+mod agreement;
 mod correlation;
 mod order;
 mod patches;
@@ -18,9 +19,10 @@ mod tests;
 
 use crate::formats::Image;
 use crate::input::source::{FrameSource, InputError};
+pub use agreement::{row_difference_px, row_error};
 use patches::PatchMatch;
-pub use rectified::RectifiedSource;
-use rows::RowError;
+pub use rectified::{PairRectifier, RectifiedSource};
+pub use rows::RowError;
 
 /// Pairs that are matched.
 const PAIRS: usize = 10;

@@ -3,7 +3,7 @@
 
 use super::camera_folders::camera_in;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
-use crate::formats::calibration::{CameraGeometry, beside};
+use crate::formats::calibration::beside;
 use crate::formats::read_poses;
 use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use crate::input::source::InputError;
@@ -53,7 +53,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         images: ImageFiles::Cameras(cameras),
         bits: options.bits,
         rectified: options.rectified,
-        cameras: CameraGeometry::read(&cameras_from, None)?,
+        cameras: options.cameras_of(&cameras_from)?,
         times: None,
         poses,
         numbered: false,

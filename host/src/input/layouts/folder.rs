@@ -6,13 +6,10 @@ use super::names::pictures_in;
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, camera_files, present, stamps_in_names};
 use crate::formats::calibration::{CameraGeometry, beside};
-use crate::formats::{calibration, picture_size, read_poses, read_times};
+use crate::formats::{picture_size, read_poses, read_times};
 use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
 use crate::input::source::{InputError, Stacking};
 use std::path::{Path, PathBuf};
-
-/// Largest distance of a principal point from the middle of an image, as a share of its side.
-const CENTRAL: f64 = 0.2;
 
 /// Any folder of stereo pairs.
 pub const DATA_SET: Layout = Layout::new(&DataSet {
@@ -26,24 +23,24 @@ pub const DATA_SET: Layout = Layout::new(&DataSet {
 });
 
 /// Opens the folder. `calib.txt` holds KITTI's `P0:` and `P1:` or `key value` lines (see
-/// [`calibration::read_rig`]); without it a calibration of raw images is looked for ([`beside`]).
+/// [`CameraGeometry::read`]); without it a calibration of raw images is looked for ([`beside`]).
 fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "A stereo folder has the images of both cameras (left/ and right/, cam0/ and \
         cam1/, one folder with left_ and right_ before the \
                   names, or both images in one file), and calib.txt with focal_px, center_u_px, \
                   center_v_px, baseline_m";
     let file = |name: &str| Some(path.join(name)).filter(|file| file.is_file());
-    let cameras = match (options.calibration.as_slice(), file("calib.txt"), beside(path)) {
-        ([], None, Some(own)) => CameraGeometry::read(&own, None)?,
-        ([], ..) => CameraGeometry::Rectified(calibration::read_rig(&present(
-            path.join("calib.txt"),
-            action,
-        )?)?),
-        (given, ..) => CameraGeometry::read(given, None)?,
+    let cameras = match (options.calibration.as_slice(), file("calib.txt")) {
+        ([], Some(own)) => options.cameras_of(&[own])?,
+        ([], None) => match beside(path) {
+            Some(own) => options.cameras_of(&own)?,
+            None => options.cameras_of(&[present(path.join("calib.txt"), action)?])?,
+        },
+        (given, _) => options.cameras_of(given)?,
     };
     Sequence::from_parts(Parts {
         name: name_of(path),
-        images: images(path, action, options.stacking, cameras.center_px())?,
+        images: images(path, action, options.stacking, &cameras)?,
         bits: options.bits,
         rectified: options.rectified,
         cameras,
@@ -91,7 +88,7 @@ fn images(
     path: &Path,
     action: &str,
     stacking: Option<Stacking>,
-    center_px: [f64; 2],
+    cameras: &CameraGeometry,
 ) -> Result<ImageFiles, InputError> {
     if let Some([left, right]) = side_folders(path) {
         return Ok(ImageFiles::Cameras([
@@ -110,7 +107,7 @@ fn images(
     let stacking = match (stacking, files.first()) {
         (Some(stacking), _) => Some(stacking),
         (None, Some(first)) => {
-            told_stacking(picture_size(first).map_err(InputError::image)?, center_px)
+            told_stacking(picture_size(first).map_err(InputError::image)?, cameras)
         }
         (None, None) => None,
     };
@@ -118,13 +115,9 @@ fn images(
     Ok(ImageFiles::Stacked(camera_files(path)?, stacking))
 }
 
-/// Two images lie in one where the calibration's principal point is near the middle of a half, and
-/// not of the whole.
-fn told_stacking(size: (usize, usize), [center_u_px, center_v_px]: [f64; 2]) -> Option<Stacking> {
-    let central = |(width, height): (usize, usize)| {
-        let off = |center_px: f64, side: usize| (center_px / side as f64 - 0.5).abs();
-        off(center_u_px, width) <= CENTRAL && off(center_v_px, height) <= CENTRAL
-    };
+/// Two images lie in one where the calibration is for a half, and not for the whole.
+fn told_stacking(size: (usize, usize), cameras: &CameraGeometry) -> Option<Stacking> {
     let both = [Stacking::SideBySide, Stacking::TopBottom];
-    both.into_iter().find(|stacking| central(stacking.size_of_one(size)) && !central(size))
+    both.into_iter()
+        .find(|stacking| cameras.suits(stacking.size_of_one(size)) && !cameras.suits(size))
 }

@@ -5,7 +5,7 @@ use super::camera_folders::camera_in;
 use super::folder::name_of;
 use super::kitti::{chosen, sequences};
 use super::sequence::{ImageFiles, Parts, Sequence, present};
-use crate::formats::calibration::KittiCalibration;
+use crate::formats::calibration::{CalibrationHints, KittiCalibration};
 use crate::formats::read_poses;
 use crate::input::data_set::{CameraPair, DataSet, Layout, OpenOptions};
 use crate::input::source::InputError;
@@ -55,7 +55,9 @@ fn open_raw(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> 
     // What was only extracted is raw: the same file says how to rectify it.
     let extracted = name_of(&drive).ends_with("_extract") && options.calibration.is_empty();
     let options = if extracted {
-        &OpenOptions { calibration: vec![found.clone()], ..options.clone() }
+        let (_, right) = pair_of(&drive, options.cameras);
+        let hints = CalibrationHints { colour: right == 3, ..options.hints };
+        &OpenOptions { calibration: vec![found.clone()], hints, ..options.clone() }
     } else {
         options
     };
@@ -86,21 +88,26 @@ struct DriveFiles {
     poses: Option<PathBuf>,
 }
 
-fn open_drive(
-    drive: &Path,
-    files: &DriveFiles,
-    prefix: &str,
-    options: &OpenOptions,
-) -> Result<Sequence, InputError> {
+/// Numbers of the cameras to read: those asked for, else the pair that is there.
+fn pair_of(drive: &Path, cameras: CameraPair) -> (usize, usize) {
     let has = |cameras: [&str; 2]| cameras.iter().all(|camera| drive.join(camera).is_dir());
-    let (left, right) = match options.cameras {
+    match cameras {
         CameraPair::Grey => (0, 1),
         CameraPair::Colour => (2, 3),
         CameraPair::Auto if !has(["image_00", "image_01"]) && has(["image_02", "image_03"]) => {
             (2, 3)
         }
         CameraPair::Auto => (0, 1),
-    };
+    }
+}
+
+fn open_drive(
+    drive: &Path,
+    files: &DriveFiles,
+    prefix: &str,
+    options: &OpenOptions,
+) -> Result<Sequence, InputError> {
+    let (left, right) = pair_of(drive, options.cameras);
     let action =
         "A drive has image_00 and image_01, or image_02 and image_03: fetch the other half";
     let camera =

@@ -5,10 +5,13 @@ use super::lidar::LidarFiles;
 use super::names::{pictures_in, stamp_in_name, stem_of};
 use super::pairing::{CameraFiles, Pairing};
 use super::tables::TableFrames;
-use crate::formats::calibration::{CameraGeometry, FittedGeometry, RectifiedSize};
+use crate::formats::calibration::{
+    CameraGeometry, FittedGeometry, RectifiedSize, SettledCameras, StereoCalibration, Swap,
+};
 use crate::formats::{
     Decoded, TimeTable, Trajectory, picture_size, read_picture, significant_bits,
 };
+use crate::input::diagnosis;
 use crate::input::source::{
     ASSUMED_HZ, AvailableMasks, FrameInfo, FrameSource, InputError, LidarScan, ObjectsTruth,
     SourceInfo, Stacking, StereoImages, StreamState, require_size,
@@ -17,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// Pictures whose largest value tells how many bits of 16 are significant.
 const RANGE_PICTURES: usize = 8;
+/// Pairs by whose rows lenses are told apart.
+const ROW_PAIRS: usize = 3;
 const NS_PER_S: f64 = 1e9;
 
 /// Stereo pairs in files.
@@ -24,12 +29,9 @@ const NS_PER_S: f64 = 1e9;
 pub struct Sequence {
     info: SourceInfo,
     pairs: Vec<[PathBuf; 2]>,
-    /// Arrangement of two images in one file, if so: both paths of a pair are then equal.
-    stacking: Option<Stacking>,
+    reading: PairReading,
     /// Width and height of the images in the files, px.
     image_size: (usize, usize),
-    /// Significant bits of 16-bit images.
-    bits: Option<u32>,
     /// One a frame, ns; `None` where nothing tells them.
     stamps_ns: Option<Vec<u64>>,
     /// Numbers of the frames; times are assumed from them where no file has times.
@@ -99,8 +101,14 @@ impl Sequence {
             .ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
         let size = picture_size(first).map_err(InputError::image)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
-        let geometry = parts.cameras.fitted(image_size, &parts.rectified)?;
-        notes.extend(raw_note(&parts.cameras, &geometry));
+        let exchanged = parts.cameras.hints().swap.is_some_and(Swap::images);
+        let reading = PairReading { stacking, exchanged, bits: parts.bits };
+        let rows = |calibration: &StereoCalibration| row_difference(&pairs, reading, calibration);
+        let SettledCameras { cameras, notes: found } =
+            parts.cameras.settled(image_size, Some(&rows))?;
+        let geometry = cameras.fitted(image_size, &parts.rectified)?;
+        notes.extend(found);
+        notes.extend(raw_note(&cameras, &geometry));
         let bits = match parts.bits {
             Some(bits) => Some(bits),
             None => detected_bits(&pairs, &mut notes)?,
@@ -133,9 +141,8 @@ impl Sequence {
         Ok(Self {
             info,
             pairs,
-            stacking,
+            reading: PairReading { bits, ..reading },
             image_size,
-            bits,
             stamps_ns,
             numbers,
             objects,
@@ -144,22 +151,56 @@ impl Sequence {
     }
 
     /// The two images of a pair, both of the sequence's size.
+    fn images(&self, pair: &[PathBuf; 2]) -> Result<[Decoded; 2], InputError> {
+        let images = self.reading.images(pair)?;
+        require_size(&images, self.image_size, |side| {
+            if side == 0 { pair[0].clone() } else { pair[1].clone() }
+        })?;
+        Ok(images)
+    }
+}
+
+/// Way in which two images are read from the files of a pair.
+#[derive(Clone, Copy, Debug)]
+struct PairReading {
+    /// Arrangement of two images in one file, if so: both paths of a pair are then equal.
+    stacking: Option<Stacking>,
+    /// True if the right camera's image comes first.
+    exchanged: bool,
+    /// Significant bits of 16-bit images.
+    bits: Option<u32>,
+}
+
+impl PairReading {
+    /// The left and the right image.
     fn images(&self, [left, right]: &[PathBuf; 2]) -> Result<[Decoded; 2], InputError> {
         let read = |path: &Path| {
             Ok::<_, InputError>(read_picture(path).map_err(InputError::image)?.to_8_bit(self.bits))
         };
-        let images = match self.stacking {
+        let mut images = match self.stacking {
             None => [read(left)?, read(right)?],
             Some(stacking) => stacking.split(&read(left)?).ok_or_else(|| InputError::Image {
                 path: left.clone(),
                 reason: format!("it cannot be cut into two equal images {}", stacking.name()),
             })?,
         };
-        require_size(&images, self.image_size, |side| {
-            if side == 0 { left.clone() } else { right.clone() }
-        })?;
+        if self.exchanged {
+            images.reverse();
+        }
         Ok(images)
     }
+}
+
+/// Row difference of some pairs by a calibration.
+fn row_difference(
+    pairs: &[[PathBuf; 2]],
+    reading: PairReading,
+    calibration: &StereoCalibration,
+) -> Option<f64> {
+    let step = pairs.len().div_ceil(ROW_PAIRS).max(1);
+    let read = |pair: &[PathBuf; 2]| Some(reading.images(pair).ok()?.map(|image| image.grey));
+    let pairs: Vec<_> = pairs.iter().step_by(step).filter_map(read).collect();
+    diagnosis::row_difference_px(&pairs, calibration)
 }
 
 /// Returns the note that raw images are rectified, and to which size.

@@ -19,7 +19,10 @@ use super::source::{
     StopRequest, StreamState, require_size,
 };
 use crate::formats::Decoded;
-use crate::formats::calibration::{CameraGeometry, RectifiedSize};
+use crate::formats::calibration::{
+    CameraGeometry, RectifiedSize, SettledCameras, StereoCalibration, Swap,
+};
+use crate::input::diagnosis;
 use queue::{Arrived, Queue};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -53,6 +56,8 @@ pub struct Stream {
     queue: Arc<Queue>,
     stop: StopRequest,
     cursor: Mutex<Cursor>,
+    /// True if the right camera's images come first.
+    exchanged: bool,
 }
 
 /// Position up to which a stream is read.
@@ -91,17 +96,25 @@ impl Stream {
         let first = queue.pop(&stop).ok_or(InputError::PastEnd { frames: 0 })?;
         let pair = first.pair?;
         let image_size = (pair[0].grey.width(), pair[0].grey.height());
-        let geometry = options.cameras.fitted(image_size, &options.rectified)?;
+        let hints = options.cameras.hints();
+        let first_pair = [pair.each_ref().map(|image| image.grey.clone())];
+        let rows = |calibration: &StereoCalibration| {
+            diagnosis::row_difference_px(&first_pair, calibration)
+        };
+        let SettledCameras { cameras, mut notes } =
+            options.cameras.clone().settled(image_size, Some(&rows))?;
+        let geometry = cameras.fitted(image_size, &options.rectified)?;
         let rate = match options.rate_hz {
             Some(rate_hz) => format!("a stream of {rate_hz} frames a second"),
             None => {
                 format!("a stream: {ASSUMED_HZ} frames a second are assumed; --rate says otherwise")
             }
         };
+        notes.push(rate);
+        let exchanged = hints.swap.is_some_and(Swap::images);
         let cursor = Mutex::new(Cursor { taken: 0, number: first.number, first: Some(pair) });
-        let info =
-            SourceInfo { notes: vec![rate], ..SourceInfo::new(options.name.clone(), 0, &geometry) };
-        Ok(Self { info, image_size, queue, stop, cursor, options })
+        let info = SourceInfo { notes, ..SourceInfo::new(options.name.clone(), 0, &geometry) };
+        Ok(Self { info, image_size, queue, stop, cursor, options, exchanged })
     }
 
     /// Time of frame number `number`, s.
@@ -165,7 +178,10 @@ impl FrameSource for Stream {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let pair = self.pair(index)?;
+        let mut pair = self.pair(index)?;
+        if self.exchanged {
+            pair.reverse();
+        }
         require_size(&pair, self.image_size, |_| {
             format!("frame {index} of the {}", self.options.name).into()
         })?;

@@ -3,19 +3,21 @@
 
 use super::format::CalibrationFormat;
 use super::{
-    Placement, StereoCalibration, lens,
+    StereoCalibration, lens,
+    pose::Pose,
     tree::{Node, Tree},
 };
 use crate::formats::FormatError;
+use crate::formats::calibration::hints::LengthUnit;
 use dynvox_core::rectify::{LensModel, RawCamera};
-use nalgebra::{Matrix3, Vector3};
 
 /// camodocal's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "camodocal",
     files: "one YAML file for each camera, and `extrinsics.yaml`",
+    unit: LengthUnit::METRE,
     matches: |files| files.has("model_type"),
-    read: |files| read(&files.roots()),
+    read: |files| read(&files.roots()).map(Into::into),
     example: &[
         (
             "left.yaml",
@@ -85,8 +87,9 @@ fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let extrinsics = extrinsics.unwrap_or(left);
     let transform = extrinsics.need("transform")?;
     let number = |key| transform.need(key)?.number();
-    let r_right_left = rotation([number("q_x")?, number("q_y")?, number("q_z")?, number("q_w")?])
-        .ok_or_else(|| {
+    let quaternion = [number("q_x")?, number("q_y")?, number("q_z")?, number("q_w")?];
+    let translation = [number("t_x")?, number("t_y")?, number("t_z")?];
+    let motion = Pose::from_quaternion(quaternion, translation).ok_or_else(|| {
         transform.refuse(
             "the quaternion does not have length 1",
             "Copy q_x, q_y, q_z, q_w from the calibration's output",
@@ -95,34 +98,13 @@ fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
-        placement: Placement::Motion {
-            r_right_left,
-            t_right_left_m: Vector3::new(number("t_x")?, number("t_y")?, number("t_z")?),
-        },
+        placement: motion.placement(),
         format: FORMAT.name,
     })
 }
 
-/// The matrix of a quaternion; `None` where its length is not 1.
-fn rotation([x, y, z, w]: [f64; 4]) -> Option<Matrix3<f64>> {
-    let square = x * x + y * y + z * z + w * w;
-    ((square - 1.0).abs() < 1e-3).then(|| {
-        let s = 2.0 / square;
-        Matrix3::new(
-            1.0 - s * (y * y + z * z),
-            s * (x * y - z * w),
-            s * (x * z + y * w),
-            s * (x * y + z * w),
-            1.0 - s * (x * x + z * z),
-            s * (y * z - x * w),
-            s * (x * z - y * w),
-            s * (y * z + x * w),
-            1.0 - s * (x * x + y * y),
-        )
-    })
-}
-
-fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
+/// A camera of camodocal's models.
+pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     let projection = node.need("projection_parameters")?;
     let parameters = |of: Node<'_>, keys: [&'static str; 4]| -> Result<[f64; 4], FormatError> {
         let mut values = [0.0; 4];
@@ -157,8 +139,7 @@ fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
         }
         other => {
             let reason = format!("the camera model {other} is not known");
-            return Err(node
-                .refuse(&reason, "Known are PINHOLE, KANNALA_BRANDT, and MEI without distortion"));
+            return Err(node.refuse(&reason, "Known are PINHOLE, KANNALA_BRANDT and MEI"));
         }
     };
     lens::camera(

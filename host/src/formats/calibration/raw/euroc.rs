@@ -2,15 +2,17 @@
 //! files are alike.
 
 use super::format::CalibrationFormat;
-use super::{Placement, StereoCalibration, kalibr, tree::Node};
+use super::{StereoCalibration, kalibr, pose::Pose, tree::Node};
 use crate::formats::FormatError;
+use crate::formats::calibration::hints::LengthUnit;
 
 /// EuRoC's and TUM VI's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "EuRoC",
-    files: "EuRoC and TUM VI: `sensor.yaml`, one for each camera",
+    files: "EuRoC, TUM VI, Kimera: `sensor.yaml` with `T_BS`, one for each camera",
+    unit: LengthUnit::METRE,
     matches: |files| files.has("T_BS"),
-    read: |files| read(&files.roots()),
+    read: |files| read(&files.roots()).map(Into::into),
     example: &[
         (
             "left.yaml",
@@ -48,16 +50,12 @@ fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
     let [left, right] = *roots else {
         return Err(two_files(roots, "sensor.yaml"));
     };
-    let (r_body_left, t_body_left) = kalibr::rigid(left.need("T_BS")?)?;
-    let (r_body_right, t_body_right) = kalibr::rigid(right.need("T_BS")?)?;
-    let to_right = r_body_right.transpose();
+    let [t_body_left, t_body_right] =
+        [Pose::from_matrix(left.need("T_BS")?)?, Pose::from_matrix(right.need("T_BS")?)?];
     Ok(StereoCalibration {
         left: kalibr::camera(left)?,
         right: kalibr::camera(right)?,
-        placement: Placement::Motion {
-            r_right_left: to_right * r_body_left,
-            t_right_left_m: to_right * (t_body_left - t_body_right),
-        },
+        placement: t_body_right.inverse().after(&t_body_left).placement(),
         format: FORMAT.name,
     })
 }

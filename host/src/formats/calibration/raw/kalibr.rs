@@ -1,18 +1,19 @@
 //! Kalibr's `camchain.yaml`: `cam0` is left, `cam1` right; `T_cn_cnm1` maps coordinates of the
-//! first to the second.
+//! first to the second. OpenVINS has `T_imu_cam` or `T_cam_imu` of each camera instead.
 
 use super::format::CalibrationFormat;
-use super::{Placement, StereoCalibration, lens, tree::Node};
+use super::{StereoCalibration, lens, pose::Pose, tree::Node};
 use crate::formats::FormatError;
+use crate::formats::calibration::hints::LengthUnit;
 use dynvox_core::rectify::{LensModel, RawCamera, RawRig};
-use nalgebra::{Matrix3, Matrix4, Vector3};
 
 /// Kalibr's file.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "Kalibr",
-    files: "`camchain.yaml`: `cam0` left, `cam1` right",
+    files: "`camchain.yaml`, also with an IMU or of OpenVINS: `cam0` left, `cam1` right",
+    unit: LengthUnit::METRE,
     matches: |files| files.has("cam0"),
-    read: |files| read(files.root()?),
+    read: |files| read(files.root_with("cam0").map_or_else(|| files.root(), Ok)?).map(Into::into),
     example: &[(
         "camchain.yaml",
         r"cam0:
@@ -38,20 +39,37 @@ cam1:
 
 /// Reads both cameras.
 fn read(root: Node<'_>) -> Result<StereoCalibration, FormatError> {
-    let [left, right] = [root.need("cam0")?, root.need("cam1")?];
-    let (r_right_left, t_right_left_m) = rigid(right.need("T_cn_cnm1")?)?;
+    let left = root.need("cam0")?;
+    let Some(right) = root.get("cam1") else {
+        return Err(left.refuse(
+            "it is of one camera: cam1 is missing",
+            "Calibrate both cameras together, and give the file with cam0 and cam1",
+        ));
+    };
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
-        placement: Placement::Motion { r_right_left, t_right_left_m },
+        placement: motion(left, right)?.placement(),
         format: FORMAT.name,
     })
 }
 
-/// Rotation and translation of a 4 x 4 matrix.
-pub fn rigid(node: Node<'_>) -> Result<(Matrix3<f64>, Vector3<f64>), FormatError> {
-    let matrix = Matrix4::from_row_slice(&node.array::<16>()?);
-    Ok((matrix.fixed_view::<3, 3>(0, 0).into(), matrix.fixed_view::<3, 1>(0, 3).into()))
+/// Motion of left camera coordinates to right ones.
+fn motion(left: Node<'_>, right: Node<'_>) -> Result<Pose, FormatError> {
+    if let Some(motion) = right.get("T_cn_cnm1") {
+        return Pose::from_matrix(motion);
+    }
+    let both = |key: &str| Some((left.get(key)?, right.get(key)?));
+    if let Some((left, right)) = both("T_cam_imu") {
+        return Ok(Pose::from_matrix(right)?.after(&Pose::from_matrix(left)?.inverse()));
+    }
+    if let Some((left, right)) = both("T_imu_cam") {
+        return Ok(Pose::from_matrix(right)?.inverse().after(&Pose::from_matrix(left)?));
+    }
+    Err(right.refuse(
+        "T_cn_cnm1 is missing in cam1",
+        "Give it, or T_cam_imu or T_imu_cam of both cameras",
+    ))
 }
 
 /// A camera of Kalibr's models; EuRoC's files name theirs alike.
@@ -80,8 +98,7 @@ pub fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
             let reason = format!("the camera model {other} is not known");
             return Err(node.refuse(
                 &reason,
-                "Known are pinhole, ds, eucm, and omni without \
-                distortion: calibrate again with one of them",
+                "Known are pinhole, ds, eucm and omni: calibrate again with one of them",
             ));
         }
     };

@@ -29,29 +29,26 @@ pub fn camera(
     Ok(RawCamera { lens, width, height })
 }
 
-/// Radial and tangential distortion in OpenCV's order: k1 k2 p1 p2 [k3 [k4 k5 k6]]. More (thin
-/// prism, tilt) must be 0.
+/// Distortion in OpenCV's order: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]].
 pub fn radial_tangential(at: Node<'_>, coefficients: &[f64]) -> Result<LensModel, FormatError> {
     let get = |index: usize| coefficients.get(index).copied().unwrap_or(0.0);
     if !matches!(coefficients.len(), 0 | 4 | 5 | 8 | 12 | 14) {
         return Err(at.refuse(
             &format!(
-                "{} distortion coefficients are not k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+                "{} distortion coefficients are not k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx \
+                 ty]]]]",
                 coefficients.len()
             ),
-            "Give 4, 5 or 8 of them",
+            "Give 4, 5, 8, 12 or 14 of them",
         ));
     }
-    if (8..14).any(|index| get(index) != 0.0) {
-        return Err(at.refuse(
-            "thin prism or tilt coefficients are not 0",
-            "Calibrate again without them: they are not served",
-        ));
+    let radial = [get(0), get(1), get(4), get(5), get(6), get(7)];
+    let tangential = [get(2), get(3)];
+    if (8..14).all(|index| get(index) == 0.0) {
+        return Ok(LensModel::RadialTangential { radial, tangential });
     }
-    Ok(LensModel::RadialTangential {
-        radial: [get(0), get(1), get(4), get(5), get(6), get(7)],
-        tangential: [get(2), get(3)],
-    })
+    let prism = [get(8), get(9), get(10), get(11)];
+    Ok(LensModel::General { xi: 0.0, radial, tangential, prism, tilt: [get(12), get(13)] })
 }
 
 /// The equidistant model's k1 to k4.
@@ -72,10 +69,20 @@ pub fn distortion(
     coefficients: &[f64],
 ) -> Result<LensModel, FormatError> {
     match name.to_ascii_lowercase().replace(['-', ' '], "_").as_str() {
-        "radtan" | "radial_tangential" | "plumb_bob" | "rational_polynomial" | "opencv" => {
-            radial_tangential(at, coefficients)
+        "radtan"
+        | "radial_tangential"
+        | "plumb_bob"
+        | "rational_polynomial"
+        | "rational"
+        | "radtan8"
+        | "brown_conrady"
+        | "brown"
+        | "opencv"
+        | "pinhole"
+        | "perspective" => radial_tangential(at, coefficients),
+        "equidistant" | "equi" | "fisheye" | "kannala_brandt" | "kannala_brandt4" | "kb4" => {
+            equidistant(at, coefficients)
         }
-        "equidistant" | "equi" | "fisheye" | "kannala_brandt" => equidistant(at, coefficients),
         "none" | "" if coefficients.iter().all(|k| *k == 0.0) => Ok(LensModel::IDEAL),
         other => Err(at.refuse(
             &format!("the distortion model {other} is not known"),
@@ -85,20 +92,22 @@ pub fn distortion(
     }
 }
 
-/// The unified model of Mei without distortion as an extended unified one: the same rays, other
-/// names.
+/// The unified model of Mei; without distortion an extended unified one with the same rays and
+/// other names.
 pub fn unified(
     at: Node<'_>,
     xi: f64,
     [fx, fy, cx, cy]: [f64; 4],
     distortion: &[f64],
 ) -> Result<([f64; 4], LensModel), FormatError> {
-    if distortion.iter().any(|k| *k != 0.0) {
-        return Err(at.refuse(
-            "the unified (MEI, omni) model with distortion is not served",
-            "Calibrate again with a pinhole, equidistant, double sphere or extended unified model",
-        ));
+    if distortion.iter().all(|k| *k == 0.0) {
+        let model = LensModel::ExtendedUnified { alpha: xi / (1.0 + xi), beta: 1.0 };
+        return Ok(([fx / (1.0 + xi), fy / (1.0 + xi), cx, cy], model));
     }
-    let model = LensModel::ExtendedUnified { alpha: xi / (1.0 + xi), beta: 1.0 };
-    Ok(([fx / (1.0 + xi), fy / (1.0 + xi), cx, cy], model))
+    let LensModel::RadialTangential { radial, tangential } = radial_tangential(at, distortion)?
+    else {
+        return Err(at.refuse("the unified (MEI, omni) model has k1 k2 p1 p2", "Give 4 numbers"));
+    };
+    let model = LensModel::General { xi, radial, tangential, prism: [0.0; 4], tilt: [0.0; 2] };
+    Ok(([fx, fy, cx, cy], model))
 }

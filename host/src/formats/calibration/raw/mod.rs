@@ -1,50 +1,84 @@
-//! Calibrations of raw pairs: lenses, and how the cameras stand.
+//! Calibrations: lenses, and how the cameras stand.
 //!
 //! Each format is a file with a row of the table [`CALIBRATION_FORMATS`].
 //! The result of every format is checked here: baseline, sizes, rotations. Units are metres and
 //! pixels.
 
+mod basalt;
 mod camodocal;
+mod check;
+mod depthai;
 mod euroc;
+mod family;
+mod files;
 mod format;
 mod kalibr;
+mod keys;
 mod kitti_raw;
 mod lens;
+mod middlebury;
 mod opencv;
+mod orbslam;
+mod ost;
 mod own;
+mod pose;
+mod read;
+mod rectified;
+mod robotcar;
 mod ros;
+mod sections;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod vins;
+mod zed;
 
-pub use format::CalibrationFormat;
+pub use format::{CalibrationFormat, Cameras};
 pub use kalibr::to_kalibr;
 pub use own::to_toml;
+pub use read::{CalibrationFiles, CalibrationRead};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{
     RawCamera, RawRig, Rectification, RectifyProblem, Sizing, TurnedCamera,
 };
-use format::Files;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
-
-/// Longest distance of two cameras that is taken for metres.
-pub const LONGEST_BASELINE_M: f64 = 10.0;
-/// Shortest distance of two cameras that is taken for metres.
-pub const SHORTEST_BASELINE_M: f64 = 0.001;
 
 /// All formats. Files are of the first that matches them, so that what asks for less stands later.
 pub static CALIBRATION_FORMATS: &[&CalibrationFormat] = &[
     &own::FORMAT,
+    &zed::FORMAT,
+    &ost::FORMAT,
     &kitti_raw::FORMAT,
+    &middlebury::FORMAT,
+    &robotcar::FORMAT,
+    &rectified::KEYS,
+    &rectified::KITTI,
+    &rectified::MATRIX,
+    &basalt::FORMAT,
+    &depthai::FORMAT,
+    &vins::FORMAT,
+    &orbslam::FORMAT,
     &kalibr::FORMAT,
     &euroc::FORMAT,
     &ros::FORMAT,
     &camodocal::FORMAT,
     &opencv::FORMAT,
 ];
+
+/// Two cameras whose images come rectified.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RectifiedCameras {
+    /// The left camera, and the distance to the right one.
+    pub rig: StereoRig,
+    /// Distance by which the right camera's principal point lies further right, px: what must be
+    /// added to disparities.
+    pub offset_px: f64,
+    /// Width and height of the images, px, where the files say it.
+    pub size: Option<[u32; 2]>,
+}
 
 /// Relative pose of the two cameras of a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,46 +117,14 @@ pub struct StereoCalibration {
 }
 
 impl StereoCalibration {
-    /// Reads the calibration in one, two or three files. `image_size` is the raw images' where it
-    /// is known: some formats do not say it.
+    /// Reads the calibration of raw cameras. `image_size` is the raw images' where it is known:
+    /// some formats do not say it.
     ///
     /// # Errors
     /// What is wrong with which file, and what to do.
     pub fn read(paths: &[&Path], image_size: Option<[u32; 2]>) -> Result<Self, FormatError> {
-        if !(1..=3).contains(&paths.len()) {
-            let action =
-                "Give one file with both cameras, or --calibration LEFT --calibration RIGHT";
-            return Err(FormatError::content(
-                paths.first().copied().unwrap_or(Path::new("")),
-                "a calibration is 1 to 3 files",
-                action,
-            ));
-        }
-        Self::from_files(Files::read(paths, image_size)?)
-    }
-
-    /// Reads a left and a right `CameraInfo`, as the texts `camera_calibration` writes. `path`
-    /// names their source in errors.
-    ///
-    /// # Errors
-    /// As [`StereoCalibration::read`].
-    pub fn of_camera_infos(path: &Path, texts: &[String; 2]) -> Result<Self, FormatError> {
-        let files = texts.iter().map(|text| (path.to_path_buf(), text.clone())).collect();
-        Self::from_files(Files::new(files, None))
-    }
-
-    /// Reads files by the first format that matches them.
-    fn from_files(files: Files) -> Result<Self, FormatError> {
-        match CALIBRATION_FORMATS.iter().find(|format| (format.matches)(&files)) {
-            Some(format) => (format.read)(&files)?.checked(files.path()),
-            None => {
-                let known = |format: &&CalibrationFormat| {
-                    format!("{} ({})", format.name, format.files.replace('`', ""))
-                };
-                let known: Vec<String> = CALIBRATION_FORMATS.iter().map(known).collect();
-                Err(files.refuse(&known.join("; ")))
-            }
-        }
+        let paths: Vec<_> = paths.iter().map(|path| path.to_path_buf()).collect();
+        CalibrationFiles::read(&paths, Default::default())?.cameras(image_size)?.raw(image_size)
     }
 
     /// Distance of the cameras, m.
@@ -181,43 +183,54 @@ impl StereoCalibration {
         RawRig { left: self.left, right: self.right, r_right_left, t_right_left_m }
     }
 
-    /// The calibration, if a pair can be rectified by it.
-    fn checked(self, path: &Path) -> Result<Self, FormatError> {
-        let refuse = |reason: String, action: &str| Err(FormatError::content(path, reason, action));
-        let baseline_m = self.baseline_m();
-        if baseline_m > LONGEST_BASELINE_M {
-            let reason = format!("the cameras are {baseline_m} m apart. Is it in millimetres?");
-            return refuse(reason, "Translations are in metres: divide them by 1000");
+    /// The calibration with lengths multiplied.
+    fn scaled(mut self, factor: f64) -> Self {
+        match &mut self.placement {
+            Placement::Motion { t_right_left_m, .. } => *t_right_left_m *= factor,
+            Placement::Rectified { rig, .. } => rig.baseline_m *= factor,
         }
-        if baseline_m.is_finite() && baseline_m > 0.0 && baseline_m < SHORTEST_BASELINE_M {
-            return refuse(
-                format!("the cameras are {} mm apart", 1e3 * baseline_m),
-                "Translations are in metres: correct their unit",
-            );
-        }
-        if let Err(problem) =
-            self.rectify(Sizing::Automatic { max_width: 4_096, max_height: 4_096 })
-        {
-            let action = match problem {
-                RectifyProblem::NotARotation => {
-                    "A rotation has three rows of length 1 at right angles: copy it whole from the \
-                     calibration tool"
+        self
+    }
+
+    /// The second camera first.
+    fn exchanged(self) -> Self {
+        let placement = match self.placement {
+            Placement::Motion { r_right_left, t_right_left_m } => {
+                let back = r_right_left.transpose();
+                Placement::Motion { r_right_left: back, t_right_left_m: -(back * t_right_left_m) }
+            }
+            Placement::Rectified { r_rectified_left, r_rectified_right, rig, size } => {
+                Placement::Rectified {
+                    r_rectified_left: r_rectified_right,
+                    r_rectified_right: r_rectified_left,
+                    rig: StereoRig { baseline_m: -rig.baseline_m, ..rig },
+                    size,
                 }
-                RectifyProblem::NoBaseline => "Give the translation between the cameras in metres",
-                RectifyProblem::Exchanged => "Exchange the two cameras: the first is the left one",
-                RectifyProblem::NotSideBySide => {
-                    "Pairs above or behind each other cannot be matched: check the order of \
-                     rotation and translation"
-                }
-                RectifyProblem::Diverging => {
-                    "Check the rotation between the cameras, and which way it maps"
-                }
-                RectifyProblem::RawSize => "Correct width and height",
-                _ => "Check focal lengths, principal points and image sizes",
-            };
-            return refuse(problem.to_string(), action);
-        }
-        Ok(self)
+            }
+        };
+        Self { left: self.right, right: self.left, placement, ..self }
+    }
+
+    /// Cameras of rectified images whose principal points differ: the right images move.
+    fn from_rectified(
+        cameras: &RectifiedCameras,
+        size: [u32; 2],
+        format: &'static str,
+    ) -> Result<Self, dynvox_core::rectify::LensProblem> {
+        let RectifiedCameras { rig, offset_px, .. } = *cameras;
+        let camera = |offset_px: f64| {
+            let center_px = [rig.center_u_px + offset_px, rig.center_v_px];
+            let lens = dynvox_core::rectify::Lens::new(
+                [rig.focal_px; 2],
+                center_px,
+                dynvox_core::rectify::LensModel::IDEAL,
+            )?;
+            Ok(RawCamera { lens, width: size[0], height: size[1] })
+        };
+        let none = Matrix3::identity();
+        let placement =
+            Placement::Rectified { r_rectified_left: none, r_rectified_right: none, rig, size };
+        Ok(Self { left: camera(0.0)?, right: camera(offset_px)?, placement, format })
     }
 
     /// Refuses images of another size than the calibration's.
@@ -229,14 +242,6 @@ impl StereoCalibration {
         if known == [width, height] && [self.right.width, self.right.height] == known {
             return Ok(());
         }
-        let [known_width, known_height] = known;
-        Err(FormatError::content(
-            path,
-            format!(
-                "it is for images of {known_width} x {known_height} px, but these are {width} x \
-                 {height} px"
-            ),
-            "Give the calibration of these images, or the images as the camera delivers them",
-        ))
+        Err(super::other_size(path, known, [width, height]))
     }
 }

@@ -1,21 +1,29 @@
-//! OpenCV's files, YAML or XML: both cameras and `R`, `T` under the short names of its stereo
-//! sample (`M1 D1 M2 D2`, in one file or with `R T` in a second), the long ones
-//! (`cameraMatrix1 distCoeffs1 ...`), or a file a camera (`cameraMatrix distCoeffs`, also
-//! `camera_matrix distortion_coefficients`) with `R` and `T` in one of them.
+//! OpenCV's files, YAML, XML or JSON: both cameras under the names of its samples and its users
+//! (`M1 D1 M2 D2`, `cameraMatrix1 distCoeffs1 ...`, `KL DL KR DR`, `left: {K, D}`), or a file for
+//! each camera (`cameraMatrix distCoeffs`, `K D`), and `R` and `T` in any of the files.
 
+use super::files::Files;
 use super::format::CalibrationFormat;
-use super::{Placement, StereoCalibration, lens, tree::Node};
+use super::keys::{self, DISTORTIONS, MATRICES};
+use super::{StereoCalibration, family, lens, pose::Pose, tree::Node};
 use crate::formats::FormatError;
+use crate::formats::calibration::hints::{LengthUnit, LensFamily};
 use dynvox_core::rectify::RawCamera;
-use nalgebra::{Matrix3, Vector3};
 
 /// OpenCV's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "OpenCV",
-    files: "YAML or XML: `M1 D1 M2 D2 R T`, `cameraMatrix1 distCoeffs1 ...`, or one file for each \
-            camera",
-    matches: |files| is_one(&files.roots()),
-    read: |files| read(&files.roots(), files.image_size, files.root()?),
+    files: "YAML, XML or JSON: `M1 D1 M2 D2 R T`, `cameraMatrix1 distCoeffs1 ...`, or one file for \
+            each camera",
+    unit: LengthUnit::METRE,
+    matches: |files| {
+        let roots = files.roots();
+        keys::pair(&roots, MATRICES).is_some()
+            || keys::find(&roots, MATRICES).is_some()
+            || keys::sections(&roots).is_some()
+            || keys::pair(&roots, &["p"]).is_some()
+    },
+    read: |files| read(files).map(Into::into),
     example: &[(
         "stereo.yml",
         r"%YAML:1.0
@@ -38,127 +46,205 @@ T: !!opencv-matrix
     )],
 };
 
-/// Names of camera matrix and distortion in files that hold both cameras.
-const PAIRS: [[[&str; 2]; 2]; 6] = [
-    [["M1", "D1"], ["M2", "D2"]],
-    [["K1", "D1"], ["K2", "D2"]],
-    [["cameraMatrix1", "distCoeffs1"], ["cameraMatrix2", "distCoeffs2"]],
-    [["cameraMatrixL", "distCoeffsL"], ["cameraMatrixR", "distCoeffsR"]],
-    [
-        ["camera_matrix_1", "distortion_coefficients_1"],
-        ["camera_matrix_2", "distortion_coefficients_2"],
-    ],
-    [
-        ["left_camera_matrix", "left_distortion_coefficients"],
-        ["right_camera_matrix", "right_distortion_coefficients"],
-    ],
+/// Names of the rotation of left camera coordinates to right ones.
+const ROTATIONS: &[&str] = &[
+    "r",
+    "rotation",
+    "rotationmatrix",
+    "rotationlefttoright",
+    "rmat",
+    "rvec",
+    "om",
+    "rotationvector",
 ];
-/// Keys in files of one camera.
-const SINGLE: [[&str; 2]; 3] = [
-    ["cameraMatrix", "distCoeffs"],
-    ["camera_matrix", "distortion_coefficients"],
-    ["Camera_Matrix", "Distortion_Coefficients"],
-];
+/// Names of the translation.
+const TRANSLATIONS: &[&str] =
+    &["t", "translation", "translationvector", "translationlefttoright", "tvec", "transvec"];
+/// Action where a part is in another file.
+const SECOND_FILE: &str = "Give the file that holds it as a second --calibration";
 
-/// Returns true if the files look like this format.
-fn is_one(roots: &[Node<'_>]) -> bool {
-    let matrices = PAIRS.iter().flatten().chain(&SINGLE).map(|[matrix, _]| *matrix);
-    matrices.clone().any(|key| roots.iter().any(|root| root.get(key).is_some()))
+/// Camera matrix, distortion and, for `cv2.omnidir`, the sphere's `xi` of one camera.
+#[derive(Clone, Copy)]
+struct Parts<'t> {
+    matrix: Node<'t>,
+    distortion: Option<Node<'t>>,
+    xi: Option<Node<'t>>,
 }
 
 /// Reads the pair.
-fn read(
-    roots: &[Node<'_>],
-    image_size: Option<[u32; 2]>,
-    first: Node<'_>,
-) -> Result<StereoCalibration, FormatError> {
-    let find = |key: &'static str| roots.iter().find_map(|root| root.get(key));
-    let needed = |keys: &[&'static str]| {
-        keys.iter().find_map(|key| find(key)).ok_or_else(|| {
-            first.refuse(
-                &format!("{} is missing", keys.join(" or ")),
-                "Give the file that holds it as a second --calibration",
-            )
-        })
+fn read(files: &Files<'_>) -> Result<StereoCalibration, FormatError> {
+    let roots = files.roots();
+    let first = files.root()?;
+    let parts = cameras(files, &roots, first)?;
+    let needed = |names: &[&str], name: &str| {
+        keys::find(&roots, names)
+            .ok_or_else(|| first.refuse(&format!("{name} is missing"), SECOND_FILE))
     };
-    let r_right_left =
-        Matrix3::from_row_slice(&needed(&["R", "rotation", "Rotation"])?.array::<9>()?);
-    let t_right_left_m = Vector3::from(needed(&["T", "translation", "Translation"])?.array::<3>()?);
-    let size = size(roots, image_size, first)?;
-    let cameras = if let Some([[m1, d1], [m2, d2]]) =
-        PAIRS.iter().find(|[[matrix, _], _]| find(matrix).is_some())
-    {
-        [
-            camera(needed(&[m1])?, needed(&[d1])?, roots, size)?,
-            camera(needed(&[m2])?, needed(&[d2])?, roots, size)?,
-        ]
-    } else {
-        let singles: Vec<_> = roots.iter().filter_map(single).collect();
-        let [(m1, Some(d1)), (m2, Some(d2))] = *singles.as_slice() else {
-            return Err(super::euroc::two_files(roots, "camera file"));
-        };
-        [camera(m1, d1, roots, size)?, camera(m2, d2, roots, size)?]
-    };
-    let [left, right] = cameras;
+    let motion = Pose::from_parts(
+        needed(ROTATIONS, "R or rotation")?,
+        needed(TRANSLATIONS, "T or translation")?,
+    )?;
+    let size = size(files, &roots, first)?;
+    let family = family_of(files, &roots, &parts, size[0])?;
+    let [left, right] = parts;
     Ok(StereoCalibration {
-        left,
-        right,
-        placement: Placement::Motion { r_right_left, t_right_left_m },
+        left: camera(left, family, size)?,
+        right: camera(right, family, size)?,
+        placement: motion.placement(),
         format: FORMAT.name,
     })
 }
 
-/// Camera matrix and distortion of a file of one camera.
-fn single<'t>(root: &Node<'t>) -> Option<(Node<'t>, Option<Node<'t>>)> {
-    let [matrix, distortion] = SINGLE.iter().find(|[matrix, _]| root.get(matrix).is_some())?;
-    Some((root.get(matrix)?, root.get(distortion)))
+/// The parts of both cameras, left first.
+fn cameras<'t>(
+    files: &Files<'_>,
+    roots: &[Node<'t>],
+    first: Node<'t>,
+) -> Result<[Parts<'t>; 2], FormatError> {
+    if let Some([left, right]) = keys::pair(roots, MATRICES) {
+        let (distortions, xis) = (keys::pair(roots, DISTORTIONS), keys::pair(roots, &["xi"]));
+        let parts = |matrix, side: usize| Parts {
+            matrix,
+            distortion: distortions.map(|of| of[side]),
+            xi: xis.map(|of| of[side]),
+        };
+        if distortions.is_none() {
+            return Err(first.refuse(
+                "the distortion coefficients of the two cameras are missing",
+                SECOND_FILE,
+            ));
+        }
+        return Ok([parts(left, 0), parts(right, 1)]);
+    }
+    let sections = keys::sections(roots);
+    let singles = sections.as_ref().map_or(roots, |sections| sections.as_slice());
+    let single = |root: &Node<'t>| {
+        let root = std::slice::from_ref(root);
+        let matrix = keys::find(root, MATRICES)?;
+        Some(Parts {
+            matrix,
+            distortion: keys::find(root, DISTORTIONS),
+            xi: keys::find(root, &["xi"]),
+        })
+    };
+    let found: Vec<Parts<'t>> = singles.iter().filter_map(single).collect();
+    match *found.as_slice() {
+        [right, left] if files.right_comes_first() => {
+            files.guess("the right camera's file comes first: exchanged".to_owned());
+            Ok([left, right])
+        }
+        [left, right] => Ok([left, right]),
+        [] => Err(rectification_only(roots, first)),
+        _ => Err(super::euroc::two_files(roots, "camera file")),
+    }
 }
 
-fn size(
+/// Refuses the output of `stereoRectify` without the lenses.
+fn rectification_only(roots: &[Node<'_>], first: Node<'_>) -> FormatError {
+    let line = |node: Node<'_>| {
+        let numbers: Vec<String> = node.numbers().ok()?.iter().map(f64::to_string).collect();
+        Some(numbers.join(" "))
+    };
+    let lines = keys::pair(roots, &["p"]).and_then(|[p1, p2]| Some([line(p1)?, line(p2)?]));
+    let rectified = lines.map_or(String::new(), |[p1, p2]| {
+        format!(
+            ". If the images are rectified already, give a calib.txt with the two lines `P0: {p1}` \
+             and `P1: {p2}`"
+        )
+    });
+    first.refuse(
+        "it holds a rectification (R1 R2 P1 P2) and not the lenses",
+        &format!("Give the files with camera matrices, distortion, R and T{rectified}"),
+    )
+}
+
+/// Size of the images: that of the files, else of the images themselves.
+fn size(files: &Files<'_>, roots: &[Node<'_>], first: Node<'_>) -> Result<[u32; 2], FormatError> {
+    for [width, height] in [["imagewidth", "imageheight"], ["width", "height"], ["w", "h"]] {
+        let both = keys::find(roots, &[width]).zip(keys::find(roots, &[height]));
+        if let Some((width, height)) = both {
+            return Ok([width.pixels()?, height.pixels()?]);
+        }
+    }
+    let list = ["imagesize", "size", "imgsize", "resolution", "framesize", "imageshape"];
+    match keys::find(roots, &list) {
+        Some(list) => list.size(),
+        None => files.image_size(first),
+    }
+}
+
+/// Family of both lenses: named by the files, said by a person, told by the number of coefficients,
+/// or guessed.
+fn family_of(
+    files: &Files<'_>,
     roots: &[Node<'_>],
-    image_size: Option<[u32; 2]>,
-    first: Node<'_>,
-) -> Result<[u32; 2], FormatError> {
-    let find = |key: &'static str| roots.iter().find_map(|root| root.get(key));
-    let sides =
-        [["image_width", "image_height"], ["imageWidth", "imageHeight"], ["width", "height"]];
-    if let Some((width, height)) =
-        sides.iter().find_map(|[width, height]| Some((find(width)?, find(height)?)))
-    {
-        return Ok([width.pixels()?, height.pixels()?]);
+    parts: &[Parts<'_>; 2],
+    width: u32,
+) -> Result<LensFamily, FormatError> {
+    let named = keys::find(roots, &["fisheyemodel", "fisheye", "isfisheye"]);
+    if let Some(flag) = named {
+        let fisheye = flag.number().map(|flag| flag != 0.0).unwrap_or(flag.is_true());
+        return Ok(if fisheye { LensFamily::Fisheye } else { LensFamily::Pinhole });
     }
-    if let Some(list) =
-        ["image_size", "imageSize", "size", "image_Size"].iter().find_map(|key| find(key))
-    {
-        return list.size();
+    let names = ["distortionmodel", "cameramodel", "model", "lensmodel", "projection"];
+    if let Some(name) = keys::find(roots, &names).and_then(|node| node.text().ok()) {
+        let name = name.to_lowercase();
+        let is = |words: &[&str]| words.iter().any(|word| name.contains(word));
+        if is(&["fish", "equi", "kannala", "kb"]) {
+            return Ok(LensFamily::Fisheye);
+        }
+        if is(&["plumb", "radtan", "rational", "pinhole", "brown", "radial", "opencv"]) {
+            return Ok(LensFamily::Pinhole);
+        }
     }
-    let action = "Add image_width and image_height, or give the calibration together with the \
-                  images: --calibration FILE PATH";
-    image_size.ok_or_else(|| first.refuse("it does not say the size of the images", action))
+    if let Some(family) = files.lens_family() {
+        return Ok(family);
+    }
+    let mut coefficients = Vec::new();
+    for distortion in parts.iter().filter(|parts| parts.xi.is_none()).filter_map(|of| of.distortion)
+    {
+        coefficients.push(distortion.numbers()?);
+    }
+    let column = parts.iter().filter_map(|of| of.distortion).any(|node| {
+        let side = |key| node.get(key).and_then(|side| side.number().ok());
+        (side("rows"), side("cols")) == (Some(4.0), Some(1.0))
+    });
+    let focal_px = parts[0].matrix.array::<9>()?[0];
+    let Some((family, reason)) =
+        family::guess(&coefficients, column, focal_px / f64::from(width.max(1)))
+    else {
+        return Ok(LensFamily::Pinhole);
+    };
+    files.guess_lens(family, reason);
+    Ok(family)
 }
 
-/// A camera; four coefficients under a model that names the fisheye are equidistant.
+/// A camera of its parts.
 fn camera(
-    matrix: Node<'_>,
-    distortion: Node<'_>,
-    roots: &[Node<'_>],
+    Parts { matrix, distortion, xi }: Parts<'_>,
+    family: LensFamily,
     size: [u32; 2],
 ) -> Result<RawCamera, FormatError> {
-    let [fx, _, cx, _, fy, cy, ..] = matrix.array::<9>()?;
-    let named = ["fisheye_model", "fisheye"]
-        .iter()
-        .find_map(|key| roots.iter().find_map(|root| root.get(key)));
-    let by_name = roots
-        .iter()
-        .find_map(|root| root.get("distortion_model"))
-        .and_then(|node| node.text().ok());
-    let fisheye = named.is_some_and(|node| node.number().is_ok_and(|flag| flag != 0.0))
-        || by_name.is_some_and(|name| name == "fisheye");
-    let coefficients = distortion.numbers()?;
-    let model = if fisheye {
-        lens::equidistant(distortion, &coefficients)?
-    } else {
-        lens::radial_tangential(distortion, &coefficients)?
+    let [fx, skew, cx, _, fy, cy, below_x, below_y, _] = matrix.array::<9>()?;
+    if cx == 0.0 && cy == 0.0 && (below_x != 0.0 || below_y != 0.0) {
+        return Err(matrix.refuse(
+            &format!("{} is transposed, as MATLAB writes matrices", matrix.key()),
+            "Transpose the camera matrices and the rotation",
+        ));
+    }
+    if skew.abs() > 1e-3 * fx.abs() {
+        return Err(matrix.refuse(
+            &format!("{} has a skew of {skew}, which no lens model here has", matrix.key()),
+            "Calibrate without skew",
+        ));
+    }
+    let at = distortion.unwrap_or(matrix);
+    let coefficients = distortion.map_or(Ok(Vec::new()), |node| node.numbers())?;
+    let pinhole = [fx, fy, cx, cy];
+    let (pinhole, model) = match (xi, family) {
+        (Some(xi), _) => lens::unified(at, xi.number()?, pinhole, &coefficients)?,
+        (None, LensFamily::Fisheye) => (pinhole, lens::equidistant(at, &coefficients)?),
+        (None, LensFamily::Pinhole) => (pinhole, lens::radial_tangential(at, &coefficients)?),
     };
-    lens::camera(matrix, [fx, fy, cx, cy], model, size)
+    lens::camera(matrix, pinhole, model, size)
 }

@@ -3,7 +3,7 @@
 use super::format::CalibrationFormat;
 use super::{Placement, StereoCalibration};
 use crate::formats::FormatError;
-use crate::formats::calibration::lens_table;
+use crate::formats::calibration::{hints::LengthUnit, lens_table};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::{Lens, LensModel, RawCamera};
 use nalgebra::{Matrix3, Vector3};
@@ -14,8 +14,9 @@ use std::path::Path;
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "dynvox",
     files: "TOML with units in its keys",
+    unit: LengthUnit::METRE,
     matches: |files| files.ends_in("toml"),
-    read: |files| read(files.text(), files.path()),
+    read: |files| read(files.text(), files.path()).map(Into::into),
     example: &[(
         "own.toml",
         r#"[left]
@@ -130,15 +131,12 @@ fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
         (None, Some(given)) => Placement::Rectified {
             r_rectified_left: matrix(&given.rotation_left),
             r_rectified_right: matrix(&given.rotation_right),
-            rig: super::super::checked(
-                StereoRig {
-                    focal_px: given.focal_px,
-                    center_u_px: given.center_px[0],
-                    center_v_px: given.center_px[1],
-                    baseline_m: given.baseline_m,
-                },
-                path,
-            )?,
+            rig: StereoRig {
+                focal_px: given.focal_px,
+                center_u_px: given.center_px[0],
+                center_v_px: given.center_px[1],
+                baseline_m: given.baseline_m,
+            },
             size: [given.width_px, given.height_px],
         },
         _ => {

@@ -1,9 +1,11 @@
 //! ROS `CameraInfo` as `camera_calibration` writes it: one YAML file a camera, with the
 //! rectification and its projection.
 
-use super::format::CalibrationFormat;
-use super::{Placement, StereoCalibration, euroc, lens, tree::Node};
+use super::files::Files;
+use super::format::{CalibrationFormat, Cameras};
+use super::{Placement, RectifiedCameras, StereoCalibration, euroc, lens, tree::Node};
 use crate::formats::FormatError;
+use crate::formats::calibration::hints::LengthUnit;
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::rectify::RawCamera;
 use nalgebra::Matrix3;
@@ -11,9 +13,10 @@ use nalgebra::Matrix3;
 /// ROS's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
     name: "ROS CameraInfo",
-    files: "`CameraInfo` of `camera_calibration`, one YAML file for each camera",
+    files: "`CameraInfo` of `camera_calibration` and RTAB-Map, one YAML file for each camera",
+    unit: LengthUnit::METRE,
     matches: |files| files.has("projection_matrix") || files.has("rectification_matrix"),
-    read: |files| read(&files.roots()),
+    read: |files| read(files).map(Into::into),
     example: &[
         (
             "left.yaml",
@@ -49,54 +52,98 @@ projection_matrix:
 };
 
 /// Reads the left and the right camera's file.
-fn read(roots: &[Node<'_>]) -> Result<StereoCalibration, FormatError> {
-    let [left, right] = *roots else {
-        return Err(euroc::two_files(roots, "CameraInfo file"));
-    };
+fn read(files: &Files<'_>) -> Result<StereoCalibration, FormatError> {
+    let [left, right] = sides(files)?;
     let rotation = |node: Node<'_>| {
         Ok::<_, FormatError>(Matrix3::from_row_slice(
             &node.need("rectification_matrix")?.array::<9>()?,
         ))
     };
-    let [p_left, p_right]: [[f64; 12]; 2] =
-        [left.need("projection_matrix")?.array()?, right.need("projection_matrix")?.array()?];
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
         placement: Placement::Rectified {
             r_rectified_left: rotation(left)?,
             r_rectified_right: rotation(right)?,
-            rig: rectified_rig(right, &p_left, &p_right)?,
-            size: [left.need("image_width")?.pixels()?, left.need("image_height")?.pixels()?],
+            rig: rig_of(left, right)?.rig,
+            size: size(left)?,
         },
         format: FORMAT.name,
     })
 }
 
-/// The rig of two projection matrices with one focal length and centre.
+/// Reads two files of rectified images: the projection matrices say all.
+pub fn read_rectified(files: &Files<'_>) -> Result<Cameras, FormatError> {
+    let [left, right] = sides(files)?;
+    Ok(Cameras::Rectified(RectifiedCameras { size: Some(size(left)?), ..rig_of(left, right)? }))
+}
+
+fn size(node: Node<'_>) -> Result<[u32; 2], FormatError> {
+    Ok([node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?])
+}
+
+/// The left and the right camera's file, in any order: the right one's projection has the baseline.
+fn sides<'f>(files: &'f Files<'_>) -> Result<[Node<'f>; 2], FormatError> {
+    let roots: Vec<Node<'f>> =
+        files.roots().into_iter().filter(|root| root.has("projection_matrix")).collect();
+    let [first, second] = *roots.as_slice() else {
+        return Err(euroc::two_files(&files.roots(), "CameraInfo file"));
+    };
+    let along = |node: Node<'_>| -> Result<f64, FormatError> {
+        Ok(node.need("projection_matrix")?.array::<12>()?[3])
+    };
+    if along(first)? < 0.0 && along(second)? == 0.0 {
+        files.guess("the right camera's file comes first: exchanged".to_owned());
+        return Ok([second, first]);
+    }
+    Ok([first, second])
+}
+
+/// The rectified cameras of two projection matrices.
+fn rig_of(left: Node<'_>, right: Node<'_>) -> Result<RectifiedCameras, FormatError> {
+    let p_left = left.need("projection_matrix")?.array()?;
+    let p_right = right.need("projection_matrix")?;
+    rectified_rig(p_right, &p_left, &p_right.array()?)
+}
+
+/// The cameras of two projection matrices with one focal length and height of the centre.
 pub fn rectified_rig(
     at: Node<'_>,
     p_left: &[f64; 12],
     p_right: &[f64; 12],
-) -> Result<StereoRig, FormatError> {
+) -> Result<RectifiedCameras, FormatError> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-    let shared = [0, 5, 2, 6].iter().all(|&entry| near(p_left[entry], p_right[entry]))
-        && near(p_left[0], p_left[5]);
-    if !shared {
-        let reason = "the two projection matrices differ in focal length or principal point";
+    let down = |p: &[f64; 12]| p[7] - p[6] * p[11];
+    let (along, below) = (p_left[3] - p_right[3], down(p_left) - down(p_right));
+    if below.abs() > along.abs() {
+        let reason = format!(
+            "the second camera stands {} the first",
+            if below > 0.0 { "below" } else { "above" }
+        );
+        return Err(at.refuse(
+            &reason,
+            "Turn the rig by a quarter, so that its cameras stand side by side, and calibrate with \
+             pictures turned alike",
+        ));
+    }
+    let square = near(p_left[0], p_left[5]);
+    if !square || ![0, 5, 6].iter().all(|&entry| near(p_left[entry], p_right[entry])) {
+        let reason = "the two projection matrices differ in focal length or in the height of the \
+                      principal point";
         return Err(at.refuse(
             reason,
-            "Rectify with zero disparity at infinity (CALIB_ZERO_DISPARITY), or \
-                               give rotation and translation instead",
+            "Rectify both images alike, or give rotation and translation instead",
         ));
     }
     let rig = StereoRig {
         focal_px: p_left[0],
         center_u_px: p_left[2],
         center_v_px: p_left[6],
-        baseline_m: (p_left[3] - p_right[3]) / p_left[0],
+        baseline_m: along / p_left[0],
     };
-    super::super::checked(rig, at.path())
+    let offset_px = p_right[2] - p_left[2];
+    let offset_px = if near(p_left[2], p_right[2]) { 0.0 } else { offset_px };
+    Ok(RectifiedCameras { rig, offset_px, size: None })
 }
 
 fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
@@ -104,10 +151,5 @@ fn camera(node: Node<'_>) -> Result<RawCamera, FormatError> {
     let name = node.get("distortion_model").map_or(Ok("plumb_bob"), |node| node.text())?;
     let coefficients = node.need("distortion_coefficients")?.numbers()?;
     let model = lens::distortion(node, name, &coefficients)?;
-    lens::camera(
-        node,
-        [fx, fy, cx, cy],
-        model,
-        [node.need("image_width")?.pixels()?, node.need("image_height")?.pixels()?],
-    )
+    lens::camera(node.need("camera_matrix")?, [fx, fy, cx, cy], model, size(node)?)
 }

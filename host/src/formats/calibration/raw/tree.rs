@@ -1,19 +1,21 @@
-//! YAML and OpenCV's XML as one tree of values whose errors name the key.
+//! YAML, JSON and OpenCV's XML as one tree of values whose errors name line and key.
 
 use crate::formats::{FormatError, read_text};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// A file's values.
+#[derive(Debug)]
 pub struct Tree {
     path: PathBuf,
+    text: String,
     value: Value,
 }
 
 /// One value of a tree.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Node<'t> {
-    path: &'t Path,
+    tree: &'t Tree,
     key: &'t str,
     value: &'t Value,
 }
@@ -24,12 +26,20 @@ impl Tree {
         Self::from_text(&read_text(path)?, path)
     }
 
-    /// Parses XML if the file's name or text says so, else YAML. `path` names the text in errors.
+    /// Parses XML or JSON if the file's name or text says so, else YAML. `path` names the text in
+    /// errors.
     pub fn from_text(text: &str, path: &Path) -> Result<Self, FormatError> {
-        let xml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
-            || text.trim_start().starts_with("<?xml");
-        let value = if xml { from_xml(text, path)? } else { from_yaml(text, path)? };
-        Ok(Self { path: path.to_path_buf(), value })
+        let ends_in =
+            |end: &str| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(end));
+        let begin = text.trim_start_matches('\u{feff}').trim_start();
+        let value = if ends_in("xml") || begin.starts_with("<?xml") {
+            from_xml(text, path)?
+        } else if begin.starts_with('{') {
+            from_json(begin, path)?
+        } else {
+            from_yaml(text, path)?
+        };
+        Ok(Self { path: path.to_path_buf(), text: text.to_owned(), value })
     }
 
     /// Lines `key: word word ...`.
@@ -40,27 +50,44 @@ impl Tree {
         };
         Self {
             path: path.to_path_buf(),
+            text: text.to_owned(),
             value: Value::Object(text.lines().filter_map(line).collect()),
         }
     }
 
+    /// Values that another parser read of a text.
+    pub fn of_values(value: Value, text: &str, path: &Path) -> Self {
+        Self { path: path.to_path_buf(), text: text.to_owned(), value }
+    }
+
     /// The whole.
     pub fn root(&self) -> Node<'_> {
-        Node { path: &self.path, key: "", value: &self.value }
+        Node { tree: self, key: "", value: &self.value }
+    }
+
+    /// Number of the only line that begins with a key; `None` where none or several do.
+    fn line_of(&self, key: &str) -> Option<usize> {
+        let begins = |line: &str| {
+            let line = line.trim_start().trim_start_matches(['"', '-', ' ', '<']);
+            line.strip_prefix(key).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric))
+        };
+        let mut lines = self.text.lines().zip(1..).filter(|(line, _)| begins(line));
+        let (_, number) = lines.next()?;
+        lines.next().is_none().then_some(number)
     }
 }
 
 const CHECK_WHOLE: &str = "Check that the file is whole and of the format its ending says";
 
+fn from_json(text: &str, path: &Path) -> Result<Value, FormatError> {
+    serde_json::from_str(text).map_err(|error| {
+        FormatError::content(path, format!("it is not JSON: {error}"), CHECK_WHOLE)
+    })
+}
+
 fn from_yaml(text: &str, path: &Path) -> Result<Value, FormatError> {
-    // OpenCV writes `%YAML:1.0`, which is no directive of YAML.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let body = if text.starts_with("%YAML") {
-        text.split_once('\n').map_or("", |(_, rest)| rest)
-    } else {
-        text
-    };
-    let value: Value = serde_saphyr::from_str(body).map_err(|error| {
+    let text = as_opencv_reads(text.strip_prefix('\u{feff}').unwrap_or(text));
+    let value: Value = serde_saphyr::from_str(&text).map_err(|error| {
         let first = error
             .to_string()
             .lines()
@@ -75,6 +102,32 @@ fn from_yaml(text: &str, path: &Path) -> Result<Value, FormatError> {
     } else {
         Err(FormatError::content(path, "it holds no keys", CHECK_WHOLE))
     }
+}
+
+/// OpenCV's dialect as YAML: `%YAML:1.0` is no directive, `key:value` needs no space, and lines may
+/// be indented by tabs. Lines keep their numbers.
+fn as_opencv_reads(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 64);
+    for (at, line) in text.lines().enumerate() {
+        let body = line.trim_start();
+        let key = body.find(|c: char| !(c.is_alphanumeric() || "_.".contains(c))).unwrap_or(0);
+        let (key, rest) = body.split_at(key);
+        let joined = rest.strip_prefix(':').filter(|value| !value.is_empty());
+        if at == 0 && line.starts_with("%YAML") {
+            out.push('#');
+        }
+        line[..line.len() - body.len()].chars().for_each(|c| match c {
+            '\t' => out.push_str("    "),
+            other => out.push(other),
+        });
+        match joined {
+            Some(value) if !key.is_empty() && !value.starts_with(char::is_whitespace) => {
+                out.extend([key, ": ", value, "\n"]);
+            }
+            _ => out.extend([body, "\n"]),
+        }
+    }
+    out
 }
 
 fn from_xml(text: &str, path: &Path) -> Result<Value, FormatError> {
@@ -121,16 +174,48 @@ fn words_of(text: &str) -> Value {
 impl<'t> Node<'t> {
     /// The file, to name it.
     pub fn path(&self) -> &'t Path {
-        self.path
+        &self.tree.path
     }
 
     /// The value of a key; `None` if the key is missing.
-    pub fn get(&self, key: &'t str) -> Option<Node<'t>> {
-        Some(Node { path: self.path, key, value: self.value.get(key)? })
+    pub fn get(&self, key: &str) -> Option<Node<'t>> {
+        let (key, value) = self.value.as_object()?.get_key_value(key)?;
+        Some(Node { tree: self.tree, key, value })
+    }
+
+    /// Tells whether a key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.get(key).is_some()
+    }
+
+    /// Keys with their values.
+    pub fn entries(&self) -> impl Iterator<Item = Node<'t>> + use<'t> {
+        let tree = self.tree;
+        self.value.as_object().into_iter().flatten().map(move |(key, value)| Node {
+            tree,
+            key,
+            value,
+        })
+    }
+
+    /// Elements of a list; none of another value.
+    pub fn elements(&self) -> impl Iterator<Item = Node<'t>> + use<'t> {
+        let (tree, key) = (self.tree, self.key);
+        self.value.as_array().into_iter().flatten().map(move |value| Node { tree, key, value })
+    }
+
+    /// Name of the value's key.
+    pub fn key(&self) -> &'t str {
+        self.key
+    }
+
+    /// The value of the first of some keys.
+    pub fn any(&self, keys: &[&str]) -> Option<Node<'t>> {
+        keys.iter().find_map(|key| self.get(key))
     }
 
     /// The value of a key that must be there.
-    pub fn need(&self, key: &'t str) -> Result<Node<'t>, FormatError> {
+    pub fn need(&self, key: &str) -> Result<Node<'t>, FormatError> {
         self.get(key).ok_or_else(|| {
             let within =
                 if self.key.is_empty() { String::new() } else { format!(" in {}", self.key) };
@@ -149,21 +234,29 @@ impl<'t> Node<'t> {
             .ok_or_else(|| self.refuse(&format!("{} is not a word", self.key), CHECK_WHOLE))
     }
 
-    /// A number.
+    /// Tells whether the value is `true` or `yes`.
+    pub fn is_true(&self) -> bool {
+        *self.value == Value::Bool(true) || self.value.as_str() == Some("yes")
+    }
+
+    /// A number, or a matrix of one.
     pub fn number(&self) -> Result<f64, FormatError> {
-        self.as_number(self.value)
+        match self.value.get("data") {
+            Some(_) => self.array().map(|[number]| number),
+            None => self.as_number(self.value),
+        }
     }
 
     /// The number of a key.
-    pub fn value_of(&self, key: &'t str) -> Result<f64, FormatError> {
+    pub fn value_of(&self, key: &str) -> Result<f64, FormatError> {
         self.need(key)?.number()
     }
 
     fn as_number(&self, value: &Value) -> Result<f64, FormatError> {
         let number = match value {
             Value::Number(number) => number.as_f64(),
-            // YAML's `.nan` and `.inf`, and numbers in quotes.
-            Value::String(word) => word.trim_start_matches('.').parse().ok().or(word.parse().ok()),
+            // Numbers in quotes.
+            Value::String(word) => word.trim().parse().ok(),
             _ => None,
         };
         match number {
@@ -222,7 +315,10 @@ impl<'t> Node<'t> {
 
     /// An error about this value.
     pub fn refuse(&self, reason: &str, action: &str) -> FormatError {
-        FormatError::content(self.path, reason, action)
+        let line = Some(self.key).filter(|key| !key.is_empty());
+        let line = line.and_then(|key| self.tree.line_of(key));
+        let line = line.map_or(String::new(), |line| format!(" (line {line})"));
+        FormatError::content(self.path(), format!("{reason}{line}"), action)
     }
 }
 

@@ -84,7 +84,7 @@ fn every_data_set_gives_the_same_frames_rig_and_times() {
         let root = TempDir::new().unwrap();
         write(root.path());
         assert_eq!(Layout::guess(root.path()).unwrap(), layout);
-        let (found, sequences) = survey(root.path(), None).unwrap();
+        let (found, sequences) = survey(root.path(), &OpenOptions::default()).unwrap();
         assert_eq!((found, sequences.len()), (layout, 1), "{layout:?}");
         let dataset = open(root.path(), &OpenOptions::default())
             .unwrap_or_else(|error| panic!("{layout:?}: {error}"));
