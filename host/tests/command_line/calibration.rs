@@ -16,9 +16,9 @@ fn list(text: &str, key: &str, nth: usize) -> Vec<f64> {
 }
 
 /// Camera matrix and distortion of the `nth` camera of a camchain, under OpenCV's short names.
-fn camera(chain: &str, nth: usize, number: usize) -> String {
-    let [fx, fy, cx, cy] = list(chain, "intrinsics", nth).try_into().expect("four numbers");
-    let distortion = list(chain, "distortion_coeffs", nth);
+fn camera(camchain: &str, nth: usize, number: usize) -> String {
+    let [fx, fy, cx, cy] = list(camchain, "intrinsics", nth).try_into().expect("four numbers");
+    let distortion = list(camchain, "distortion_coeffs", nth);
     format!(
         "K{number}: [[{fx}, 0.0, {cx}], [0.0, {fy}, {cy}], [0.0, 0.0, 1.0]]\n\
          D{number}: {distortion:?}\n"
@@ -26,8 +26,8 @@ fn camera(chain: &str, nth: usize, number: usize) -> String {
 }
 
 /// Rotation and translation of the right camera in a camchain.
-fn motion(chain: &str) -> ([[f64; 3]; 3], [f64; 3]) {
-    let rows = &chain[chain.find("T_cn_cnm1:").expect("a motion")..];
+fn motion(camchain: &str) -> ([[f64; 3]; 3], [f64; 3]) {
+    let rows = &camchain[camchain.find("T_cn_cnm1:").expect("a motion")..];
     let row = |line: &str| -> [f64; 4] {
         let line = line.trim().trim_start_matches("- [").trim_end_matches(']');
         let numbers: Vec<f64> =
@@ -72,10 +72,12 @@ fn opencvs_file_without_size_and_lens_maps_as_kalibrs_with_both() {
     );
     assert!(synth.status.success(), "{}", output_text(&synth));
     write_images(root, 3);
-    let chain = fs::read_to_string(root.join("street/sequences/00/camchain.yaml")).expect("a file");
-    fs::write(root.join("camchain.yaml"), &chain).expect("a file");
-    let (r, t) = motion(&chain);
-    let stereo = format!("{}{}R: {r:?}\nT: {t:?}\n", camera(&chain, 0, 1), camera(&chain, 1, 2));
+    let camchain =
+        fs::read_to_string(root.join("street/sequences/00/camchain.yaml")).expect("a file");
+    fs::write(root.join("camchain.yaml"), &camchain).expect("a file");
+    let (r, t) = motion(&camchain);
+    let stereo =
+        format!("{}{}R: {r:?}\nT: {t:?}\n", camera(&camchain, 0, 1), camera(&camchain, 1, 2));
     fs::write(root.join("stereo.yml"), &stereo).expect("a file");
 
     let coarse = ["--profile", "tiny", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
@@ -98,8 +100,8 @@ fn opencvs_file_without_size_and_lens_maps_as_kalibrs_with_both() {
     let t_back = [0, 1, 2].map(|row| -back(row).iter().zip(t).map(|(r, t)| r * t).sum::<f64>());
     let reversed = format!(
         "{}{}R: {:?}\nT: {t_back:?}\n",
-        camera(&chain, 1, 1),
-        camera(&chain, 0, 2),
+        camera(&camchain, 1, 1),
+        camera(&camchain, 0, 2),
         [back(0), back(1), back(2)]
     );
     fs::write(root.join("reversed.yml"), reversed).expect("a file");
