@@ -1,6 +1,6 @@
 //! `dynvox view`: the viewer of a finished run.
 
-use crate::formats::SUMMARY_FILE;
+use crate::formats::{SUMMARY_FILE, read_text};
 use crate::report::{html::page, viewer};
 use crate::run::replace_whole;
 use crate::scene::{MAX_TRIANGLES, Scene};
@@ -28,7 +28,7 @@ pub struct ViewArgs {
 
 pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
     let folder = &args.run;
-    let Ok(summary) = std::fs::read_to_string(folder.join(SUMMARY_FILE)) else {
+    let Ok(summary) = read_text(&folder.join(SUMMARY_FILE)) else {
         bail!(
             "{} is not a run folder (it has no summary.json). Give the folder that `dynvox run` \
              printed as its results",

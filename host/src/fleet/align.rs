@@ -11,6 +11,8 @@ use super::pose_graph::{Edge, Node, solve, with_drift};
 use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
 use super::submap::Submap;
 use super::{FleetError, Job, Manifest, distance_m};
+use crate::formats::bounds::MANIFEST_TEXT;
+use crate::formats::read_text_within;
 use crate::run::write_whole;
 use dynvox_core::geometry::Transform;
 use serde::{Deserialize, Serialize};
@@ -161,7 +163,7 @@ pub fn poses(
     if !path.is_file() {
         return Ok(given);
     }
-    let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+    let text = read_text_within(&path, &MANIFEST_TEXT)?;
     let other = || {
         FleetError::content(
             &path,

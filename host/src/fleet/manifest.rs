@@ -3,6 +3,8 @@
 //! folder.
 
 use super::{FleetError, Recording, Recordings, submap, tile_file};
+use crate::formats::bounds::MANIFEST_TEXT;
+use crate::formats::read_text_within;
 use crate::owned::OwnedFolder;
 use crate::request::Request;
 use crate::run::{self, write_whole};
@@ -136,7 +138,7 @@ impl Manifest {
     /// The folder has no list of jobs, or another version of the program planned them.
     pub fn read(folder: &Path) -> Result<Self, FleetError> {
         let path = folder.join(MANIFEST_FILE);
-        let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+        let text = read_text_within(&path, &MANIFEST_TEXT)?;
         let again = "Make it with `dynvox fleet plan`";
         let manifest: Self = serde_json::from_str(&text).map_err(|error| {
             FleetError::content(

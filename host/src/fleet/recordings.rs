@@ -2,7 +2,8 @@
 
 use super::FleetError;
 use super::manifest::{Given, rows_of, transform};
-use crate::formats::read_gnss;
+use crate::formats::bounds::SETTINGS_TEXT;
+use crate::formats::{read_gnss, read_text_within};
 use dynvox_core::geometry::Transform;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -76,7 +77,7 @@ impl Recordings {
     /// # Errors
     /// The file cannot be read, or is no list of recordings.
     pub fn read(path: &Path) -> Result<Self, FleetError> {
-        let text = std::fs::read_to_string(path).map_err(FleetError::io(path))?;
+        let text = read_text_within(path, &SETTINGS_TEXT)?;
         toml::from_str(&text).map_err(|error| {
             let why = error.message().replace('\n', " ");
             FleetError::content(

@@ -12,6 +12,8 @@ use super::distance_field::DistanceField;
 use super::free_space::{Camera, CameraPose, free_blocks};
 use super::manifest::{rows_of, transform};
 use super::tile_file::Lattice;
+use crate::formats::bounds::MANIFEST_TEXT;
+use crate::formats::read_text_within;
 use crate::owned::DraftFolder;
 use crate::run::store::{BlockFile, Position};
 use crate::run::{BLOCKS_FILE, write_whole};
@@ -253,7 +255,7 @@ impl Submap {
 impl SubmapHeader {
     fn read(folder: &Path) -> Result<Self, FleetError> {
         let path = folder.join(HEAD_FILE);
-        let text = std::fs::read_to_string(&path).map_err(FleetError::io(&path))?;
+        let text = read_text_within(&path, &MANIFEST_TEXT)?;
         serde_json::from_str(&text)
             .map_err(|error| FleetError::content(&path, format!("is no map of a run: {error}")))
     }

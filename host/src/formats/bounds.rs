@@ -7,19 +7,34 @@
 //! | bound | value |
 //! |---|---|
 //! | side of an image | [`MAX_SIDE_PX`] |
-//! | memory to decode one picture, its file included where it is read whole | [`MAX_DECODE_BYTES`] |
+//! | memory to decode one picture | [`MAX_DECODE_BYTES`] |
 //! | scans of a progressive JPEG | [`MAX_JPEG_SCANS`] |
 //! | chunk or record of an MCAP file, packed or not | [`MAX_BAG_RECORD_BYTES`] |
 //! | index of an MCAP file | [`MAX_BAG_INDEX_BYTES`] |
 //! | unpacked chunks for each byte of an MCAP file | [`MAX_BAG_RATIO`] |
 //! | images of a topic; image topics | [`MAX_BAG_IMAGES`], [`MAX_BAG_TOPICS`] |
-//! | text: bytes, lines, bytes of a line | [`CALIBRATION_TEXT`], [`TABLE_TEXT`] |
+//! | text: bytes, lines, bytes of a line | [`CALIBRATION_TEXT`], [`SETTINGS_TEXT`] |
+//! | as above | [`MANIFEST_TEXT`], [`TABLE_TEXT`] |
+//! | line of a table that is read row by row | [`MAX_ROW_BYTES`] |
+//! | XML: elements, attributes of one | [`MAX_XML_NODES`], [`MAX_XML_ATTRIBUTES`] |
+//! | YAML: values, aliases | [`MAX_YAML_NODES`], [`MAX_YAML_ALIASES`] |
+//! | bytes for each value of a depth image in text | [`MAX_VALUE_TEXT_BYTES`] |
+//! | LiDAR scan | [`MAX_SCAN_BYTES`] |
+//! | PLY: header, bytes of a vertex | [`MAX_PLY_HEADER_BYTES`], [`MAX_PLY_VERTEX_BYTES`] |
+//! | COCO: file | [`MAX_COCO_BYTES`] |
+//! | network: file | [`MAX_NETWORK_FILE_BYTES`] |
+//! | address space of a network's process | [`MAX_NETWORK_BYTES`] |
+//! | time of a network for a picture | [`MAX_NETWORK_TIME`] |
+//! | network: pixels of its input, outputs, values of one | [`MAX_NETWORK_INPUT_PX`] |
+//! | as above | [`MAX_NETWORK_OUTPUTS`], [`MAX_NETWORK_VALUES`] |
+//! | snapshot: file, the part about the run | [`MAX_SNAPSHOT_BYTES`], [`MAX_SNAPSHOT_PART_BYTES`] |
 
 use std::fmt;
+use std::time::Duration;
 
 /// Largest width and height of an image, px: those of the mapper.
 pub const MAX_SIDE_PX: usize = dynvox_core::stereo::MAX_IMAGE_SIZE;
-/// Memory that decoding one picture may take, bytes.
+/// Memory that decoding one picture may take, bytes: its file included where it is read whole.
 pub const MAX_DECODE_BYTES: u64 = 96 * MIB;
 /// Scans of a progressive JPEG; encoders write about ten.
 pub const MAX_JPEG_SCANS: usize = 100;
@@ -50,12 +65,60 @@ pub struct TextBound {
     pub line_bytes: usize,
 }
 
-/// Calibrations, settings and manifests.
+/// Calibrations.
 pub const CALIBRATION_TEXT: TextBound =
     TextBound { what: "a calibration", bytes: MIB, lines: 20_000, line_bytes: 1 << 18 };
 /// Tables: poses, times, labels, detections and run-length masks.
 pub const TABLE_TEXT: TextBound =
-    TextBound { what: "a table", bytes: 32 * MIB, lines: 500_000, line_bytes: 1 << 20 };
+    TextBound { what: "a table", bytes: 64 * MIB, lines: 500_000, line_bytes: 1 << 20 };
+
+/// Lists of jobs, alignments and results, which programs write on one line.
+pub const MANIFEST_TEXT: TextBound = TextBound {
+    what: "a manifest",
+    bytes: 32 * MIB,
+    lines: 2_000_000,
+    line_bytes: 32 * MIB as usize,
+};
+/// Settings, plans and summaries.
+pub const SETTINGS_TEXT: TextBound =
+    TextBound { what: "settings", bytes: 8 * MIB, lines: 200_000, line_bytes: 4 << 20 };
+
+/// Bytes of a row of a table that is read row by row.
+pub const MAX_ROW_BYTES: usize = 1 << 20;
+/// Elements of an XML file.
+pub const MAX_XML_NODES: u32 = 10_000;
+/// Attributes of one element, whose names are compared with each other.
+pub const MAX_XML_ATTRIBUTES: usize = 64;
+/// Values of a YAML file.
+pub const MAX_YAML_NODES: usize = 100_000;
+/// Aliases in a YAML file.
+pub const MAX_YAML_ALIASES: usize = 1_000;
+/// Bytes of one value, with its blank, in a depth image that is text.
+pub const MAX_VALUE_TEXT_BYTES: u64 = 16;
+/// Bytes of a LiDAR scan: two million points.
+pub const MAX_SCAN_BYTES: u64 = 32 * MIB;
+/// Bytes of a PLY file's header.
+pub const MAX_PLY_HEADER_BYTES: u64 = 64 << 10;
+/// Bytes of one vertex of a PLY file.
+pub const MAX_PLY_VERTEX_BYTES: usize = 64;
+/// Bytes of a COCO file.
+pub const MAX_COCO_BYTES: u64 = 16 * MIB;
+/// Bytes of a network's file.
+pub const MAX_NETWORK_FILE_BYTES: u64 = 512 * MIB;
+/// Address space of a network's process, bytes.
+pub const MAX_NETWORK_BYTES: u64 = 2_048 * MIB;
+/// Time that a network may take for a picture.
+pub const MAX_NETWORK_TIME: Duration = Duration::from_secs(30);
+/// Pixels of a network's input.
+pub const MAX_NETWORK_INPUT_PX: usize = 1 << 22;
+/// Outputs of a network.
+pub const MAX_NETWORK_OUTPUTS: usize = 16;
+/// Values of one output of a network.
+pub const MAX_NETWORK_VALUES: usize = 1 << 25;
+/// Bytes of a snapshot.
+pub const MAX_SNAPSHOT_BYTES: u64 = 8 << 30;
+/// Bytes of a snapshot's part about the run; the mapper's part is read straight into its slab.
+pub const MAX_SNAPSHOT_PART_BYTES: u64 = 64 * MIB;
 
 /// A number with a comma before each three digits.
 pub fn thousands(number: impl fmt::Display) -> String {
@@ -105,6 +168,22 @@ pub fn check_decoding(width: usize, height: usize, bytes: u64) -> Result<(), Str
     Err(format!(
         "its {width} x {height} px take {needed} to decode; at most {most} are taken for a picture"
     ))
+}
+
+/// The number of values of a network's output.
+///
+/// # Errors
+/// The number and its bound, as the rest of a sentence.
+pub fn check_output(shape: &[usize]) -> Result<usize, String> {
+    let count = shape.iter().try_fold(1usize, |count, side| count.checked_mul(*side));
+    count.filter(|count| *count <= MAX_NETWORK_VALUES).ok_or_else(|| {
+        let sides: Vec<String> = shape.iter().map(usize::to_string).collect();
+        format!(
+            "an output has the shape [{}]; at most {} values of one are read",
+            sides.join(", "),
+            thousands(MAX_NETWORK_VALUES)
+        )
+    })
 }
 
 /// Refuses bytes beyond a bound.

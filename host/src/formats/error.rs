@@ -3,7 +3,7 @@
 use super::bounds::{TABLE_TEXT, TextBound, check_bytes, most_text};
 use super::text::decoded;
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Next action for a file beyond its bounds.
@@ -51,6 +51,15 @@ impl FormatError {
     /// Attaches the path to a failed read.
     pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::Read { path: path.to_path_buf(), source }
+    }
+}
+
+impl From<FormatError> for std::io::Error {
+    fn from(error: FormatError) -> Self {
+        match error {
+            FormatError::Read { source, .. } => source,
+            FormatError::Content { reason, .. } => Self::new(ErrorKind::InvalidData, reason),
+        }
     }
 }
 

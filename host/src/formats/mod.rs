@@ -21,11 +21,13 @@ mod png_numbers;
 mod poses;
 pub mod rle;
 mod rows;
+mod rows_of_file;
 mod run_files;
 #[cfg(test)]
 mod tests;
 mod text;
 mod times;
+mod xml;
 
 pub use capacity::{CapacityFile, CapacityTable};
 pub use checksum::checksum_of;
@@ -41,6 +43,7 @@ pub use picture::{
 pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
+pub use rows_of_file::rows_of_file;
 pub use run_files::{
     BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, SETTINGS_FILE, SUMMARY_FILE, TIMED_TRAJECTORY_FILE,
     TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,

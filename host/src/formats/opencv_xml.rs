@@ -1,7 +1,9 @@
 //! OpenCV's XML: a matrix `depth-frame` of signed 16-bit millimetres, as the original's ELAS tool
 //! wrote it.
 
-use super::{FormatError, Image, read_text};
+use super::bounds::{MAX_VALUE_TEXT_BYTES, TABLE_TEXT, TextBound};
+use super::xml::xml;
+use super::{FormatError, Image, read_text_within};
 use std::path::Path;
 
 /// Name of the matrix.
@@ -16,10 +18,13 @@ const ACTION: &str = "Write it anew with OpenCV's FileStorage, of the images' si
 /// # Errors
 /// The file cannot be read, is not XML, lacks the matrix, or has another size or type.
 pub fn read_opencv_depth(path: &Path, size: (usize, usize)) -> Result<Image<f32>, FormatError> {
-    let text = read_text(path)?;
+    let pixels = (size.0 * size.1) as u64;
+    let bytes = TABLE_TEXT.bytes.max(MAX_VALUE_TEXT_BYTES * pixels);
+    let bound =
+        TextBound { what: "a depth image", bytes, line_bytes: bytes as usize, ..TABLE_TEXT };
+    let text = read_text_within(path, &bound)?;
     let refuse = |reason: String| FormatError::content(path, reason, ACTION);
-    let document = roxmltree::Document::parse(&text)
-        .map_err(|error| refuse(format!("it is not XML: {error}")))?;
+    let document = xml(&text).map_err(refuse)?;
     let matrix = document.root_element().children().find(|node| node.has_tag_name(MATRIX));
     let matrix = matrix.ok_or_else(|| refuse(format!("it holds no matrix {MATRIX}")))?;
     let part = |name: &str| {

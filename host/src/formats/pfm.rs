@@ -1,8 +1,11 @@
 //! Portable float maps: `Pf`, width, height, a scale whose sign tells the byte order, then floats,
 //! the lowest row first.
 
-use super::{FormatError, Image};
+use super::{FormatError, Image, read_bytes_within};
 use std::path::Path;
+
+/// Bytes of a header: its four words, and blanks.
+const HEADER_BYTES: u64 = 256;
 
 /// Next action for a file that is not of this format.
 const ACTION: &str = "Write it anew, as a grey PFM of the images' size";
@@ -13,7 +16,8 @@ const ACTION: &str = "Write it anew, as a grey PFM of the images' size";
 /// # Errors
 /// The file cannot be read, has no header of a grey PFM, or another size.
 pub fn read_pfm(path: &Path, size: (usize, usize)) -> Result<Image<f32>, FormatError> {
-    let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
+    let most = HEADER_BYTES + 4 * (size.0 * size.1) as u64;
+    let bytes = read_bytes_within(path, "a PFM of the images' size", most)?;
     let refuse = |reason: &str| FormatError::content(path, reason, ACTION);
     let (header, body) = header(&bytes)
         .ok_or_else(|| refuse("it does not have the header of a PFM: Pf, width, height, scale"))?;

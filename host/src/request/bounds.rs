@@ -1,7 +1,8 @@
 //! Memory of the mapper: a byte budget, a named profile, or bounds one by one.
 
 use super::{Bytes, RequestError};
-use crate::formats::{CapacityFile, CapacityTable};
+use crate::formats::bounds::SETTINGS_TEXT;
+use crate::formats::{CapacityFile, CapacityTable, read_text_within};
 use dynvox_core::planning::Planning;
 use dynvox_core::rectify::Rectification;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
@@ -155,9 +156,8 @@ pub fn solve(
 /// The bounds in a file; in the error's place a sentence.
 fn read(path: &Path) -> Result<Capacity, String> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).map_err(|error| {
-        format!("{shown} cannot be read. Check the path of --capacity: {error}")
-    })?;
+    let text = read_text_within(path, &SETTINGS_TEXT)
+        .map_err(|error| format!("--capacity cannot be used: {error}"))?;
     let hint = "`dynvox budget --memory 48MiB --image 752x480` prints such a file";
     let file: CapacityFile = toml::from_str(&text).map_err(|error| {
         format!("{shown} is not a capacity: {}. {hint}", error.message().replace('\n', " "))

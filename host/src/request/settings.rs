@@ -1,7 +1,9 @@
 //! Settings: defaults, then the file of `--config`, then each `--set key=value`. Unknown keys are
 //! errors that name the key.
 
+use crate::formats::bounds::SETTINGS_TEXT;
 use crate::formats::calibration::RectifiedSize;
+use crate::formats::read_text_within;
 use crate::synth::StreetConfig;
 use anyhow::{Context, bail};
 use dynvox_core::MapperConfig;
@@ -73,8 +75,8 @@ impl Settings {
         let mut layers = Layers::defaults()?;
         if let Some(path) = file {
             let shown = path.display();
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("{shown} cannot be read. Check the path of --config"))?;
+            let text = read_text_within(path, &SETTINGS_TEXT)
+                .context("the file of --config cannot be used")?;
             let table: Table = text.parse().map_err(|error: toml::de::Error| {
                 anyhow::anyhow!(
                     "{shown} is not TOML: {}. Correct it, or begin with the config.toml of a run",

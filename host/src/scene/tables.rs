@@ -1,6 +1,6 @@
 //! The columns of `frames.csv` and `tracks.csv` that a viewer shows.
 
-use crate::formats::FormatError;
+use crate::formats::{FormatError, rows_of_file};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -62,8 +62,7 @@ pub fn read_rows<R: DeserializeOwned>(
 ) -> Result<(), FormatError> {
     let refuse =
         |error: csv::Error| FormatError::content(path, error.to_string(), "Make the run again");
-    let file = std::fs::File::open(path).map_err(FormatError::read(path))?;
-    for row in csv::Reader::from_reader(std::io::BufReader::new(file)).deserialize() {
+    for row in csv::Reader::from_reader(rows_of_file(path)?).deserialize() {
         sink(row.map_err(refuse)?);
     }
     Ok(())

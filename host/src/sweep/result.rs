@@ -3,6 +3,8 @@
 
 use super::SweepError;
 use crate::evaluate::reference::{EvaluatedFrame, PointOutcomes, Region};
+use crate::formats::bounds::MANIFEST_TEXT;
+use crate::formats::read_text_within;
 use crate::report::Summary;
 use crate::request::Request;
 use crate::run::{RunRecord, write_whole};
@@ -91,7 +93,7 @@ impl RunResult {
     /// # Errors
     /// The file cannot be read, or is not a result.
     pub fn read(path: &Path) -> Result<Option<Self>, SweepError> {
-        let text = match std::fs::read_to_string(path) {
+        let text = match read_text_within(path, &MANIFEST_TEXT).map_err(std::io::Error::from) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(SweepError::Read { path: path.to_path_buf(), source }),

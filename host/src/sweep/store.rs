@@ -1,6 +1,8 @@
 //! A sweep's folder: the plan, a file for each finished run, tables and page of the results so far.
 
 use super::{Plan, RunResult, SweepError, page, table};
+use crate::formats::bounds::MANIFEST_TEXT;
+use crate::formats::read_text_within;
 use crate::owned::{OwnedFolder, create_folder};
 use crate::run::{FolderError, write_whole};
 use std::collections::BTreeMap;
@@ -55,8 +57,8 @@ impl SweepFolder {
     /// There is no plan.
     pub fn plan(&self) -> Result<Plan, SweepError> {
         let path = self.root.join("plan.json");
-        let text = std::fs::read_to_string(&path)
-            .map_err(|source| SweepError::Read { path: path.clone(), source })?;
+        let text = read_text_within(&path, &MANIFEST_TEXT)
+            .map_err(|error| SweepError::Read { path: path.clone(), source: error.into() })?;
         serde_json::from_str(&text)
             .map_err(|error| SweepError::Foreign { path, reason: error.to_string() })
     }

@@ -6,7 +6,7 @@ use crate::cli::{signals, sweep};
 use crate::fleet::{
     self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap,
 };
-use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses};
+use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses, rows_of_file};
 use crate::observe::tables::read_frame_digests;
 use crate::owned::{self, check_overlap, create_folder};
 use crate::report::text::counted;
@@ -165,7 +165,7 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
 /// Reads the camera's poses of a run.
 fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
     let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
-    let rows = read_frame_digests(&std::fs::read_to_string(run_folder.join(FRAMES_FILE))?)?;
+    let rows = read_frame_digests(rows_of_file(&run_folder.join(FRAMES_FILE))?)?;
     Ok(rows
         .iter()
         .zip(poses)

@@ -4,7 +4,8 @@
 //! `K` and their baseline is `(P_left[0,3] - P_right[0,3]) / focal`.
 
 use super::{RectifiedCameras, checked, unusable};
-use crate::formats::{FormatError, read_text};
+use crate::formats::bounds::CALIBRATION_TEXT;
+use crate::formats::{FormatError, read_text_within};
 use dynvox_core::geometry::StereoRig;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use std::path::Path;
@@ -28,7 +29,7 @@ impl KittiCalibration {
     /// `P_rect_00:` is another name of P0, `Tr:` and `R0_rect:` have several. Other lines are
     /// passed over.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
-        Self::parse(&read_text(path)?, path)
+        Self::parse(&read_text_within(path, &CALIBRATION_TEXT)?, path)
     }
 
     pub(super) fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {

@@ -1,7 +1,8 @@
 //! The calibration of a plain stereo folder: KITTI's lines, or a key and a value a line.
 
 use super::{KittiCalibration, checked, unusable};
-use crate::formats::{FormatError, read_text};
+use crate::formats::bounds::CALIBRATION_TEXT;
+use crate::formats::{FormatError, read_text_within};
 use dynvox_core::geometry::StereoRig;
 use std::path::Path;
 
@@ -13,7 +14,7 @@ const KEYS: [&str; 4] = ["focal_px", "center_u_px", "center_v_px", "baseline_m"]
 /// # Errors
 /// The file cannot be read, a line is neither, a key is missing, or the rig cannot be.
 pub fn read_rig(path: &Path) -> Result<StereoRig, FormatError> {
-    let text = read_text(path)?;
+    let text = read_text_within(path, &CALIBRATION_TEXT)?;
     if has_keys(&text) {
         return parse(&text, path).and_then(|rig| checked(rig, path));
     }

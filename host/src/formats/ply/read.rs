@@ -4,12 +4,15 @@
 use super::Axes;
 use super::records::Records;
 use crate::formats::FormatError;
+use crate::formats::bounds::{MAX_PLY_HEADER_BYTES, MAX_PLY_VERTEX_BYTES, bytes_text};
 use dynvox_core::view::Vertex;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
 use std::path::Path;
 
+/// Next action for a file that is cut off.
+const MAKE_ANEW: &str = "Make it again, or copy it anew";
 /// Bytes of a face: the number of its corners, and three of them.
 const FACE_BYTES: usize = 13;
 /// Faces read at once.
@@ -114,11 +117,12 @@ fn header(file: &mut BufReader<File>, path: &Path) -> Result<Header, FormatError
     };
     let (mut layout, mut counts, mut element, mut binary) =
         (VertexLayout::default(), [0u64; 2], String::new(), false);
+    let mut header = file.by_ref().take(MAX_PLY_HEADER_BYTES);
     loop {
         let mut line = String::new();
         // A file without line breaks is no PLY: 4 KiB of a line are enough.
         let read =
-            file.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
+            header.by_ref().take(4_096).read_line(&mut line).map_err(FormatError::read(path))?;
         let words: Vec<&str> = line.split_whitespace().collect();
         match words[..] {
             ["end_header"] => break,
@@ -146,9 +150,16 @@ fn header(file: &mut BufReader<File>, path: &Path) -> Result<Header, FormatError
                     .unwrap_or(layout.axes);
             }
             ["ply"] => {}
-            _ if read == 0 => return Err(refuse("it has no header of a PLY file")),
+            _ if read == 0 => {
+                let most = bytes_text(MAX_PLY_HEADER_BYTES);
+                return Err(refuse(&format!("its first {most} hold no header of a PLY file")));
+            }
             _ => return Err(refuse("its header cannot be read")),
         }
+    }
+    if layout.bytes > MAX_PLY_VERTEX_BYTES {
+        let (found, most) = (layout.bytes, MAX_PLY_VERTEX_BYTES);
+        return Err(refuse(&format!("its vertices have {found} bytes; at most {most} are read")));
     }
     if !binary || layout.position.is_none() {
         return Err(refuse("it is not binary, or its vertices have no positions"));
@@ -166,7 +177,16 @@ impl PlyMesh {
         let Header { layout, counts } = header(&mut file, path)?;
         let ([vertices, triangles], vertices_at) =
             (counts, file.stream_position().map_err(FormatError::read(path))?);
-        let faces_at = vertices_at + vertices * layout.bytes as u64;
+        let damaged =
+            || FormatError::content(path, "it is shorter than its header says", MAKE_ANEW);
+        let bytes = |count: u64, size: usize| count.checked_mul(size as u64).ok_or_else(damaged);
+        let faces_at =
+            bytes(vertices, layout.bytes)?.checked_add(vertices_at).ok_or_else(damaged)?;
+        let end = bytes(triangles, FACE_BYTES)?.checked_add(faces_at).ok_or_else(damaged)?;
+        let len = file.get_ref().metadata().map_err(FormatError::read(path))?.len();
+        if end > len {
+            return Err(damaged());
+        }
         let open = |at: u64| {
             File::open(path)
                 .and_then(|mut file| file.seek(SeekFrom::Start(at)).map(|_| file))

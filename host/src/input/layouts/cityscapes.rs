@@ -6,7 +6,8 @@ use super::kitti::{chosen, sequences};
 use super::names::{pictures_in, stem_of};
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
-use crate::formats::{FormatError, read_text};
+use crate::formats::bounds::CALIBRATION_TEXT;
+use crate::formats::{FormatError, read_text_within};
 use crate::input::data_set::{DataSet, Layout, OpenOptions};
 use crate::input::source::InputError;
 use dynvox_core::geometry::StereoRig;
@@ -149,8 +150,8 @@ fn rig(folder: &Path, sequence: &str) -> Result<StereoRig, FormatError> {
             "Fetch the camera file anew, or give a calibration with --calibration",
         )
     };
-    let camera: CameraFile =
-        serde_json::from_str(&read_text(file)?).map_err(|error| refuse(error.to_string()))?;
+    let camera: CameraFile = serde_json::from_str(&read_text_within(file, &CALIBRATION_TEXT)?)
+        .map_err(|error| refuse(error.to_string()))?;
     let rig = StereoRig {
         focal_px: camera.intrinsic.fx,
         center_u_px: camera.intrinsic.u0,

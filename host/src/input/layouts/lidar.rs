@@ -4,8 +4,9 @@
 //! reflectance. `Tr` carries them to the unrectified camera 0, `R0` turns them into the rectified
 //! one; odometry's calibration has `R0` multiplied in.
 
-use crate::formats::FormatError;
+use crate::formats::bounds::MAX_SCAN_BYTES;
 use crate::formats::calibration::{KittiCalibration, Projection};
+use crate::formats::{FormatError, read_bytes_within};
 use crate::input::source::{InputError, LidarScan};
 use nalgebra::{Matrix3x4, Vector4};
 use std::path::PathBuf;
@@ -65,7 +66,7 @@ impl LidarFiles {
                      or run without --evaluate",
             )
         })?;
-        let bytes = std::fs::read(&path).map_err(FormatError::read(&path))?;
+        let bytes = read_bytes_within(&path, "a LiDAR scan", MAX_SCAN_BYTES)?;
         let (points, rest) = bytes.as_chunks::<POINT_BYTES>();
         if !rest.is_empty() {
             let reason = format!(

@@ -6,7 +6,8 @@ use super::boxes::{DetectedBox, DetectionSource, Detections};
 use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::shapes::{Polygons, around_runs, mask_of_runs};
 use super::{Frames, class_of, coco_class};
-use crate::formats::{FormatError, read_text, rle};
+use crate::formats::bounds::{MAX_COCO_BYTES, TABLE_TEXT, TextBound};
+use crate::formats::{FormatError, read_text_within, rle};
 use crate::input::source::{InputError, InstanceMask, StereoImages};
 use dynvox_core::tracking::Class;
 use serde::Deserialize;
@@ -27,12 +28,29 @@ pub static FORMAT: MaskFormat = MaskFormat {
     },
 };
 
-/// A file of either kind.
+/// A file of annotations.
 #[derive(Deserialize)]
-#[serde(untagged)]
+struct Annotations {
+    images: Vec<ImageEntry>,
+    annotations: Vec<Object>,
+    categories: Vec<Category>,
+}
+
+/// A file of either kind, told by its first sign: trying both would hold the file a second time, in
+/// values.
 enum File {
-    Annotations { images: Vec<ImageEntry>, annotations: Vec<Object>, categories: Vec<Category> },
+    Annotations(Annotations),
     Results(Vec<Object>),
+}
+
+impl File {
+    fn from_text(text: &str) -> serde_json::Result<Self> {
+        if text.trim_start().starts_with('[') {
+            serde_json::from_str(text).map(Self::Results)
+        } else {
+            serde_json::from_str(text).map(Self::Annotations)
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -93,13 +111,19 @@ pub(super) struct Coco {
 impl Coco {
     /// Reads the file, and tells how many of the frames it names.
     pub fn open(path: &Path, frames: Frames) -> Result<(Self, usize), InputError> {
-        let file = serde_json::from_str(&read_text(path)?).map_err(|error| {
+        let bound = TextBound {
+            what: "COCO's JSON",
+            bytes: MAX_COCO_BYTES,
+            line_bytes: MAX_COCO_BYTES as usize,
+            ..TABLE_TEXT
+        };
+        let file = File::from_text(&read_text_within(path, &bound)?).map_err(|error| {
             let reason =
                 format!("it is neither COCO's annotations nor a list of results ({error})");
             InputError::masks_format(FormatError::content(path, reason, ""))
         })?;
         let (images, list, classes) = match file {
-            File::Annotations { images, annotations, categories } => (
+            File::Annotations(Annotations { images, annotations, categories }) => (
                 images,
                 annotations,
                 Some(categories.into_iter().map(|one| (one.id, class_of(&one.name))).collect()),

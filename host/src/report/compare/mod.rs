@@ -4,12 +4,17 @@ mod distance;
 
 pub use distance::{Distance, Outcome};
 
-use crate::formats::{FRAMES_FILE, SETTINGS_FILE, SUMMARY_FILE, TRAJECTORY_FILE, read_poses};
+use crate::formats::bounds::SETTINGS_TEXT;
+use crate::formats::{
+    FRAMES_FILE, FormatError, SETTINGS_FILE, SUMMARY_FILE, TRAJECTORY_FILE, read_poses,
+    read_text_within, rows_of_file,
+};
 use crate::observe::tables::{FrameDigests, read_frame_digests};
 use crate::run::settings::{Setting, differing, settings};
 use dynvox_core::StageDigests;
 use dynvox_core::{Digested, ObjectDigest, ObjectDigests};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A run folder that cannot be compared.
@@ -130,15 +135,15 @@ impl RunDigests {
     /// # Errors
     /// It is not a run folder, is damaged, or an older build wrote it.
     pub fn read(folder: &Path) -> Result<Self, CompareError> {
-        let text = |file: &'static str| {
-            std::fs::read_to_string(folder.join(file)).map_err(|source| CompareError::NoRun {
-                path: folder.to_path_buf(),
-                file,
-                source,
-            })
+        let no_run = |file: &'static str| {
+            let path = folder.to_path_buf();
+            move |error: FormatError| CompareError::NoRun { path, file, source: error.into() }
         };
-        let (frames, config, summary) =
-            (text(FRAMES_FILE)?, text(SETTINGS_FILE)?, text(SUMMARY_FILE)?);
+        let text = |file: &'static str| {
+            read_text_within(&folder.join(file), &SETTINGS_TEXT).map_err(no_run(file))
+        };
+        let frames = rows_of_file(&folder.join(FRAMES_FILE)).map_err(no_run(FRAMES_FILE))?;
+        let (config, summary) = (text(SETTINGS_FILE)?, text(SUMMARY_FILE)?);
         let damaged =
             |file: &str, reason: String| CompareError::Damaged { path: folder.join(file), reason };
         let mut settings = settings(&config)
@@ -151,7 +156,7 @@ impl RunDigests {
                 settings.insert(format!("({key})"), value.to_owned());
             }
         }
-        let mut rows = read_rows(&frames, &folder.join(FRAMES_FILE))?;
+        let mut rows = read_rows(frames, &folder.join(FRAMES_FILE))?;
         let poses = read_poses(&folder.join(TRAJECTORY_FILE))
             .map(|trajectory| trajectory.poses)
             .unwrap_or_default();
@@ -211,9 +216,9 @@ pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareErro
 }
 
 /// The rows of `frames.csv`, by frame.
-fn read_rows(text: &str, path: &Path) -> Result<BTreeMap<usize, Row>, CompareError> {
+fn read_rows(table: impl Read, path: &Path) -> Result<BTreeMap<usize, Row>, CompareError> {
     let damaged = |reason: String| CompareError::Damaged { path: path.to_path_buf(), reason };
-    let rows = read_frame_digests(text).map_err(|error| match missing_column(&error) {
+    let rows = read_frame_digests(table).map_err(|error| match missing_column(&error) {
         Some(column) => CompareError::Column { path: path.to_path_buf(), column },
         None => damaged(match error.position() {
             Some(position) => format!("line {} cannot be read", position.line()),

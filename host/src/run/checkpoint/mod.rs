@@ -29,6 +29,7 @@ pub use manifest::{RunManifest, fingerprint};
 
 use super::state::RunState;
 use super::{FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, write_whole};
+use crate::formats::bounds::{MAX_SNAPSHOT_BYTES, MAX_SNAPSHOT_PART_BYTES, check_bytes};
 use crate::formats::checksum_of;
 use crate::owned::rename_file;
 use crate::request::Plan;
@@ -101,6 +102,11 @@ fn open(path: &Path) -> Result<(BufReader<File>, [u64; 2]), ResumeError> {
     let damaged = || ResumeError::Damaged { path: path.to_path_buf() };
     let mut file = File::open(path).map_err(failed)?;
     let len = file.metadata().map_err(failed)?.len();
+    let bounded = |what: &str, len: u64, most: u64| {
+        let otherwise = |reason| ResumeError::Otherwise { path: path.to_path_buf(), reason };
+        check_bytes(what, len, most).map_err(otherwise)
+    };
+    bounded("a snapshot", len, MAX_SNAPSHOT_BYTES)?;
     let mut head = [0; HEAD];
     file.read_exact(&mut head[..8])
         .map_err(|_| ResumeError::Foreign { path: path.to_path_buf() })?;
@@ -115,6 +121,8 @@ fn open(path: &Path) -> Result<(BufReader<File>, [u64; 2]), ResumeError> {
     let part_len = head[12..].iter().rev().fold(0, |len, byte| len << 8 | u64::from(*byte));
     let content_len = len.checked_sub((HEAD + TAIL) as u64).ok_or_else(damaged)?;
     let mapper_len = content_len.checked_sub(part_len).ok_or_else(damaged)?;
+    // The part is held in memory; the mapper's goes to its slab.
+    bounded("a snapshot's part about the run", part_len, MAX_SNAPSHOT_PART_BYTES)?;
     file.rewind().map_err(failed)?;
     let checksum = checksum_of(&file, HEAD as u64 + content_len).map_err(failed)?;
     let mut tail = [0; TAIL];

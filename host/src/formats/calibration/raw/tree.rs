@@ -1,6 +1,8 @@
 //! YAML, JSON and OpenCV's XML as one tree of values whose errors name line and key.
 
-use crate::formats::{FormatError, read_text};
+use crate::formats::bounds::{CALIBRATION_TEXT, MAX_YAML_ALIASES, MAX_YAML_NODES};
+use crate::formats::xml::xml;
+use crate::formats::{FormatError, read_text_within};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -23,7 +25,7 @@ pub struct Node<'t> {
 impl Tree {
     /// Reads a file as [`Tree::from_text`] does.
     pub fn read(path: &Path) -> Result<Self, FormatError> {
-        Self::from_text(&read_text(path)?, path)
+        Self::from_text(&read_text_within(path, &CALIBRATION_TEXT)?, path)
     }
 
     /// Parses XML or JSON if the file's name or text says so, else YAML. `path` names the text in
@@ -87,7 +89,13 @@ fn from_json(text: &str, path: &Path) -> Result<Value, FormatError> {
 
 fn from_yaml(text: &str, path: &Path) -> Result<Value, FormatError> {
     let text = as_opencv_reads(text.strip_prefix('\u{feff}').unwrap_or(text));
-    let value: Value = serde_saphyr::from_str(&text).map_err(|error| {
+    let options = serde_saphyr::options! {
+        budget: serde_saphyr::budget! {
+            max_nodes: MAX_YAML_NODES,
+            max_aliases: MAX_YAML_ALIASES,
+        },
+    };
+    let value: Value = serde_saphyr::from_str_with_options(&text, options).map_err(|error| {
         let first = error
             .to_string()
             .lines()
@@ -132,8 +140,7 @@ fn as_opencv_reads(text: &str) -> String {
 
 fn from_xml(text: &str, path: &Path) -> Result<Value, FormatError> {
     let refuse = |reason: String| FormatError::content(path, reason, CHECK_WHOLE);
-    let document = roxmltree::Document::parse(text)
-        .map_err(|error| refuse(format!("it is not XML: {error}")))?;
+    let document = xml(text).map_err(refuse)?;
     let root = document.root_element();
     if root.has_tag_name("opencv_storage") {
         Ok(element(root, 0))

@@ -1,6 +1,8 @@
 //! Digests of each frame, read from `frames.csv`.
 
+use crate::formats::bounds::TABLE_TEXT;
 use serde::Deserialize;
+use std::io::Read;
 
 /// Part of a row that a comparison reads.
 #[derive(Deserialize)]
@@ -37,10 +39,10 @@ pub struct FrameDigests {
     pub blocks_used: u32,
 }
 
-/// Reads the digests of every row.
+/// Reads the digests of every row, up to the bound of a table's rows.
 ///
 /// # Errors
 /// A column is missing, or a row cannot be read.
-pub fn read_frame_digests(text: &str) -> Result<Vec<FrameDigests>, csv::Error> {
-    csv::Reader::from_reader(text.as_bytes()).deserialize().collect()
+pub fn read_frame_digests(table: impl Read) -> Result<Vec<FrameDigests>, csv::Error> {
+    csv::Reader::from_reader(table).deserialize().take(TABLE_TEXT.lines).collect()
 }
