@@ -113,6 +113,13 @@ enum Command {
     Completions(manual::CompletionsArgs),
     /// Write the manual: dynvox man | man -l -
     Man(manual::ManArgs),
+    /// Serve a network to the program that started this one
+    #[cfg(feature = "onnx")]
+    #[command(hide = true)]
+    NetworkWorker {
+        /// ONNX file
+        network: std::path::PathBuf,
+    },
 }
 
 /// Exit code of a run whose images would give a meaningless map.
@@ -122,6 +129,10 @@ const INCOMPLETE: u8 = 4;
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
+    #[cfg(feature = "onnx")]
+    if let Ok(program) = std::env::current_exe() {
+        crate::input::masks::run_networks_in(program);
+    }
     let done = match Cli::parse().command {
         None => run::run(&run::RunArgs::default()),
         Some(Command::Run(args)) => run::run(&args),
@@ -142,6 +153,10 @@ pub fn main() -> ExitCode {
             Ok(())
         }
         Some(Command::Man(args)) => manual::man(&args, Cli::command()),
+        #[cfg(feature = "onnx")]
+        Some(Command::NetworkWorker { network }) => {
+            return crate::input::masks::serve_network(&network);
+        }
     };
     match done.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,

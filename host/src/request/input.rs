@@ -99,7 +99,8 @@ fn options(request: &Request) -> OpenOptions {
 pub fn dress(
     request: &Request,
     dataset: Box<dyn FrameSource>,
+    stop: &StopRequest,
 ) -> Result<Box<dyn FrameSource>, RequestError> {
-    let masked = masks::attach(dataset, &request.masks.source, request.masks.every)?;
+    let masked = masks::attach(dataset, &request.masks.source, request.masks.every, stop)?;
     faults::attach(masked, request.input.faults.as_ref()).map_err(RequestError::Invalid)
 }

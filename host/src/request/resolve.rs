@@ -38,7 +38,7 @@ impl Request {
         let recorded = input::open(self, stop)?;
         // Before networks, which would run on every image that is examined.
         let Examined { warnings, interval_s } = examine(self, recorded.as_ref())?;
-        let dataset = input::dress(self, recorded)?;
+        let dataset = input::dress(self, recorded, stop)?;
         let scaled = self.scaled_settings(&dataset.rig(), dataset.size().0)?;
         let (profile, capacity) = self.bounds.resolve(
             dataset.size(),

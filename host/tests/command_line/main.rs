@@ -4,6 +4,7 @@
 
 mod bags;
 mod binary;
+mod bombs;
 mod book;
 mod browser;
 mod calibration;
@@ -20,6 +21,7 @@ mod fixtures;
 mod fleet;
 mod layouts;
 mod masks;
+mod networks;
 mod ownership;
 mod requests;
 mod resume;

@@ -35,6 +35,8 @@ mod yolo;
 pub use choice::{MASK_FORMATS, MaskChoice};
 pub use format::MaskFormat;
 pub use indexed::FORMAT as INDEXED_PNGS;
+#[cfg(feature = "onnx")]
+pub use network::{run_networks_in, serve as serve_network};
 pub use open::attach;
 pub use pairs::{LabelPair, label_pairs};
 pub use save::{save_masks, save_masks_in_order};

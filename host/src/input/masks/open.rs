@@ -9,11 +9,13 @@ use super::network::Networks;
 use super::{MaskChoice, MaskFormat, MaskSource, exact::Exact, noisy::Noisy};
 use crate::input::source::{
     AvailableMasks, FrameMasks, FrameSource, InputError, Overlay, OverlaySource, StereoImages,
+    StopRequest,
 };
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// Lays the chosen masks over a data set, those of every `every`-th frame.
+/// Lays the chosen masks over a data set, those of every `every`-th frame. Where a network takes
+/// long, `stop` ends it.
 ///
 /// # Errors
 /// The source does not exist, has nothing for any frame, or does not fit the data set.
@@ -21,8 +23,10 @@ pub fn attach(
     dataset: Box<dyn FrameSource>,
     choice: &MaskChoice,
     every: NonZeroUsize,
+    stop: &StopRequest,
 ) -> Result<Box<dyn FrameSource>, InputError> {
-    let Some(OpenedSource { source, note, fits_scaled }) = open(dataset.as_ref(), choice)? else {
+    let opened = open(dataset.as_ref(), choice, stop)?;
+    let Some(OpenedSource { source, note, fits_scaled }) = opened else {
         return Ok(dataset);
     };
     let scale = dataset.size().0 as f64 / dataset.full_size().0 as f64;
@@ -43,6 +47,7 @@ struct OpenedSource {
 fn open(
     dataset: &dyn FrameSource,
     choice: &MaskChoice,
+    stop: &StopRequest,
 ) -> Result<Option<OpenedSource>, InputError> {
     let opened = match choice {
         MaskChoice::None | MaskChoice::Motion => return Ok(None),
@@ -54,7 +59,7 @@ fn open(
         )?,
         MaskChoice::Auto => return Ok(available(dataset)),
         MaskChoice::Files(format, path) => given(dataset, format, path)?,
-        MaskChoice::Networks(paths) => networks(dataset, paths)?,
+        MaskChoice::Networks(paths) => networks(dataset, paths, stop)?,
     };
     Ok(Some(opened))
 }
@@ -104,8 +109,12 @@ fn given(
 
 /// Masks of networks.
 #[cfg(feature = "onnx")]
-fn networks(dataset: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, InputError> {
-    let source = Box::new(BoxMasks::of_pictures(Networks::open(paths)?, dataset)?);
+fn networks(
+    dataset: &dyn FrameSource,
+    paths: &[PathBuf],
+    stop: &StopRequest,
+) -> Result<OpenedSource, InputError> {
+    let source = Box::new(BoxMasks::of_pictures(Networks::open(paths, stop)?, dataset)?);
     let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     Ok(OpenedSource {
         source,
@@ -116,7 +125,11 @@ fn networks(dataset: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource
 
 /// Networks in a program that was built without them.
 #[cfg(not(feature = "onnx"))]
-fn networks(_: &dyn FrameSource, paths: &[PathBuf]) -> Result<OpenedSource, InputError> {
+fn networks(
+    _: &dyn FrameSource,
+    paths: &[PathBuf],
+    _: &StopRequest,
+) -> Result<OpenedSource, InputError> {
     let path = paths.first().map_or_else(PathBuf::new, Clone::clone);
     Err(InputError::network(
         &path,

@@ -7,7 +7,7 @@ mod dumps;
 use super::*;
 use crate::formats::rle;
 use crate::input::source::{FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals};
-use crate::input::{self, FrameSource, InputError, OpenOptions, StreetFrames};
+use crate::input::{self, FrameSource, InputError, OpenOptions, StopRequest, StreetFrames};
 use crate::synth::StreetConfig;
 use dynvox_core::masks::PixelBox;
 use image::{ImageBuffer, Luma};
@@ -57,6 +57,15 @@ fn labels(path: &Path, values: &[u16], deep: bool) {
     } else {
         ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([at(u, v) as u8])).save(path).unwrap();
     }
+}
+
+/// Lays masks over a data set, in a run that is not stopped.
+fn attach(
+    dataset: Box<dyn FrameSource>,
+    choice: &MaskChoice,
+    every: NonZeroUsize,
+) -> Result<Box<dyn FrameSource>, InputError> {
+    super::attach(dataset, choice, every, &StopRequest::default())
 }
 
 fn laid_over(root: &Path, choice: &MaskChoice) -> Result<Box<dyn FrameSource>, InputError> {

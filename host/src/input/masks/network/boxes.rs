@@ -69,6 +69,8 @@ pub fn rows<'o>(
         let (class, score) =
             row.best(part.classes).filter(|(_, score)| *score >= part.settings.score_min)?;
         let edges = part.edges(row.edges(part.input));
+        // A width that overflows is no box.
+        edges.iter().all(|edge| edge.is_finite()).then_some(())?;
         Some((row, DetectedBox { class, score: score.min(1.0), edges }))
     })
 }

@@ -31,6 +31,9 @@ pub fn decode(
             continue;
         };
         let edges = part.edges([left, top, right, bottom].map(f64::from));
+        if edges.iter().any(|edge| !edge.is_finite()) {
+            continue;
+        }
         let one = DetectedBox { class, score: score.min(1.0), edges };
         let Some(masks) = format.masks.map(|at| &outputs[at]) else {
             found.boxes.push(one);

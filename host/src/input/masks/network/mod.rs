@@ -1,4 +1,4 @@
-//! Networks of ONNX files, run in this process: their boxes, masks and semantic maps become the
+//! Networks of ONNX files: their boxes, masks and semantic maps become the
 //! masks of a frame.
 //!
 //! What a network's outputs mean is told from their shapes, never from their names (`layout`); what
@@ -6,28 +6,34 @@
 //! given: boxes of one and the semantic map of another name the same objects, and are combined
 //! where boxes are made masks.
 //!
-//! A network runs on the thread that reads frames ahead, beside the mapper, on one thread of its
-//! own: with two it computes other bits. Memory: what the runtime takes; an input and its outputs
-//! at a time. Time: 50 to 100 ms a picture for the small networks this is meant for; boxes in wide
-//! images take three, with two tiles.
+//! A network runs while frames are read ahead, beside the mapper, on one thread: with two it
+//! computes other bits. Memory and time: a process of its own has bounds (`worker`); here are an
+//! input and its outputs at a time. A picture takes 50 to 100 ms with the small networks this is
+//! meant for, and boxes in wide images three times that, with two tiles.
 
+mod arrays;
 mod boxes;
 mod end_to_end;
 mod layout;
 mod model;
 mod picture;
+mod protocol;
 mod prototypes;
+mod runtime;
 mod semantic;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod worker;
+
+pub use worker::{run_networks_in, serve};
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
 use crate::formats::Image;
-use crate::input::source::{InputError, StereoImages};
+use crate::input::source::{InputError, StereoImages, StopRequest};
 use dynvox_core::tracking::Class;
 use layout::Layout;
-use model::{Input, InputValues, Model};
+use model::{Input, InputValues, Model, Output};
 use picture::{Fit, Picture};
 use settings::Settings;
 use std::path::{Path, PathBuf};
@@ -75,10 +81,10 @@ impl Networks {
     /// Loads the networks.
     ///
     /// # Errors
-    /// A file is missing, is not a network that the runtime takes, or has an input that is not one
-    /// picture.
-    pub fn open(paths: &[PathBuf]) -> Result<Self, InputError> {
-        paths.iter().map(|path| Network::open(path)).collect::<Result<_, _>>().map(Self)
+    /// A file is missing, is not a network that the runtime takes, has an input that is not one
+    /// picture, or meets a bound of memory or time.
+    pub fn open(paths: &[PathBuf], stop: &StopRequest) -> Result<Self, InputError> {
+        paths.iter().map(|path| Network::open(path, stop)).collect::<Result<_, _>>().map(Self)
     }
 }
 
@@ -97,16 +103,17 @@ impl DetectionSource for Networks {
 impl Network {
     /// Loads a network and runs it on a grey picture: what its outputs are is known before the
     /// first frame.
-    fn open(path: &Path) -> Result<Self, InputError> {
+    fn open(path: &Path, stop: &StopRequest) -> Result<Self, InputError> {
         let (path, settings) = Settings::beside(path)?;
         let refused = |reason: String| InputError::network(&path, reason);
-        let model = Model::open(&path, &settings).map_err(refused)?;
+        let model = Model::open(&path, &settings, stop).map_err(refused)?;
         let Input { size, bytes, .. } = model.input();
         let grey = Image::new(size.0, size.1, vec![0; size.0 * size.1])
             .ok_or_else(|| refused("its input is empty".to_owned()))?;
         let fit = Fit::new([0, 0, size.0, size.1], size, true);
         let outputs = model
             .run(&Picture::Grey(&grey), &fit, &settings.values(bytes, false))
+            .and_then(numbers)
             .map_err(refused)?;
         let layout = Layout::of(&outputs, size, &settings).map_err(refused)?;
         let classes = settings.classes(layout.class_count(&outputs)).map_err(refused)?;
@@ -147,7 +154,8 @@ impl Network {
         let input = self.model.input().size;
         let fill = self.settings.fill.unwrap_or(self.layout == Layout::Semantic);
         let fit = &Fit::new(part, input, fill);
-        let outputs = self.model.run(picture, fit, &self.values).map_err(refused)?;
+        let outputs =
+            self.model.run(picture, fit, &self.values).and_then(numbers).map_err(refused)?;
         if Layout::of(&outputs, input, &self.settings) != Ok(self.layout) {
             return Err(refused(
                 "its outputs change their shapes from picture to picture. Export it \
@@ -173,6 +181,18 @@ impl Network {
             Layout::EndToEnd(format) => end_to_end::decode(&outputs, format, &part, found),
         }
         Ok(())
+    }
+}
+
+/// Outputs without a value that is no number: comparisons with one would be false, and nothing be
+/// found.
+fn numbers(outputs: Vec<Output>) -> Result<Vec<Output>, String> {
+    match outputs.iter().position(|output| output.values.iter().any(|value| value.is_nan())) {
+        None => Ok(outputs),
+        Some(at) => Err(format!(
+            "its output {at} holds values that are no numbers (nan). Export it anew, or check its \
+             input's mean and scale"
+        )),
     }
 }
 

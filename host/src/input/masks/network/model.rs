@@ -1,11 +1,15 @@
-//! A network in the runtime: its input, and running it.
+//! A network: its input, and running it on parts of pictures.
 
+pub use super::arrays::Output;
+use super::arrays::{InputShape, Numbers, Request};
 use super::picture::{Fit, Picture};
+use super::runtime::Runtime;
 use super::settings::Settings;
-use rten::{DataType, Dimension, NodeId, RunOptions, ThreadPool, Value, ValueType};
-use rten_tensor::prelude::*;
+use super::worker::{self, Worker};
+use crate::formats::bounds::{MAX_NETWORK_INPUT_PX, thousands};
+use crate::input::source::StopRequest;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::Mutex;
 
 /// Grey value of the input outside the picture.
 const GREY: f32 = 114.0;
@@ -29,46 +33,38 @@ pub struct InputValues {
     pub scale: [f32; 3],
 }
 
-/// An output of a network.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Output {
-    pub shape: Vec<usize>,
-    pub values: Vec<f32>,
-    /// True if the values are whole numbers.
-    pub integers: bool,
-}
-
 /// A network that was loaded.
 pub struct Model {
-    model: rten::Model,
-    input_id: NodeId,
+    runner: Runner,
     input: Input,
-    /// One thread: with two the results have other bits.
-    options: RunOptions,
+}
+
+/// Place where a network runs.
+enum Runner {
+    /// In this process.
+    Here(Box<Runtime>),
+    /// In a process of its own, one picture at a time.
+    Apart(Mutex<Worker>),
 }
 
 impl Model {
-    /// Loads a network.
+    /// Loads a network, in a process of its own where the program can be one.
     ///
     /// # Errors
-    /// The runtime refuses it, or it does not have one picture as input.
-    pub fn open(path: &Path, settings: &Settings) -> Result<Self, String> {
-        let model = rten::Model::load_file(path)
-            .map_err(|error| format!("the runtime does not take it ({error})"))?;
-        let [input_id] = model.input_ids() else {
-            return Err(format!(
-                "it has {} inputs, and one picture is given. Export it with one",
-                model.input_ids().len()
-            ));
+    /// The runtime refuses it, it does not have one picture as input, or the picture is too large.
+    pub fn open(path: &Path, settings: &Settings, stop: &StopRequest) -> Result<Self, String> {
+        let (runner, shape) = match worker::program() {
+            Some(program) => {
+                let (worker, shape) = Worker::start(program, path, stop.clone())?;
+                (Runner::Apart(Mutex::new(worker)), shape)
+            }
+            None => {
+                let (runtime, shape) = Runtime::open(path)?;
+                (Runner::Here(Box::new(runtime)), shape)
+            }
         };
-        let info = model.node_info(*input_id);
-        let bytes =
-            info.as_ref().and_then(|info| info.dtype()) == Some(ValueType::Tensor(DataType::UInt8));
-        let shape = info.and_then(|info| info.shape()).unwrap_or_default();
-        let input = Input::of(&shape, bytes, settings)?;
-        let options =
-            RunOptions::default().with_thread_pool(Some(Arc::new(ThreadPool::with_num_threads(1))));
-        Ok(Self { input_id: *input_id, input, options, model })
+        let input = Input::of(&shape, settings)?;
+        Ok(Self { runner, input })
     }
 
     /// The input.
@@ -79,62 +75,27 @@ impl Model {
     /// Runs it on a part of a picture, whose values become as `values` says.
     ///
     /// # Errors
-    /// The runtime fails, or an output is no array of numbers.
+    /// The runtime fails, an output is no array of numbers, or a bound is met.
     pub fn run(
         &self,
         picture: &Picture<'_>,
         fit: &Fit,
         values: &InputValues,
     ) -> Result<Vec<Output>, String> {
-        let failed = |error: &dyn std::fmt::Display| format!("it fails in the runtime ({error})");
-        let input = self.input.value(picture, fit, values).map_err(|error| failed(&error))?;
-        let inputs = vec![(self.input_id, input.into())];
-        let values = self
-            .model
-            .run(inputs, self.model.output_ids(), Some(self.options.clone()))
-            .map_err(|error| failed(&error))?;
-        values
-            .iter()
-            .map(|value| {
-                output(value).ok_or_else(|| {
-                    "an output is no array of numbers. Export it with arrays alone".to_owned()
-                })
-            })
-            .collect()
+        let request = self.input.request(picture, fit, values);
+        match &self.runner {
+            Runner::Here(runtime) => runtime.run(request),
+            Runner::Apart(worker) => match worker.lock() {
+                Ok(mut worker) => worker.run(&request),
+                Err(_) => Err("its process was left while it computed".to_owned()),
+            },
+        }
     }
-}
-
-/// An output's numbers.
-fn output(value: &Value) -> Option<Output> {
-    if let Some(view) = value.as_tensor_view::<f32>() {
-        return Some(Output {
-            shape: view.shape().to_vec(),
-            values: view.to_vec(),
-            integers: false,
-        });
-    }
-    if let Some(view) = value.as_tensor_view::<i32>() {
-        return Some(Output {
-            shape: view.shape().to_vec(),
-            values: view.iter().map(|value| *value as f32).collect(),
-            integers: true,
-        });
-    }
-    let view = value.as_tensor_view::<u8>()?;
-    Some(Output {
-        shape: view.shape().to_vec(),
-        values: view.iter().map(|value| f32::from(*value)).collect(),
-        integers: true,
-    })
 }
 
 impl Input {
     /// Told from a shape; sizes that it leaves open are those of the settings.
-    fn of(shape: &[Dimension], bytes: bool, settings: &Settings) -> Result<Self, String> {
-        let sides: Vec<Option<usize>> = shape
-            .iter()
-            .map(|side| if let Dimension::Fixed(side) = side { Some(*side) } else { None })
-            .collect();
+    fn of(InputShape { sides, bytes }: &InputShape, settings: &Settings) -> Result<Self, String> {
         let shown: Vec<String> = sides
             .iter()
             .map(|side| side.map_or_else(|| "?".to_owned(), |side| side.to_string()))
@@ -160,8 +121,17 @@ impl Input {
             ));
         }
         match (width.or(settings.width), height.or(settings.height)) {
+            (Some(width), Some(height))
+                if width.checked_mul(height).is_none_or(|pixels| pixels > MAX_NETWORK_INPUT_PX) =>
+            {
+                Err(format!(
+                    "its input has {width} x {height} px; at most {} px are given to a network. \
+                     Export it smaller",
+                    thousands(MAX_NETWORK_INPUT_PX)
+                ))
+            }
             (Some(width), Some(height)) if width.min(height) >= 32 => {
-                Ok(Self { size: (width, height), channels_last, bytes })
+                Ok(Self { size: (width, height), channels_last, bytes: *bytes })
             }
             (Some(width), Some(height)) => {
                 Err(format!("its input of {width} x {height} px is too small for a picture"))
@@ -175,7 +145,7 @@ impl Input {
     }
 
     /// The part of a picture as the network takes it.
-    fn value(&self, picture: &Picture<'_>, fit: &Fit, kind: &InputValues) -> Result<Value, String> {
+    fn request(&self, picture: &Picture<'_>, fit: &Fit, kind: &InputValues) -> Request {
         let (width, height) = self.size;
         let mut values = vec![0.0f32; 3 * width * height];
         for at in 0..width * height {
@@ -198,11 +168,12 @@ impl Input {
             }
         }
         let shape = if self.channels_last { [1, height, width, 3] } else { [1, 3, height, width] };
-        if self.bytes {
-            let bytes: Vec<u8> =
-                values.iter().map(|value| value.round().clamp(0.0, 255.0) as u8).collect();
-            return Value::from_shape(shape, bytes).map_err(|error| error.to_string());
-        }
-        Value::from_shape(shape, values).map_err(|error| error.to_string())
+        let byte = |value: &f32| value.round().clamp(0.0, 255.0) as u8;
+        let numbers = if self.bytes {
+            Numbers::Bytes(values.iter().map(byte).collect())
+        } else {
+            Numbers::Floats(values)
+        };
+        Request { shape, numbers }
     }
 }

@@ -1,13 +1,16 @@
 //! What the shapes of a network cannot tell: `MODEL.toml` beside `MODEL.onnx`.
 
 use super::model::InputValues;
-use crate::formats::{FormatError, read_text};
+use crate::formats::bounds::SETTINGS_TEXT;
+use crate::formats::{FormatError, read_text_within};
 use crate::input::masks::{class_of, coco_class};
 use crate::input::source::InputError;
 use dynvox_core::tracking::{Class, Treatment};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
+/// Tiles of a picture at most.
+const MAX_TILES: usize = 16;
 /// Cityscapes' classes in the order of its networks.
 const CITYSCAPES: [&str; 19] = [
     "road",
@@ -101,7 +104,7 @@ impl Settings {
         let is_settings = path.extension().is_some_and(|ending| ending == "toml");
         let file = if is_settings { path.to_path_buf() } else { path.with_extension("toml") };
         let settings = if is_settings || file.is_file() {
-            toml::from_str(&read_text(&file)?).map_err(|error| {
+            toml::from_str(&read_text_within(&file, &SETTINGS_TEXT)?).map_err(|error| {
                 InputError::from(FormatError::content(
                     &file,
                     error.message().to_owned(),
@@ -111,6 +114,10 @@ impl Settings {
         } else {
             Self::default()
         };
+        settings.check().map_err(|reason| {
+            let action = "docs/inputs.md lists the keys of a network's settings";
+            InputError::from(FormatError::content(&file, reason, action))
+        })?;
         let given = if is_settings {
             settings.model.as_ref().map(|model| file.with_file_name("").join(model))
         } else {
@@ -126,12 +133,60 @@ impl Settings {
         }
     }
 
+    /// Refuses values that leave nothing to be found.
+    fn check(&self) -> Result<(), String> {
+        if !(0.0..=1.0).contains(&self.score_min) {
+            return Err(format!("score_min = {} is not within 0 and 1", self.score_min));
+        }
+        let numbers = self.mean.iter().chain(&self.scale).flatten();
+        if numbers.into_iter().any(|number| !number.is_finite()) {
+            return Err("mean or scale is not a finite number".to_owned());
+        }
+        if self.scale.is_some_and(|scale| scale.contains(&0.0)) {
+            return Err("a scale of 0 makes every picture black".to_owned());
+        }
+        if self.tiles.is_some_and(|tiles| tiles > MAX_TILES) {
+            return Err(format!("there are at most {MAX_TILES} tiles"));
+        }
+        let named = |kept: &String| self.names.iter().flatten().any(|name| name == kept);
+        for kept in self.keep.iter().flatten() {
+            if class_of(kept).is_none() && !named(kept) {
+                return Err(format!("`keep` names {}", self.unknown(kept)));
+            }
+        }
+        Ok(())
+    }
+
+    /// An unknown name, with the known one that is nearest to it.
+    fn unknown(&self, name: &str) -> String {
+        let classes = Class::ALL.iter().map(|class| class.name());
+        let known = classes.chain(self.names.iter().flatten().map(String::as_str));
+        let nearest = known
+            .filter(|known| *known != name)
+            .min_by_key(|known| strsim::damerau_levenshtein(known, name))
+            .unwrap_or_default();
+        format!("`{name}`, which is no class; the nearest that is known is `{nearest}`")
+    }
+
     /// Returns the class of each of so many outputs; `None` for those that are not kept. Without a
     /// number, as for a map of integers, there are as many as are named.
     ///
     /// # Errors
-    /// The number of classes has no list that is known.
+    /// The number of classes has no list that is known, or no class is kept.
     pub fn classes(&self, count: Option<usize>) -> Result<Vec<Option<Class>>, String> {
+        let classes = self.all_classes(count)?;
+        if classes.iter().any(Option::is_some) {
+            return Ok(classes);
+        }
+        let first = self.names.iter().flatten().find(|name| class_of(name).is_none());
+        let why =
+            first.map_or_else(String::new, |name| format!(": `names` has {}", self.unknown(name)));
+        Err(format!(
+            "none of its classes is kept, and nothing would be found{why}. Correct its settings"
+        ))
+    }
+
+    fn all_classes(&self, count: Option<usize>) -> Result<Vec<Option<Class>>, String> {
         let named = |name: &str| self.kept(name, class_of(name));
         match (&self.names, count) {
             (Some(names), Some(count)) if names.len() != count => Err(format!(

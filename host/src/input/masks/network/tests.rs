@@ -263,7 +263,7 @@ fn folder(network: &[u8], settings: &str) -> TempDir {
 }
 
 fn refusal(root: &TempDir, name: &str) -> String {
-    Networks::open(&[root.path().join(name)])
+    Networks::open(&[root.path().join(name)], &StopRequest::default())
         .err()
         .map(|error| error.to_string())
         .unwrap_or_default()
@@ -280,7 +280,7 @@ fn a_network_runs_and_its_map_has_the_classes_of_its_settings() {
             "model = \"net.onnx\"\nnames = [\"road\", \"car\", \"person\"]\n",
         )
         .unwrap();
-        let networks = Networks::open(&[root.path().join(name)]).unwrap();
+        let networks = Networks::open(&[root.path().join(name)], &StopRequest::default()).unwrap();
         let regions = networks.detections(0, &images).unwrap().regions.unwrap();
         let car = Class::Car.code() as u8;
         assert!((0..64).all(|u| regions.get(u, 9) == Some(if u < 40 { 0 } else { car })));
@@ -290,7 +290,7 @@ fn a_network_runs_and_its_map_has_the_classes_of_its_settings() {
         "names = [\"road\", \"car\", \"person\"]\nkeep = [\"person\"]\n",
     )
     .unwrap();
-    let regions = Networks::open(&[root.path().join("net.onnx")])
+    let regions = Networks::open(&[root.path().join("net.onnx")], &StopRequest::default())
         .unwrap()
         .detections(0, &images)
         .unwrap()
@@ -338,7 +338,7 @@ fn the_clips_networks_find_the_overtaking_car_in_the_same_pixels_twice() {
         let images = dataset.frame(10).unwrap();
         let masks = || {
             let source = BoxMasks::of_pictures(
-                Networks::open(std::slice::from_ref(&path)).unwrap(),
+                Networks::open(std::slice::from_ref(&path), &StopRequest::default()).unwrap(),
                 dataset.as_ref(),
             )
             .unwrap();
