@@ -10,6 +10,15 @@ const MUTATIONS: u32 = 1_000;
 /// Longest time one input may take. It is far above what any takes: it tells a hang from a slow
 /// machine.
 const MAX_INPUT: Duration = Duration::from_secs(20);
+/// Most memory that all targets together may have taken, KiB. No input is longer than 1 MiB.
+const MAX_RESIDENT_KIB: u64 = 1 << 20;
+
+/// The peak of the resident memory so far, KiB, where the system tells it.
+fn resident_kib() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
 
 /// Runs a target on mutations, and prints how many there were and how many it took.
 fn fuzz(target: &Target) {
@@ -38,6 +47,13 @@ fn fuzz(target: &Target) {
         }
         // No input may take much longer than its size suggests.
         assert!(at.elapsed() < MAX_INPUT, "{} takes {:?} at run {runs}", target.name, at.elapsed());
+        let resident = resident_kib().unwrap_or(0);
+        assert!(
+            resident < MAX_RESIDENT_KIB,
+            "{} or another target takes {} MiB at run {runs}",
+            target.name,
+            resident >> 10
+        );
         runs += 1;
     }
     println!("{}: {runs} runs, {taken} taken, {:.0} s", target.name, begin.elapsed().as_secs_f64());
@@ -93,6 +109,10 @@ targets!(
     stream,
     clip,
     snapshot,
+    sealed_snapshot,
+    bag,
+    mesh,
+    plan,
     settings,
     calls
 );

@@ -14,7 +14,7 @@ use dynvox::formats::{
 };
 use dynvox::input::masks::{MaskChoice, attach};
 use dynvox::input::stream::netpbm::NetpbmPairs;
-use dynvox::input::{OpenOptions, Stacking, open};
+use dynvox::input::{OpenOptions, Stacking, StopRequest, open};
 use dynvox::run::store::BlockFile;
 use dynvox_core::volume::BlockCoord;
 
@@ -27,10 +27,10 @@ pub const VOXEL_M: f32 = 0.05;
 pub const TRUNCATION_M: f32 = 0.25;
 
 /// A folder that goes with its content.
-struct Folder(PathBuf);
+pub(super) struct Folder(PathBuf);
 
 impl Folder {
-    fn new() -> Self {
+    pub fn new() -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let name =
             format!("dynvox-fuzz-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -39,7 +39,11 @@ impl Folder {
         Self(path)
     }
 
-    fn file(&self, name: &str, content: &[u8]) -> PathBuf {
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    pub fn file(&self, name: &str, content: &[u8]) -> PathBuf {
         let path = self.0.join(name);
         fs::write(&path, content).expect("the temporary folder can be written to");
         path
@@ -164,7 +168,7 @@ pub fn masks(bytes: &[u8]) -> bool {
     let Ok(choice) = format!("{choice}{}", from.display()).parse::<MaskChoice>() else {
         return false;
     };
-    attach(source, &choice, NonZeroUsize::MIN)
+    attach(source, &choice, NonZeroUsize::MIN, &StopRequest::default())
         .is_ok_and(|source| source.frame(0).is_ok_and(|frame| !frame.masks.instances.is_empty()))
 }
 

@@ -8,6 +8,7 @@
 //! coverage (`tests/fuzz`).
 
 mod calls;
+mod containers;
 mod files;
 mod mapper;
 mod mutate;
@@ -29,7 +30,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 13] = [
+pub const TARGETS: [Target; 17] = [
     Target { name: "calibration", seeds: seeds::calibrations, run: files::calibration },
     Target { name: "poses", seeds: seeds::poses, run: files::poses },
     Target { name: "times", seeds: seeds::times, run: files::times },
@@ -41,6 +42,10 @@ pub const TARGETS: [Target; 13] = [
     Target { name: "stream", seeds: seeds::stream, run: files::stream },
     Target { name: "clip", seeds: seeds::clip, run: mapper::clip },
     Target { name: "snapshot", seeds: mapper::snapshots, run: mapper::snapshot },
+    Target { name: "sealed_snapshot", seeds: mapper::snapshots, run: mapper::sealed_snapshot },
+    Target { name: "bag", seeds: containers::bags, run: containers::bag },
+    Target { name: "mesh", seeds: containers::meshes, run: containers::mesh },
+    Target { name: "plan", seeds: containers::plans, run: containers::plan },
     Target { name: "settings", seeds: seeds::settings, run: mapper::settings },
     Target { name: "calls", seeds: calls::programs, run: calls::calls },
 ];
