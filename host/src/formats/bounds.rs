@@ -21,7 +21,7 @@
 //! | bytes for each value of a depth image in text | [`MAX_VALUE_TEXT_BYTES`] |
 //! | LiDAR scan | [`MAX_SCAN_BYTES`] |
 //! | PLY: header, bytes of a vertex | [`MAX_PLY_HEADER_BYTES`], [`MAX_PLY_VERTEX_BYTES`] |
-//! | COCO: file | [`MAX_COCO_BYTES`] |
+//! | COCO: file, polygons of an object | [`MAX_COCO_BYTES`], [`MAX_POLYGONS`] |
 //! | network: file | [`MAX_NETWORK_FILE_BYTES`] |
 //! | address space of a network's process | [`MAX_NETWORK_BYTES`] |
 //! | time of a network for a picture | [`MAX_NETWORK_TIME`] |
@@ -101,6 +101,8 @@ pub const MAX_SCAN_BYTES: u64 = 32 * MIB;
 pub const MAX_PLY_HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of one vertex of a PLY file.
 pub const MAX_PLY_VERTEX_BYTES: usize = 64;
+/// Polygons of an object in a COCO file.
+pub const MAX_POLYGONS: usize = 10_000;
 /// Bytes of a COCO file.
 pub const MAX_COCO_BYTES: u64 = 16 * MIB;
 /// Bytes of a network's file.

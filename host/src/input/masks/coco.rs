@@ -3,6 +3,7 @@
 //! or a `bbox` alone.
 
 use super::boxes::{DetectedBox, DetectionSource, Detections};
+use super::coco_values::{Counts, ImageId, Segmentation};
 use super::format::{MaskFormat, OpenedMasks, frames_of};
 use super::shapes::{Polygons, around_runs, mask_of_runs};
 use super::{Frames, class_of, coco_class};
@@ -75,27 +76,6 @@ struct Object {
     segmentation: Option<Segmentation>,
     #[serde(default)]
     iscrowd: u8,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum ImageId {
-    Number(u64),
-    Name(String),
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Segmentation {
-    Polygons(Vec<Vec<f64>>),
-    Runs { size: [usize; 2], counts: Counts },
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum Counts {
-    Text(String),
-    Numbers(Vec<i64>),
 }
 
 /// A file of COCO JSON.

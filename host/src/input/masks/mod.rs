@@ -15,6 +15,7 @@
 mod boxes;
 mod choice;
 mod coco;
+mod coco_values;
 mod exact;
 mod format;
 mod ids;

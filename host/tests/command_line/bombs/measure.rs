@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
+use std::time::Duration;
 use wait4::Wait4;
 
 /// Bounds of the shell around the program, so that a fault does not take the machine: CPU seconds,
@@ -19,7 +20,30 @@ pub struct Usage {
     pub cpu_s: f64,
     /// Peak of the resident memory, bytes.
     pub rss: u64,
-    pub stderr: String,
+    /// Both outputs.
+    pub text: String,
+}
+
+/// Reads a pipe to its end.
+fn whole(mut pipe: impl Read + Send + 'static) -> thread::JoinHandle<String> {
+    thread::spawn(move || {
+        let mut text = Vec::new();
+        let _ = pipe.read_to_end(&mut text);
+        String::from_utf8_lossy(&text).into_owned()
+    })
+}
+
+/// The peak of a process's resident memory, bytes, as long as it lives. What the system counts for
+/// a process that ended includes the tests' own memory, from which it was made.
+fn peak(id: u32) -> u64 {
+    let mut peak = 0;
+    while let Ok(status) = std::fs::read_to_string(format!("/proc/{id}/status")) {
+        let Some(line) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) else { break };
+        let kib = line.split_whitespace().next().and_then(|number| number.parse().ok());
+        peak = peak.max(1_024 * kib.unwrap_or(0u64));
+        thread::sleep(Duration::from_millis(1));
+    }
+    peak
 }
 
 /// Runs the program in a folder.
@@ -30,7 +54,7 @@ pub fn measured(folder: &Path, call: Call) -> Usage {
     let mut child = command
         .current_dir(folder)
         .stdin(stdin)
-        .stdout(Stdio::null())
+        .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -43,12 +67,10 @@ pub fn measured(folder: &Path, call: Call) -> Usage {
             }
         })
     });
-    let mut pipe = child.stderr.take().unwrap();
-    let reader = thread::spawn(move || {
-        let mut text = Vec::new();
-        let _ = pipe.read_to_end(&mut text);
-        String::from_utf8_lossy(&text).into_owned()
-    });
+    let (out, err) = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+    let text = [whole(out), whole(err)];
+    let id = child.id();
+    let watch = thread::spawn(move || peak(id));
     let used = child.wait4().unwrap();
     if let Some(writer) = writer {
         writer.join().unwrap();
@@ -56,7 +78,7 @@ pub fn measured(folder: &Path, call: Call) -> Usage {
     Usage {
         code: used.status.code(),
         cpu_s: (used.rusage.utime + used.rusage.stime).as_secs_f64(),
-        rss: used.rusage.maxrss,
-        stderr: reader.join().unwrap(),
+        rss: watch.join().unwrap(),
+        text: text.map(|reader| reader.join().unwrap()).concat(),
     }
 }

@@ -69,18 +69,18 @@ fn failures(seed: u64) -> Vec<String> {
     for bomb in kinds() {
         let folder = TempDir::new().unwrap();
         let call = (bomb.make)(folder.path(), &mut Random::new(seed));
-        let Usage { code, cpu_s, rss, stderr } = measured(folder.path(), call);
-        println!("{:>6.2} s {:>5} MiB  {}: {}", cpu_s, rss >> 20, bomb.name, stderr.trim());
+        let Usage { code, cpu_s, rss, text } = measured(folder.path(), call);
+        println!("{:>6.2} s {:>5} MiB  {}: {}", cpu_s, rss >> 20, bomb.name, text.trim());
         let faults = [
             (code.is_none_or(|code| code == 0), "its exit code is wrong"),
-            (!stderr.contains(bomb.bound), "its sentence lacks the bound"),
+            (!text.contains(bomb.bound), "its sentence lacks the bound"),
             (cpu_s > MAX_CPU_S * slower, "it takes too much time"),
             (rss > MAX_RSS, "it takes too much memory"),
         ];
         let found = faults.iter().filter(|(is_there, _)| *is_there).map(|(_, fault)| fault);
         failures.extend(found.map(|fault| {
             format!(
-                "{} (seed {seed}): {fault}: exit {code:?}, {cpu_s:.1} s, {} MiB: {stderr}",
+                "{} (seed {seed}): {fault}: exit {code:?}, {cpu_s:.1} s, {} MiB: {text}",
                 bomb.name,
                 rss >> 20
             )

@@ -77,13 +77,13 @@ pub fn widened(path: &Path, random: &mut Random) {
 }
 
 fn attributes(root: &Path, random: &mut Random) -> Call {
-    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!(" a{at}=''")).collect();
+    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!("\na{at}=''")).collect();
     let text = format!("<?xml version='1.0'?><opencv_storage><M1{many}/></opencv_storage>");
     calibration(root, "c.xml", &text)
 }
 
 fn elements(root: &Path, random: &mut Random) -> Call {
-    let many = "<a/>".repeat(above(10_001, random) as usize);
+    let many = "<a/>\n".repeat(above(10_001, random) as usize);
     let text = format!("<?xml version='1.0'?><opencv_storage>{many}</opencv_storage>");
     calibration(root, "c.xml", &text)
 }
@@ -117,7 +117,11 @@ fn yaml_aliases(root: &Path, random: &mut Random) -> Call {
 
 fn yaml_values(root: &Path, random: &mut Random) -> Call {
     let count = 100_001 + random.below(20_000) as usize;
-    calibration(root, "c.yaml", &format!("a: [\n{}0]\n", "0,\n".repeat(count).replace("\n", " ")))
+    calibration(
+        root,
+        "c.yaml",
+        &format!("a: [\n{}0]\n", "0,0,0,0,0,0,0,0,0,0,\n".repeat(count / 10 + 1)),
+    )
 }
 
 fn toml_nesting(root: &Path, random: &mut Random) -> Call {
@@ -234,7 +238,7 @@ fn depth_png(root: &Path, random: &mut Random) -> Call {
 }
 
 fn depth_xml(root: &Path, random: &mut Random) -> Call {
-    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!(" a{at}=''")).collect();
+    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!("\na{at}=''")).collect();
     let text =
         format!("<?xml version='1.0'?><opencv_storage><depth-frame{many}/></opencv_storage>");
     fs::write(root.join("calib.txt"), CALIB).unwrap();
