@@ -1,5 +1,6 @@
-//! Values of COCO JSON that may be of several types. Each is told by its first sign: to try one type
-//! after the other, all of it would first be held as values of any type, 16 times as long as text.
+//! Values of COCO JSON that may be of several types. Each is told by its first sign: to try one
+//! type after the other, all of it would first be held as values of any type, 16 times as long as
+//! text.
 
 use crate::formats::bounds::{MAX_POLYGONS, thousands};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};

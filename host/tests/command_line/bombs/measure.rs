@@ -70,7 +70,7 @@ pub fn measured(folder: &Path, call: Call) -> Usage {
     let (out, err) = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
     let text = [whole(out), whole(err)];
     let id = child.id();
-    let watch = thread::spawn(move || peak(id));
+    let sampler = thread::spawn(move || peak(id));
     let used = child.wait4().unwrap();
     if let Some(writer) = writer {
         writer.join().unwrap();
@@ -78,7 +78,7 @@ pub fn measured(folder: &Path, call: Call) -> Usage {
     Usage {
         code: used.status.code(),
         cpu_s: (used.rusage.utime + used.rusage.stime).as_secs_f64(),
-        rss: watch.join().unwrap(),
+        rss: sampler.join().unwrap(),
         text: text.map(|reader| reader.join().unwrap()).concat(),
     }
 }

@@ -54,10 +54,14 @@ impl Runtime {
         let failed = |error: &dyn std::fmt::Display| format!("it fails in the runtime ({error})");
         let Request { shape, numbers } = request;
         let input = match numbers {
-            Numbers::Bytes(values) => Value::from_shape(shape, values),
-            Numbers::Floats(values) => Value::from_shape(shape, values),
+            Numbers::Bytes(values) => {
+                Value::from_shape(shape, values).map_err(|error| failed(&error))?
+            }
+            Numbers::Floats(values) => {
+                Value::from_shape(shape, values).map_err(|error| failed(&error))?
+            }
         };
-        let inputs = vec![(self.input_id, input.map_err(|error| failed(&error))?.into())];
+        let inputs = vec![(self.input_id, input.into())];
         let outputs = self.model.output_ids();
         if outputs.len() > MAX_NETWORK_OUTPUTS {
             let (found, most) = (outputs.len(), MAX_NETWORK_OUTPUTS);

@@ -141,9 +141,12 @@ impl Worker {
                 Ok(Ok(answer)) => return answer,
                 Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
                 Err(RecvTimeoutError::Timeout) if self.stop.signal().is_some() => {
+                    let _ = self.child.kill();
                     return Err("it was stopped, as the run was".to_owned());
                 }
                 Err(RecvTimeoutError::Timeout) if begin.elapsed() > MAX_NETWORK_TIME => {
+                    // A late answer would be taken for that of the next picture.
+                    let _ = self.child.kill();
                     return Err(format!(
                         "it takes more than the {} s that it may take for a picture. Export it \
                          smaller, or check its loops",
