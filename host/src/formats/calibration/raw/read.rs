@@ -4,8 +4,9 @@ use super::files::Files;
 use super::format::Cameras;
 use super::{CALIBRATION_FORMATS, CalibrationFormat, Placement, RectifiedCameras};
 use super::{StereoCalibration, check, ros};
-use crate::formats::FormatError;
+use crate::formats::bounds::CALIBRATION_TEXT;
 use crate::formats::calibration::hints::{CalibrationHints, LensFamily};
+use crate::formats::{FormatError, read_bytes_within};
 use std::path::{Path, PathBuf};
 
 /// Most files of one calibration.
@@ -147,7 +148,10 @@ fn known_formats() -> String {
 
 /// The text of a file, which may be of Windows' making.
 fn text_of(path: &Path) -> Result<String, FormatError> {
-    let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
+    let bound = &CALIBRATION_TEXT;
+    let bytes = read_bytes_within(path, bound.what, bound.bytes)?;
+    let too_long = |reason| FormatError::content(path, reason, "Check that it is the right file");
+    bound.check_lines(&bytes).map_err(too_long)?;
     String::from_utf8(bytes).map_err(|_| {
         FormatError::content(
             path,
