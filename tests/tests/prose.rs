@@ -15,6 +15,9 @@ use std::path::Path;
 const COLUMNS: usize = 100;
 /// Longest name of a test, characters.
 const NAME_CHARS: usize = 70;
+/// Fewest comment lines in a thousand lines of code, over all folders. The figure only ever rises;
+/// none of them may repeat the code.
+const MIN_COMMENTS: usize = 19;
 /// This test, which names what it forbids.
 const EXEMPT: &str = "tests/tests/prose.rs";
 
@@ -36,11 +39,11 @@ const PHRASES: [&str; 5] = [
 const BOUNDS: [(&str, usize); 7] = [
     ("doc opens with a clause", 0),
     ("doc leans on a neighbour", 0),
-    ("line over 100 columns", 246),
-    ("line over 140 columns", 40),
+    ("line over 100 columns", 220),
+    ("line over 140 columns", 0),
     ("test name over 70 characters", 0),
     ("number without its zero", 0),
-    ("phrase with a plainer word", 1),
+    ("phrase with a plainer word", 0),
 ];
 const CLAUSE: usize = 0;
 const LEANS: usize = 1;
@@ -152,6 +155,35 @@ fn prose_can_be_read_alone_and_lines_fit() {
         .map(|((name, most), count)| format!("{name}: {count}, at most {most}"))
         .collect();
     assert!(over.is_empty(), "{}; run with --nocapture for the lines", over.join("; "));
+}
+
+/// Lines of comments, and lines of code, of a Rust file. Docs and blank lines are neither.
+fn comment_and_code_lines(rust: &str) -> [usize; 2] {
+    let mut counts = [0; 2];
+    let lines = rust.lines().map(str::trim).filter(|line| !line.is_empty());
+    for line in lines.filter(|line| !line.starts_with("///") && !line.starts_with("//!")) {
+        counts[usize::from(!line.starts_with("//"))] += 1;
+    }
+    counts
+}
+
+#[test]
+fn code_has_comments_that_say_why() {
+    let mut sums = [0; 2];
+    for path in files(&["rs"]) {
+        let counts = comment_and_code_lines(&text(&path));
+        sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+    }
+    let [comments, code] = sums;
+    let per_thousand = 1_000 * comments / code;
+    println!("{comments} lines of comments, {code} of code: {per_thousand} in a thousand");
+    assert!(per_thousand >= MIN_COMMENTS, "{per_thousand} in a thousand, at least {MIN_COMMENTS}");
+}
+
+#[test]
+fn docs_and_blank_lines_are_neither_comments_nor_code() {
+    let rust = "//! Module.\n\n/// Item.\nfn f() {\n    // Reason.\n    g(); // not a line\n}\n";
+    assert_eq!(comment_and_code_lines(rust), [1, 3]);
 }
 
 #[test]

@@ -123,7 +123,7 @@ pub struct Options {
     #[arg(long, value_name = "CELLS", help_heading = "Results")]
     #[serde(deserialize_with = "words::parsed")]
     pub planning: Option<WindowSize>,
-    /// Keep distances to obstacles for every cell of that window, and not for a slice of it alone
+    /// Keep distances to obstacles for every cell of that window, not only for its slice
     #[arg(long, requires = "planning", help_heading = "Results")]
     pub planning_3d: bool,
     /// First frame [default: 0]
