@@ -139,6 +139,7 @@ impl<T: Table> Drive<T> {
     fn slice(&mut self) -> Duration {
         let begin = Instant::now();
         for number in self.entered..self.entered + SLICE {
+            // A ring of blocks: the one that is replaced leaves the index first.
             let slot = number % BLOCKS;
             if number >= BLOCKS {
                 self.table.remove(&self.coords, block(number - BLOCKS));
@@ -147,6 +148,7 @@ impl<T: Table> Drive<T> {
             let one = Instant::now();
             self.table.insert(&self.coords, block(number), Slot::new(slot as u32));
             self.insertions_ns.push(one.elapsed().as_nanos() as u32);
+            // Blocks of different ages, as a camera that turns would ask for.
             for back in 0..4 {
                 let number = number - (number % BLOCKS).min(back * 777);
                 black_box(self.table.find(&self.coords, block(number)));
@@ -160,6 +162,7 @@ impl<T: Table> Drive<T> {
         criterion.bench_function(&format!("index_1000_in_and_out/{name}"), |bencher| {
             bencher.iter_custom(|iterations| (0..iterations).map(|_| self.slice()).sum());
         });
+        // A mean hides the rare insertion that rehashes: percentiles show it.
         self.insertions_ns.sort_unstable();
         let share = |share: f64| {
             self.insertions_ns[(share * (self.insertions_ns.len() - 1) as f64) as usize]

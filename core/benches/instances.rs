@@ -75,6 +75,7 @@ fn texture(surface: i64, a: f64, b: f64) -> u8 {
 fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
     let along = frame as f64 * STEP_M;
     let mut nearest = (f64::INFINITY, 0, 0u8);
+    // Road, two walls, then the cars: the nearest surface counts.
     if y > 0.0 {
         let z = EYE_M / y;
         nearest = (z, 0, texture(1, x * z + eye_x, z + along));
@@ -86,6 +87,7 @@ fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
         }
     }
     for (car, &(start, gain, near_x)) in CARS.iter().enumerate() {
+        // A box is met where the ray is inside all three pairs of planes.
         let front = start + gain * frame as f64;
         let slab = |low: f64, high: f64, slope: f64| {
             let (a, b) = (low / slope, high / slope);
@@ -95,6 +97,7 @@ fn meet(x: f64, y: f64, eye_x: f64, frame: usize) -> (usize, u8) {
         let (y_in, y_out) = slab(EYE_M - CAR_M[1], EYE_M, y);
         let (enter, leave) = (x_in.max(y_in).max(front), x_out.min(y_out).min(front + CAR_M[2]));
         if enter < leave && enter < nearest.0 {
+            // Texture in the car's own coordinates moves with the car.
             let own = [x * enter + eye_x - near_x, y * enter, enter - front];
             let (a, b) = if enter > front { (own[2], own[0] + own[1]) } else { (own[0], own[1]) };
             nearest = (enter, car + 1, texture(10 + car as i64, a, b));
@@ -144,6 +147,7 @@ fn render(frame: usize) -> Frame {
                 eye_x,
                 frame,
             );
+            // Masks are those of the left camera.
             if eye_x == 0.0 {
                 shown[at] = car;
             }
@@ -213,12 +217,14 @@ fn map_frames(frames: &[Frame], slab: &mut [u8], count: usize, by_motion: bool) 
         };
         let (timed, begin) = (Timed::default(), ThreadTime::now());
         let report = mapper.step(&seen, &timed).unwrap();
+        // The first frames only fill the map.
         if at >= BEGINNING {
             spent[2] += begin.elapsed();
             spent
                 .iter_mut()
                 .zip(timed.0.into_inner().unwrap())
                 .for_each(|(sum, time)| *sum += time);
+            // The figures count only if as many objects were mapped as were meant to be.
             if by_motion {
                 assert!(report.segmentation.instances >= 4, "frame {at}: {:?}", report.objects);
             } else {

@@ -49,6 +49,7 @@ fn distances(criterion: &mut Criterion) {
         ("200x200 slice", [200, 200, 1]),
         ("100x100x20 window", [100, 100, 20]),
     ] {
+        // The number of obstacles decides how long the envelopes get.
         for (scene, one_in) in [
             ("street", None),
             ("one in 200", Some(200)),
@@ -62,6 +63,7 @@ fn distances(criterion: &mut Criterion) {
             let mut field =
                 DistanceField::new_in(cells, longest, &mut Carver::new(&mut slab, bytes).unwrap());
             criterion.bench_function(&format!("distance {name}, {scene}"), |bencher| {
+                // CPU time of this thread: other work on the machine does not count.
                 bencher.iter_custom(|rounds| {
                     let begin = ThreadTime::now();
                     for _ in 0..rounds {
@@ -112,6 +114,7 @@ fn windows(criterion: &mut Criterion) {
             config.voxel_size_m,
             &mut carver,
         );
+        // One depth image for all poses: only the camera moves.
         let (grey, depth_m) = (vec![128; WIDTH * HEIGHT], canyon());
         let focal_baseline = RIG.focal_baseline_px_m() as f32;
         let disparity_q8: Vec<u16> = depth_m
@@ -123,6 +126,7 @@ fn windows(criterion: &mut Criterion) {
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
         let ground = GroundPlane::find(&RIG, disparity_q8);
         let sight = |t_world_camera| DepthView { rig: &RIG, t_world_camera, disparity_q8, ground };
+        // Twelve views fill the window before anything is measured.
         let poses: Vec<Transform> = (0..12).map(pose).collect();
         for pose in &poses {
             let view = Viewpoint { rig: RIG, width: WIDTH, height: HEIGHT, t_world_camera: *pose };
@@ -162,6 +166,7 @@ fn measure(
             });
         });
     };
+    // The three parts of a planner's cycle.
     bench("free space", &mut || planning.observe(black_box(sight)));
     bench("update", &mut || assert!(planning.update(black_box(volume)).occupied > 0));
     bench("predict", &mut || assert!(planning.predict(black_box(1.0)).occupied > 0));

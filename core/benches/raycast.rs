@@ -53,6 +53,7 @@ fn depth(x: f64, y: f64, z: f64) -> f64 {
                 let (a, b) = (low / slope, high / slope);
                 if a < b { (a, b) } else { (b, a) }
             };
+            // The slabs' entry and exit along the ray.
             let (x_in, x_out) = slab(near, far, x);
             let (y_in, y_out) = slab(0.2, 1.65, y);
             let enter = x_in.max(y_in).max(front);
@@ -114,6 +115,7 @@ fn bench(criterion: &mut Criterion) {
     let mut caster = Raycaster::new_in(&capacity, &RaycastConfig::default(), &mut carver);
     fill(&mut volume);
 
+    // A step of seven frames: the picture before is of no help.
     let mut at = 0;
     criterion.bench_function("raycast", |bencher| {
         bencher.iter(|| {
@@ -122,6 +124,7 @@ fn bench(criterion: &mut Criterion) {
         });
     });
     let mut triangles = 0;
+    // The sum keeps the mesh from being optimised away.
     criterion.bench_function("triangles", |bencher| {
         bencher.iter(|| {
             let mut sum = 0.0;

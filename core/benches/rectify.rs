@@ -44,6 +44,7 @@ fn rectify(criterion: &mut Criterion) {
     let mut rectifier = Rectifier::new_in(&CAPACITY, &mut carver);
     let mut images = RectifiedImages::new_in(&CAPACITY, &mut carver);
     rectifier.prepare(&rectification, &rig).expect("it fits");
+    // Noise: remapping takes the same time for any image.
     let mut random = Random::new(1);
     let mut noise = || -> Vec<u8> { (0..1_392 * 512).map(|_| random.below(256) as u8).collect() };
     let (left, right) = (noise(), noise());
@@ -57,6 +58,7 @@ fn rectify(criterion: &mut Criterion) {
             bencher.iter(|| black_box(rectifier.rectify(&pair, &mut images, &Serial).is_some()))
         });
     }
+    // Once for each calibration, not for each frame.
     group.bench_function("maps, once", |bencher| {
         bencher.iter(|| rectifier.prepare(&rectification, &rig))
     });

@@ -80,6 +80,7 @@ fn bench(criterion: &mut Criterion) {
     let [before, after] = pairs();
     let config = SceneFlowConfig::default();
 
+    // From rest: features only, no matches.
     criterion.bench_function("scene_flow/features of a pair", |bencher| {
         bencher.iter(|| {
             matcher.reset();
@@ -90,6 +91,7 @@ fn bench(criterion: &mut Criterion) {
         [("scene_flow/frame without refinement", false), ("scene_flow/frame", true)]
     {
         let config = SceneFlowConfig { refine, ..config };
+        // The two pairs take turns, so that every frame has one before it.
         let mut odd = false;
         criterion.bench_function(name, |bencher| {
             bencher.iter(|| {
@@ -99,6 +101,7 @@ fn bench(criterion: &mut Criterion) {
             });
         });
     }
+    // Egomotion works on the matches of one frame.
     matcher.reset();
     for pair in [&before, &after] {
         matcher.push(&config, pair[0].view(), pair[1].view(), &Serial);

@@ -32,6 +32,7 @@ fn synthetic() -> Pair {
     let (width, height) = (1242, 375);
     let mut random = Random::new(1);
     let mut texture = || -> Vec<f32> {
+        // Smoothed noise: every place is unlike its neighbours, at all scales.
         let noise: Vec<f32> =
             (0..(width + 256) * height).map(|_| random.below(256) as f32).collect();
         (0..noise.len())
@@ -49,6 +50,7 @@ fn synthetic() -> Pair {
         };
         let pixel = |i: usize| {
             let (u, v) = ((i % width) as f32, i / width);
+            // Disparity grows down the road; pillars stand in front of what is farther.
             let ground = 12.0 + 78.0 * v.saturating_sub(180) as f32 / 195.0;
             let pillar = (v > 60 && (u + shift * 40.0) % 300.0 < 40.0).then_some(40.0);
             let (texture, disparity) =
@@ -61,6 +63,7 @@ fn synthetic() -> Pair {
 }
 
 fn kitti() -> Option<Pair> {
+    // A real pair, where the data set is there.
     let data = std::env::var_os("DYNVOX_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
         PathBuf::from,
@@ -90,6 +93,7 @@ fn stereo(criterion: &mut Criterion) {
         let left = View::new(&pair.left, pair.width, pair.height).unwrap();
         let right = View::new(&pair.right, pair.width, pair.height).unwrap();
         let mut group = criterion.benchmark_group(format!("stereo/{}", pair.name));
+        // Few samples: a whole match takes tens of milliseconds.
         group
             .sample_size(20)
             .measurement_time(Duration::from_secs(4))
@@ -104,6 +108,8 @@ fn stereo(criterion: &mut Criterion) {
                     let mut spent = Duration::ZERO;
                     for _ in 0..times {
                         let mut last = Instant::now();
+                        // The matcher tells when a step ends: the time since the step before is
+                        // that step's.
                         matcher.compute_observed(&config, [left, right], &Serial, |done| {
                             let now = Instant::now();
                             if done == step {

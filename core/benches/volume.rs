@@ -43,6 +43,7 @@ fn kitti() -> Option<Vec<Frame>> {
         baseline_m: 379.8145 / 707.0912,
     };
     let mut frames = Vec::new();
+    // As long as there are disparities: the clip may be shorter than the list of poses.
     for (i, line) in poses.lines().enumerate() {
         let disparity = image::open(root.join(format!("sequences/06/disp_elas/{i:06}.png")))
             .ok()?
@@ -76,6 +77,7 @@ fn canyon() -> Vec<Frame> {
     let rig =
         StereoRig { focal_px: 707.0, center_u_px: 601.0, center_v_px: 183.0, baseline_m: 0.54 };
     let (width, height) = (1226, 370);
+    // A road below and a wall on either side, out to 20 m.
     let mut depth_m = vec![0.0; width * height];
     for (i, depth) in depth_m.iter_mut().enumerate() {
         let (x, y) = (((i % width) as f32 - 601.0) / 707.0, ((i / width) as f32 - 183.0) / 707.0);
@@ -100,6 +102,7 @@ fn canyon() -> Vec<Frame> {
 }
 
 fn bench(criterion: &mut Criterion) {
+    // KITTI where it is there, else a canyon.
     let frames = kitti().unwrap_or_else(canyon);
     let capacity = Capacity { blocks: 120_000, ..Capacity::ONBOARD };
     let config = VolumeConfig::default();
