@@ -99,6 +99,7 @@ impl DynvoxRawRig {
         if self.width == 0 {
             return Ok(None);
         }
+        // Rows, as C has them; the matrix is built of columns.
         let [a, b, c, d, e, f, g, h, i] = self.r_right_left;
         let rig = RawRig {
             left: self.left.camera()?,
@@ -106,6 +107,7 @@ impl DynvoxRawRig {
             r_right_left: [[a, d, g], [b, e, h], [c, f, i]].into(),
             t_right_left_m: self.t_right_left_m.into(),
         };
+        // A zeroed struct asks for the default, as everywhere in this interface.
         let focal_px = if self.focal_px == 0.0 { None } else { Some(self.focal_px) };
         let sizing = Sizing::Given { width: self.width, height: self.height, focal_px };
         Rectification::new(&rig, sizing).map(Some).map_err(|_| DynvoxStatus::Config)

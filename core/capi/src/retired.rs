@@ -77,6 +77,7 @@ impl ObjectSink for Retiring {
         let Some(retire) = self.sink.retire else { return };
         let (summary, volume) =
             (&object.summary, RetiredVolume { volume: object.volume, mesh: self.mesh });
+        // Valid while `retire` runs, and no longer.
         let object = DynvoxRetired {
             id: summary.id,
             segment_id: summary.segment_id,

@@ -144,6 +144,7 @@ impl From<RaycastError> for DynvoxStatus {
 /// A sentence for a status, in static memory; "no such status" for another number.
 #[unsafe(no_mangle)]
 pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
+    // In the order of their numbers, which are part of the binary interface.
     const ALL: [DynvoxStatus; 19] = {
         use DynvoxStatus::*;
         [

@@ -160,6 +160,7 @@ impl From<&Report> for DynvoxReport {
             disparities: report.stereo.valid,
             inliers: report.egomotion.map_or(0, |egomotion| egomotion.inliers),
             blocks: report.blocks.used,
+            // Three ways for a block to be missing from the map; C callers only ask whether one is.
             blocks_peak: report.blocks.peak,
             blocks_capacity: report.blocks.capacity,
             blocks_refused: allocation.refused + allocation.beyond + allocation.unlisted,

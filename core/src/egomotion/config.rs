@@ -55,6 +55,7 @@ pub struct EgomotionConfig {
 impl Default for EgomotionConfig {
     fn default() -> Self {
         Self {
+            // libviso2 takes 200 samples; the search ends earlier where `confidence` is reached.
             samples: 500,
             confidence: 0.9999,
             inlier_px: 2.0,

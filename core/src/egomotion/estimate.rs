@@ -302,8 +302,10 @@ impl<'s> Estimator<'s> {
                 let side = side_weight(config, rig, &point);
                 sums.add(&point, &matrix, rig, |squared| side * robust_weight(config, squared));
             }
+            // Too few inliers, or all of them in one direction.
             let Some(step) = sums.solve() else { return (motion, taken, false) };
             motion = motion.retract(step);
+            // At rest: a further step would not change a digit that counts.
             if largest(step) < REFINE_STEP_MIN {
                 return (motion, taken, true);
             }

@@ -71,6 +71,7 @@ impl<'s> Points<'s> {
     ) -> usize {
         self.len = 0;
         let mut given = 0;
+        // Positions among the matches given, so that inliers can be named to the caller.
         for (index, m) in (0..).zip(matches) {
             given += 1;
             if let Some(point) = triangulate(m, rig) {
@@ -155,6 +156,7 @@ impl<'s> Points<'s> {
         let mut slots = inliers.iter_mut();
         let mut count = 0;
         let mut index = 0;
+        // The callback's result is summed up by `errors` and is not needed here.
         self.errors(&view, 0..self.len, |_, error| {
             if error < inlier_px * inlier_px
                 && let Some(slot) = slots.next()

@@ -59,11 +59,14 @@ impl RightAhead {
         rig: &StereoRig,
         matches: impl Iterator<Item = &'m Match> + Clone,
     ) -> Option<Self> {
+        // Counted first: the rows are made anew for each round, since the core has no heap to hold
+        // them.
         let rows = matches.filter_map(|m| row(rig, m));
         let count = rows.clone().count();
         if count < MATCHES_MIN {
             return None;
         }
+        // The first round has equal weights, the others those of the estimate before.
         let mut estimate = (Vector3::zeros(), 0.0);
         for _ in 0..ROUNDS {
             estimate = solve(rows.clone(), &estimate.0)?;
@@ -126,12 +129,15 @@ mod tests {
     /// shifted by 1 px and a focal length half a percent longer; every fifth is an outlier.
     fn matches(ahead_m: f64, random: &mut Random) -> [Match; 200] {
         core::array::from_fn(|index| {
+            // A random number between 0 and `most`.
             let mut within =
                 |most: f64| f64::from(random.below(1 << 20)) / f64::from(1 << 20) * most;
             let (x, y, z) = (within(20.0) - 10.0, within(4.0) - 2.0, 5.0 + within(40.0));
             let noise_px = within(0.4) - 0.2 + if index % 5 == 0 { within(4.0) } else { 0.0 };
             let left = [600.0 + 700.0 * x / z, 180.0 + 700.0 * y / z];
             let right =
+                // y / (z - ahead_m): the right camera is nearer to the point by what it stands
+                // ahead.
                 [600.0 + 700.0 * (x - 0.5) / z, 181.0 + 703.5 * y / (z - ahead_m) + noise_px];
             let [left, right] = [left, right].map(|at| at.map(|px| px as f32));
             Match {
@@ -228,6 +234,7 @@ mod tests {
     ) -> [Match; 60] {
         core::array::from_fn(|index| {
             let at = index as f64;
+            // Coprime steps, so that rows and disparities are not correlated.
             let (y_px, disparity_px) = (12.0 * (at % 13.0) - 70.0, 8.0 + 3.0 * (at % 11.0));
             let (u_left, v_left) = (300.0 + 5.0 * at, RIG.center_v_px + y_px);
             let v_right = v_left

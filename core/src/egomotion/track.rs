@@ -224,9 +224,11 @@ impl Egomotion {
         motion: &Transform,
         frame_s: f64,
     ) -> bool {
+        // Without a last motion there is nothing that it could contradict.
         if self.motion_s <= 0.0 {
             return true;
         }
+        // The last motion, scaled to this frame's time: frames may be dropped.
         let (then, now) = (
             self.t_current_previous.translation() * (frame_s / self.motion_s),
             motion.translation(),
@@ -286,6 +288,7 @@ impl Egomotion {
     /// this frame's estimate.
     pub fn digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
         let mut hasher = Hasher::default();
+        // Everything the next frame depends on, in the order of a snapshot.
         self.visit(&mut hasher);
         let mut digest = hasher.0;
         if let Some(estimate) = estimate {
@@ -304,6 +307,7 @@ impl Egomotion {
 
     /// Visits every field.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        // Without `..`, so that a new field must be visited to compile.
         let Self {
             t_world_camera,
             t_world_reference,

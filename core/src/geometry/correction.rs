@@ -213,6 +213,7 @@ mod tests {
     #[test]
     fn a_row_equals_its_twin_one_cast_at_a_time() {
         let mut random = Random::new(51);
+        // No correction, usual ones, and some beyond those of any rig: limits must be alike.
         for ([offset_px, slope_px, quartic_px, row_quadratic_px], v) in [
             ([0.0; 4], 0),
             ([-0.7, 0.3, 0.2, 0.0], 5),
@@ -224,6 +225,7 @@ mod tests {
             let correction =
                 DisparityCorrection { offset_px, slope_px, quartic_px, row_quadratic_px }
                     .for_rig(&RIG);
+            // About half of the pixels have no disparity, as in a real image.
             let row: Vec<u16> = (0..1_301)
                 .map(|_| random.below(65_536).saturating_sub(random.below(2) * 65_000) as u16)
                 .collect();
@@ -232,6 +234,7 @@ mod tests {
             for (u, (&before, after)) in row.iter().zip(corrected).enumerate() {
                 let px = f32::from(before) / 256.0;
                 let plain =
+                    // The lowest bit is a flag, which is kept.
                     ((px + correction.at([u as f32 - px, v as f32])) * 256.0 + 0.5) as u16 & !1;
                 assert_eq!(after, if before == 0 || plain == 0 { 0 } else { plain | before & 1 });
             }

@@ -23,6 +23,7 @@ pub fn depth_from_disparity(
     depth_m: &mut ViewMut<'_, f32>,
 ) {
     let depths = DepthRange::new(rig, near_m, far_m);
+    // A width of 0 has no rows, but `chunks_exact_mut` panics on it.
     let width = depth_m.width();
     for (row, disparities) in
         depth_m.pixels_mut().chunks_exact_mut(width.max(1)).zip(disparity_q8.rows())

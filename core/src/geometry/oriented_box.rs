@@ -31,6 +31,7 @@ impl OrientedBox {
         let t_world_box = self.t_box_world.inverse();
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         let [[x, y, z], [x2, y2, z2]] = [self.low_m, self.high_m];
+        // Turned, the extremes along the axes are those of corners.
         for corner in [
             [x, y, z],
             [x2, y, z],
@@ -64,6 +65,7 @@ mod tests {
             high_m: [1.0, 0.5, 2.0],
         };
         let [low, high] = turned.bounds_m();
+        // Four corners of the eight: the others are their opposites.
         for corner in [[-1.0, -0.5, -2.0], [1.0, -0.5, 2.0], [1.0, 0.5, -2.0], [-1.0, 0.5, 2.0]] {
             let inside: [f64; 3] = t_world_box.transform_point(corner.map(|c| 0.99 * c));
             let outside: [f64; 3] = t_world_box.transform_point(corner.map(|c| 1.01 * c));

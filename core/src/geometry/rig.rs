@@ -226,6 +226,7 @@ mod tests {
             let seen = RIG.project(point).unwrap();
             let (forward, back) = (RIG.project_jacobian(point), RIG.triangulate_jacobian(&seen));
             for by in 0..3 {
+                // One coordinate moved by a step, of the point and then of its observation.
                 let moved = |sign: f64| {
                     core::array::from_fn(|axis| {
                         if axis == by { point[axis] + sign * STEP } else { point[axis] }
@@ -247,6 +248,7 @@ mod tests {
                 let (far, near) = (shifted(1.0), shifted(-1.0));
                 for row in 0..3 {
                     let expected = (high[row] - low[row]) / (2.0 * STEP);
+                    // Relative to the derivative where that is large, absolute where it is small.
                     assert!(
                         (forward[row][by] - expected).abs() < 1e-5 * (1.0 + expected.abs()),
                         "{point:?} {row} {by}"

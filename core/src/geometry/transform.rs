@@ -354,12 +354,14 @@ mod tests {
         let part = whole.part_of(5);
         assert!((part.angle_rad() * 5.0 - whole.angle_rad()).abs() < 1e-12);
         assert!((part.distance_m() * 5.0 - whole.distance_m()).abs() < 1e-12);
+        // q and -q are one rotation; the part must take the shorter way for both.
         let negative = Transform { rotation: whole.rotation.map(|value| -value), ..whole };
         let difference = negative.part_of(5).inverse() * part;
         assert!(
             difference.angle_rad() < 1e-9 && difference.distance_m() < 1e-12,
             "both quaternions are one rotation"
         );
+        // Without a rotation the part is exact.
         assert_eq!(
             Transform::from_translation([0.0, 0.0, 6.0]).part_of(3),
             Transform::from_translation([0.0, 0.0, 2.0])
@@ -372,6 +374,7 @@ mod tests {
         let mut number =
             |scale: f64| scale * (f64::from(random.next_u32()) / 2_147_483_648.0 - 1.0);
         for round in 0..2_000 {
+            // Every third turn is close to none, where its axis is hard to tell.
             let angle = if round % 3 == 0 { 1e-10 } else { 3.0 };
             let mut motion = || {
                 Transform::new(
@@ -379,6 +382,7 @@ mod tests {
                     [number(50.0), number(2.0), number(900.0)],
                 )
             };
+            // To the bit, since digests are compared with recorded ones.
             let (a, b) = (motion(), motion());
             assert_eq!(bits(&(a * b)), bits_of(&(isometry(&a) * isometry(&b))));
             assert_eq!(bits(&a.inverse()), bits_of(&isometry(&a).inverse()));

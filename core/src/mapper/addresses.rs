@@ -75,6 +75,7 @@ mod tests {
     /// Bounds of any size up to their limits, small ones as likely as large ones.
     fn random_capacity(random: &mut Random) -> Capacity {
         let mut up_to = |bits: u32| {
+            // A random number of bits first, so that sizes are spread over their magnitudes.
             let bits = random.below(bits + 1);
             random.below(1 << bits) as usize
         };
@@ -112,11 +113,13 @@ mod tests {
             let (bytes, most) = (capacity.bytes() as u64, capacity.bytes_at_most());
             assert!(bytes <= most, "{bytes} of at most {most}: {capacity:?}");
             assert!(
+                // A bound that is far above the sum would refuse capacities that fit.
                 most < 3 * bytes + 2 * FIXED + 16 * OBJECT,
                 "{bytes} of at most {most}, which says little: {capacity:?}"
             );
             passed[usize::from(capacity.is_countable(LAST_OF_32))] += 1;
         }
+        // Without enough capacities on both sides the comparison would test one of them only.
         assert!(
             passed.iter().all(|count| *count > 500),
             "{passed:?} of them beyond and within 4 GiB"

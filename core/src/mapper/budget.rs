@@ -348,8 +348,10 @@ impl<'o> Question<'o> {
             let crop_pixels = if objects > 0 { crop_pixels } else { 0 };
             Capacity { objects, object_blocks, crop_pixels, ..base }
         };
+        // Objects are paid from what the image leaves over.
         let cost = |capacity: &Capacity| capacity.bytes() - base.bytes();
         let pixels = self.width * self.height;
+        // Crops as large as 1.6 images, or as half an image where that costs more than its share.
         let crops = Capacity { crop_pixels: pixels * 8 / 5, ..base };
         let crop_pixels =
             if cost(&crops) <= rest / CROPS_SHARE { crops.crop_pixels } else { pixels / 2 };
@@ -358,6 +360,7 @@ impl<'o> Question<'o> {
         } else {
             rest / OBJECTS_SHARE
         };
+        // From the most objects to none; a number that was asked for stays, with fewer blocks each.
         let steps = OBJECTS.into_iter().map(|(objects, blocks)| match self.options.objects {
             Some(0) => (0, 0),
             Some(asked) => (asked, blocks.max(150)),
@@ -365,6 +368,7 @@ impl<'o> Question<'o> {
         });
         let fits = |step: &(usize, usize)| cost(&with_objects(*step, crop_pixels)) <= share;
         let step =
+            // Where no step fits its share, the last and smallest one is taken.
             steps.clone().find(fits).or_else(|| steps.clone().next_back()).unwrap_or_default();
         self.filled(with_objects(step, crop_pixels))
     }

@@ -229,9 +229,11 @@ mod tests {
         };
         assert_eq!(one.first_difference(&one), None);
         assert_eq!(
+            // The order is that of computation: the map differs because egomotion does.
             one.first_difference(&StageDigests { static_map: 0, egomotion: 0, ..one }),
             Some(Digested::Egomotion)
         );
+        // Object 9 has another content; in the next case object 5 exists on one side only.
         assert_eq!(
             one.first_difference(&StageDigests { objects: objects(&[(2, 7), (9, 2)]), ..one }),
             Some(Digested::Object(9))
@@ -248,8 +250,10 @@ mod tests {
             None,
             "in any order"
         );
+        // Equal outcomes of two frames have two digests.
         assert_ne!(one.whole(0), one.whole(1));
         assert_ne!(one.whole(0), StageDigests { objects: objects(&[(2, 7)]), ..one }.whole(0));
+        // Inputs that lead to equal outcomes are no difference.
         assert_eq!(one.whole(0), StageDigests { input: 0, ..one }.whole(0));
         assert_eq!(format!("{}", one.objects), "2:0000000000000007;9:0000000000000001");
         assert_eq!(format!("{}", ObjectDigests::default()), "-");

@@ -174,10 +174,12 @@ impl<'s> Mapper<'s> {
         slab: &'s mut [u8],
     ) -> Result<(), NewError> {
         *slot = None;
+        // Before anything is taken from the slab.
         Self::check(capacity, config, slab)?;
         let mut carver = Carver::new(slab, capacity.bytes())?;
         let mapper = slot.insert(Self::new_in(capacity, config, &mut carver));
         let prepared = mapper.prepare(config, &carver);
+        // `slot` must not hold a mapper that cannot rectify.
         if prepared.is_err() {
             *slot = None;
         }
@@ -226,6 +228,7 @@ impl<'s> Mapper<'s> {
         Self {
             config: *config,
             capacity: *capacity,
+            // Regions are taken in this order; `Capacity::bytes` adds up the same ones.
             stereo: StereoMatcher::new_in(capacity, carver),
             scene_flow: FlowMatcher::new_in(capacity, carver),
             localization: Localization::new_in(capacity, config, carver),

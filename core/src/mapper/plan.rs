@@ -55,10 +55,12 @@ impl<'s> Mapper<'s> {
             return PlanningReport::default();
         }
         self.planning.read(&self.static_map.volume);
+        // An uncertain object counts as static: its surface is an obstacle where it was last seen.
         let is_static = |posed: &PosedObject<'_, '_>| posed.summary.state != MotionState::Dynamic;
         for posed in self.objects.posed(&self.tracker).filter(is_static) {
             self.planning.add_static(posed.object.volume(), &posed.t_world_object);
         }
+        // A full list of boxes is no error: the report counts what it lacks.
         let mut refused = 0;
         for (track, _) in self.tracker.tracks_with_instances() {
             if let Some(moving) = self.moving_box(track) {

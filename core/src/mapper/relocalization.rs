@@ -201,6 +201,7 @@ mod tests {
     #[test]
     fn an_image_is_like_itself_brighter_or_darker_and_unlike_itself_moved() {
         let mut random = Random::new(3);
+        // Noise has edges everywhere, so that a shift of 7 px correlates no more.
         let grey: [u8; WIDTH * HEIGHT] = core::array::from_fn(|_| 20 + random.below(100) as u8);
         let picture = |shift: usize, gain: u8| -> [[u8; 3]; WIDTH * HEIGHT] {
             core::array::from_fn(|at| [gain * grey[(at + shift) % (WIDTH * HEIGHT)]; 3])
@@ -213,6 +214,8 @@ mod tests {
             edge_correlation(views.0, views.1)
         };
         assert!(correlation(&picture(0, 1)).unwrap() > 0.999);
+        // Twice the brightness has the same edges but for a factor, which the correlation divides
+        // out.
         assert!(correlation(&picture(0, 2)).unwrap() > 0.999);
         assert!(correlation(&picture(7, 1)).unwrap().abs() < 0.2);
         assert_eq!(correlation(&[[0; 3]; WIDTH * HEIGHT]), None, "nothing is shown");

@@ -159,6 +159,7 @@ mod tests {
 
     #[test]
     fn smaller_baselines_give_finer_maps_that_reach_less_far() {
+        // From a small depth camera to a wide automotive rig.
         let scales = [0.025, 0.05, 0.11, 0.25].map(|baseline_m| {
             let rig = rig(450.0, baseline_m);
             Scale::for_rig(&rig, 752)
@@ -176,6 +177,7 @@ mod tests {
     #[test]
     fn every_rig_gives_settings_that_are_valid() {
         let mut tried = 0;
+        // Beyond any real rig on both sides, since users mistype units.
         for focal_px in [20.0, 200.0, 754.0, 4000.0] {
             for baseline_m in [0.0005, 0.01, 0.063, 0.24, 0.54, 3.0, 200.0] {
                 for width in [32, 320, 1242, 8192] {

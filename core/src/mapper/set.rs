@@ -76,6 +76,7 @@ impl Config {
 
     /// Borrows the field of a key.
     pub(super) fn value(&mut self, key: &str) -> Option<Value<'_>> {
+        // A key without a dot has no section, and so no setting.
         let (section, _) = key.split_once('.')?;
         match section {
             "rig" => find(RigConfig::CHECKS, &mut self.rig_settings, key),

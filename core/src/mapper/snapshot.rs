@@ -211,8 +211,10 @@ impl<'s> Mapper<'s> {
         slab: &'s mut [u8],
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<(), RestoreError<E>> {
+        // The capacity and configuration are the caller's; `read` refuses a snapshot of others.
         Self::new_into(slot, capacity, config, slab).map_err(RestoreError::New)?;
         let read = slot.as_mut().map_or(Ok(()), |mapper| mapper.read(source));
+        // Half of the regions may be overwritten: such a mapper must not be used.
         if read.is_err() {
             *slot = None;
         }

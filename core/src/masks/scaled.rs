@@ -94,6 +94,7 @@ fn runs_of_ones(words: impl Iterator<Item = u64>, mut visit: impl FnMut(Range<i3
 /// The pixels of a line of `from` resized to `to` that lie between two of a run, or beyond the
 /// line's ends where these belong to it.
 fn scaled_run(run: Range<i32>, from: i32, to: i32) -> Range<i32> {
+    // The mask reaches the edge, and so does the scaled one, however it is rounded.
     let start = if run.start <= 0 {
         0
     } else {

@@ -221,6 +221,8 @@ impl<'s> Carver<'s> {
 
     /// Takes `bytes` off the front and records them.
     fn take(&mut self, name: &'static str, bytes: usize) -> &'s mut [u8] {
+        // After the first failure everything is empty: constructors need not check each region,
+        // only the carver at the end.
         if self.failure.is_some() {
             return &mut [];
         }
@@ -230,6 +232,7 @@ impl<'s> Carver<'s> {
                 return &mut [];
             }
             Some(rest) => rest.split_off_mut(..bytes).unwrap_or_default(),
+            // A footprint is counted without memory behind it.
             None => &mut [],
         };
         if !self.footprint.record(self.name.unwrap_or(name), bytes) {

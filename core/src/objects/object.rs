@@ -197,10 +197,12 @@ impl<'s> ObjectVolumes<'s> {
             objects: Vec::new(),
         };
         for _ in 0..Self::volumes(capacity) {
+            // One name for all of them: the footprint lists a row, not one for each object.
             let object = carver.group("objects.volumes", |carver| {
                 let volume = Volume::new_in(&bounds, &config, carver);
                 carver.alloc_value("object", OBJECT_BYTES, Object { volume, summary: None })
             });
+            // More volumes than the list can have are not made; `volumes` is bounded by it.
             object.and_then(|object| made.objects.push(object).err());
         }
         made

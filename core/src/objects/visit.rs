@@ -13,6 +13,7 @@ impl Objects<'_> {
     pub(crate) fn check_invariants(&self, invariants: &mut Invariants) {
         self.crops.check_invariants(invariants);
         for object in &self.volumes.objects {
+            // Id 0 is that of no track.
             invariants.require(
                 object.summary.is_none_or(|summary| summary.id != 0),
                 "an object belongs to a track",
@@ -42,6 +43,7 @@ impl Object<'_> {
     /// Visits the object: the digest of its volume stands for that.
     pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { volume, summary } = self;
+        // What an object is read into, when a snapshot is restored; all of it is overwritten.
         let blank = || ObjectSummary {
             id: 0,
             segment_id: 0,

@@ -109,6 +109,7 @@ impl Planning<'_> {
     pub fn cut_slice(&mut self, limits: &Limits) {
         let Self { config, cells, height_map, slice, slice_obstacle, slice_distance, grid, .. } =
             self;
+        // The other settings stay, such as whether unknown cells are obstacles.
         let config = PlanningConfig {
             low_m: limits.low_m,
             high_m: limits.high_m,
@@ -130,8 +131,11 @@ impl Planning<'_> {
         if cell_obstacle.is_empty() {
             return;
         }
+        // The field has its cells column by column, from the lowest up, without the ring of the
+        // window.
         for (at, column) in cell_obstacle.chunks_mut(height.max(1)).enumerate() {
             let first = cells.column(at % width.max(1), at / width.max(1));
+            // The window is a ring in height as well.
             for (z, obstacle) in column.iter_mut().enumerate() {
                 let bits = cells.bits.get(first + cells.level(z)).copied().unwrap_or_default();
                 *obstacle = u8::from(is_obstacle(config, CellState::of(bits) as u8));
@@ -223,6 +227,7 @@ impl Planning<'_> {
     pub fn cell_distance(&self, cell: Cell) -> Option<Distance> {
         let [x, y, z] = self.cells.local(cell)?;
         let [width, _, height] = self.cells.size.map(|side| side.max(1));
+        // The order of `fill_distances`.
         let position = (y * width + x) * height + z;
         let (squared, nearest) = self.cell_distance.get(position)?;
         let column = nearest / height;

@@ -355,6 +355,7 @@ fn surfaces([x, y]: [usize; 2], cell_m: f32, cells: &Cells<'_>) -> impl Iterator
 fn clearance([x, y]: [usize; 2], ground_m: f32, growth: &Growth<'_, '_>) -> f32 {
     let &Growth { config, cell_m, cells, .. } = growth;
     let (column, floor_m) = (cells.column(x, y), cells.origin[2] as f32 * cell_m);
+    // A cell less than its own height above the ground may hold the ground itself.
     let from = max_f32(config.low_m, cell_m);
     let above = (0..cells.size[2])
         .map(|z| (z, floor_m + z as f32 * cell_m - ground_m))

@@ -108,6 +108,7 @@ impl<'s> Planning<'s> {
     pub const fn bytes(capacity: &Capacity) -> usize {
         let [width, length, height] = Cells::sides(capacity);
         let columns = width * length;
+        // Without columns not even the boxes have memory: no window costs nothing.
         if columns == 0 {
             return 0;
         }
@@ -189,7 +190,9 @@ impl<'s> Planning<'s> {
         let Some(cell) = self.grid.cell_at(camera).filter(|_| !self.is_empty()) else { return };
         let [width, length, _] = self.cells.size;
         let below = libm::floor(f64::from(self.config.below_m) / self.grid.cell_m()) as i32;
+        // Before new marks are made, those there are age by one frame.
         self.cells.advance();
+        // The camera in the middle, and `below_m` beneath it.
         self.cells.move_to([
             cell[0] - width as i32 / 2,
             cell[1] - length as i32 / 2,
@@ -256,6 +259,7 @@ impl<'s> Planning<'s> {
         for slot in volume.pool().live() {
             let Some(coord) = volume.blocks().coord(slot) else { continue };
             crossings(volume, slot, coord, config.min_weight, |crossing| {
+                // From the object's frame into the world's, and from there into the window's cells.
                 let point = t_world_object.transform_point(crossing.point_m(voxel_m));
                 let position = grid
                     .cell_at(grid.of_world(point))

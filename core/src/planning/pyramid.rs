@@ -119,6 +119,7 @@ mod tests {
         let pixels = &pixels[..];
         let image = View::new(pixels, width, height).unwrap();
         pyramid.build(image);
+        // The rectangle's greatest pixel, looked up one by one.
         let within = |u: [usize; 2], v: [usize; 2]| {
             (v[0]..=v[1].min(height - 1))
                 .flat_map(|row| {
@@ -133,6 +134,7 @@ mod tests {
                 [a.min(b), a.max(b)]
             };
             let (u, v) = (span(width), span(height));
+            // Texels may reach beyond the rectangle by less than half of its longer side.
             let more = (u[1] - u[0]).max(v[1] - v[0]) + 1;
             let wider = |[low, high]: [usize; 2]| [low.saturating_sub(more / 2), high + more / 2];
             let found = pyramid.greatest(image, u, v);

@@ -293,15 +293,19 @@ impl Leg {
     fn touches(&self, point: [f64; 3], robot: &RobotCylinder) -> Option<f64> {
         let [along, beside] = self.local(point);
         let square = robot.radius_m * robot.radius_m - beside * beside;
+        // The point passes beside the robot.
         if square < 0.0 {
             return None;
         }
         let half = libm::sqrt(square);
+        // The robot's circle covers the point between these two positions of its centre.
         let (begins, leaves) = (along - half, along + half);
         if leaves < 0.0 || begins > self.length_m {
             return None;
         }
+        // Where the leg begins within reach of the point, it touches at once.
         let at_m = if begins > 0.0 { begins } else { 0.0 };
+        // Heights count from the path, which rises along the leg.
         let above_m = point[2] - (self.from[2] + self.rise * at_m);
         (above_m >= robot.low_m && above_m <= robot.high_m).then_some(at_m)
     }

@@ -40,6 +40,7 @@ impl<'s> AlignedImage<'s> {
     ) -> Option<View<'_, u8>> {
         let (width, height) = (right.width(), right.height());
         let bands = Bands::of(height);
+        // The buffer is for the capacity's largest image.
         let rows = clipped_mut(self.0, ..width * height);
         each(executor, zip2(bands.first(), bands.split_mut(rows, width)), |(first, rows)| {
             executor.vectors().run(AlignRows { right, shift, first, rows });
@@ -131,6 +132,7 @@ mod tests {
     #[test]
     fn rows_move_by_parts_of_a_pixel_and_end_at_the_borders() {
         let at = |image: &[u8], u: usize, v: usize| image[v * 70 + u];
+        // The image's rows rise by 4 grey levels each: half a row is two levels.
         let down = moved([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(
             [at(&down, 3, 0), at(&down, 3, 1), at(&down, 3, 10), at(&down, 69, 39)],
@@ -141,6 +143,7 @@ mod tests {
             [at(&up, 3, 0), at(&up, 3, 10), at(&up, 69, 38), at(&up, 69, 39)],
             [5, 45, 156, 156]
         );
+        // However wrong the shift, rows are taken from within the image.
         for nonsense in [f64::NAN, f64::INFINITY, -1e30, 1e30] {
             assert_eq!(moved([nonsense, 0.0, 0.0, 0.0, 0.0, 0.0]).len(), 70 * 40);
         }

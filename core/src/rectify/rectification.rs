@@ -88,6 +88,7 @@ impl Rectification {
         let middle_focal_px =
             0.5 * (rig.left.lens.middle_focal_px() + rig.right.lens.middle_focal_px());
         let (focal_px, [width, height]) = common.sized(sizing, middle_focal_px)?;
+        // The common field of view in the middle of the image.
         let rig = StereoRig {
             focal_px,
             center_u_px: 0.5 * f64::from(width - 1) - focal_px * 0.5 * (common.x[0] + common.x[1]),
@@ -107,6 +108,7 @@ impl Rectification {
         [width, height]: [u32; 2],
     ) -> Result<Self, RectifyProblem> {
         for camera in [&left, &right] {
+            // The map mixes 2 x 2 raw pixels, and has 12 bits before the point.
             align::rotation(&camera.r_rectified_raw)?;
             let side = 2..=MAX_RAW_SIDE;
             if !(side.contains(&camera.raw.width) && side.contains(&camera.raw.height)) {

@@ -195,6 +195,7 @@ impl<'s> Rectifier<'s> {
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         let [pixels, words] = lengths(capacity);
         let camera = |carver: &mut Carver<'s>| {
+            // Without raw images, not even an empty region is listed.
             if pixels == 0 {
                 return Camera::default();
             }
@@ -221,6 +222,7 @@ impl<'s> Rectifier<'s> {
         rectification: &Rectification,
         rig: &StereoRig,
     ) -> Result<(), RectifierError> {
+        // First: nothing is changed after an error.
         rectification.check_fit(&self.capacity)?;
         let [width, height] = [rectification.width as usize, rectification.height as usize];
         for (camera, turned) in
@@ -286,6 +288,7 @@ impl<'s> Rectifier<'s> {
     /// Report of a frame; `None` where nothing is rectified.
     pub(crate) fn report(&self, rectified: &Pair<'_>) -> Option<RectifyReport> {
         self.rectification.as_ref()?;
+        // The digest is of the images that the stages read, and not of the raw ones.
         let mut digest = Digest::default();
         rectified.left.rows().chain(rectified.right.rows()).for_each(|row| digest.bytes(row));
         rectified

@@ -267,16 +267,20 @@ fn inside_sse2(best: Eight<u32>, [low, high]: [__m128i; 2], inside: &Inside<'_>)
 #[inline]
 #[target_feature(enable = "avx2")]
 fn inside_avx2(best: Eight<u32>, sums: __m256i, inside: &Inside<'_>) -> Eight<u32> {
+    // Eight neighbours at once, a lane each.
     let offset = _mm256_add_epi32(
         _mm256_set1_epi32(inside.offset as i32),
         _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
     );
+    // Two coordinates in a lane: within the window where neither exceeds its span.
     let at = _mm256_sub_epi16(cast(*inside.at), _mm256_set1_epi32(both(inside.low)));
     let beyond = _mm256_subs_epu16(at, _mm256_set1_epi32(both(inside.span)));
     let is_within = _mm256_cmpgt_epi32(_mm256_set1_epi32(inside.end as i32), offset);
     let is_inside = _mm256_and_si256(_mm256_cmpeq_epi32(beyond, _mm256_setzero_si256()), is_within);
+    // The sum above, the position below: the least key is the best, and the first of equal ones.
     let key = _mm256_or_si256(_mm256_slli_epi32(sums, OFFSET_BITS as i32), offset);
     let key =
+        // Lanes beyond the window or the list become keys that never win.
         _mm256_or_si256(key, _mm256_andnot_si256(is_inside, _mm256_set1_epi32(NO_FEATURE as i32)));
     cast(_mm256_min_epi32(cast(best), key))
 }

@@ -137,6 +137,7 @@ impl<'s> Camera<'s> {
         config: &SceneFlowConfig,
         vectors: Vectors,
     ) -> FeatureCount {
+        // Two frames in turns: what was current becomes the previous one without a copy.
         self.current = !self.current;
         let [a, b] = &mut self.frames;
         let frame = if self.current { b } else { a };
@@ -161,6 +162,7 @@ impl<'s> Camera<'s> {
     /// Visits the pixels of the current frame; [`Camera::describe`] finds the rest. The frame
     /// before is not looked at again.
     pub(super) fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {
+        // All fields by name: a new one must be placed here to compile.
         let Self {
             frames: [a, b],
             current,

@@ -142,6 +142,7 @@ mod tests {
         let out = Responses { gradient: &mut gradient, blob: &mut blob, corner: &mut corner };
         filter(image, out, &mut vec![0; COLUMN_SUMS * width]);
 
+        // The blob and corner filters of StereoScan, and Sobel's in the middle of 5 x 5.
         let blob_kernel = [
             [-1, -1, -1, -1, -1],
             [-1, 1, 1, 1, -1],
@@ -159,6 +160,7 @@ mod tests {
                     let at = |i: usize| i32::from(pixels[(v + i / 5 - 2) * width + u + i % 5 - 2]);
                     (0..25).map(|i| kernel[i / 5][i % 5] * at(i)).sum()
                 };
+                // A quarter of Sobel's response, cut to 8 bits around 128.
                 let byte = |kernel| ((apply(kernel) >> 2).clamp(-127, 127) + 128) as u16;
                 let i = v * width + u;
                 assert_eq!(i32::from(blob[i]), apply(blob_kernel));

@@ -358,6 +358,7 @@ impl<'s> FlowMatcher<'s> {
 fn images<'a>(
     left: &'a Camera<'_>,
     right: &'a Camera<'_>,
+    // The buffers are for the capacity; the images use their beginning.
     [width, height]: [usize; 2],
 ) -> Images<'a> {
     let ((left_before, left), (right_before, right)) = (left.frames(), right.frames());

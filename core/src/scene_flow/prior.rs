@@ -115,6 +115,7 @@ impl<'s> Prior<'s> {
     /// Returns the reach that a bin learned itself, or else that of the nearest bins in the four
     /// directions.
     fn near(&self, column: usize, row: usize) -> Reach {
+        // A bin without a single match of its own has an empty range.
         let taught = |column: usize, row: usize| {
             self.learned
                 .get(row * self.columns + column)
@@ -130,6 +131,7 @@ impl<'s> Prior<'s> {
             (0..row).rev().find_map(|row| taught(column, row)),
             (row + 1..self.rows).find_map(|row| taught(column, row)),
         ];
+        // A reach that holds all four: a search too wide only costs time.
         sides.into_iter().flatten().fold(NOTHING, |a, b| Reach {
             to_previous_right: united(a.to_previous_right, b.to_previous_right),
             to_current_right: united(a.to_current_right, b.to_current_right),

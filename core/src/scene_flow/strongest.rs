@@ -61,6 +61,7 @@ impl<'a> Strongest<'a> {
         [width, height]: [usize; 2],
         wanted: usize,
     ) -> Self {
+        // Cells grow until each can keep the least quota of each class.
         let mut shift = CELL_SHIFT;
         let mut shape = Shape::new(width, height, 1 << shift);
         while shift < MAX_CELL_SHIFT && CLASSES * QUOTA_MIN * shape.cells() > wanted {

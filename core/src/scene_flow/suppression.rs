@@ -323,11 +323,13 @@ mod tests {
         let mut found = Vec::new();
         for v in FEATURE_MARGIN..height - FEATURE_MARGIN {
             for u in FEATURE_MARGIN..width - FEATURE_MARGIN {
+                // Minima are maxima of the negated response.
                 let here = sign * response[v * width + u];
                 let mut peak = here >= response_min;
                 for y in v.saturating_sub(radius)..=(v + radius).min(height - 1) {
                     for x in u.saturating_sub(radius)..=(u + radius).min(width - 1) {
                         let there = sign * response[y * width + x];
+                        // Of equal ones the first in scan order is the peak.
                         peak &= there < here || (there == here && (y, x) >= (v, u));
                     }
                 }

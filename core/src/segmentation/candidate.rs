@@ -66,6 +66,7 @@ impl Candidate {
     pub fn is_neighbour(&self, other: &Self, reach_px: f64) -> bool {
         let depth_m = f64::from(self.point_m[2]);
         let apart = |a: f32, b: f32| libm::fabs(f64::from(a) - f64::from(b));
+        // Within an object disparities differ by a share of them, and at least by their noise.
         let disparity_px =
             max_f64(DISPARITY_SHARE * f64::from(self.disparity_px), DISPARITY_MIN_PX);
         if apart(self.u, other.u) > reach_px
@@ -75,6 +76,8 @@ impl Candidate {
             return false;
         }
         let side_m = motion_tolerance_m(depth_m);
+        // Along the ray the motion is known less well than across it, by both points' own
+        // deviations.
         let along_m = side_m + f64::from(self.depth_sigma_m) + f64::from(other.depth_sigma_m);
         let [[x, y, z], [x2, y2, z2]] = [self.motion_m, other.motion_m];
         apart(x, x2) < side_m && apart(y, y2) < side_m && apart(z, z2) < along_m

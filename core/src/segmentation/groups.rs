@@ -187,6 +187,7 @@ impl Members<'_> {
         values.iter_mut().zip(members).for_each(|(value, member)| *value = of(member));
         let rank = (self.count.saturating_sub(1)) * permille / 1000;
         let mut selected = 0u32;
+        // The bits from the highest: one is set where at most `rank` values lie below.
         for bit in (0..u32::BITS).rev() {
             let candidate = selected | 1 << bit;
             if values.iter().filter(|value| ordered(**value) < candidate).count() <= rank {

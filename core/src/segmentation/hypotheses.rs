@@ -129,6 +129,7 @@ impl<'s> Hypotheses<'s> {
         let frames_most = u32::from(PREDICT_FRAMES) + HIDDEN_FRAMES;
         for index in 0..self.len {
             let Some(mut hypothesis) = self.table.get(index).copied() else { break };
+            // It stays for one more frame, in which its trail is told.
             let is_given_up = hypothesis.is_confirmed() && hypothesis.missed == frames_most + 1;
             if is_given_up {
                 hypothesis.end_unmasked();
@@ -139,6 +140,7 @@ impl<'s> Hypotheses<'s> {
             } else {
                 is_recent
             };
+            // The kept ones move up in place.
             if let Some(slot) = self.table.get_mut(kept).filter(|_| stays) {
                 *slot = hypothesis;
                 kept += 1;
@@ -273,6 +275,7 @@ mod tests {
         );
         assert!(!boxes[0].contains([-0.2, 1.1, 10.0]), "not the ground below it");
         assert!(frame(&[moving], true).is_empty(), "its mask was shown");
+        // Twenty frames are more than a hypothesis is searched for.
         let lost: u32 =
             (0..20).map(|_| frame(&[], false).iter().map(Trail::frames).sum::<u32>()).sum();
         assert_eq!(

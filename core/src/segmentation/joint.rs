@@ -74,6 +74,7 @@ impl<'m> FarMatches<'m> {
     /// Adds a match that is far, and not the ground's; beyond the bound none is added.
     pub fn add(&mut self, m: &Match, index: usize, residual: &Residual, candidate: bool) {
         let depth_m = residual.point_m.z;
+        // Without a known ground nothing can be told from it, and all counts.
         let above_m = self.ground.map(|ground| ground.above_m(residual.point_m.into()));
         let is_tested = depth_m > FROM_M
             && above_m.is_none_or(|above_m| above_m > ABOVE_MIN_M && above_m < ABOVE_MAX_M);
@@ -153,6 +154,7 @@ impl FarMatch {
         }
         let share_px = DISPARITY_SHARE * f64::from(d);
         let disparity_px = if share_px > DISPARITY_MIN_PX { share_px } else { DISPARITY_MIN_PX };
+        // Neighbours of one object are off in the same direction, by about as much.
         let residuals = self.residual_px.iter().zip(other.residual_px).zip(RESIDUAL_PX);
         f64::from(apart(d, d2)) < disparity_px
             && residuals

@@ -85,6 +85,7 @@ impl<'a> Lattice<'a> {
 
     /// The pixels in the middle of the marked cells.
     pub fn marked(&self, cells: &[u8], pixels: &PixelBox) -> impl Iterator<Item = [usize; 2]> {
+        // Masks may begin outside the image.
         let cell = |px: i32| usize::try_from(px).unwrap_or(0) / CELL_PX;
         let (columns, rows) = (
             cell(pixels.left)..cell(pixels.left + pixels.width - 1) + 1,
@@ -195,6 +196,8 @@ impl<'a> Lattice<'a> {
             return;
         }
         let reach_px = max_f64(BLOCK_SHARE * disparity_px, BLOCK_PX);
+        // The cell must show the match's surface: a match on a pole does not block the wall behind
+        // it.
         let is_same = |other_px: f64| libm::fabs(other_px - disparity_px) < reach_px;
         let slot = blocked.get_mut(row * self.columns + column);
         if let Some(slot) =
@@ -232,6 +235,7 @@ impl<'a> Lattice<'a> {
         let is_marked = |cells: &[u8], column: usize, row: usize| {
             bounds.contains(column, row) && cells.get(row * self.columns + column) == Some(&GROWN)
         };
+        // In place: cells filled here are `FILLED` and not `GROWN`, and so do not count as marked.
         for (column, row) in bounds.cells() {
             let is_between = (is_marked(cells, column.wrapping_sub(1), row)
                 && is_marked(cells, column + 1, row))
@@ -251,10 +255,12 @@ impl<'a> Lattice<'a> {
         for row in bounds.top..bounds.bottom {
             let at = |column: usize| row * self.columns + column;
             let is_marked = |column: &usize| cells.get(at(*column)).is_some_and(|cell| *cell > 0);
+            // The mask's leftmost cell of the row.
             let Some(first) = (bounds.left..bounds.right).find(is_marked) else { continue };
             let own_px = self.disparity_px(self.pixel(first, row)).unwrap_or_default();
             let is_unseen =
                 (0..first).all(|column| self.disparity_px(self.pixel(column, row)).is_none());
+            // Farther from the border than its disparity, the right camera would see it.
             if is_unseen && ((first * CELL_PX) as f64) < own_px + BORDER_PX {
                 let unseen = cells.get_mut(at(bounds.left)..at(first)).unwrap_or_default();
                 unseen.fill(FILLED);
@@ -274,6 +280,7 @@ impl<'a> Lattice<'a> {
         let (top, bottom) =
             (marked().map(|(_, row)| row).min()?, marked().map(|(_, row)| row).max()?);
         let side = |first: usize, last: usize, size: usize| {
+            // The last column and row of cells may end with the image.
             ((last + 1) * CELL_PX).min(size) - first * CELL_PX
         };
         Some(PixelBox {

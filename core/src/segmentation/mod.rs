@@ -170,6 +170,7 @@ impl<'s> MotionSegmenter<'s> {
 
     /// Visits what outlives a frame.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        // Without `..`: a new field must be placed here to compile.
         let Self {
             candidates: _,
             is_candidate: _,

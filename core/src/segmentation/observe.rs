@@ -78,12 +78,14 @@ impl MotionSegmenter<'_> {
         search: &mut PatchSearch<'_, '_>,
         found: &mut Found,
     ) -> usize {
+        // The report counts the dense matches alone: that of the sparse ones is dropped.
         let len = self.collect(model, sparse, &mut SegmentationReport::default());
         let candidates = self.candidates.get_mut(..len).unwrap_or_default();
         groups::join(candidates, model.rig.focal_px);
         let marked = free_matches(sparse, self.is_candidate);
         let mut groups = heapless::Vec::<Group, MAX_GROUPS>::new();
         found.report.refused += groups::select(model, candidates, marked, self.values, &mut groups);
+        // Posts of a fence match their neighbours and seem to move.
         groups.retain(|group| !search.is_repeated(model, candidates, group));
         found.report.refused += groups::add(&mut found.groups, &groups, MEMBERS_MIN);
         len

@@ -186,6 +186,7 @@ impl<'a, 's> PatchSearch<'a, 's> {
         let (mut still, mut searched) = (0u32, 0u32);
         for member in candidates.iter().filter(|member| member.is_of(group.first)).take(MAX_PATCHES)
         {
+            // The budget of the frame: without any left, what was found so far decides.
             let Some(left) = self.left.checked_sub(1) else { break };
             self.left = left;
             let [u, v, disparity_px] = member.position();

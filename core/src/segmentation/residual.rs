@@ -69,6 +69,7 @@ impl<'a> StaticModel<'a> {
         t_current_previous: &Transform,
         bias_px: [f64; 2],
     ) -> Self {
+        // Variances, px².
         let square = |sigma: f32| f64::from(sigma) * f64::from(sigma);
         Self {
             config,

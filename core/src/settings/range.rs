@@ -49,6 +49,7 @@ impl Range {
     /// assert!(!Range::Any.contains(f64::NAN), "no setting is NaN");
     /// ```
     pub fn contains(self, number: f64) -> bool {
+        // Bounds are of `f32`, as most settings, and compared in `f64`, which is exact.
         let at_least = |low: f32| number >= f64::from(low);
         let above = |low: f32| number > f64::from(low);
         let at_most = |high: f32| number <= f64::from(high);

@@ -48,6 +48,7 @@ mod tests {
 
     #[test]
     fn a_step_of_the_checksum_can_be_undone() {
+        // An odd multiplier has an inverse, so that no two states become one.
         assert_eq!(MULTIPLIER.wrapping_mul(inverse()), 1);
         let mut random = Random::new(3);
         let mut any =
@@ -56,6 +57,7 @@ mod tests {
             let (state, word) = (any(), any());
             let mut sum = Checksum(state);
             sum.step(word);
+            // Backwards: first the rotation, then the product.
             let undone = sum.0.rotate_right(29).wrapping_mul(inverse());
             assert_eq!(
                 (undone ^ word, undone ^ state),
@@ -68,10 +70,12 @@ mod tests {
     #[test]
     fn every_bit_of_a_piece_of_any_length_counts() {
         let bytes: [u8; 67] = core::array::from_fn(|at| (at * 37) as u8);
+        // Lengths around the word of eight bytes, which is taken whole.
         for len in [1, 7, 8, 9, 64, 67] {
             let of = |piece: &[u8]| {
                 let mut sum = Checksum::new();
                 sum.take(piece);
+                // A suffix: the difference must not be lost in what follows.
                 sum.take(&bytes);
                 sum.0
             };

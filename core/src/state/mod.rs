@@ -144,6 +144,7 @@ pub(crate) trait Visitor {
         match present {
             0 => *value = None,
             1 => visit(self, value.get_or_insert_with(blank)),
+            // Neither 0 nor 1 can have been written.
             _ => self.refuse(),
         }
     }

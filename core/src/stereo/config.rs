@@ -112,6 +112,7 @@ impl StereoConfig {
             consistency_threshold: 2,
             speckle_similarity: 1,
             speckle_size: 200,
+            // Not of libelas, and off.
             lone_share: 0.0,
             lone_gap: 70,
             gap_width: 3,

@@ -144,6 +144,7 @@ impl<'s> Triangulation<'s> {
     pub fn add(&mut self, point: SupportPoint) -> bool {
         let key = |p: &SupportPoint| (p.v, p.u);
         let points = self.points.get_mut(..self.len).unwrap_or_default();
+        // From the end: points come nearly sorted, and most belong last.
         let at = points.iter().rposition(|other| key(other) <= key(&point));
         if let Some(twin) =
             at.and_then(|i| points.get_mut(i)).filter(|other| key(other) == key(&point))
@@ -152,7 +153,9 @@ impl<'s> Triangulation<'s> {
             return true;
         }
         let at = at.map_or(0, |i| i + 1);
+        // All behind it move by one.
         let Some(behind) = self.points.get_mut(at..self.len + 1) else { return true };
+        // The last swap carries out the unused slot at the end.
         let mut carried = point;
         behind.iter_mut().for_each(|slot| core::mem::swap(slot, &mut carried));
         self.len += 1;

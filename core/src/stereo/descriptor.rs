@@ -130,6 +130,7 @@ impl<'a> SampledRows<'a> {
     #[inline(never)]
     fn describe(&self, u: usize) -> Descriptor {
         let ([du_above, du_here, du_below], [dv_above, dv_here, dv_below]) = (self.du, self.dv);
+        // Rows are as long as the image: columns two from an end are always there.
         let at = |row: &[u8], u: usize| row.get(u).copied().unwrap_or(FLAT);
         let (l, r) = (u - 1, u + 1);
         Descriptor([
@@ -217,6 +218,7 @@ mod tests {
         });
         let gradients = Gradients { du: &du, dv: &dv, width, height };
         let mut row = std::vec![Descriptor([0; 16]); width];
+        // Rows nearer to the border than the samples reach are refused.
         assert!(!gradients.describe_row(2, &mut row) && !gradients.describe_row(6, &mut row));
         assert!(gradients.describe_row(4, &mut row));
         let at = |image: &[u8], u: usize, v: usize| image[v * width + u];

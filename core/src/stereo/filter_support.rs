@@ -142,6 +142,7 @@ fn any_alike<'r>(
     threshold: u16,
 ) -> [u16; BLOCK] {
     let mut any = [0u16; BLOCK];
+    // Flags instead of branches, so that the compiler can use vectors.
     for row in rows {
         let others: [i16; BLOCK] = padded(row, first, 0, NO_MATCH);
         for ((any, other), &point) in any.iter_mut().zip(others).zip(points) {
@@ -202,11 +203,13 @@ mod tests {
     fn the_implausible_are_those_whose_whole_window_has_too_few_alike() {
         let (window, threshold) = (PLAUSIBLE_WINDOW as i32, PLAUSIBLE_THRESHOLD);
         let mut random = Random::new(72);
+        // Also a grid that is narrower than a window.
         for (width, height, sparse) in [(23i32, 17i32, 4), (40, 9, 9), (5, 30, 2)] {
             let before: Vec<i16> = (0..width * height)
                 .map(|_| if random.below(sparse) > 0 { NO_MATCH } else { random.below(60) as i16 })
                 .collect();
             let mut grid = before.clone();
+            // What is removed still counts for its neighbours: the twin reads the grid from before.
             let removed = remove_implausible(&mut grid, width as usize, &mut vec![0; before.len()]);
             let at = |u: i32, v: i32| before[(v * width + u) as usize];
             for (u, v) in (0..width)
@@ -253,11 +256,13 @@ mod tests {
     fn the_redundant_are_those_that_a_walk_in_scan_order_takes() {
         let config = StereoConfig::default();
         let mut random = Random::new(73);
+        // Also lines of a single point, and long ones.
         for (width, height) in [(23, 17), (150, 9), (64, 70), (1, 5), (5, 1)] {
             let mut grid: Vec<i16> = (0..width * height)
                 .map(|_| if random.below(5) == 0 { NO_MATCH } else { random.below(4) as i16 })
                 .collect();
             let mut expected = grid.clone();
+            // Down the columns first, and then along the rows, as libelas does it.
             for (stride, length, lines, line_stride) in
                 [(width, height, width, 1), (1, width, height, width)]
             {
@@ -268,6 +273,7 @@ mod tests {
                         expected[at(k)] != NO_MATCH
                             && expected[at(k)].abs_diff(here) <= REDUNDANT_THRESHOLD
                     };
+                    // Taken points do not support those behind them.
                     let reach = config.redundant_distance;
                     if (i.saturating_sub(reach)..i).any(alike)
                         && (i + 1..length.min(i + reach + 1)).any(alike)

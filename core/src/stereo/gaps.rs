@@ -185,6 +185,7 @@ mod tests {
     #[test]
     fn rows_and_columns_equal_their_plain_twin() {
         let mut random = Random::new(31);
+        // Rows of one pixel, columns of one pixel, and usual images; with few holes and with many.
         for (i, (width, height, none)) in
             [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6).into_iter().enumerate()
         {
@@ -203,6 +204,7 @@ mod tests {
             );
             assert_eq!(filled as usize, image.iter().zip(&rows).filter(|(a, b)| a != b).count());
 
+            // The columns are filled after the rows, as the matcher does it.
             let mut columns = rows.clone();
             FillColumns {
                 image: &mut columns,
@@ -223,7 +225,10 @@ mod tests {
 
     #[test]
     fn one_surface_gets_the_mean_and_two_nothing_or_the_farther() {
+        // 640 and 700 differ by less than the discontinuity and are one surface; 700 and 100 are
+        // two.
         let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther };
+        // Gaps of two, of one, of four, and one that reaches the end.
         let image = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
         let [surface, farther] = [670, 100].map(|disparity| disparity | FILLED);
         let fill = |rows: &mut [i16], ends| {

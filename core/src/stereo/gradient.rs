@@ -25,6 +25,7 @@ impl Work for GradientRows<'_> {
         for (v, (du, dv)) in
             (first..).zip(du.chunks_exact_mut(width).zip(dv.chunks_exact_mut(width)))
         {
+            // The first and last row have no neighbours on one side.
             let is_inner = v > 0 && v + 1 < image.height();
             if !is_inner || row(image.row(v - 1), image.row(v), image.row(v + 1), du, dv).is_none()
             {
@@ -77,6 +78,7 @@ mod tests {
 
     #[test]
     fn a_ramp_has_a_constant_gradient_and_an_edge_saturates() {
+        // Nine columns that rise by 8 each.
         let ramp: std::vec::Vec<u8> = (0..5 * 9).map(|i| ((i % 9) * 8) as u8).collect();
         let (mut du, mut dv) = (std::vec![0; 45], std::vec![0; 45]);
         GradientRows { image: View::new(&ramp, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }
@@ -86,6 +88,7 @@ mod tests {
             "8 a pixel is a response of 64, a quarter of it 16"
         );
         assert!(dv.iter().all(|&g| g == FLAT));
+        // White above, black below.
         let edge: std::vec::Vec<u8> = (0..45).map(|i| if i < 18 { 255 } else { 0 }).collect();
         GradientRows { image: View::new(&edge, 9, 5).unwrap(), first: 0, du: &mut du, dv: &mut dv }
             .run();

@@ -144,6 +144,7 @@ impl<'s> StereoMatcher<'s> {
             columns: carver.alloc("stereo.columns", capacity.image_width),
             image_width: capacity.image_width,
             image_height: capacity.image_height,
+            // No pair yet: one pixel without disparity, so that a view of it is never empty.
             width: 1,
             height: 1,
         }

@@ -17,6 +17,7 @@ pub(super) fn median(from: &[i16], width: usize, first: usize, to: &mut [i16]) {
 /// Filters row `v`. Nothing where it is the first or the last.
 fn median_row(from: &[i16], width: usize, v: usize, to: &mut [i16]) -> Option<()> {
     let n = width.checked_sub(2)?;
+    // Nine slices of one length, shifted by a pixel each, so that the loop needs no checks.
     let mut taps: [&[i16]; 9] = [&[]; 9];
     for (k, tap) in taps.iter_mut().enumerate() {
         *tap = from.get((v + k / 3).checked_sub(1)? * width + k % 3..)?.get(..n)?;
@@ -27,6 +28,7 @@ fn median_row(from: &[i16], width: usize, v: usize, to: &mut [i16]) -> Option<()
         let window = [a, b, c, d, e, f, g, h, i];
         let least = window.iter().fold(i16::MAX, |a, &b| a.min(b));
         let middle = middle_of_nine(window.map(|disparity| disparity & !FILLED));
+        // A window with a hole leaves the pixel as it is; the flag stays that of the middle pixel.
         *to = if least == NONE { *to } else { middle | e & FILLED };
     }
     Some(())
@@ -67,6 +69,7 @@ mod tests {
         median(&from, width, 0, &mut to);
         for (i, &got) in to.iter().enumerate() {
             let (u, v) = (i % width, i / width);
+            // The outermost pixels have no full window and stay.
             let inside = u > 0 && v > 0 && u + 1 < width && v + 1 < height;
             let mut window: std::vec::Vec<i16> = if inside {
                 (0..9).map(|k| from[(v + k / 3 - 1) * width + u + k % 3 - 1]).collect()

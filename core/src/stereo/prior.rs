@@ -132,6 +132,7 @@ struct Plane {
 impl Plane {
     fn through([a, b, c]: [SupportPoint; 3], slope_max: i64) -> Option<Self> {
         let d = |x: u16, y: u16| i64::from(x) - i64::from(y);
+        // Cramer's rule in integers: the same plane on every machine.
         let (bu, bv, bd) = (d(b.u, a.u), d(b.v, a.v), d(b.disparity, a.disparity));
         let (cu, cv, cd) = (d(c.u, a.u), d(c.v, a.v), d(c.disparity, a.disparity));
         let slope = |numerator: i64| (numerator * ONE).checked_div(bu * cv - bv * cu);
@@ -216,7 +217,9 @@ pub(super) fn mark_cells(
     for point in points {
         let (cu, cv) = (usize::from(point.u) / size, usize::from(point.v) / size);
         let (low, high) =
+            // A match between two whole disparities may be rounded either way.
             (point.disparity.saturating_sub(1), (point.disparity + 1).min(config.disparity_max));
+        // Three rows and columns of cells, two at the image's border.
         for row in out.chunks_exact_mut(columns).skip(cv.saturating_sub(1)).take(cv.min(1) + 2) {
             for cell in row.iter_mut().skip(cu.saturating_sub(1)).take(cu.min(1) + 2) {
                 for disparity in low..=high {

@@ -130,6 +130,7 @@ mod tests {
         }
         let (quotient, rest) =
             (numerator.div_euclid(denominator), numerator.rem_euclid(denominator));
+        // Halves go to the even number.
         let up = 2 * rest > denominator || (2 * rest == denominator && quotient % 2 != 0);
         image[i] + (quotient + i64::from(up)) as i16
     }
@@ -138,6 +139,7 @@ mod tests {
     fn equals_wide_integers_on_edges_holes_and_noise() {
         let mut random = Random::new(41);
         for (width, height) in [(37, 21), (8, 8), (9, 9), (64, 5)].repeat(5) {
+            // Three surfaces in columns of 7 px, the last one at the largest disparity.
             let base = [0, 40 * 64, 255 * 64 - 400];
             let image: Vec<i16> = (0..width * height)
                 .map(|i| match random.below(9) {

@@ -254,6 +254,7 @@ mod tests {
             while let Some(&i) = segment.get(next) {
                 next += 1;
                 let u = i % width;
+                // Four neighbours; the row above and below may lie outside.
                 let beside = [
                     (u > 0).then(|| i - 1),
                     (u + 1 < width).then_some(i + 1),
@@ -284,6 +285,7 @@ mod tests {
             [(31, 17, 3, 5), (40, 30, 6, 12), (64, 9, 2, 30), (1, 50, 3, 4), (50, 1, 3, 4)]
                 .repeat(8)
         {
+            // Few levels, so that segments of many sizes come about.
             let pixel = |random: &mut Random| match random.below(6) {
                 0 => NONE,
                 1 => (random.below(levels) as i16 * 64) | FILLED,
@@ -291,6 +293,7 @@ mod tests {
             };
             let image: Vec<i16> = (0..width * height).map(|_| pixel(&mut random)).collect();
             let mut fast = image.clone();
+            // Filled with 7: nothing may rely on zeroed buffers.
             let (mut runs, mut ends, mut flags) =
                 (vec![7; image.len()], vec![7; image.len()], vec![7; 3 * width]);
             let scratch = Scratch { runs: &mut runs, ends: &mut ends, flags: &mut flags };

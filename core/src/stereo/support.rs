@@ -274,6 +274,7 @@ mod tests {
         let matching = SupportMatching { config: &config, left: flat, right: flat };
         let mut random = Random::new(71);
         let mut found = 0;
+        // Every count of disparities, twice: lists that end within a block are the delicate ones.
         for count in (1..=256).chain(1..=256) {
             let costs: Vec<i16> = (0..count)
                 .map(|_| 400 + random.below(40 + 4_000 * (count as u32 % 3)) as i16)

@@ -109,6 +109,7 @@ mod tests {
     fn a_wrong_pose_counts_as_unreported_only_where_nothing_is_said() {
         let (info, affected) = (Severity::Info, Severity::MapAffected);
         let outcome = FaultOutcome::from_frames(
+            // How far off each frame is, m, and what it reports; the fault is at frame 1.
             &run_with(&[(0.0, info), (0.1, info), (2.0, affected), (1.0, info), (0.2, info)]),
             1,
         );
@@ -117,6 +118,7 @@ mod tests {
             (outcome.unreported_frames, outcome.wrong_fused, outcome.map_affected),
             (1, 2, 1)
         );
+        // Frame 4 is the first that is close again: three frames after the fault.
         assert_eq!(outcome.recovered_after, Some(3));
         assert_eq!(
             FaultOutcome::from_frames(&run_with(&[(0.0, info), (0.0, info)]), 1).recovered_after,

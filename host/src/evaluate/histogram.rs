@@ -41,6 +41,7 @@ impl Histogram {
             if bin == 0 {
                 0.0
             } else {
+                // The middle of the bin: the dropped bits are half of their range.
                 f64::from(f32::from_bits(bin << DROPPED_BITS | 1 << (DROPPED_BITS - 1)))
             }
         })
@@ -59,6 +60,7 @@ mod tests {
             .collect();
         let mut histogram = Histogram::default();
         values.iter().for_each(|value| histogram.add(*value));
+        // No value, and counted by none.
         histogram.add(f64::NAN);
         let sorted = ascending(values.into_iter());
         for share in [0.0, 0.01, 0.5, 0.99, 1.0] {
@@ -67,6 +69,7 @@ mod tests {
             assert!((ours - exact).abs() <= 0.001 * exact, "{share}: {ours} for {exact}");
         }
         assert_eq!((histogram.values(), Histogram::default().quantile(0.5)), (5_000, None));
+        // -0 has its sign bit set, and must count as 0.
         let mut zero = Histogram::default();
         zero.add(-0.0);
         assert_eq!(zero.quantile(0.5), Some(0.0));

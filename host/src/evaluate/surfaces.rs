@@ -251,8 +251,10 @@ mod tests {
         );
         let off = side.compare(&patch(8.06, -1.0, 1.0), 0.05).unwrap();
         assert!((off.median_m.unwrap() - 0.061).abs() < 0.006, "{off:?}");
+        // Half of the mesh: what is there is right, and half of the truth is missing.
         let half = side.compare(&patch(8.0, -1.0, 0.0), 0.05).unwrap();
         assert!((half.completeness - 0.53).abs() < 0.03 && half.accuracy > 0.99, "{half:?}");
+        // Beyond the distance up to which surfaces are compared.
         let far = side.compare(&patch(8.5, -1.0, 1.0), 0.05).unwrap();
         assert_eq!((far.median_m, far.accuracy, far.completeness), (None, 0.0, 0.0));
         assert!(

@@ -120,12 +120,14 @@ mod tests {
             speed_m_s: 10.0,
         };
         let mut swept = Swept::default();
+        // Four metres of driving, and a car that stands, where nothing is swept.
         (0..5)
             .for_each(|frame| swept.add(&car(10.0 + f64::from(frame), true), &Transform::IDENTITY));
         swept.add(&car(30.0, false), &Transform::IDENTITY);
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("map.ply");
         let mut ply = PlyWriter::begin(&path).unwrap();
+        // A small triangle, a little bent so that it has an area.
         let mut patch = |x: f32, y: f32, z: f32| {
             ply.triangle(
                 [0.0, 0.05, 0.1]

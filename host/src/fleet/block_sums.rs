@@ -121,6 +121,7 @@ impl BlockSums {
         if bytes.len() != Self::bytes(colour) {
             return None;
         }
+        // Arrays of one length, in the order of `write`.
         let mut arrays = bytes.chunks_exact(4 * BLOCK_VOXELS);
         let mut next = || arrays.next().map(numbers);
         sums.distance.iter_mut().zip(next()?).for_each(|(to, value)| *to = value.cast_signed());
@@ -202,13 +203,16 @@ mod tests {
         let mut sums = BlockSums::zero(false);
         sums.observe(0, -3, 1, [0; 3]);
         sums.observe(0, -4, 1, [0; 3]);
+        // With their weights: (2 * 100 - 50) / 3 is 50.
         sums.observe(1, 100, 2, [0; 3]);
         sums.observe(1, -50, 1, [0; 3]);
+        // 257 times 255 is the greatest weight that is no overflow.
         for _ in 0..257 {
             sums.observe(2, i16::MIN, 255, [0; 3]);
         }
         assert_eq!(sums.weight[2], MAX_WEIGHT);
         sums.observe(3, 5, 255, [0; 3]);
+        // An overflown voxel counts as never observed.
         sums.weight[3] += MAX_WEIGHT;
         let average = sums.average();
         assert_eq!(

@@ -87,6 +87,7 @@ fn connected(first: BlockChange, left: &mut BTreeMap<BlockCoord, BlockChange>) -
     let (mut found, mut at) = (vec![first], 0);
     while let Some(BlockChange { coord, .. }) = found.get(at).copied() {
         at += 1;
+        // All 26 neighbours, and the block itself, which is not left any more.
         for neighbour in 0..27 {
             let side = |c: i16, by: i32| i32::from(c) + by - 1;
             let coord = BlockCoord::new(

@@ -106,6 +106,7 @@ impl Depths {
                     across(row, rig.center_v_px),
                     1.0,
                 ]);
+                // 0: the ray met nothing.
                 depth_m.push(first_surface(field, pose.translation_m, ray).unwrap_or(0.0));
             }
         }

@@ -277,6 +277,7 @@ mod tests {
         let path = root.path().join("recordings.toml");
         std::fs::write(&path, RECORDINGS_EXAMPLE).unwrap();
         let manifest = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap();
+        // The folder of the list is the user's own.
         let refused = manifest.write(root.path()).unwrap_err().to_string();
         assert!(refused.contains("has no marker"), "a folder of the user's: {refused}");
         let folder = root.path().join("fleet");
@@ -295,6 +296,7 @@ mod tests {
         assert!(monday.is_of(5) && !monday.is_of(4) && monday.id != tuesday.id);
         assert_eq!(manifest.shard(1, 2).collect::<Vec<_>>(), [tuesday]);
         assert_eq!(tuesday.state(&folder), JobState::Open);
+        // A finished job is told by its submap, and by nothing that would have to be kept in step.
         std::fs::create_dir_all(tuesday.submap(&folder)).unwrap();
         assert_eq!(tuesday.state(&folder), JobState::Done);
     }
@@ -306,6 +308,7 @@ mod tests {
         Manifest { program: program(), jobs: Vec::new() }.write(root.path()).unwrap();
         assert!(Manifest::read(root.path()).is_ok());
         let text = std::fs::read_to_string(&path).unwrap();
+        // Sums of another version cannot be added to these.
         std::fs::write(&path, text.replace("sums 1", "sums 0")).unwrap();
         let refused = Manifest::read(root.path()).unwrap_err().to_string();
         assert!(

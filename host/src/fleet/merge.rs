@@ -132,11 +132,13 @@ mod tests {
         let mut random = Random::new(seed);
         let mut blocks = BTreeMap::new();
         for _ in 0..6 {
+            // On both sides of 0, so that the blocks lie in four tiles.
             let mut side = || random.below(8) as i16 * 10 - 40;
             let coord = BlockCoord { x: side(), y: 0, z: side() };
             let mut sums = BlockSums::zero(lattice.colour);
             for _ in 0..50 {
                 let mixed = random.next_u32();
+                // One random number for position, distance, weight and a colour.
                 sums.observe(
                     (mixed % 512) as usize,
                     (mixed >> 16) as i16,
@@ -198,6 +200,7 @@ mod tests {
         }
         let mut random = Random::new(77);
         let mut digests = BTreeSet::new();
+        // The digest must depend on the maps alone: not on their order, the tree, or the workers.
         for count in [2, 3, 8, 64] {
             let mut expected = None;
             for trial in 0..100 {
@@ -221,12 +224,14 @@ mod tests {
         let root = tempfile::TempDir::new().unwrap();
         let path = |name: &str| root.path().join(name);
         map(&path("a"), 1, &LATTICE);
+        // Voxels with and without colour have different sums.
         map(&path("b"), 2, &Lattice { colour: false, ..LATTICE });
         let both = [path("a"), path("b")];
         assert!(matches!(merge(&both, &path("out")), Err(FleetError::OtherLattice { .. })));
         assert!(matches!(merge(&both, &path("a")), Err(FleetError::Exists { .. })));
         let tile = tiles(&path("a")).unwrap().into_values().next().unwrap();
         let bytes = std::fs::read(&tile).unwrap();
+        // A byte is missing at the end.
         std::fs::write(&tile, &bytes[..bytes.len() - 1]).unwrap();
         assert!(merge(&both[..1], &path("out")).unwrap_err().to_string().contains("is damaged"));
         std::fs::write(path("a").join("notes.txt"), "").unwrap();

@@ -149,6 +149,7 @@ mod tests {
 
     #[test]
     fn registered_recordings_are_moved_and_one_without_overlap_stays() {
+        // Three that overlap one after the other, and one far away.
         let truth = [
             Transform::new([0.0, 0.3, 0.0], [500.0, 1.0, -300.0]),
             Transform::new([0.0, 0.9, 0.1], [520.0, 1.0, -280.0]),
@@ -156,12 +157,14 @@ mod tests {
             Transform::from_translation([-900.0, 0.0, 10.0]),
         ];
         let centre_m = [3.0, 0.0, 14.0];
+        // Errors about the middle of what a recording saw, as its uncertainty is given.
         let off = |pose: &Transform, at: f64| {
             let centre = Vector3::from(pose.transform_point(centre_m));
             motion_about(&centre, &Vector6::new(0.0, 0.017 * at, 0.0, 0.15, -0.05 * at, 0.1))
                 * *pose
         };
         let given = [truth[0], off(&truth[1], 1.0), off(&truth[2], -1.0), off(&truth[3], 1.0)];
+        // The first one is nearly certain: it holds the others.
         let uncertainty = |at: usize| UNCERTAINTY.times(if at == 0 { 1e-4 } else { 1.0 });
         let node = |(at, &given): (usize, &Transform)| Node {
             given,
@@ -184,7 +187,9 @@ mod tests {
             );
             assert!((solved[at].inverse() * truth[at]).angle_rad() < 1e-4);
         }
+        // Without an edge nothing moves it.
         assert!(apart(&solved[3], &given[3], centre_m) < 1e-9);
+        // Bit for bit the same each time.
         assert_eq!(solved, solve(&nodes, &[edge(0, 1), edge(1, 2)], &given));
     }
 
@@ -244,6 +249,7 @@ mod tests {
             centre_m: [0.0; 3],
         };
         let start = nodes.each_ref().map(|node| node.given);
+        // Nine parts of the first and one of the second.
         let solved = solve(&nodes, &[edge(0.1, 9e6), edge(0.2, 1e6)], &start);
         assert!((solved[1].translation_m[0] - 0.11).abs() < 1e-4, "{:?}", solved[1]);
     }

@@ -89,6 +89,7 @@ impl Recordings {
 
     /// The world's origin, where a recording has fixes.
     pub(super) fn origin(&self) -> Result<Option<[f64; 3]>, FleetError> {
+        // Only where no origin is given: it comes first.
         let Some(gnss) = self
             .recordings
             .iter()
@@ -97,6 +98,7 @@ impl Recordings {
         else {
             return Ok(self.origin);
         };
+        // Rows without a fix are skipped.
         let fixes = read_gnss(gnss).map_err(FleetError::Format)?;
         let first = fixes
             .iter()
@@ -164,6 +166,7 @@ mod tests {
         let given =
             |list: &str| example(list).unwrap().recordings[0].given(Some([49.0, 8.0, 0.0]), None);
         let recording = "[[recording]]\nname = \"tuesday\"\narguments = []\n";
+        // A rotation matrix with a 2 is none.
         let turned = "t_world_camera = [2, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]\n";
         assert_eq!(
             given(&format!("{recording}{turned}")).unwrap_err(),
@@ -186,6 +189,7 @@ mod tests {
             list.recordings[0].given(Some([49.0, 8.0, 110.0]), Some(&pose)).unwrap()
         };
         assert_eq!(given("poses_in_world = true"), Given::TWorldCamera(rows_of(&pose)));
+        // Without anything said, the recording begins at the world's origin.
         assert_eq!(given(""), Given::TWorldCamera(rows_of(&Transform::IDENTITY)));
         let gnss = Given::Gnss {
             file: "fixes".into(),
@@ -199,6 +203,7 @@ mod tests {
     fn the_world_begins_at_the_first_fix_unless_it_is_given() {
         let root = tempfile::TempDir::new().unwrap();
         let fixes = root.path().join("fixes.txt");
+        // The first row has no fix.
         std::fs::write(&fixes, "-\n49 8 110\n48 8 110\n").unwrap();
         let recording =
             format!("[[recording]]\nname = \"tuesday\"\narguments = []\ngnss = {fixes:?}\n");

@@ -227,6 +227,7 @@ fn refusal(
 
 /// The least eigenvalue over the greatest, with rotations counted by how far they move the points.
 fn min_eigen_share(matrix: &Matrix6<f64>, radius_m: f64) -> f64 {
+    // A radian at the radius moves a point by the radius: metres on both sides.
     let scale = Matrix6::from_diagonal(&Vector6::new(
         1.0 / radius_m,
         1.0 / radius_m,
@@ -239,6 +240,7 @@ fn min_eigen_share(matrix: &Matrix6<f64>, radius_m: f64) -> f64 {
     let (least, most) = values
         .iter()
         .fold((f64::INFINITY, 0.0f64), |(least, most), &value| (least.min(value), most.max(value)));
+    // Rounding may make the least one negative.
     if most > 0.0 { least.max(0.0) / most } else { 0.0 }
 }
 

@@ -108,6 +108,7 @@ impl FirstSegment {
     /// `None` where segments lie at one height.
     fn of(camera: &Camera, block_m: f64) -> Option<Self> {
         let (first, later): (Vec<CameraPose>, Vec<CameraPose>) =
+            // Segment 0 is the map before the camera was lost; later ones lie above it.
             camera.poses.iter().partition(|pose| pose.segment == 0);
         let height = |pose: &CameraPose| pose.t_map_camera.translation_m[1];
         let top_m = first.iter().map(height).fold(f64::INFINITY, f64::min);
@@ -269,6 +270,7 @@ mod tests {
     #[test]
     fn a_kept_map_has_the_newest_values_and_a_changed_one_is_refused() {
         let root = tempfile::TempDir::new().unwrap();
+        // One block twice: its newer values count.
         let (mut store, _) = BlockFile::open(&root.path().join("run.blocks"), 0.1, 0.5).unwrap();
         for (x, weight) in [(3, 1), (-2, 5), (3, 9)] {
             let (sdf, weight) = ([-7; BLOCK_VOXELS], [weight; BLOCK_VOXELS]);
@@ -288,6 +290,7 @@ mod tests {
             segment: 0,
             t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]),
         };
+        // Two blocks, although three were stored.
         let camera = Camera { rig, size: (100, 40), poses: vec![pose] };
         assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
         assert!(matches!(
@@ -300,6 +303,7 @@ mod tests {
         let source = Source::load(&mut map.store, BlockCoord { x: 3, y: 0, z: 0 }, false).unwrap();
         assert_eq!((source.sdf[5], source.weight[5]), (-7, 9));
         let path = out.join(BLOCKS_FILE);
+        // A byte of the head, one of a block, and the last one.
         let whole = std::fs::read(&path).unwrap();
         for at in [20, whole.len() / 2, whole.len() - 1] {
             let mut bytes = whole.clone();

@@ -273,6 +273,7 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             assert!(read(&path).is_err(), "byte {at} of {}", whole.len());
         }
+        // A file that a full disk cut short.
         for len in 0..whole.len() {
             std::fs::write(&path, &whole[..len]).unwrap();
             assert!(read(&path).is_err(), "{len} of {} bytes", whole.len());

@@ -55,6 +55,7 @@ pub fn tiles(folder: &Path) -> Result<BTreeMap<WorldTile, PathBuf>, FleetError> 
     for entry in folder.read_dir().map_err(FleetError::io(folder))? {
         let path = entry.map_err(FleetError::io(folder))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // The marker is dynvox's own and no tile.
         if name == MARKER_FILE {
             continue;
         }
@@ -74,6 +75,7 @@ mod tests {
     fn tiles_are_named_by_their_coordinates_and_cover_the_world() {
         let lattice = Lattice { voxel_size_m: 0.05, truncation_m: 0.25, colour: false };
         let of = |x: i16| WorldTile::of(BlockCoord { x, y: 0, z: 0 }, &lattice, 7).sides[0];
+        // 160 blocks of 0.4 m are a tile, and block -1 lies in tile -1.
         assert_eq!([-161, -160, -1, 0, 159, 160, i16::MAX].map(of), [-2, -1, -1, 0, 0, 1, 204]);
         let tile = WorldTile { sides: [-3, 0, 12], epoch: 20_261_122 };
         assert_eq!(
@@ -82,6 +84,7 @@ mod tests {
         );
         assert!(
             [
+                // A number too few, one too many, a plus, no ending, letters, and an epoch below 0.
                 "3_0_1.sums",
                 "1_2_3_4_5.sums",
                 "+1_2_3_0.sums",

@@ -104,6 +104,7 @@ impl Observer for BlocksObserver {
     ) -> Result<(), ObserveError> {
         let (totals, row) = (&mut self.totals, frame.row);
         let (allocation, prune) = (&row.report.allocate, &row.report.prune);
+        // The pool keeps its peak itself; all others are of one frame.
         totals.peak = row.report.blocks.peak;
         totals.refused += u64::from(row.blocks_refused());
         totals.stored += u64::from(allocation.eviction.stored);

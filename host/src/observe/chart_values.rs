@@ -50,10 +50,12 @@ impl ChartValues {
     /// Adds a frame.
     pub(super) fn add(&mut self, row: &FrameRow) {
         let point = Point::from_row(row);
+        // A point takes so many frames; the next one begins a new point.
         let begins = self.frames.is_multiple_of(self.frames_per_point());
         match self.points.last_mut() {
             Some(last) if !begins => last.merge(&point),
             _ => {
+                // Twice the frames a point, so that the number of points stays bounded.
                 if self.points.len() == MAX_POINTS {
                     self.halve();
                 }
@@ -119,9 +121,11 @@ mod tests {
             (short.frames_per_point(), short.frames()[1], short.series("step_ms")[1]),
             (1, 11, 1.0)
         );
+        // 5,000 frames need 8 of them a point, to be less than the most points.
         let long = run(5_000);
         assert_eq!((long.frames_per_point(), long.frames().len()), (8, 625));
         assert_eq!(long.frames()[1], 18);
+        // The greatest of a point's frames, since peaks matter in a chart of times.
         assert_eq!([0, 1, 624].map(|at| long.series("step_ms")[at]), [7.0, 15.0, 4_999.0]);
         assert!(
             long.series("rss_bytes").iter().all(|value| value.is_nan()),

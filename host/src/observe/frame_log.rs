@@ -133,6 +133,7 @@ mod tests {
         let mut log = FrameLog::default();
         for ms in (1..=200).rev().map(f64::from) {
             let mut row = FrameRow { step_ms: 1.0, ..FrameRow::default() };
+            // Half of the frames fused: the statistics of that stage must not contain zeros.
             if ms > 100.0 {
                 row.times.stages[Stage::Fuse as usize] =
                     StageTime { wall_ms: ms, cpu_ms: 2.0 * ms };
@@ -145,6 +146,7 @@ mod tests {
             [("step", 200), (Stage::Fuse.name(), 100)]
         );
         let fuse = statistics[1].1;
+        // Within a histogram's bins, which are a thousandth wide.
         for (value, exact) in
             [(fuse.median_ms, 151.0), (fuse.p99_ms, 200.0), (fuse.cpu_median_ms, 302.0)]
         {

@@ -62,10 +62,13 @@ impl Observer for GalleryObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let position = frame.position;
+        // Without a known number of frames every n-th is taken, and thinned out as they become
+        // many.
         let chosen = run.plan.frames.count().map_or_else(
             || position.is_multiple_of(self.every),
             |frames| spread(frames, FRAMES)(position),
         );
+        // A failure is reported once, at the end: pictures do not end a run.
         if chosen && self.failure.is_none() {
             self.taken.push((position, frame.row.frame));
             self.failure = write_frame(&folder(run), frame).err().map(|error| error.to_string());
@@ -142,6 +145,7 @@ fn write_frame(folder: &Path, frame: &mut FrameContext<'_, '_>) -> Result<(), Ob
     let disparity_q8 = frame.view.mapper().disparity_q8();
     let masks = pictures::masks(frame.view.mapper(), disparity_q8.width(), disparity_q8.height());
     let composed = frame.jpeg(Shown::Composed);
+    // Without objects the composed picture is empty, and the map's own is shown.
     let map = if composed.is_empty() { frame.jpeg(Shown::Map) } else { composed };
     let (left, disparity) = (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity));
     let number = frame.row.frame;

@@ -114,10 +114,12 @@ impl GrowingFile {
             self.file = Some(owned::create_file(&path).map_err(failed)?);
         }
         let Some(file) = &mut self.file else { return Ok(()) };
+        // By hand, since after a failure `pending` must hold exactly what is not yet written.
         while !self.pending.is_empty() {
             match file.write(&self.pending) {
                 Ok(0) => return Err(failed(ErrorKind::WriteZero.into())),
                 Ok(written) => drop(self.pending.drain(..written)),
+                // A signal came: the write is repeated.
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(source) => return Err(failed(source)),
             }
@@ -143,12 +145,14 @@ mod tests {
         let mut file = GrowingFile::new("rows.csv");
         file.append(b"a\n");
         file.write_due(folder.path()).unwrap();
+        // Few bytes wait for more, and `sync` does not.
         assert!(!path.exists(), "two bytes are not worth a write");
         file.sync(folder.path()).unwrap();
         let checkpoint = saved(&file);
         file.append(&[b'x'; WRITE_BYTES]);
         file.write_due(folder.path()).unwrap();
         assert_eq!(std::fs::metadata(&path).unwrap().len(), 2 + WRITE_BYTES as u64);
+        // What was written after the checkpoint is cut off.
         let mut again = saved(&checkpoint);
         again.resume(folder.path()).unwrap();
         again.append(b"b\n");

@@ -47,6 +47,7 @@ impl Observer for HealthObserver {
         sums.detections = sum(sums.detections, &tracking.detections);
         sums.tracks_refused += u64::from(tracking.tracks.refused + objects.refused);
         sums.internal_faults += u64::from(row.report.internal_faults);
+        // The order of severities is that of how bad they are.
         sums.worst = sums.worst.max(row.severity());
         Ok(())
     }

@@ -35,6 +35,7 @@ impl Observer for InstancesObserver {
         let save = |folder: &Path, masks: &[InstanceMask]| {
             Ok::<(), ObserveError>(save_masks(folder, &stem, size, masks)?)
         };
+        // The masks that were given; beside them those that the core found itself.
         save(folder, &frame.images.masks.instances)?;
         save(&motion_folder, &found_by_motion(frame.view.mapper(), size))
     }

@@ -83,6 +83,7 @@ impl Observer for KeyframesObserver {
 fn keyframe(frame: &mut FrameContext<'_, '_>) -> Option<Keyframe> {
     let (input_jpeg, disparity_jpeg, raycast_jpeg) =
         (frame.jpeg(Shown::Left), frame.jpeg(Shown::Disparity), frame.jpeg(Shown::Map));
+    // A picture that cannot be made leaves the key frame out, not the run.
     if input_jpeg.is_empty() || raycast_jpeg.is_empty() {
         return None;
     }

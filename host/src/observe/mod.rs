@@ -317,6 +317,7 @@ impl Observer for Observers {
         run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
+        // In the order of the fields. The first error ends the frame, and with it the run.
         self.trajectory.frame(run, frame)?;
         self.keyframes.frame(run, frame)?;
         self.gallery.frame(run, frame)?;
@@ -348,6 +349,7 @@ impl Observer for Observers {
     }
 
     fn finish(self, run: &ObservedRun<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
+        // Those without a section of the summary.
         self.planning.finish(run, finished)?;
         self.block_history.finish(run, finished)?;
         Ok(Sections {

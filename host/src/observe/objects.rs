@@ -128,6 +128,7 @@ impl Observer for ObjectsObserver {
         run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
+        // First those that left: their tables end before this frame.
         self.write_all(run, frame.retired);
         for object in fused(frame) {
             self.paths.entry((object.id, object.segment_id)).or_default().push(PosedAt {
@@ -358,6 +359,8 @@ fn write_mesh(
     object: &MeshedObject<'_>,
     frame: &MeshFrame<'_>,
 ) -> std::io::Result<Mesh> {
+    // The mesh is in the object's frame, in f32; the pose is applied in f64, since the world is
+    // large.
     let moved = |position_m: [f32; 3]| {
         frame.t_frame_object.transform_point(position_m.map(f64::from)).map(|metres| metres as f32)
     };

@@ -117,6 +117,7 @@ pub fn masks(mapper: &Mapper<'_>, width: usize, height: usize) -> Vec<u8> {
         Some([red, green, blue]) => Rgba([red, green, blue, MASK_ALPHA]),
         None => Rgba([0; 4]),
     });
+    // Objects that are all too small for the thinned pixels.
     if mask.pixels().all(|pixel| pixel.0[3] == 0) {
         return Vec::new();
     }
@@ -157,11 +158,13 @@ pub fn disparity_errors(
     given: &View<'_, u16>,
     marked: bool,
 ) -> Vec<u8> {
+    // From 1/256 px.
     let px = |q8: u16| f32::from(q8) / f32::from(DISPARITY_ONE_PX);
     let picture = RgbImage::from_fn(grey.width() as u32, grey.height() as u32, |u, v| {
         let at = (u as usize, v as usize);
         let [truth, given] = [truth, given].map(|image| image.get(at.0, at.1).unwrap_or_default());
         if truth == 0 {
+            // At most a third of full brightness, so that the errors stand out.
             return Rgb([grey.get(at.0, at.1).unwrap_or_default() / 32 * 11; 3]);
         }
         let colour = error_colour(px(given), px(truth));
@@ -249,6 +252,7 @@ pub fn composed(
     if states.is_empty() {
         return None;
     }
+    // Layer 0 is the static map, which has no tint.
     let tint = |layer: u8| match states.get(usize::from(layer).checked_sub(1)?)? {
         MotionState::Dynamic => Some(MOVING),
         _ => Some(STATIC),

@@ -137,6 +137,7 @@ pub fn write_folder(
     };
     let columns = Columns { planning };
     let description = describe(&columns, frame, camera_world, report);
+    // The states are gathered once for all three maps.
     let states = columns.states();
     for mode in MapMode::ALL {
         write(mode.picture(), &mode.encode(&states, columns.size()))?;
@@ -224,6 +225,8 @@ impl Columns<'_, '_> {
                 .column(self.at(u, v))
                 .and_then(|column| column.ground_m())
                 .map(f64::from);
+            // The scale is stated in window.json, and the greatest value is reserved for unknown
+            // heights.
             let value = height_m.map(|height_m| {
                 (height_m - description.scales.height_zero_m) / description.scales.height_unit_m
             });

@@ -124,6 +124,7 @@ mod tests {
 
     /// Cells of a random window: columns, rows, states.
     fn random_window(seed: u64) -> ((u32, u32), Vec<CellState>) {
+        // An odd seed: xorshift stays at 0 forever.
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut random = move || {
             state ^= state << 13;
@@ -199,6 +200,7 @@ mod tests {
                         CellState::Occupied => 100,
                         CellState::Unknown => -1,
                     };
+                    // nav2 and ROS 1 decode the modes each in their way; both must agree.
                     let values = [true, false].map(|nav2| loaded(&yaml, pixel.0, has_alpha, nav2));
                     assert_eq!(values, [expected; 2], "{mode:?}, {state:?}, window {seed}");
                 }

@@ -205,6 +205,7 @@ impl Observer for TracksObserver {
     }
 
     fn finish(self, _: &ObservedRun<'_>, _: &Finished) -> Result<TracksSection, ObserveError> {
+        // By the track's id; a track that no true object was near has none.
         let errors = self.errors.tracks();
         Ok(TracksSection {
             tracks: self
@@ -229,11 +230,14 @@ fn overlaps(mapper: &Mapper<'_>, exact: &Image<u8>) -> (Overlaps, BTreeSet<u16>)
     let overlaps = Overlaps::from_pairs(exact.pixels().iter().enumerate().map(|(at, truth)| {
         let found =
             mapper.instance_at((at % width) as i32, (at / width) as i32).map_or(0, |instance| {
+                // Pixels of one track and class have one label, those without a track one for
+                // each class.
                 let next = labels.len() as u16 + 1;
                 *labels.entry((instance.track, instance.class)).or_insert(next)
             });
         (found, u16::from(*truth))
     }));
+    // Found by motion are those of this class, which no detector gives.
     let moving = labels.iter().filter(|((_, class), _)| *class == Class::MovingObject);
     by_motion.extend(moving.map(|(_, label)| *label));
     (overlaps, by_motion)

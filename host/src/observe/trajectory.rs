@@ -58,12 +58,14 @@ pub struct ThinnedPath {
 impl ThinnedPath {
     fn add(&mut self, position_m: [f64; 3]) {
         if self.frames.is_multiple_of(1 << self.doublings) {
+            // Every second point goes, and from now on half as many come.
             if self.points_m.len() == MAX_POINTS {
                 self.points_m = self.points_m.iter().step_by(2).copied().collect();
                 self.doublings += 1;
             }
             self.points_m.push(position_m);
         }
+        // The length counts every step, also those whose points are left out.
         let step = self
             .last_m
             .map(|last| nalgebra::Vector3::from(position_m) - nalgebra::Vector3::from(last));
@@ -159,6 +161,7 @@ impl Observer for TrajectoryObserver {
     ) -> Result<TrajectorySection, ObserveError> {
         let (frames, poses): (Vec<usize>, Vec<Transform>) = self.compared.into_iter().unzip();
         let truth = run.plan.dataset.truth().map(|truth| from_first(truth, &frames));
+        // The most frequent reason first.
         let mut because: Vec<_> = self.extrapolated_because.into_iter().collect();
         because.sort_by_key(|(_, frames)| std::cmp::Reverse(*frames));
         Ok(TrajectorySection {

@@ -33,6 +33,8 @@ impl VolumeCopy {
             colour: false,
             blocks: Vec::with_capacity(pool.len()),
         };
+        // Slots are not kept: the copy is for writing meshes, and knows blocks by their
+        // coordinates.
         for slot in pool.live() {
             let colour = blocks.colour(slot);
             copy.colour |= colour.is_some();
@@ -133,6 +135,7 @@ mod tests {
         let view =
             Viewpoint { rig, width: WIDTH, height: HEIGHT, t_world_camera: Transform::IDENTITY };
         let grey: Vec<u8> = (0..WIDTH * HEIGHT).map(|i| 40 + (i % 200) as u8).collect();
+        // The first wall is nearer in the left part; the second frame sees nothing there.
         for walls_m in [[1.0, 2.0], [0.0, 2.0]] {
             let depth_m: Vec<f32> =
                 (0..WIDTH * HEIGHT).map(|i| walls_m[usize::from(i % WIDTH > 40)]).collect();

@@ -71,6 +71,7 @@ mod tests {
         std::fs::write(&path, b"ply\n").unwrap();
         let written = WrittenFile::synced(folder.path(), "7.ply".to_owned()).unwrap();
         assert!(written.check(folder.path()).is_ok());
+        // A byte missing, one changed, and one too many.
         for bytes in [&b"ply"[..], b"plx\n", b"ply\n1"] {
             std::fs::write(&path, bytes).unwrap();
             let refused = written.check(folder.path()).unwrap_err().to_string();

@@ -22,6 +22,8 @@ impl DraftFolder {
         let process = std::process::id();
         let numbered =
             |number: u32| folder.with_file_name(format!(".{name}.partial-{process}-{number}"));
+        // A name in use is that of another draft of this process, or not ours: the next one is
+        // tried.
         for draft in (1u32..1000).map(numbered) {
             match OwnedFolder::create(&draft) {
                 Ok(made) => return Ok(Self(Some(made))),
@@ -75,6 +77,7 @@ impl Drop for DraftFolder {
 fn remove_dead(folder: &Path) {
     let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else { return };
     let begin = format!(".{}.partial-", name.to_string_lossy());
+    // The parent of a bare name is the current directory.
     let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     for entry in parent.read_dir().into_iter().flatten().flatten() {
         let path = entry.path();

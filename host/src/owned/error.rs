@@ -24,7 +24,7 @@ pub enum NotOwned {
         path: PathBuf,
     },
     /// The system refuses.
-    #[error("{path}: {source}")]
+    #[error("{path} cannot be read or written: {source}. Check the disk and the permissions")]
     Io {
         /// The file or folder.
         path: PathBuf,

@@ -24,6 +24,7 @@ impl Location {
     fn of(path: &Path) -> io::Result<Self> {
         let path = std::path::absolute(path)?;
         let Some(parent) = path.parent() else { return Err(ErrorKind::InvalidInput.into()) };
+        // The nearest one, since run folders may lie in a fleet's folder.
         match parent.ancestors().find(|folder| Marker::is_in(folder)) {
             Some(home) => {
                 let below = named(path.strip_prefix(home).map_err(io::Error::other)?)?;
@@ -192,6 +193,8 @@ pub fn write_whole(
     let location = Location::of(path)?;
     let free = location.is_free(path)?;
     with_draft(path, write, |draft| {
+        // In a folder of ours the ledger has refused foreign files before; elsewhere only a free
+        // name is taken.
         if location.marked {
             rename_file(draft, path)
         } else if free {

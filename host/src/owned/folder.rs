@@ -171,6 +171,7 @@ fn foreign_below(folder: &Dir, prefix: &str, marker: &Marker) -> io::Result<Opti
         let name = entry.file_name().to_string_lossy().into_owned();
         let path = if prefix.is_empty() { name } else { format!("{prefix}/{name}") };
         let kind = entry.file_type()?;
+        // A link is neither file nor folder here, and so is always foreign.
         let known = path == MARKER_FILE
             || kind.is_file() && marker.files.contains(&path)
             || kind.is_dir() && marker.folders.contains(&path);

@@ -22,6 +22,7 @@ pub struct Overlap {
 /// # Errors
 /// The first such input.
 pub fn check_overlap(output: &Path, inputs: &[PathBuf]) -> Result<(), Overlap> {
+    // Compared without links, and named as the user gave them.
     let real_output = resolved(output);
     for input in inputs {
         let real_input = resolved(input);

@@ -55,6 +55,7 @@ pub fn sentence(run: &RunRecord) -> String {
     let mib = run.sections.bounds.least.bytes() as f64 / MIB;
     let refused: Vec<String> =
         refusals(run).iter().map(|(name, count)| format!("{name} {count}")).collect();
+    // A refusal hides how much would have been needed.
     if refused.is_empty() {
         format!("{mib:.1} MiB would have held this run without a refusal: --capacity capacity.toml")
     } else {
@@ -72,6 +73,7 @@ pub fn sentence(run: &RunRecord) -> String {
 /// A bound is beyond TOML's integers.
 pub fn capacity_toml(run: &RunRecord) -> Result<String, toml::ser::Error> {
     let least = &run.sections.bounds.least;
+    // As a comment of the file, which may be used long after the report was read.
     let refused = if refusals(run).is_empty() {
         ""
     } else {

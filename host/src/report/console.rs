@@ -195,6 +195,7 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             let frames = trajectory.extrapolated_frames;
             let reasons = reasons(&trajectory.extrapolated_because);
             let extrapolated = ("poses extrapolated", format!("in {frames} frames: {reasons}"));
+            // Above, so that two segments do not look like one map.
             let apart = format!(
                 "{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above \
                                  the one before",

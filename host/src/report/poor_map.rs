@@ -15,6 +15,7 @@ const MAIN_SHARE: f64 = 0.5;
 pub fn sentence(run: &RunRecord) -> Option<String> {
     let mesh = &run.sections.blocks.mesh;
     let triangles = mesh.static_triangles() + mesh.object_triangles;
+    // What one frame's depth alone would have given: a map has at least a share of that.
     let best = run.sections.blocks.depth.triangles_most;
     if triangles > 0 && triangles as f64 >= POOR_SHARE * best {
         return None;
@@ -37,6 +38,7 @@ fn reason(run: &RunRecord) -> String {
     let lost = run.sections.trajectory.extrapolated_frames;
     let pruned = run.sections.blocks.totals.voxels_reset;
     let volume = &run.plan.config.volume;
+    // In the order in which they hide each other: without depth nothing else can be told.
     if share(known, all.pixels) < SPARSE_SHARE {
         return format!(
             "there is depth at {:.1} % of the pixels. Check the calibration with `dynvox inspect`, \
@@ -60,6 +62,7 @@ fn reason(run: &RunRecord) -> String {
             volume.near_m
         );
     }
+    // Frames without a pose are not fused.
     if share(lost as u64, frames as u64) > MAIN_SHARE {
         return format!(
             "{lost} of {} had no pose and are not in it. frames.csv has the reason of each",
@@ -73,5 +76,6 @@ fn reason(run: &RunRecord) -> String {
             counted(usize::from(volume.prune_weight), "frame")
         );
     }
+    // None of the usual reasons.
     "frames.csv says what became of each frame, and summary.json what was refused".to_owned()
 }

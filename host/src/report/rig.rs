@@ -147,7 +147,9 @@ mod tests {
     #[test]
     fn another_run_begins_with_what_was_found() {
         let mut report = SelfCalibrationReport::default();
+        // Nothing was found: no lines to begin with.
         assert_eq!(begin_with(&report, 9), None);
+        // Binary fractions come back from TOML bit for bit.
         (
             report.known,
             report.corrected,
@@ -171,6 +173,7 @@ mod tests {
             }
         );
         assert_eq!(rig.row_correction, report.rows);
+        // The disparity's correction needs motion, which the rows' does not.
         report.known = false;
         let text = begin_with(&report, 9).unwrap();
         assert!(

@@ -182,6 +182,7 @@ mod tests {
         let bounds = Bounds { planning, ..Bounds::default() };
         let (_, with) = bounds.resolve((1_242, 375), None, 0.05).unwrap();
         let (_, without) = Bounds::default().resolve((1_242, 375), None, 0.05).unwrap();
+        // The window is paid from the budget, so that fewer blocks are left.
         assert!(
             with.bytes() <= 256 << 20 && with.blocks < without.blocks && with.planning_distance_3d
         );
@@ -205,6 +206,7 @@ mod tests {
         assert_eq!(bounds.resolve((752, 480), None, 0.05).unwrap().1, solved);
         let refusal = |text: &str| {
             std::fs::write(&path, text).unwrap();
+            // A misspelt key, a bound beyond its limit, and a budget of nothing.
             Memory::read(&path).unwrap_err().to_string()
         };
         assert!(refusal(&text.replace("matches = ", "matchs = ")).contains("dynvox budget"));

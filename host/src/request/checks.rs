@@ -29,6 +29,7 @@ pub fn check_bounds(
     if !fits(bounds) {
         let scale = (bounds.image_width as f64 / width as f64)
             .min(bounds.image_height as f64 / height as f64);
+        // Down, so that the scaled images fit.
         let scale = (scale * 100.0).floor() / 100.0;
         let larger = Capacity::PROFILES.iter().find(|(_, capacity)| fits(capacity));
         return Err(RequestError::ImageSize {
@@ -47,6 +48,7 @@ pub fn check_bounds(
     }
     let problems = config.validate();
     let (prune_lag, history_frames) = (config.volume.prune_lag, bounds.history_frames);
+    // Pruning looks back through the history, which must reach so far.
     if problems.is_empty() && config.volume.prunes() && prune_lag as usize > history_frames {
         return Err(RequestError::Window {
             prune_lag,

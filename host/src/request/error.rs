@@ -89,6 +89,7 @@ impl RequestError {
 /// Says why there is no reference, and what to do.
 fn missing(reference: Reference, frames: usize, delay: usize) -> String {
     match reference {
+        // First: with any reference nothing is left to compare.
         _ if delay >= frames => format!(
             "--evaluation-delay {delay} reaches beyond the last of \
             them. Give a smaller delay, or more --frames"

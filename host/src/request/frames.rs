@@ -54,6 +54,7 @@ impl FrameNumbers {
     pub fn new(source: &dyn FrameSource, asked: &Frames) -> Result<Self, RequestError> {
         let (start, stride) = (asked.start, asked.stride.max(1));
         let most = asked.most.unwrap_or(usize::MAX);
+        // A stream's frames cannot be counted before they came.
         if source.stream().is_some() {
             return Ok(Self::Open { start, stride, most });
         }

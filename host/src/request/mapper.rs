@@ -59,6 +59,7 @@ impl Request {
     /// # Errors
     /// The sentences of [`Request::resolve`].
     pub fn check_mapper(&self) -> Result<usize, RequestError> {
+        // What a mapper alone can use; a request that asks for more differs from it.
         let mapper = Self {
             input: Input::default(),
             frames: Frames::default(),

@@ -281,6 +281,7 @@ impl Options {
         if self.bits.is_some_and(|bits| !(8..=16).contains(&bits)) {
             return Err(RequestError::invalid("--bits must be 8 to 16. Give another number"));
         }
+        // A path of `-` is standard input, as with other tools.
         Ok(Input {
             source: match &self.path {
                 None => Source::Street,

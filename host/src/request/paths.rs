@@ -76,6 +76,7 @@ mod tests {
         for name in ["recording", "left.yaml", "right.yaml", "depth", "masks", "poses.txt"] {
             assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
         }
+        // The folder of saved masks is an output.
         assert_eq!(inputs.len(), 6, "{inputs:?}");
         assert_eq!(request.saved_folders().count(), 1);
     }

@@ -93,6 +93,7 @@ impl Request {
         bounds: &Capacity,
         interval_s: Option<f64>,
     ) -> Settings {
+        // First what depends on the bounds, then what the user's choice of masks implies.
         settings.fit(bounds);
         if let Some(finds_motion) = self.masks.source.finds_motion() {
             settings.segmentation.enabled = finds_motion;

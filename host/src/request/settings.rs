@@ -296,6 +296,7 @@ pub(super) fn insert(table: &mut Table, key: &str, value: Value) {
         None => drop(table.insert(key.to_owned(), value)),
         Some((first, rest)) => {
             let inner = table.entry(first).or_insert_with(|| Value::Table(Table::new()));
+            // A value in the way of a table is replaced: the later of two arguments counts.
             if !inner.is_table() {
                 *inner = Value::Table(Table::new());
             }
@@ -376,6 +377,7 @@ mod tests {
             .to_toml(true)
             .unwrap();
         assert!(
+            // Exact decimal numbers, and names instead of numbers of a variant.
             text.contains("voxel_size_m = 0.1\n")
                 && text.contains("observation_weight = \"depth\""),
             "{text}"
@@ -386,6 +388,7 @@ mod tests {
 
     #[test]
     fn the_core_sets_every_key_of_the_file_to_the_same_value() {
+        // Keys of every kind: numbers, integers, switches, choices, and nested sections.
         let other = [
             "volume.voxel_size_m=0.1",
             "volume.observation_weight=depth",
@@ -403,6 +406,7 @@ mod tests {
         for (key, value) in leaves("", &table) {
             let text = value.to_string();
             assert_eq!(
+                // The core takes bare words and numbers, and knows no quotes or brackets.
                 config.set(&key, text.trim_matches(['"', '[', ']'])),
                 Ok(()),
                 "{key} = {text}"
@@ -413,6 +417,7 @@ mod tests {
 
     #[test]
     fn unknown_keys_and_wrong_kinds_are_named() {
+        // Each message must name the key as it was written.
         let refusal = |set: &str| format!("{:#}", sets(&[set]).unwrap_err());
         let message = refusal("volume.voxel_sise_m=0.1");
         assert!(

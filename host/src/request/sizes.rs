@@ -113,6 +113,7 @@ mod tests {
         ] {
             assert_eq!(text.parse(), Ok(Bytes(bytes)), "{text}");
         }
+        // No number, no unit that is known, below 0, and beyond 64 bits.
         assert!(
             ["", "MiB", "48 pounds", "-1", "1e99", "99999999999GiB"]
                 .iter()
@@ -125,6 +126,7 @@ mod tests {
         assert_eq!("752x480".parse(), Ok(ImageSize(752, 480)));
         assert!("752".parse::<ImageSize>().is_err() && "x480".parse::<ImageSize>().is_err());
         assert_eq!("200x100x20".parse(), Ok(WindowSize([200, 100, 20])));
+        // Two sides, a side of 0, one too long, and no numbers.
         assert!(
             ["200x100", "0x1x1", "2000x1x1", "axbxc"]
                 .iter()

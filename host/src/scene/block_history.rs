@@ -103,10 +103,13 @@ mod tests {
             "[volume]\nvoxel_size_m = 0.05\nfar_m = 20\n",
         )
         .unwrap();
+        // Block 0 was evicted and came back; block 1 was pruned and came back; block 9 was pruned
+        // twice.
         let rows = "x,y,z,last_frame,fate\n0,0,0,7,evicted\n1,0,0,5,pruned\n9,0,0,5,pruned\n0,0,0,9,map\n9,0,0,6,pruned\n1,0,0,8,map\n";
         std::fs::write(folder.path().join(BLOCKS_TABLE_FILE), rows).unwrap();
         let history = BlockHistory::read(folder.path()).unwrap();
         let at = |x: f32| history.last_frame([x, 0.1, 0.1]);
+        // A block of 0.05 m voxels has 0.4 m.
         assert_eq!(
             [at(0.1), at(0.5), at(0.9), at(-0.1), at(3.7)],
             [Some(9), Some(8), Some(8), Some(9), None]

@@ -137,6 +137,7 @@ mod tests {
             "distance_zero": 32768, "distance_unit_m": 0.01,
         });
         std::fs::write(folder.join("window.json"), window.to_string()).unwrap();
+        // Unknown and free in the far row, occupied and free in the near one.
         std::fs::write(folder.join("map.pgm"), b"P5\n2 2\n255\n\xcd\xfe\x00\xfe").unwrap();
         let image = |values: [u16; 4]| Image::new(2, 2, values.to_vec()).unwrap();
         write_png_deep(&folder.join("height.png"), &image([0, 100, u16::MAX, 0])).unwrap();
@@ -144,6 +145,7 @@ mod tests {
         let PlanningWindow { cell_m, up, cells } = PlanningWindow::read(run.path()).unwrap();
         let cell =
             |position_m, occupied, distance_m| PlanningCell { position_m, occupied, distance_m };
+        // The unknown cell is left out; heights and distances count from their zeros.
         let expected = [
             cell([0.25, 1.4, 2.75], false, Some(1.0)),
             cell([-0.25, 1.5, 2.25], true, Some(-0.5)),
@@ -151,6 +153,7 @@ mod tests {
         ];
         assert_eq!((cell_m, up), (0.5, [0.0, -1.0, 0.0]));
         assert_eq!(cells, expected);
+        // Without the keys of a window.
         std::fs::write(folder.join("window.json"), "{}").unwrap();
         assert!(
             PlanningWindow::read(run.path())

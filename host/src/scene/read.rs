@@ -80,6 +80,7 @@ fn objects(folder: &Path, max_triangles: usize) -> Result<Vec<SceneObject>, Form
         return Ok(Vec::new());
     }
     let names = object_files(folder)?;
+    // Objects share the triangles, but each has enough to be recognised.
     let each =
         (max_triangles / names.len().max(1)).clamp(LEAST_OBJECT_TRIANGLES, MAX_OBJECT_TRIANGLES);
     let object = |(id, name): (u32, String)| {

@@ -73,10 +73,12 @@ impl MeshFile {
             return Ok(LEAST_CELL_M);
         }
         let every = (self.ply.pieces() / COUNTED).min(COUNTED_OF) as usize;
+        // A surface's triangles fall with the square of the cells' size.
         let mut cell_m = LEAST_CELL_M * (all / most).sqrt() as f32;
         for _ in 0..COUNTS {
             let Clustered { clustering, read, .. } =
                 self.clustered(cell_m, max_triangles, every)?;
+            // From the share that was read to all.
             let will_stay = clustering.triangles() as f64 * all / read as f64;
             cell_m = (cell_m * growth(will_stay / most)).max(LEAST_CELL_M);
         }
@@ -136,6 +138,7 @@ mod tests {
                 ..Vertex::default()
             }
         };
+        // Column by column, as blocks come from a mesh, so that each part of the file is local.
         for first in (0..squares).step_by(8) {
             for (x, y) in
                 (0..squares).flat_map(|y| (first..(first + 8).min(squares)).map(move |x| (x, y)))

@@ -144,6 +144,7 @@ fn over_time(rows: &[Row<'_>]) -> Markup {
 fn rate(rows: &[Row<'_>]) -> Markup {
     let labels = labels(rows);
     let of =
+        // k begins at 1, and the published table has 12 values.
         |table: [f64; 12]| published_at(rows, |k| table.get((k as usize).checked_sub(1)?).copied());
     let figure = |title: &str, of_sample: fn(&FrameSample) -> Option<f64>, table| {
         let theirs = original("DispNet, medians (original)", 1, of(table));
@@ -165,6 +166,7 @@ fn rate(rows: &[Row<'_>]) -> Markup {
 
 fn scale(rows: &[Row<'_>]) -> Markup {
     let labels = labels(rows);
+    // The original shows errors: what is not accurate.
     let wrong = |source: &str| {
         shares(rows, source, "accuracy")
             .into_iter()

@@ -65,6 +65,7 @@ impl RunResult {
     /// # Errors
     /// The summary cannot be turned into JSON.
     pub fn from_run(request: &Request, run: &RunRecord) -> Result<Self, serde_json::Error> {
+        // The charts of the page need a bounded number of values, however long the run was.
         let charts = run.frames.charts();
         Ok(Self {
             request: request.clone(),

@@ -85,6 +85,8 @@ impl SweepFolder {
     pub fn results(&self, plan: &Plan) -> Result<Results, SweepError> {
         let mut results = Results::new();
         for (key, request) in &plan.runs {
+            // A result that is missing is a run not yet made; one of another request is another
+            // sweep's.
             let path = self.result(key);
             if let Some(result) = RunResult::read(&path)? {
                 if result.request != *request {

@@ -90,6 +90,8 @@ fn columns<'a>(
     result: Option<&'a RunResult>,
     common: Option<(f64, u64)>,
 ) -> PointColumns<'a> {
+    // By the names of summary.json, so that results of earlier versions can be read: what they lack
+    // stays empty.
     let value =
         |group: &str, name: &str| -> Option<&'a Value> { result?.summary.get(group)?.get(name) };
     let number = |group: &str, name: &str| value(group, name).and_then(Value::as_f64);

@@ -183,6 +183,7 @@ fn half_ring(section: &Section) -> [(f64, f64); 8] {
     let &(_, top, belt, wide, narrow, sill) = section;
     let edge = top - 0.05 * (top - sill).min(1.0);
     let waist = sill + 0.45 * (belt - sill);
+    // Widths of the body at each height, from the sill over the waist to the roof.
     [
         (0.88 * wide, sill),
         (0.97 * wide, sill + 0.3 * (waist - sill)),

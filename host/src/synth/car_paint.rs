@@ -71,7 +71,9 @@ fn joints(shape: &Shape, p: &BodyPoint) -> f32 {
     let [front, rear, ..] = shape.side_glass_m;
     let low = above(0.32, p.up, p.f) * (1.0 - above(shape.side_height_m[0] + 0.02, p.up, p.f));
     let line = |at: f32| within(at - 0.008, at + 0.008, p.z, p.f);
+    // A shape without a middle pillar has it far outside.
     let middle = if shape.pillars_m[0] < 5.0 { shape.pillars_m[0] } else { -0.2 };
+    // A line at the front door, one between the doors, one behind.
     let doors = line(front - 0.02).max(line(middle)).max(line((rear + 0.15).max(middle - 0.85)));
     let handle = |at: f32| {
         within(at, at + 0.16, p.z, p.f) * within(-0.11, -0.085, p.up - shape.side_height_m[0], p.f)

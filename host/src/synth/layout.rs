@@ -63,6 +63,7 @@ pub fn cleared_m(config: &StreetConfig) -> Vec<(bool, f64, f64)> {
         let (at, stop) = super::traffic::ends_m(car, config.rate_hz);
         for (lane, at_m) in [(Some(car.lane), at), (car.to_lane, stop)] {
             match lane {
+                // 18 m to either side: the way of a car that parks or pulls out.
                 Some(Lane::ParkedRight) => cleared.push((true, at_m - 18.0, at_m + 18.0)),
                 Some(Lane::ParkedLeft) => cleared.push((false, at_m - 18.0, at_m + 18.0)),
                 _ => {}

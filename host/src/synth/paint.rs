@@ -213,11 +213,13 @@ impl Painter {
     fn pavement(&self, surface: &Surface, surface_point: &SurfacePoint) -> Painted {
         let [s, d, _] = surface_point.surface_m;
         let [fs, fd, _] = surface_point.footprint_m;
+        // Slabs of half a metre; every second row is shifted by half a slab.
         let (row, size) = (floor(d * 2.0), 0.5);
         let shifted = s + 0.25 * (row & 1) as f32;
         let column = floor(shifted * 2.0);
         let joint =
             1.0 - (1.0 - stripes(shifted, size, 0.012, fs)) * (1.0 - stripes(d, size, 0.012, fd));
+        // Slabs differ in shade, which fades where a pixel covers many.
         let own = (unit(cell(surface.seed, column.rem_euclid(480), row)) - 0.5)
             * survives(size, fs.max(fd));
         let fine = self.fine(3, surface_point, 1.0);
@@ -291,6 +293,7 @@ impl Painter {
         let [fu, fv, _] = surface_point.footprint_m;
         let (wide, tall) = (0.24, 0.32);
         let (row, column) = (floor(v / tall), floor(u / wide));
+        // The shadow under each tile's edge, and the rounding of its side.
         let lip = stripes(v, tall, 0.05, fv);
         let roll = stripes(u, wide, 0.07, fu);
         let own = (unit(cell(surface.seed, column, row)) - 0.5) * survives(wide, fu.max(fv)) * 0.45;

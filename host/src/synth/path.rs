@@ -136,10 +136,12 @@ impl RoadSpan<'_> {
         let right = Vector3::new(libm::cos(heading), 0.0, -libm::sin(heading));
         let mut pose = Transform::new(Vector3::new(0.0, heading + yaw_rad, 0.0), Vector3::zeros());
         pose.translation_m = (self.point(s_m) + right * lateral_m).into();
+        // A flat street keeps the bits it had before there were hills.
         if self.centerline.hills != 0.0 {
             let (height_m, rise) = self.centerline.height(s_m);
             let rotation =
                 |x: f64, y: f64| Transform::new(Vector3::new(x, y, 0.0), Vector3::zeros());
+            // First the heading, then the slope along it, then the object's own turn.
             let tilted =
                 rotation(0.0, heading) * rotation(libm::atan(rise), 0.0) * rotation(0.0, yaw_rad);
             pose.rotation = tilted.rotation;
@@ -162,8 +164,10 @@ mod tests {
         for step in 0..800 {
             let s = f64::from(step) * 0.1;
             let (low, high) = (centerline.height(s), centerline.height(s + 0.01));
+            // The rise is the derivative of the height.
             assert!(((high.0 - low.0) / 0.01 - low.1).abs() < 1e-3);
             steepest = steepest.max(low.1);
+            // y points down.
             let pose = span.t_street_local(s, 0.0, 0.0);
             assert!((pose.translation_m[1] + low.0).abs() < 1e-9);
             let ahead = pose.rotate(Vector3::z());
@@ -186,6 +190,7 @@ mod tests {
             let delta = span.point(s + 0.1) - span.point(s);
             let heading = centerline.heading_rad(s + 0.05);
             assert!(
+                // The chord of 0.1 m is the tangent in its middle.
                 (delta - Vector3::new(libm::sin(heading), 0.0, libm::cos(heading)) * 0.1).norm()
                     < 1e-6
             );

@@ -175,6 +175,7 @@ pub fn views(
 
 /// Returns the rectification of raw images by a calibration.
 pub fn rectification(calibration: &StereoCalibration) -> Option<Rectification> {
+    // Only a calibration that states its rectification has one to return.
     let Placement::Rectified { r_rectified_left, r_rectified_right, size, .. } =
         calibration.placement
     else {

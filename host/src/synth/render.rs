@@ -124,6 +124,7 @@ impl Renderer<'_> {
     }
 
     fn out_of_sight(&self, middle: Point, radius_m: f64) -> bool {
+        // The four sides of the field of view, a pixel wider: their planes go through the camera.
         let (u, v) = self.pinhole.center_px;
         let sides = [
             (u + 1.0, middle.x, 1.0),
@@ -134,6 +135,7 @@ impl Renderer<'_> {
         let focal = self.pinhole.focal_px;
         middle.z < -radius_m
             || sides.iter().any(|&(reach, offset, sign)| {
+                // The distance of the sphere's middle from such a plane, against its radius.
                 let length = libm::sqrt(reach * reach + focal * focal);
                 (middle.z * reach + sign * offset * focal) / length < -radius_m
             })
@@ -189,6 +191,7 @@ impl Shading<'_> {
     /// Colour and centre depth of one pixel.
     fn pixel(&self, u: f64, v: f64, samples: [u32; SAMPLES]) -> (Tone, f32) {
         let (centre, depth_m) = self.sample(u, v, samples[0]);
+        // All samples see one triangle: its tone varies little within a pixel.
         if samples.iter().all(|&seen| seen == samples[0]) {
             return (centre, depth_m);
         }
@@ -196,6 +199,7 @@ impl Shading<'_> {
         let mut tones = [centre; SAMPLES];
         let mut sum = centre;
         for k in 1..SAMPLES {
+            // Samples of one group share a tone: only edges between groups are worth another look.
             tones[k] = match groups[..k].iter().position(|&group| group == groups[k]) {
                 Some(known) => tones[known],
                 None => self.sample(u + OFFSETS_PX[k].0, v + OFFSETS_PX[k].1, samples[k]).0,

@@ -256,9 +256,11 @@ impl GroundLight {
         let (u, v) =
             (point.x * scale + self.offset[0] as f32, point.z * scale + self.offset[1] as f32);
         let limit = GROUND_SIDE as f32 - 2.0;
+        // Beyond the map of the ground the sky is open; negated, so that NaN is beyond.
         if !(u > 0.0 && v > 0.0 && u < limit && v < limit) {
             return 1.0;
         }
+        // Between the four texels around.
         let (u0, v0) = (u as usize, v as usize);
         let (fu, fv) = (u - u0 as f32, v - v0 as f32);
         let at = |row: usize, column: usize| self.open[row * GROUND_SIDE + column];

@@ -214,9 +214,11 @@ impl Street {
     fn view(&self, scene: &Scene, index: u32, camera: u32) -> Picture {
         let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
         match self.views.as_ref().and_then(|views| views.get(camera as usize)) {
+            // The ideal rig renders what its camera sees.
             None => self.render(scene, camera::pinhole(&self.config), camera, &sensor),
             Some(view) => {
                 let rendering =
+                    // Without noise: the sensor comes after the lens.
                     self.render(scene, view.pinhole, camera, &Sensor::new(0, 0, 0, 0.0));
                 Picture {
                     rgb: view.image(&rendering, &sensor),
@@ -254,6 +256,7 @@ impl Street {
     pub(super) fn surroundings(&self, index: u32) -> Surroundings {
         let time_s = self.time_s(index);
         let along = camera::along_m(&self.config, time_s);
+        // Ahead and behind as far as the camera or a shadow can reach.
         let reach = (along - REACH_M.0, along + REACH_M.1);
         let (first, last) =
             (libm::floor(reach.0 / SEGMENT_M) as i64, libm::floor(reach.1 / SEGMENT_M) as i64);
@@ -284,6 +287,7 @@ impl Street {
         if let Some(known) = find(&lock()) {
             return known;
         }
+        // Outside the lock: another thread may make the same one meanwhile, which is equal.
         let made = Arc::new(segment(&self.config, &self.centerline, &self.sun, number));
         let mut cached = lock();
         if cached.len() >= CACHED_SEGMENTS {

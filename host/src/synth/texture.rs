@@ -22,6 +22,7 @@ pub struct Ripmap {
 
 impl Ripmap {
     fn new(mut base: Vec<f32>, tile_m: f32) -> Self {
+        // Mean 0 and deviation 1, so that strengths mean the same for all textures.
         let mean = base.iter().sum::<f32>() / base.len() as f32;
         base.iter_mut().for_each(|value| *value -= mean);
         let deviation =
@@ -30,6 +31,8 @@ impl Ripmap {
         let mut texels: Vec<i16> = Vec::with_capacity(4 * SIDE * SIDE);
         let mut starts = [0; (LOG + 1) * (LOG + 1)];
         let mut column = base;
+        // Every pair of levels in u and v: surfaces are seen at a slant, with unlike sizes along
+        // and across.
         for lv in 0..=LOG {
             let mut row = column.clone();
             for lu in 0..=LOG {
@@ -53,6 +56,7 @@ impl Ripmap {
     pub fn grain(seed: u32, tile_m: f32, tilt: f32) -> Self {
         let mut base = vec![0.0_f32; SIDE * SIDE];
         let mut strength = 1.0;
+        // From 4 cells a side to one a texel.
         for octave in 2..=LOG as u32 {
             let cells = 1_i32 << octave;
             let step = SIDE as i32 / cells;
@@ -61,6 +65,7 @@ impl Ripmap {
                     let (cx, cy) = (x / step, y / step);
                     let (fx, fy) =
                         ((x % step) as f32 / step as f32, (y % step) as f32 / step as f32);
+                    // Smoothed at the cells' edges, so that no grid shows.
                     let (fx, fy) = (fx * fx * (3.0 - 2.0 * fx), fy * fy * (3.0 - 2.0 * fy));
                     let at = |dx: i32, dy: i32| {
                         unit(cell(seed ^ octave, (cx + dx) % cells, (cy + dy) % cells)) - 0.5

@@ -35,6 +35,7 @@ fn travelled(profile: &SpeedProfile, time_s: f64, rate_hz: f64) -> (f64, f64) {
         SpeedProfile::Constant { speed_m_s } => (speed_m_s * time_s, speed_m_s),
         SpeedProfile::Starting { frame, speed_m_s, acceleration_m_s2 } => {
             let since = (time_s - f64::from(frame) / rate_hz).max(0.0);
+            // The time to reach the speed, and half of it is what the start costs in way.
             let reached = speed_m_s / acceleration_m_s2;
             if since < reached {
                 (0.5 * acceleration_m_s2 * since * since, acceleration_m_s2 * since)

@@ -197,6 +197,7 @@ pub fn track(
 /// Checks a motion by KinectFusion's tests.
 fn classify(config: &IcpConfig, report: &IcpReport) -> IcpStatus {
     let motion = &report.t_current_previous;
+    // Twice the vector of the quaternion is the angle for the small turns that pass here.
     let (way_m, turn_rad) = (motion.distance_m(), 2.0 * motion.quaternion().coords.xyz().norm());
     if report.pairs < PAIRS_MIN {
         IcpStatus::TooFewPairs

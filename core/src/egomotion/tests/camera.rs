@@ -16,6 +16,7 @@ fn a_dark_right_camera_repeats_the_last_motion() {
     let mut t_world_camera = Transform::IDENTITY;
     for frame in 0..4 {
         let [left, right] = see(&t_world_camera);
+        // The right camera fails at the third frame, after one motion could be estimated.
         let right = if frame < 2 { &right } else { &dark };
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(right), &Serial);
@@ -29,6 +30,7 @@ fn a_dark_right_camera_repeats_the_last_motion() {
             let expected =
                 if frame == 1 { MotionStatus::Estimated } else { MotionStatus::TooFewMatches };
             assert_eq!((estimate.status, camera.extrapolated_frames()), (expected, frame - 1));
+            // A motion that cannot be estimated repeats the last one, which here is the true one.
             let (distance, _) = between(camera.t_current_previous(), &step.inverse());
             assert!(distance < 0.02);
         }
@@ -51,6 +53,7 @@ fn after_dark_frames_the_camera_is_found_from_the_last_frame_seen() {
     let mut camera = Egomotion::default();
     let dark = vec![0; WIDTH * HEIGHT];
     let mut t_world_camera = Transform::IDENTITY;
+    // The camera slows down while it sees nothing, so that the guesses are wrong.
     for (frame, metres) in [0.0, 0.3, 0.3, 0.1, 0.1].into_iter().enumerate() {
         t_world_camera = t_world_camera * Transform::from_translation([0.0, 0.0, metres]);
         let seen = see(&t_world_camera);
@@ -66,12 +69,14 @@ fn after_dark_frames_the_camera_is_found_from_the_last_frame_seen() {
                 &mut estimator,
             );
         }
+        // As the tracker does: the frame before the dark ones stays the reference.
         if camera.since_reference() > 0 {
             matcher.keep_previous();
         }
         let (distance, _) = between(camera.t_world_camera(), &t_world_camera);
         let guessed = camera.extrapolated_frames() > 0;
         assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
+        // A guess is wrong by what the camera moved otherwise; afterwards the error must be gone.
         assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
     }
     assert!(
@@ -146,10 +151,12 @@ fn a_camera_stands_at_once_where_it_could_brake() {
 fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
+    // Until then the reference is kept, and each frame guesses the last motion again.
     for frame in 1..=MAX_REFERENCE_FRAMES {
         assert_eq!((camera.is_lost(), camera.since_reference()), (false, frame - 1));
         camera.hold(0.1);
     }
+    // Lost: the guess goes on, and a segment begins only when told.
     for frame in 0..20 {
         assert_eq!((camera.is_lost(), camera.segment(), camera.since_reference()), (true, 0, 0));
         assert!(
@@ -165,9 +172,11 @@ fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
     camera.begin_segment();
     assert_eq!(
         (camera.t_world_camera().translation_m, camera.segment()),
+        // Above the guess, so that the new segment does not lie in the map of the old one.
         ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1)
     );
     let pose = Transform::from_translation([3.0, 0.0, 2.0]);
     camera.relocalize(&pose);
+    // A pose that was found again belongs to the same segment.
     assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, 1));
 }

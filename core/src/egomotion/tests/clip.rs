@@ -93,6 +93,7 @@ fn relative_errors(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors 
     let (mut translation, mut rotation, mut count) = (0.0, 0.0, 0.0);
     for segment_m in LENGTHS_M {
         for i in 0..frames {
+            // The first frame whose path since `i` is at least as long as the segment.
             let Some(j) = (i..frames).find(|&j| distance[j] >= distance[i] + segment_m) else {
                 break;
             };
@@ -102,6 +103,7 @@ fn relative_errors(truth: &[Matrix4<f64>], estimate: &[Matrix4<f64>]) -> Errors 
         }
     }
     let (mut frame_m, mut frame_deg) = (0.0, 0.0);
+    // Besides, errors from frame to frame, which longer segments average away.
     for i in 1..frames {
         frame_m += length(&error(i - 1, i)).powi(2);
         frame_deg += degrees(&error(i - 1, i)).powi(2);
@@ -123,6 +125,7 @@ fn run(name: &str) -> Vec<Matrix4<f64>> {
     let bytes = FlowMatcher::bytes(&capacity) + Estimator::bytes(&capacity);
     let mut slab: Vec<[u64; 8]> = vec![[0; 8]; bytes / 64 + 1];
     let slab: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
+    // The carver asks for cache lines, and a Vec of arrays of u64 is aligned to 8 bytes only.
     let start = slab.as_ptr().align_offset(64);
     let mut carver = Carver::new(&mut slab[start..], bytes).unwrap();
     let mut matcher = FlowMatcher::new_in(&capacity, &mut carver);
@@ -140,6 +143,7 @@ fn run(name: &str) -> Vec<Matrix4<f64>> {
             View::new(&left.0, left.1, left.2).unwrap(),
             View::new(&right.0, right.1, right.2).unwrap(),
         );
+        // Times of the process, not of the clock: other processes must not count.
         let begin = cpu_ms();
         let report = matcher.push(&SceneFlowConfig::default(), left_view, right_view, &Serial);
         let matched = cpu_ms();

@@ -87,6 +87,7 @@ fn distances_are_signed_and_point_to_the_nearest_obstacle() {
     for y in 0..size[1] {
         for x in 0..size[0] {
             for z in 0..size[2] {
+                // A slab of obstacle ten cells thick across the whole window, from x = 20.
                 let at = cells.position([x, y, z]).unwrap();
                 cells.bits[at] = if (20..30).contains(&x) {
                     crate::planning::cells::OCCUPIED
@@ -98,14 +99,17 @@ fn distances_are_signed_and_point_to_the_nearest_obstacle() {
     }
     planning.predict(0.0);
     let [x, y, z] = planning.origin();
+    // One cell ten cells before the slab, and one in it, two cells from the free side.
     let (outside, inside) = ([x + 10, y + 5, z], [x + 21, y + 5, z + 3]);
     let slice = planning.slice_distance(outside).unwrap();
     assert_eq!(
+        // Cells of 0.2 m: ten of them are 2 m.
         (slice.squared_cells, slice.nearest, slice.distance_m),
         (100, [x + 20, y + 5, z], 2.0)
     );
     let cell = planning.cell_distance(inside).unwrap();
     assert_eq!(
+        // Within, the nearest free cell counts, two cells away, and the sign is negative.
         (cell.squared_cells, cell.nearest, cell.distance_m),
         (4, [x + 19, y + 5, z + 3], -0.4)
     );
@@ -113,7 +117,9 @@ fn distances_are_signed_and_point_to_the_nearest_obstacle() {
         gradient.is_some_and(|[right, ahead]| (right + 1.0).abs() < 1e-6 && ahead == 0.0)
     };
     assert!(is_down(planning.slice_gradient(outside)));
+    // Within, the gradient points out of the obstacle's near face.
     assert_eq!(planning.cell_gradient(inside).map(|[right, ..]| right < 0.0), Some(true));
+    // A cell of the window's edge has a neighbour on one side only.
     assert!(is_down(planning.slice_gradient([x, y, z])), "at the edge");
     assert_eq!(planning.slice_distance([x - 1, y, z]), None);
 }

@@ -50,6 +50,7 @@ fn a_path_is_free_until_the_robots_rim_touches() {
     let robot = RobotCylinder { radius_m: 0.4, low_m: 0.2, high_m: 1.0, unknown_ends: false };
     let sweep =
         |path: &[[f64; 3]], robot: &RobotCylinder| scene.planning.sweep(&scene.volume, path, robot);
+    // The path lies on the ground, which is 1.5 m below the camera.
     let ground = |x: f64, z: f64| [x, 1.5, z];
     let straight = sweep(&[ground(-1.0, 3.0), ground(-1.0, 12.0)], &robot);
     assert!(
@@ -62,20 +63,24 @@ fn a_path_is_free_until_the_robots_rim_touches() {
         "a bar at 5, less the radius: {bar:?}"
     );
     assert_eq!(
+        // A detour of 1.6 m to the left passes the bar with the radius to spare.
         sweep(&[ground(1.0, 2.0), ground(1.0, 4.5), ground(-0.6, 4.5), ground(-0.6, 7.0)], &robot)
             .end,
         PathEnd::Free,
         "around it"
     );
     let over = RobotCylinder { low_m: 0.8, ..robot };
+    // The bar is 0.6 m high, and this cylinder begins above it.
     assert_eq!(sweep(&[ground(1.0, 2.0), ground(1.0, 7.0)], &over).end, PathEnd::Free, "over it");
     let unknown = RobotCylinder { unknown_ends: true, ..robot };
+    // Where all was seen, unknown_ends changes nothing.
     assert_eq!(sweep(&[ground(-1.0, 4.0), ground(-1.0, 7.0)], &unknown).end, PathEnd::Free);
     let back = sweep(&[ground(0.0, 4.0), ground(0.0, -4.0)], &unknown);
     assert!(
         back.end == PathEnd::Unknown && back.free_m > 1.0 && back.free_m < 4.5,
         "behind the camera nothing is known: {back:?}"
     );
+    // No way, no obstacle.
     assert_eq!(sweep(&[], &robot), FreePath { end: PathEnd::Free, free_m: 0.0 });
 }
 
@@ -84,6 +89,7 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
     let scene = scene();
     let robot = RobotCylinder { radius_m: 0.5, low_m: 0.2, high_m: 1.2, unknown_ends: false };
     let mut points = Vec::new();
+    // The twin tries a thousand positions of the robot against every point of the surface.
     for slot in scene.volume.pool().live() {
         let coord = scene.volume.blocks().coord(slot).unwrap();
         crossings(&scene.volume, slot, coord, 1, |crossing| points.push(crossing.point_m(0.1)));
@@ -92,6 +98,7 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
     let mut random = crate::random::Random::new(8);
     let mut touched = 0;
     for _ in 0..50 {
+        // The paths begin and end anywhere on the ground, also within the obstacles.
         let mut random_point = || {
             [0.1 * f64::from(random.below(60)) - 3.0, 1.5, 2.0 + 0.1 * f64::from(random.below(70))]
         };
@@ -105,6 +112,7 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
                 libm::hypot(px - x, pz - z) < robot.radius_m && (0.2..1.2).contains(&(1.5 - py))
             })
         };
+        // Paths are at most 9 m long, and a step 9 mm: the bound below is 2 cm.
         let first = (0..=1_000).map(|n| f64::from(n) / 1_000.0).find(|s| touches(*s));
         assert_eq!(way.end == PathEnd::Surface, first.is_some(), "{from:?} to {to:?}");
         if let Some(first) = first {
@@ -116,5 +124,6 @@ fn a_path_touches_where_a_search_over_fine_steps_does() {
             );
         }
     }
+    // Without paths that touch, the comparison would be empty.
     assert!(touched > 10);
 }

@@ -63,6 +63,7 @@ fn a_kerb_is_a_step_a_slope_is_none_and_a_bridge_hangs_over() {
             solid([-3.0, -1.3, 5.0], [0.5, -1.0, 6.0])(camera, ray),
         ])
     };
+    // The camera moves on, so that each cell is seen from several distances.
     for n in 0..8 {
         scene.observe(at(0.0, 0.1 * f64::from(n)), street);
     }
@@ -72,10 +73,13 @@ fn a_kerb_is_a_step_a_slope_is_none_and_a_bridge_hangs_over() {
         .filter(|z| [0.9, 1.1].iter().any(|x| column(*x, 0.2 * f64::from(*z) + 0.1).step_m > 0.06))
         .count();
     assert!(kerbs >= 9, "{kerbs} of 10");
+    // 6 cm are half the height of the kerb.
     let flat = (20..30).filter(|z| column(-0.5, 0.2 * f64::from(*z) + 0.1).step_m > 0.06).count();
     assert_eq!(flat, 0, "no kerb on the road");
     let under = column(-1.1, 5.3);
+    // From the road to the slab are 2.5 m, and a cell has 0.2 m.
     assert!((2.2..2.6).contains(&under.clearance_m), "{under:?}");
+    // Beside the slab nothing hangs over, which is a clearance of 0.
     assert_eq!(column(-1.1, 4.1).clearance_m, 0.0);
     assert_eq!(
         scene.planning.slice_state(scene.cell_of([-1.1, 0.0, 5.3])),

@@ -86,6 +86,7 @@ impl Scene {
                 (v as f64 - RIG.center_v_px) / RIG.focal_px,
                 1.0,
             ];
+            // Depths outside are pixels without an answer, as a matcher leaves them.
             depth_at(camera, t_world_camera.rotate(ray)).filter(|depth| (0.5..40.0).contains(depth))
         };
         let pixels: Vec<Option<f64>> =
@@ -106,6 +107,7 @@ impl Scene {
             colour: None,
             class: None,
         };
+        // The map and the window see one image, as in a frame of the mapper.
         self.volume.allocate(&view, depth_m, &mut NoStore, &Serial);
         self.volume.fuse(&view, seen, &Serial);
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();

@@ -48,6 +48,7 @@ fn a_moving_box_covers_where_it_will_be_and_leaves_the_window_beneath() {
         &PlanningConfig { object_sigmas: 0.0, level: true, low_m: -1.0, ..CONFIG() },
     );
     let [width, length, _] = planning.size();
+    // The window's middle is the world's origin, so that the car starts within it.
     cells_of(&mut planning).move_to([-(width as i32) / 2, -(length as i32) / 2, -10]);
     assert!(planning.add_moving(car()));
     let covers = |planning: &Planning<'_>, x: f64, y: f64| {
@@ -69,6 +70,7 @@ fn a_moving_box_covers_where_it_will_be_and_leaves_the_window_beneath() {
         covers(&planning, 2.0, -1.0) && !covers(&planning, 2.0, 4.0),
         "a second earlier, and nothing is left where it was"
     );
+    // At its speed the box has left the window long before 100 s.
     planning.predict(100.0);
     assert!(planning.cells.bits.iter().all(|bits| bits & OBJECT == 0), "out of the window");
 }

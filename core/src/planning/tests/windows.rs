@@ -25,6 +25,7 @@ fn no_side_costs_no_byte_and_a_window_what_its_formula_says() {
         Planning::new_in(&capacity, &CONFIG(), 0.1, &mut carver);
         assert_eq!(carver.footprint().bytes(), bytes);
         assert_eq!(capacity.footprint().region("planning").unwrap().bytes, bytes);
+        // The capacity's window: 20 x 18 x 4 m in cells of 0.2 m.
         let (cells, columns, longest) = (100 * 90 * 20, 100 * 90, 100);
         let boxes = capacity.tracks * size_of::<MovingBox>() + 2 * capacity.pixels() / 3;
         let formula = 6 * cells
@@ -107,10 +108,13 @@ fn moving_keeps_what_stays_and_forgets_what_leaves() {
     let mut random = crate::random::Random::new(5);
     for step in 0..200 {
         let mut shift = |most: u32| random.below(2 * most + 1) as i32 - most as i32;
+        // Every fiftieth shift may leave little or nothing of the window.
         let far = if step % 50 == 49 { 100 } else { 4 };
         let by = [shift(far), shift(3), shift(2)];
         let origin = [cells.origin[0] + by[0], cells.origin[1] + by[1], cells.origin[2] + by[2]];
         cells.move_to(origin);
+        // The model is a map from cells of the world, without a ring buffer: what lies outside
+        // goes.
         model.retain(|cell: &Cell, _| cells.local(*cell).is_some());
         for _ in 0..40 {
             let local = cells.size.map(|size| random.below(size as u32) as usize);
@@ -123,6 +127,7 @@ fn moving_keeps_what_stays_and_forgets_what_leaves() {
             model.len(),
             "step {step}"
         );
+        // As many cells are free, and each of the model's is: none is left over or moved.
         assert!(
             model.keys().all(|cell| cells.bits
                 [cells.position(cells.local(*cell).unwrap()).unwrap()]
@@ -153,6 +158,7 @@ fn an_object_that_left_is_no_obstacle_and_a_thin_pole_stays_one() {
     }
     scene.planning.update(&scene.volume);
     assert_eq!([state(&scene, car), state(&scene, pole)], [CellState::Free, CellState::Occupied]);
+    // A ray through where the car stood.
     let through = scene.planning.ray(&scene.volume, [-1.1, 0.6, 2.0], [0.0, 0.0, 1.0], 5.0);
     assert_eq!(through.end, PathEnd::Free, "{through:?}");
 }

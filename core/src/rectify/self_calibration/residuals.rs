@@ -61,6 +61,7 @@ impl<'r> Residuals<'r> {
             t_current_previous,
             rotation: t_current_previous.rotation_matrix(),
             per_px: Shares::per_px(rig),
+            // What the correction that is tried adds to the one that the observations have.
             ahead_px: [
                 at.offset_px - applied.offset_px,
                 at.slope_px - applied.slope_px,

@@ -155,14 +155,17 @@ mod tests {
         let mut uniform = move || f64::from(random.next_u32()) / f64::from(u32::MAX);
         (0..count)
             .map(|at| {
+                // Shares of the image's half width and height, from -1 to 1.
                 let shares = [uniform() * 2.0 - 1.0, uniform() * 2.0 - 1.0];
                 let noise = if at % 10 == 0 {
                     uniform() * 4.0 - 2.0
                 } else {
+                    // A triangle of 0.3 px to either side; and outliers of up to 2 px.
                     (uniform() + uniform() - 1.0) * 0.3
                 };
                 let pixel =
                     [RIG.center_u_px * (1.0 + shares[0]), RIG.center_v_px * (1.0 + shares[1])];
+                // What remains after what is applied.
                 (pixel, error.at(shares) - applied.at(shares) + noise)
             })
             .collect()
@@ -200,6 +203,7 @@ mod tests {
 
     #[test]
     fn a_search_that_begins_with_the_error_moves_the_first_image_and_stays() {
+        // 20 further updates must not walk away by their noise.
         let (mut random, mut rows) = (Random::new(3), RowCalibration::new(KITTI));
         assert_eq!(*rows.applied(), KITTI);
         for _ in 0..20 {

@@ -159,6 +159,7 @@ fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     support(
         &matches,
         Shape::new(WIDTH, HEIGHT, 16),
+        // A least support of 0 takes all of them, also the lone one.
         &all,
         SortedMotions { cells: &mut cells, motion: &mut [[0.0; 4]; 100] },
         &mut supported,

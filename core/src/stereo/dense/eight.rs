@@ -67,6 +67,7 @@ impl<'a, const LEFT: bool> Row<'a, LEFT> {
             cost,
             least_texture: MATCH_TEXTURE,
             most: i32::from(config.disparity_max),
+            // Stands for the pixels beyond a row's end.
             spare: UNTEXTURED,
         }
     }

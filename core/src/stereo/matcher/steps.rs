@@ -252,11 +252,13 @@ impl StereoMatcher<'_> {
     fn fill<E: Executor>(&mut self, filling: Filling, executor: &E) -> u32 {
         let (width, vectors) = (self.width, executor.vectors());
         let image = image_of(self.disparity, width * self.height);
+        // Buffers that other steps use as well, cut to what the bands need.
         let edges = Bands::of(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
         let bands = zip2(Bands::of(self.height).split_mut(image, width), edges);
         let along_rows = each(executor, bands, |(rows, edges)| {
             vectors.run(FillRows { rows, width, filling, edges })
         });
+        // Columns are filled in one band: each needs the whole image's height.
         let (ends, last_row) = bytemuck::cast_slice_mut::<u32, u16>(self.columns)
             .split_at_mut_checked(width)
             .unwrap_or_default();

@@ -122,10 +122,12 @@ fn a_pillar_before_a_wall_keeps_its_edges() {
     let (wall, pillar) = (Texture::new(660, 120, 4), Texture::new(660, 120, 5));
     let image = |shift: f32| {
         Grey::of(400, 120, |u, v| {
+            // The right image shows the texture of a surface further left by its disparity.
             let near = (180.0..220.0).contains(&(u + shift * 40.0));
             if near { pillar.at(u + shift * 40.0, v) } else { wall.at(u + shift * 15.0, v) }
         })
     };
+    // Disparities of 40 px for the pillar and 15 px for the wall, in 256ths of a pixel below.
     let (_, disparity) = disparity(&StereoConfig::default(), &image(0.0), &image(1.0), &Serial);
     let share = |columns: std::ops::Range<usize>, expected: f32| {
         let pixels: Vec<u16> = disparity
@@ -142,6 +144,7 @@ fn a_pillar_before_a_wall_keeps_its_edges() {
             .count() as f64
             / pixels.len() as f64
     };
+    // The columns keep 4 px and more off the pillar's edges, where windows lie on both surfaces.
     assert!(share(184..216, 40.0) > 0.9, "pillar: {}", share(184..216, 40.0));
     assert!(share(230..380, 15.0) > 0.9, "wall to its right: {}", share(230..380, 15.0));
     // What only the left camera sees, to the left of the pillar, is filled with the wall behind.
@@ -180,7 +183,9 @@ fn a_lone_patch_goes_and_one_of_the_wall_behind_a_gap_stays() {
                 disparity.chunks(400).skip(50).take(20).flat_map(|row| &row[columns.clone()]);
             pixels.filter(|&&d| (i32::from(d) - 256 * expected).abs() <= 256).count()
         };
+        // A removal that took the wall with it would pass the checks of the patches.
         assert!(count(150..230, 15) > 1_500, "the wall stays");
+        // The counted columns keep 4 px inside each patch.
         (count(98..114, 40), count(278..294, 15), report)
     };
     let (floating, framed, report) = shown(0.0, 32);
@@ -189,6 +194,7 @@ fn a_lone_patch_goes_and_one_of_the_wall_behind_a_gap_stays() {
     let (floating, framed, removed) = shown(0.02, 32);
     assert!(floating == 0 && framed > 250, "{floating}, {framed}: {removed:?}");
     assert!(removed.speckles > report.speckles + 400);
+    // A gap of 8 px does not reach across the frame of 20, so that the framed patch is alone too.
     let (floating, framed, _) = shown(0.02, 8);
     assert!(floating == 0 && framed == 0, "{floating}, {framed}");
 }

@@ -30,6 +30,7 @@ fn threads_change_nothing() {
 fn a_matcher_remembers_nothing_of_the_pair_before() {
     let (left, right) = surface(200, 80, 7, |_, _| 12.0);
     let (config, fresh) =
+        // What a matcher answers that has seen nothing else and whose buffer has just this size.
         (StereoConfig::default(), disparity(&StereoConfig::default(), &left, &right, &Serial));
     with_matcher(&capacity(333, 100), |matcher| {
         for seed in 0..2 {
@@ -42,6 +43,7 @@ fn a_matcher_remembers_nothing_of_the_pair_before() {
             let report = matcher.compute(&config, left.view(), right.view(), &Serial);
             let disparity: Vec<u16> = matcher.disparity_q8().rows().flatten().copied().collect();
             assert!((report, disparity) == fresh, "a larger buffer and another pair before");
+            // One pair that has no texture, and one whose images differ in size.
             for unlike in [flat(200, 80, 0), flat(199, 80, 0)] {
                 matcher.compute(&config, left.view(), right.view(), &Serial);
                 matcher.compute(&config, left.view(), unlike.view(), &Serial);
@@ -102,6 +104,7 @@ fn refused_pairs_are_named_and_leave_no_disparity() {
             status(&gamma, noise(100, 50, 1), noise(100, 50, 1)),
             StereoStatus::ConfigRefused
         );
+        // The least size is computed, however little there is to find.
         assert_ne!(status(&config, noise(16, 16, 1), noise(16, 16, 1)), StereoStatus::TooSmall);
     });
 }

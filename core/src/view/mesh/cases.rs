@@ -201,6 +201,7 @@ mod tests {
 
     /// Directed sides of a case's triangles that no other of its triangles takes back.
     fn rim(case: &Case) -> Vec<(u8, u8)> {
+        // Two triangles of a case share a side in opposite directions; what is left is the border.
         let mut sides = BTreeMap::new();
         for triangle in &case.triangles[..usize::from(case.count)] {
             for i in 0..3 {
@@ -222,6 +223,7 @@ mod tests {
 
     #[test]
     fn every_cut_edge_has_a_vertex_and_no_other_has() {
+        // Of all 256 cases: the corners within the surface as bits.
         for (inside, case) in CASES.iter().enumerate() {
             let mut used = 0u16;
             case.triangles[..usize::from(case.count)]
@@ -229,6 +231,7 @@ mod tests {
                 .flatten()
                 .for_each(|&edge| used |= 1 << edge);
             for (edge, &start) in EDGE_START.iter().enumerate() {
+                // An edge is cut where one of its ends lies inside.
                 let is_cut =
                     (inside >> start ^ inside >> (start + (1 << edge_axis(edge)))) & 1 == 1;
                 assert_eq!(
@@ -284,10 +287,13 @@ mod tests {
     #[test]
     fn no_diagonal_lies_within_a_face_where_a_neighbour_could_draw_it_too() {
         for (inside, case) in CASES.iter().enumerate() {
+            // The segments that the case draws on the faces of its cube.
             let next = segments(inside);
             for triangle in &case.triangles[..usize::from(case.count)] {
                 for i in 0..3 {
                     let (a, b) = (usize::from(triangle[i]), usize::from(triangle[(i + 1) % 3]));
+                    // A segment of a face is shared with the neighbour, and so must be its only
+                    // line there.
                     assert!(
                         next[a] == b || next[b] == a || !share_a_face(a, b),
                         "case {inside:08b}: {a} {b}"

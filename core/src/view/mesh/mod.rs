@@ -83,6 +83,7 @@ struct LatticePoint {
 
 impl<'v, 's> Patch<'v, 's> {
     fn load(volume: &'v Volume<'s>, slot: Slot, coord: BlockCoord, min_weight: u8) -> Self {
+        // The block and its seven neighbours on the far sides: cubes reach one voxel into them.
         let mut slots = [None; 8];
         for (n, entry) in (0i32..).zip(&mut slots) {
             let beside = || volume.find(coord.offset([n & 1, n >> 1 & 1, n >> 2])?);
@@ -95,6 +96,7 @@ impl<'v, 's> Patch<'v, 's> {
             voxel_size_m: volume.config().voxel_size_m,
             sdf: [UNSEEN; SIDE * SIDE * SIDE],
         };
+        // Voxels never observed have weight 0 and are no surface, also where any weight will do.
         (0..8).for_each(|n| patch.copy(n, if min_weight == 0 { 1 } else { min_weight }));
         patch
     }
@@ -251,6 +253,7 @@ impl<'v, 's> Patch<'v, 's> {
     #[expect(clippy::indexing_slicing, reason = "voxels are below 512")]
     fn point(&self, at: [usize; 3]) -> LatticePoint {
         let sdf = self.sdf(at).into();
+        // The lattice reaches one point into each neighbour.
         let [x, y, z] = at.map(|along| along / BLOCK_SIDE);
         let Some(slot) = self.slots.get(x + 2 * y + 4 * z).copied().flatten() else {
             return LatticePoint { sdf, weight: 0, colour: None };

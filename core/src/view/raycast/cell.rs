@@ -152,15 +152,19 @@ mod tests {
         for _ in 0..1_000 {
             let corners = [(); 8].map(|()| random.below(65_535) as f32 - 32_767.0);
             let field = Field::new(&corners);
+            // Bit by bit of the corner's number: x, y, z.
             for (corner, &value) in corners.iter().enumerate() {
                 assert_eq!(field.at([0, 1, 2].map(|axis| (corner >> axis & 1) as f32)), value);
             }
             let point = [(); 3].map(|()| random.below(1_000) as f32 / 1_000.0);
+            // Sums of numbers up to 32,767 in `f32` are off by some hundredths.
             assert!((field.at(point) - mean(&corners, point)).abs() < 0.05);
             for axis in 0..3 {
                 let mut beside = point;
                 beside[axis] += 0.5;
                 let slope = (field.at(beside) - field.at(point)) / 0.5;
+                // Along one axis a trilinear field is linear, so that a step of a half gives the
+                // slope.
                 assert!(
                     (field.gradient(point)[axis] - slope).abs() < 0.2,
                     "linear along each axis"
@@ -180,6 +184,7 @@ mod tests {
         let mut completed = 0;
         for observed in 0..=u8::MAX {
             let sdf = core::array::from_fn(|corner| {
+                // 9,999 where nothing was observed: it must not be looked at.
                 if observed >> corner & 1 == 1 { plane(corner) } else { 9_999.0 }
             });
             if let Some(corners) = (Corners { sdf, observed }).complete() {
@@ -190,6 +195,7 @@ mod tests {
                     .for_each(|(sdf, exact)| assert!((sdf - exact).abs() < 1e-3));
             }
         }
+        // Not all of them: few corners do not determine a plane.
         assert!(completed > 100, "{completed} of 256");
     }
 }

@@ -148,8 +148,10 @@ mod tests {
                 (cell.voxel() as i32, cell.bit()),
                 (x + 8 * y + 64 * z, (z as usize, (x + 8 * y) as u32))
             );
+            // A cell is inner where all of its corners are of its own block.
             assert_eq!(cell.is_inner(), x < 7 && y < 7 && z < 7);
             for (corner, point) in (0..).zip(cell.corners()) {
+                // The corners of a cell of the last layer are of the next block.
                 let [x, y, z] = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
                 assert_eq!(point.block() as i32, x / 8 + 2 * (y / 8) + 4 * (z / 8));
                 assert_eq!(point.voxel() as i32, x % 8 + 8 * (y % 8) + 64 * (z % 8));

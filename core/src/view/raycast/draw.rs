@@ -25,6 +25,7 @@ impl<'b> Band<'b> {
     // Four calls a picture: apart, for the size of a Cortex-M7's image.
     #[inline(never)]
     pub fn split(self, rows: usize, width: usize) -> (Self, Self) {
+        // A last band may have fewer rows.
         let at = (rows * width).min(self.depth_m.len());
         let (depth_m, depth_low) = self.depth_m.split_at_mut_checked(at).unwrap_or_default();
         let (normal, normal_low) = self.normal.split_at_mut_checked(at).unwrap_or_default();
@@ -143,6 +144,7 @@ impl Row<'_> {
                 self.layers.get_mut(u),
             )
         {
+            // A component of a unit vector times 127 fits a signed byte.
             let unit = hit.normal.map(|c| (c * NORMAL_ONE) as i8);
             (*depth_m, *normal, *colour, *weight, *shown) =
                 (hit.depth_m, unit, hit.colour, hit.weight, layer);

@@ -121,10 +121,12 @@ pub(super) struct RowToHit<'a, 's> {
 fn hit(cells: &CrossedCells<'_, '_>, cell: &CrossedCell<'_>, meeting: &Meeting) -> Hit {
     let &Meeting { depth_m, point, direction: [right, down, forward], colour } = meeting;
     let length = libm::sqrtf(right * right + down * down + forward * forward);
+    // Where all corners are alike there is no direction: the normal is 0.
     let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
     let mut nearest = cell.at.first();
     for axis in AXES {
         let next = nearest.plus(cell.at.edge(axis));
+        // The corner nearest to the point: its voxel tells the weight.
         nearest = if point[axis] >= 0.5 { next } else { nearest };
     }
     Hit {

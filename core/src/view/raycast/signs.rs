@@ -48,11 +48,14 @@ pub(crate) fn of_block(
 fn with_a_corner(points: &[Layers; 8]) -> Layers {
     let along_x =
         |own: u64, next: u64| own | (own >> 1 & BUT_LAST_COLUMN) | (next & FIRST_COLUMN) << 7;
+    // A cell reaches one voxel further along x, and in the last column into the next block.
     let layer = |n: usize, z: usize| {
         let own = along_x(points[n][z], points[n + 1][z]);
+        // And one row further, in the last row into the block after it in y.
         own | own >> 8 | along_x(points[n + 2][z], points[n + 3][z]) << 56
     };
     let mut cells = [0; BLOCK_SIDE];
+    // From the last layer back, with the first layer of the block after it in z.
     let mut above = layer(4, 0);
     for (z, cells) in cells.iter_mut().enumerate().rev() {
         let here = layer(0, z);
@@ -112,11 +115,13 @@ mod tests {
         let mut weight = [[0u8; BLOCK_VOXELS]; 8];
         for round in 0..20 {
             for value in sdf.iter_mut().flatten() {
+                // From all before the surface to a mixture of signs.
                 *value = if random.below(20) > round { 900 } else { random.below(3) as i16 - 1 };
             }
             weight.iter_mut().flatten().for_each(|value| *value = random.below(9) as u8);
             let signs: [_; 8] = core::array::from_fn(|n| of_block(&sdf[n], &weight[n], 2));
             let cells = cells(signs.each_ref());
+            // A voxel's bits: 3 each for x, y and z.
             for cell in 0..BLOCK_VOXELS {
                 let (mut before, mut behind, mut fully_observed) = (false, false, true);
                 for corner in 0..8 {

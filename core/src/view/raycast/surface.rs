@@ -264,6 +264,7 @@ impl<'s> Surface<'s> {
     #[inline]
     fn entry(&self, block: [i32; 3]) -> Option<usize> {
         let key = key(block);
+        // The table has at least one free entry, at which an unlucky search ends.
         let mut at = bucket(key, self.shift);
         let mask = (1usize << (64 - self.shift)) - 1;
         loop {

@@ -29,6 +29,7 @@ impl Overlaps {
     /// Counts pairs of labels: found, true.
     pub fn from_pairs(pairs: impl Iterator<Item = (u16, u16)>) -> Self {
         let mut counted = Self::default();
+        // Neither found nor true says nothing about masks.
         for (found, truth) in pairs.filter(|pair| *pair != (0, 0)) {
             *counted.both.entry((found, truth)).or_default() += 1;
         }
@@ -36,6 +37,7 @@ impl Overlaps {
             *counted.found.entry(found).or_default() += count;
             *counted.truth.entry(truth).or_default() += count;
         }
+        // Pairs with label 0 counted for the sizes only: it is no mask.
         counted.both.retain(|(found, truth), _| *found > 0 && *truth > 0);
         counted.found.remove(&0);
         counted.truth.remove(&0);

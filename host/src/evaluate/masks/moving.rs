@@ -119,6 +119,7 @@ impl MovingErrors {
     /// Sums up; `None` where no frame was compared.
     pub fn figures(&self) -> Option<MovingFigures> {
         let share = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
+        // Each range begins where the one before it ends.
         let begins = std::iter::once(0.0).chain(RANGES_M);
         let range = |((sums, begin_m), end_m): ((&RangeSums, f64), f64)| RangeFigures {
             distance_m: [begin_m, end_m],
@@ -127,6 +128,7 @@ impl MovingErrors {
             recall: share(sums.found as f64, sums.objects),
             mean_iou: share(sums.iou, sums.found),
         };
+        // Over all ranges, weighted by the masks found.
         let (iou, found) = self
             .ranges
             .iter()

@@ -80,6 +80,8 @@ impl Counts {
         for (source, seen) in self.sources.iter_mut().zip(seen_px) {
             if seen <= 0.0 {
                 source.missing_alone += 1;
+                // One source can be compared where the other has no answer; `errors` counts points
+                // that both have.
                 continue;
             }
             for (at, rule) in ACCEPTANCE_RULES.iter().enumerate() {

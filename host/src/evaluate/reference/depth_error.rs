@@ -72,6 +72,7 @@ mod tests {
     fn medians_are_right_to_half_a_bin_and_outliers_do_not_move_them() {
         let mut errors = DepthErrors::default();
         assert_eq!(errors.figures(), None);
+        // The third is a gross outlier on a nearer point.
         for (shown_m, true_m) in [(10.1, 10.0), (9.9, 10.0), (400.0, 12.0)] {
             errors.add(shown_m, true_m, Some(-0.2));
         }
@@ -81,6 +82,7 @@ mod tests {
                 && (figures.median_depth_m - 10.0).abs() < 0.02,
             "{figures:?}"
         );
+        // 0.1 m along the ray is 0.02 m along the normal.
         assert!((figures.median_surface_m.unwrap() - 0.02).abs() < 0.001, "{figures:?}");
     }
 }

@@ -42,6 +42,7 @@ impl PendingFrame {
         input_px: impl Fn(usize, usize) -> f32,
         region: impl Fn(i32, i32) -> Region,
     ) -> Self {
+        // Now, since the frame's images are gone when the map is looked at.
         let sample = |&point: &ProjectedPoint| Sample {
             point,
             input_px: input_px(point.u.into(), point.v.into()),

@@ -56,6 +56,7 @@ mod tests {
     #[test]
     fn points_of_one_cell_are_averaged() {
         let mut errors = SurfaceErrors::default();
+        // Two points of one cell of 0.2 m, and one of the cell beside it.
         for (at, distance_m) in
             [([0.05, 0.0, 0.1], 0.1), ([-0.05, 0.0, 0.1], 0.5), ([0.15, 0.19, 0.0], 0.3)]
         {

@@ -115,6 +115,7 @@ impl StereoCounts {
         (self.pixels > 0).then(|| StereoFigures {
             pixels: self.pixels,
             coverage: share(self.given, self.pixels),
+            // `d1` is of the pixels with a disparity, `d1_filled` of all that have a truth.
             d1: share(self.d1[0], self.given),
             d1_filled: share(self.d1[1], self.pixels),
             bad: self.bad[0].map(|bad| share(bad, self.given)),

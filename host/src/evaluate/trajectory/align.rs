@@ -14,6 +14,7 @@ pub(super) fn aligned_error_m(truth: &[Transform], estimate: &[Transform]) -> f6
     let (truth, estimate) = (positions(truth), positions(estimate));
     let centre =
         |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    // The best translation maps one centre to the other, so that the rotation is found alone.
     let (to, from) = (centre(&truth), centre(&estimate));
     let spread: Matrix3<f64> =
         estimate.iter().zip(&truth).map(|(a, b)| (a - from) * (b - to).transpose()).sum();
@@ -25,6 +26,7 @@ pub(super) fn aligned_error_m(truth: &[Transform], estimate: &[Transform]) -> f6
 }
 
 fn horn_rotation(s: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    // Differences and sums of the off-diagonal elements, as in Horn's paper.
     let (yz, zx, xy) = (s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
     let (sxy, sxz, syz) = (s[(0, 1)] + s[(1, 0)], s[(0, 2)] + s[(2, 0)], s[(1, 2)] + s[(2, 1)]);
     let (xx, yy, zz) = (s[(0, 0)], s[(1, 1)], s[(2, 2)]);

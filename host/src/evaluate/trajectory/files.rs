@@ -62,8 +62,8 @@ pub enum TrajectoryError {
     },
     /// Fewer than two pairs.
     #[error(
-        "only {pairs} poses have the same time: two are needed. Times must agree to {SAME_TIME_S} \
-         s; check that both use the same clock"
+        "{pairs} of the poses have the same time, and two are needed. Times must agree to \
+         {SAME_TIME_S} s; check that both use the same clock"
     )]
     Few {
         /// Pairs found.

@@ -118,6 +118,7 @@ fn box_of(volume: &Volume<'_>) -> Option<[[f64; 3]; 2]> {
         .filter_map(|slot| volume.blocks().coord(slot))
         .map(|at| [at.x, at.y, at.z].map(f64::from));
     let bounds =
+        // A block reaches one step beyond its coordinate.
         coords.map(|at| [at, at.map(|steps| steps + 1.0)]).reduce(|[low, high], [from, to]| {
             [
                 [0, 1, 2].map(|axis| low[axis].min(from[axis])),
@@ -182,6 +183,7 @@ pub fn planning(stamp: Stamp, layers: &PlanningLayers) -> Value {
         layers.distance_m.iter().zip(&layers.height_m).zip(&layers.occupancy)
     {
         data.extend([distance_m, height_m].into_iter().flat_map(|value| value.to_le_bytes()));
+        // Three bytes of padding, so that each cell is 12 bytes.
         data.extend([occupancy.to_le_bytes()[0], 0, 0, 0]);
     }
     let fields = [("distance_m", 0, FLOAT32), ("height_m", 4, FLOAT32), ("occupancy", 8, INT8)];

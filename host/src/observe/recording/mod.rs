@@ -57,6 +57,7 @@ impl Recording {
     fn begin(run: &ObservedRun<'_>) -> Result<Self, mcap::McapError> {
         let file = BufWriter::new(owned::create_file(&run.folder.join(RECORDING_FILE))?);
         let mut writer = mcap::WriteOptions::new().library("dynvox").create(file)?;
+        // Channels are added once, and found by the topic's number.
         let mut channels = [0; TOPICS.len()];
         for (channel, topic) in channels.iter_mut().zip(TOPICS) {
             let schema = writer.add_schema(
@@ -81,6 +82,7 @@ impl Recording {
             channel_id,
             sequence: self.sequence,
             log_time: time_ns,
+            // Both times are those of the data: a recording has no other clock.
             publish_time: time_ns,
         };
         self.writer.write_to_known_channel(&header, message.to_string().as_bytes())

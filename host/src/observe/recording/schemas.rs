@@ -103,6 +103,7 @@ impl Topic {
             Self::Trajectory => json!({ "frame_id": text(), "poses": array(&pose()) }),
         };
         let mut schema = object(&properties);
+        // The scene of Foxglove has times in its entities, and none of its own.
         if self != Self::Objects {
             schema["properties"]["timestamp"] = time();
         }

@@ -35,6 +35,7 @@ pub fn track_rows(frame: usize, tracks: &[TrackRow], first: bool) -> io::Result<
 
 fn track_columns(frame: usize, track: &TrackRow) -> TrackColumns {
     let pixels = &track.pixels;
+    // Unknown speeds stay empty cells.
     let [speed, sigma] =
         [0, 1].map(|at| track.speed_m_s.map(|speeds| rounded(f64::from(speeds[at]), 3)));
     TrackColumns {

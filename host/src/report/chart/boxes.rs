@@ -76,6 +76,8 @@ fn draw_box(
     let y = |value: f64| px(plot.y(value));
     let left = px(centre - width / 2.0);
     let centre = px(centre);
+    // From the least to the greatest value a line, a box for the middle half, a thick line for the
+    // median.
     html! {
         path d={ "M" (centre) " " (y(first)) "V" (y(low)) "M" (centre) " " (y(high)) "V" (y(last)) } stroke=(colour) fill="none" {}
         rect x=(left) y=(y(high)) width=(px(width)) height=(px((plot.y(low) - plot.y(high)).max(0.5)))
@@ -92,6 +94,7 @@ fn draw_curve(plot: &Plot, curve: &Curve<'_>, x: impl Fn(usize) -> f64) -> Marku
         .enumerate()
         .filter_map(|(at, number)| Some((at, (*number)?)))
         .collect();
+    // Neighbouring positions are joined; a gap begins a new line.
     let stretches = marks.chunk_by(|a, b| a.0 + 1 == b.0);
     let path: String = stretches
         .map(|marks| polyline(marks.iter().map(|&(at, number)| (x(at), plot.y(number)))))

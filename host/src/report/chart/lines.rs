@@ -34,6 +34,7 @@ impl Series<'_> {
 
 /// Lines over frames; the y axis begins at 0 and reaches at least `least_top`.
 pub fn lines(frames: &[usize], series: &[Series<'_>], title: &str, least_top: f64) -> Markup {
+    // Values that are not known are NaN, and have no height.
     let finite =
         series.iter().flat_map(|one| &one.values).copied().filter(|value| value.is_finite());
     let plot = Plot::from_zero(finite.fold(least_top, f64::max));

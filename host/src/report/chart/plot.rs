@@ -42,6 +42,7 @@ impl Plot {
 
     /// The drawing: title, grid, and what is on it.
     pub fn svg(&self, title: &str, content: &Markup) -> Markup {
+        // Rounded: the quotient is whole but for its last bits.
         let ticks = (0..=((self.high - self.low) / self.step).round() as usize)
             .map(|tick| self.low + tick as f64 * self.step);
         html! {

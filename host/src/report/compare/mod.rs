@@ -218,6 +218,7 @@ pub fn compare(a: &RunDigests, b: &RunDigests) -> Result<Comparison, CompareErro
 /// The rows of `frames.csv`, by frame.
 fn read_rows(table: impl Read, path: &Path) -> Result<BTreeMap<usize, Row>, CompareError> {
     let damaged = |reason: String| CompareError::Damaged { path: path.to_path_buf(), reason };
+    // Of an older dynvox, or damaged: the next action differs.
     let rows = read_frame_digests(table).map_err(|error| match missing_column(&error) {
         Some(column) => CompareError::Column { path: path.to_path_buf(), column },
         None => damaged(match error.position() {
@@ -227,6 +228,7 @@ fn read_rows(table: impl Read, path: &Path) -> Result<BTreeMap<usize, Row>, Comp
     })?;
     let row = |(at, row): (usize, &FrameDigests)| {
         let digests =
+            // The first line is the header, and lines count from 1.
             row_of(row).ok_or_else(|| damaged(format!("line {} cannot be read", at + 2)))?;
         Ok((row.frame, digests))
     };
@@ -280,6 +282,7 @@ mod tests {
         change: impl Fn(usize, &mut StageDigests),
     ) -> RunDigests {
         let rows = frames.map(|frame| {
+            // Two objects, so that one of them can be missing.
             let objects = ObjectDigests::from_objects(
                 [ObjectDigest { id: 3, digest: 7 }, ObjectDigest { id: 9, digest: 8 }].into_iter(),
             );
@@ -307,12 +310,14 @@ mod tests {
         assert_eq!(divergence(&|_, _| {}), None);
         let late = |frame: usize, stages: &mut StageDigests| {
             if frame >= 3 {
+                // Two stages differ, and the one that runs first is the cause.
                 (stages.static_map, stages.scene_flow) = (1, 1);
             }
         };
         assert_eq!(divergence(&late), Some((3, Some(Digested::SceneFlow))));
         let object = |frame: usize, stages: &mut StageDigests| {
             if frame == 4 {
+                // Object 9 is gone.
                 stages.objects =
                     ObjectDigests::from_objects([ObjectDigest { id: 3, digest: 7 }].into_iter());
             }
@@ -324,6 +329,7 @@ mod tests {
     fn says_how_far_apart_outcomes_are_where_they_diverge_and_at_most() {
         let clean = run(0..5, |_, _| {});
         let mut drifting = run(0..5, |frame, stages| stages.egomotion = u64::from(frame >= 2));
+        // Two metres apart at first, and further with each frame.
         for (frame, row) in &mut drifting.rows {
             let by_m = if *frame >= 2 { *frame as f64 } else { 0.0 };
             row.outcome = Outcome {
@@ -358,6 +364,7 @@ mod tests {
             (found.equal(), found.prefix(), found.shared)
         };
         assert_eq!(
+            // The second number tells which of the two is the beginning.
             [of(&whole, &whole), of(&start, &whole), of(&whole, &start)],
             [(true, None, 5), (false, Some(0), 3), (false, Some(1), 3)]
         );

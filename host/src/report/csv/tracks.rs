@@ -38,6 +38,7 @@ pub fn write_tracks_truth(out: &mut impl Write, tracks: &TracksSection) -> io::R
 }
 
 fn truth_columns(frame: usize, id: u32, one: &TrackComparison) -> TruthColumns {
+    // Errors of a track without a measurement are empty cells.
     let [t, r] = [0, 1].map(|at| one.error.map(|error| rounded(error[at], 5)));
     TruthColumns {
         frame,

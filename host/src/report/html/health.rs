@@ -21,6 +21,7 @@ pub fn section(run: &RunRecord) -> Markup {
         &frames,
         &[series(run, "pixels with a disparity", COLOURS[3], "stereo_density").scaled(100.0)],
         "%",
+        // The whole range, so that runs can be compared by eye.
         100.0,
     );
     html! {

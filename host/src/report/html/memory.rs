@@ -70,6 +70,7 @@ fn regions(run: &RunRecord) -> Markup {
                 tr {
                     td { code { (region.name) } }
                     @for bytes in [region.bytes, region.used, region.peak] { td.n { (grouped(bytes as u64)) } }
+                    // A region of 0 bytes has no peak.
                     td { span.bar { u style=(format!("width:{:.0}%", 100.0 * region.peak as f64 / region.bytes.max(1) as f64)) {} } }
                 }
             }

@@ -86,6 +86,7 @@ fn truth(figures: &ObjectFigures) -> Markup {
             Some(format!("{name}: {} in {} motions", motion_error(of)?, of.frames))
         })
         .collect();
+    // Rows are the truth, columns what was said.
     let confusion = figures.confusion.iter().zip(["static", "moving"]).map(|(counts, name)| {
         std::iter::once(name.to_owned())
             .chain(counts.iter().map(ToString::to_string))
@@ -138,6 +139,7 @@ fn lanes_of(shown: &[&TrackRecord]) -> Vec<Lane> {
         let bars = record.spans.iter().map(|span| Bar {
             from: span.from,
             to: span.to,
+            // A static track has a speed of noise.
             style: state_name(span.state),
             pale: !span.measured,
             text: span
@@ -145,6 +147,7 @@ fn lanes_of(shown: &[&TrackRecord]) -> Vec<Lane> {
                 .filter(|_| span.state != MotionState::Static)
                 .map(|speed| format!("{speed:.1} m/s")),
         });
+        // The truth is drawn frame by frame beneath the track's bars.
         let truth =
             record.errors.iter().flat_map(|errors| &errors.moving).map(|&(at, moving)| Bar {
                 from: at,

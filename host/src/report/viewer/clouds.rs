@@ -120,7 +120,9 @@ mod tests {
 
     #[test]
     fn a_cloud_is_thinned_out_and_keeps_places_and_colours() {
+        // Without points no cloud, and no entry in the page.
         assert!(cloud("a", String::new(), &[], 1.0).unwrap().is_none());
+        // 200 points in x at each step in z: thinning by three keeps the extent.
         let points: Vec<_> = (0..3 * MAX_POINTS)
             .map(|at| ([(at % 200) as f32, 5.0, (at / 200) as f32], [1, 2, 3]))
             .collect();
@@ -129,6 +131,7 @@ mod tests {
         let mut planes = Vec::new();
         flate2::read::ZlibDecoder::new(&bytes[..]).read_to_end(&mut planes).unwrap();
         assert_eq!(planes.len(), 9 * MAX_POINTS);
+        // Planes hold differences to the point before, so that equal colours are zeros.
         let sums = [6, 7, 8].map(|plane| {
             planes[plane * MAX_POINTS..][..MAX_POINTS]
                 .iter()

@@ -166,9 +166,11 @@ mod tests {
         let mut bytes = Vec::new();
         flate2::read::ZlibDecoder::new(&tile.bytes[..]).read_to_end(&mut bytes).unwrap();
         let (count, corners) = (tile.head.vertices, 3 * tile.head.triangles);
+        // Two bytes for each coordinate, the colour, the values, and two bytes a corner.
         assert_eq!(bytes.len(), (11 + VALUES) * count + 2 * corners);
         let (mut positions, mut colours) = (vec![[0.0; 3]; count], vec![[0u8; 4]; count]);
         for axis in 0..3 {
+            // Differences to the vertex before, the sign in the lowest bit.
             let mut at = 0u16;
             for (vertex, position) in positions.iter_mut().enumerate() {
                 let word = u16::from(bytes[2 * axis * count + vertex])
@@ -185,6 +187,7 @@ mod tests {
                 tint[channel] = colour;
             }
         }
+        // A corner counts back from the newest vertex: 0 is a vertex not named before.
         let (mut named, mut triangles) = (0, vec![[0; 3]; tile.head.triangles]);
         for at in 0..corners {
             let word = usize::from(bytes[(11 + VALUES) * count + at])
@@ -197,6 +200,7 @@ mod tests {
 
     #[test]
     fn every_triangle_is_in_one_tile_to_a_millimetre() {
+        // More than one tile holds.
         let side = 150u32;
         let at = |x: u32, y: u32| y * (side + 1) + x;
         let (mut mesh, mut values) = (IndexedMesh::default(), Vec::new());
@@ -213,6 +217,7 @@ mod tests {
         }
         let tiles = tiles(&mesh, &values, Some(3)).unwrap();
         assert!(tiles.len() == 3 && tiles.iter().all(|tile| tile.head.object == Some(3)));
+        // By millimetres, since positions are quantised; sorted, since tiles have their own order.
         let key = |corners: [([f32; 3], [u8; 4]); 3]| {
             corners.map(|(at, colour)| (at.map(|metres| (1_000.0 * metres).round() as i32), colour))
         };

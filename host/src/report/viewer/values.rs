@@ -53,6 +53,7 @@ impl<'s> SurfaceValues<'s> {
     pub fn new(scene: &'s Scene) -> Self {
         let mut weights = scene.static_map.weights.clone();
         weights.sort_unstable();
+        // The 95th percentile: a few voxels seen very often would leave no colours for the others.
         let most = weights.get(weights.len() * 19 / 20).copied().unwrap_or_default();
         let frames =
             scene.frames.first().zip(scene.frames.last()).filter(|_| !scene.blocks.is_empty());

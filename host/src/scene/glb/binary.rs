@@ -34,6 +34,7 @@ impl Binary {
     /// Appends bytes as a view of their own: of vertices `stride` bytes apart, of indices, or of
     /// neither. Returns its number.
     pub fn view(&mut self, bytes: &[u8], target: Option<u32>, stride: Option<usize>) -> usize {
+        // glTF wants views to begin at multiples of four bytes.
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut view =
             json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });

@@ -86,6 +86,7 @@ fn digest(digests: &StageDigests, of: Digested) -> String {
 
 /// All columns of `frames.csv`, in their order.
 pub fn frame_columns() -> &'static [FrameColumn] {
+    // Names of digests are put together, so that the table cannot be a constant.
     static COLUMNS: LazyLock<Vec<FrameColumn>> = LazyLock::new(|| {
         let digest = |of: Digested| FrameColumn {
             name: Cow::Owned(format!("{}_digest", of.name())),
