@@ -13,7 +13,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     memory::Carver,
-    volume::{BlockCoord, BlockIndex, Slot},
+    volume::{BlockCoord, BlockIndex, BlockKey, Slot},
 };
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -26,21 +26,21 @@ const SLOTS: usize = 1 << 17;
 
 /// Operations that an index of blocks needs.
 trait Table {
-    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot>;
-    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot);
-    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord);
+    fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot>;
+    fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot);
+    fn remove(&mut self, coords: &[BlockKey], coord: BlockKey);
 }
 
 impl Table for BlockIndex<'_> {
-    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot> {
+    fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot> {
         self.find(coord, |slot| Some(coords[slot.index()]))
     }
 
-    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot) {
+    fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot) {
         self.insert(coord, slot, |slot| Some(coords[slot.index()])).unwrap();
     }
 
-    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord) {
+    fn remove(&mut self, coords: &[BlockKey], coord: BlockKey) {
         assert!(self.remove(coord, |slot| Some(coords[slot.index()])));
     }
 }
@@ -48,7 +48,7 @@ impl Table for BlockIndex<'_> {
 /// Slots + 1 by hash; 0 is none.
 struct Plain(Vec<u32>);
 
-fn home(coord: BlockCoord) -> usize {
+fn home(BlockKey { coord, .. }: BlockKey) -> usize {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
     let mixed =
         x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
@@ -57,7 +57,7 @@ fn home(coord: BlockCoord) -> usize {
 }
 
 impl Plain {
-    fn seek(&self, coords: &[BlockCoord], coord: BlockCoord) -> Result<usize, usize> {
+    fn seek(&self, coords: &[BlockKey], coord: BlockKey) -> Result<usize, usize> {
         let mut at = home(coord);
         while self.0[at] != 0 {
             if coords[self.0[at] as usize - 1] == coord {
@@ -70,11 +70,11 @@ impl Plain {
 }
 
 impl Table for Plain {
-    fn find(&self, coords: &[BlockCoord], coord: BlockCoord) -> Option<Slot> {
+    fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot> {
         self.seek(coords, coord).ok().map(|at| Slot::new(self.0[at] - 1))
     }
 
-    fn insert(&mut self, coords: &[BlockCoord], coord: BlockCoord, slot: Slot) {
+    fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot) {
         let mut at = home(coord);
         while self.0[at] != 0 {
             at = (at + 1) & (SLOTS - 1);
@@ -83,7 +83,7 @@ impl Table for Plain {
         self.0[at] = slot.get() + 1;
     }
 
-    fn remove(&mut self, coords: &[BlockCoord], coord: BlockCoord) {
+    fn remove(&mut self, coords: &[BlockKey], coord: BlockKey) {
         let mut hole = self.seek(coords, coord).unwrap();
         let mut at = hole;
         loop {
@@ -102,19 +102,19 @@ impl Table for Plain {
 }
 
 /// The `number`th block of the street: 25 across, 8 high, 5 deep a slice.
-fn block(number: usize) -> BlockCoord {
+fn block(number: usize) -> BlockKey {
     let (slice, within) = (number / SLICE, number % SLICE);
-    BlockCoord::new(
+    let coord = BlockCoord::new(
         (within % 25) as i32 - 12,
         (within / 25 % 8) as i32 - 4,
         (slice * 5 + within / 200) as i32 % 30_000,
-    )
-    .unwrap()
+    );
+    BlockKey::in_first(coord.unwrap())
 }
 
 struct Drive<T> {
     table: T,
-    coords: Vec<BlockCoord>,
+    coords: Vec<BlockKey>,
     /// Blocks entered so far; the oldest of those in the table is `BLOCKS` behind.
     entered: usize,
     insertions_ns: Vec<u32>,
@@ -124,7 +124,7 @@ impl<T: Table> Drive<T> {
     fn new(table: T) -> Self {
         let mut churn = Self {
             table,
-            coords: vec![BlockCoord::default(); BLOCKS],
+            coords: vec![BlockKey::default(); BLOCKS],
             entered: 0,
             insertions_ns: Vec::new(),
         };

@@ -9,24 +9,22 @@ use dynvox_core::{
     Capacity, Config, Mapper, Serial,
     memory::SLAB_ALIGN,
     objects::NoSink,
-    volume::{BLOCK_VOXELS, BlockStore, EvictedBlock, LoadedBlock},
+    volume::{BLOCK_VOXELS, BlockKey, BlockStore, EvictedBlock, LoadedBlock},
 };
 use std::collections::HashMap;
 
-/// Distances and weights of the blocks that left, by their coordinates.
+/// Distances and weights of the blocks that left, by their segment and coordinates.
 #[derive(Default)]
-struct Memory(HashMap<[i16; 3], ([i16; BLOCK_VOXELS], [u8; BLOCK_VOXELS])>);
+struct Memory(HashMap<BlockKey, ([i16; BLOCK_VOXELS], [u8; BLOCK_VOXELS])>);
 
 impl BlockStore for Memory {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
-        self.0.insert([block.coord.x, block.coord.y, block.coord.z], (*block.sdf, *block.weight));
+        self.0.insert(block.key, (*block.sdf, *block.weight));
         true
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        let Some((sdf, weight)) = self.0.get(&[block.coord.x, block.coord.y, block.coord.z]) else {
-            return false;
-        };
+        let Some((sdf, weight)) = self.0.get(&block.key) else { return false };
         (*block.sdf, *block.weight) = (*sdf, *weight);
         true
     }

@@ -107,5 +107,5 @@ fn scan(
         if is_object { Region::Ignored } else { Region::Static }
     };
     // The input's disparity takes no part in what is counted for the map alone.
-    Ok(scan.map(|scan| PendingFrame::new(index, *t_world_camera, &scan, |_, _| 1.0, region)))
+    Ok(scan.map(|scan| PendingFrame::new(index, t_world_camera.into(), &scan, |_, _| 1.0, region)))
 }

@@ -10,6 +10,7 @@
 //! walls, and compared with the path that the same planner finds to the same goal on the exact
 //! geometry.
 
+use dynvox::observe::{WindowCamera, write_planning};
 use dynvox::synth::{
     CAMERA_HEIGHT_M, CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, Street, StreetConfig,
     SynthFrame, Traffic,
@@ -263,10 +264,13 @@ fn map(
         .find_map(|argument| Some(std::path::PathBuf::from(argument.strip_prefix("out=")?)))
     {
         let folder = folder.join(street.config().seed.to_string());
-        dynvox::observe::write_planning(
+        write_planning(
             &folder,
-            frames as usize,
-            mapper.t_world_camera().translation_m,
+            &WindowCamera {
+                frame: frames as usize,
+                segment: mapper.static_map().segment(),
+                position_m: mapper.t_world_camera().translation_m,
+            },
             report,
             mapper.planning(),
         )?;

@@ -12,7 +12,7 @@ use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::objects::NoSink;
 use dynvox_core::random::Random;
 use dynvox_core::tracking::{Class, Detection};
-use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper, Report, Serial, StereoFrame};
 use dynvox_tests::fuzz::sizes;
 
@@ -65,7 +65,7 @@ struct Counts {
     restored: u64,
 }
 
-/// Keeps, loses and makes up blocks, by their coordinates alone.
+/// Keeps, loses and makes up blocks, by their segments and coordinates.
 #[derive(Default)]
 struct Store {
     kept: u32,
@@ -75,21 +75,21 @@ struct Store {
 }
 
 impl Store {
-    fn random(&self, coord: dynvox_core::volume::BlockCoord) -> Random {
+    fn random(&self, BlockKey { segment, coord }: BlockKey) -> Random {
         let [x, y, z] = [coord.x, coord.y, coord.z].map(|along| u64::from(along as u16));
-        Random::new(self.seed ^ (x << 32 | y << 16 | z))
+        Random::new(self.seed ^ (u64::from(segment.get()) << 48 | x << 32 | y << 16 | z))
     }
 }
 
 impl BlockStore for Store {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
-        let keeps = self.random(block.coord).below(4) > 0;
+        let keeps = self.random(block.key).below(4) > 0;
         *if keeps { &mut self.kept } else { &mut self.lost } += 1;
         keeps
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        let mut random = self.random(block.coord);
+        let mut random = self.random(block.key);
         let loads = random.below(2) == 0;
         if loads {
             block.sdf.iter_mut().for_each(|sdf| *sdf = random.next_u32() as i16);

@@ -2,14 +2,16 @@
 
 use core::ffi::c_void;
 use dynvox_core::view::Triangle;
-use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, LoadedBlock};
 
 /// An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxBlock {
-    /// Coordinates, blocks.
+    /// Coordinates in the segment's lattice, blocks.
     pub coord: [i16; 3],
+    /// Number of the map's segment that the block is of; a segment has a lattice of its own.
+    pub segment: u16,
     /// 512 signed distances, 1/32767 of the truncation.
     pub sdf: *const i16,
     /// 512 weights.
@@ -23,8 +25,10 @@ pub struct DynvoxBlock {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxLoadedBlock {
-    /// Coordinates, blocks.
+    /// Coordinates in the segment's lattice, blocks.
     pub coord: [i16; 3],
+    /// Number of the map's segment that the block is of; a segment has a lattice of its own.
+    pub segment: u16,
     /// 512 signed distances.
     pub sdf: *mut i16,
     /// 512 weights.
@@ -40,10 +44,10 @@ pub struct DynvoxLoadedBlock {
 pub struct DynvoxStore {
     /// Handed to both functions.
     pub context: *mut c_void,
-    /// Stores an evicted block; the last one stored at its coordinates counts. False when it
-    /// cannot: the block is lost, and counted. Null: all are lost.
+    /// Stores an evicted block; the last one stored with its segment and coordinates counts. False
+    /// when it cannot: the block is lost, and counted. Null: all are lost.
     pub store: Option<extern "C" fn(context: *mut c_void, block: *const DynvoxBlock) -> bool>,
-    /// Fills a block; false when none is stored at its coordinates. Null: none is.
+    /// Fills a block; false when none is stored with its segment and coordinates. Null: none is.
     pub load: Option<extern "C" fn(context: *mut c_void, block: *const DynvoxLoadedBlock) -> bool>,
 }
 
@@ -55,7 +59,8 @@ impl BlockStore for DynvoxStore {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
         let Some(store) = self.store else { return false };
         let block = DynvoxBlock {
-            coord: [block.coord.x, block.coord.y, block.coord.z],
+            coord: coordinates(block.key),
+            segment: block.key.segment.get(),
             sdf: block.sdf.as_ptr(),
             weight: block.weight.as_ptr(),
             colour: block.colour.map_or(core::ptr::null(), |planes| planes.as_ptr().cast()),
@@ -66,7 +71,8 @@ impl BlockStore for DynvoxStore {
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         let Some(load) = self.load else { return false };
         let block = DynvoxLoadedBlock {
-            coord: [block.coord.x, block.coord.y, block.coord.z],
+            coord: coordinates(block.key),
+            segment: block.key.segment.get(),
             sdf: block.sdf.as_mut_ptr(),
             weight: block.weight.as_mut_ptr(),
             colour: block.colour.map_or(core::ptr::null_mut(), |planes| planes.as_mut_ptr().cast()),
@@ -75,11 +81,15 @@ impl BlockStore for DynvoxStore {
     }
 }
 
+fn coordinates(BlockKey { coord, .. }: BlockKey) -> [i16; 3] {
+    [coord.x, coord.y, coord.z]
+}
+
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxVertex {
-    /// Position in the world, m.
+    /// Position in the world of the camera's segment, m.
     pub position_m: [f32; 3],
     /// Red, green, blue.
     pub colour: [u8; 3],

@@ -112,13 +112,13 @@ pub struct DynvoxReport {
     pub frame: u32,
     /// The worst that happened.
     pub severity: DynvoxSeverity,
-    /// Pose of the left camera in the world.
+    /// Pose of the left camera in the world, which is that of its segment of the map.
     pub t_world_camera: DynvoxPose,
     /// True if the frame was fused into the map.
     pub fused: bool,
-    /// Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
-    /// lost and not found again.
-    pub segment: u32,
+    /// Number of the map's segment, from 0: another one begins where the camera was lost and is not
+    /// found again, with that camera as its world. Where one segment lies in another is not known.
+    pub segment: u16,
     /// Pixels with a disparity.
     pub disparities: u32,
     /// Matches the camera's motion rests on.
@@ -156,7 +156,7 @@ impl From<&Report> for DynvoxReport {
             },
             t_world_camera: (&report.t_world_camera).into(),
             fused: report.fused,
-            segment: report.segment,
+            segment: report.segment.get(),
             disparities: report.stereo.valid,
             inliers: report.egomotion.map_or(0, |egomotion| egomotion.inliers),
             blocks: report.blocks.used,

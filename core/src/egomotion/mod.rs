@@ -54,7 +54,7 @@ mod track;
 pub use config::EgomotionConfig;
 pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};
 pub use synchrony::RightAhead;
-pub use track::{Egomotion, MAX_REFERENCE_FRAMES, SEGMENT_GAP_M, TimedMatches};
+pub use track::{Egomotion, MAX_REFERENCE_FRAMES, TimedMatches};
 
 #[cfg(test)]
 mod tests;

@@ -3,10 +3,10 @@ mod clip;
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MAX_REFERENCE_FRAMES, MotionEstimate, MotionHypotheses,
-    MotionStatus, SEGMENT_GAP_M, TimedMatches,
+    MotionStatus, TimedMatches,
 };
 use crate::{
-    geometry::{StereoRig, Transform},
+    geometry::{MapSegment, StereoRig, Transform},
     image::View,
     memory::{Carver, Slab},
     parallel::Serial,

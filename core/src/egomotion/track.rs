@@ -4,7 +4,7 @@ use super::{
     EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, RightAhead,
 };
 use crate::{
-    geometry::{StereoRig, Transform},
+    geometry::{MapSegment, StereoRig, Transform},
     random::Random,
     scene_flow::Match,
     state::{Hasher, Visitor},
@@ -23,10 +23,6 @@ const NOISE_M: f64 = 0.1;
 /// Frames without an estimate after which the camera is lost: matches are sought with the last
 /// frame, although its pose is a guess.
 pub const MAX_REFERENCE_FRAMES: u32 = 8;
-
-/// Height by which a segment of the map stands above where its first pose was guessed, m: farther
-/// than any frame is fused, so that no block of it is one of another segment.
-pub const SEGMENT_GAP_M: f64 = 100.0;
 
 /// Matches of a frame with the reference, and when it was taken.
 #[derive(Clone, Debug)]
@@ -62,8 +58,9 @@ pub struct Egomotion {
     /// Matches that motion explained.
     inliers: u32,
     extrapolated: u32,
-    /// Number of segments of the map were begun after the first.
-    segment: u32,
+    /// Segment of the map that poses lie in, and the one begun last.
+    segment: MapSegment,
+    newest_segment: MapSegment,
     random: Random,
 }
 
@@ -79,7 +76,8 @@ impl Default for Egomotion {
             motion_s: 0.0,
             inliers: 0,
             extrapolated: 0,
-            segment: 0,
+            segment: MapSegment::FIRST,
+            newest_segment: MapSegment::FIRST,
             random: Random::new(SEED),
         }
     }
@@ -168,10 +166,16 @@ impl Egomotion {
         self.refer_to_last();
     }
 
-    /// Begins another segment of the map, [`SEGMENT_GAP_M`] above the guessed pose: y points down.
+    /// Begins another segment of the map, with the camera at its origin. Where no number is left
+    /// for one, the camera stays lost, so that nothing is fused into a segment it is not in.
     pub fn begin_segment(&mut self) {
-        self.segment = self.segment.saturating_add(1);
-        self.t_world_camera.translation_m[1] -= SEGMENT_GAP_M;
+        match self.newest_segment.next() {
+            Some(next) => {
+                (self.segment, self.newest_segment) = (next, next);
+                self.t_world_camera = Transform::IDENTITY;
+            }
+            None => self.extrapolated = MAX_REFERENCE_FRAMES,
+        }
         self.refer_to_last();
     }
 
@@ -257,13 +261,13 @@ impl Egomotion {
         self.since_reference
     }
 
-    /// Number of the map's segment, from 0: the way from the poses of one to those of another is
-    /// not known.
-    pub fn segment(&self) -> u32 {
+    /// Segment of the map that the pose lies in.
+    pub fn segment(&self) -> MapSegment {
         self.segment
     }
 
-    /// Sets the camera's pose to a given one; its motion is the difference from the pose before.
+    /// Sets the camera's pose to a given one, which lies in the map's first segment. Its motion is
+    /// the difference from the pose before if that lies there as well; if not, it stays.
     ///
     /// ```
     /// use dynvox_core::{egomotion::Egomotion, geometry::Transform};
@@ -273,7 +277,10 @@ impl Egomotion {
     /// assert_eq!(camera.t_world_camera().distance_m(), 2.0);
     /// ```
     pub fn set_pose(&mut self, t_world_camera: &Transform) {
-        self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
+        if self.segment == MapSegment::FIRST {
+            self.t_current_previous = (t_world_camera.inverse() * self.t_world_camera).normalized();
+        }
+        self.segment = MapSegment::FIRST;
         self.t_world_camera = t_world_camera.normalized();
         (self.extrapolated, self.motion_s) = (0, 0.0);
         self.refer_to_last();
@@ -318,8 +325,11 @@ impl Egomotion {
             inliers,
             extrapolated,
             segment,
+            newest_segment,
             random,
         } = self;
+        // Two halves of one word.
+        let mut segments = u32::from(newest_segment.get()) << 16 | u32::from(segment.get());
         visitor.transform(t_world_camera);
         visitor.transform(t_world_reference);
         visitor.u32(since_reference);
@@ -328,7 +338,9 @@ impl Egomotion {
         visitor.f64(motion_s);
         visitor.u32(inliers);
         visitor.u32(extrapolated);
-        visitor.u32(segment);
+        visitor.u32(&mut segments);
+        *segment = MapSegment::new(segments as u16);
+        *newest_segment = MapSegment::new((segments >> 16) as u16);
         random.visit(visitor);
     }
 

@@ -9,6 +9,7 @@ mod oriented_box;
 mod rig;
 mod row_correction;
 pub mod scalar;
+mod segment;
 mod shares;
 mod transform;
 
@@ -22,5 +23,6 @@ pub(crate) use rig::StereoObservation;
 pub use rig::{DEPTH_MIN_M, DISPARITY_MIN_PX, RigProblem, StereoRig};
 pub use row_correction::RowCorrection;
 pub(crate) use row_correction::RowShift;
+pub use segment::MapSegment;
 pub(crate) use shares::Shares;
 pub use transform::Transform;

@@ -31,6 +31,8 @@ pub(super) struct Localization<'s> {
 pub(super) struct Located {
     pub camera: CameraMotion,
     pub found: Found,
+    /// The pose lies in another segment of the map than the one before.
+    pub enters_segment: bool,
 }
 
 /// Origin of a pose, and the report of the stage that found it.
@@ -98,6 +100,7 @@ impl<'s> Localization<'s> {
     ) -> Located {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
+        let segment = self.camera.segment();
         let found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
@@ -123,11 +126,14 @@ impl<'s> Localization<'s> {
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
-        // A guess says nothing of how the camera moved: objects get no motion from it.
-        let is_measured = matches!(
-            found.origin,
-            PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
-        );
+        let enters_segment = self.camera.segment() != segment;
+        // A guess says nothing of how the camera moved, nor does a pose given in another segment:
+        // objects get no motion from them.
+        let is_measured = match found.origin {
+            PoseOrigin::Estimated | PoseOrigin::Relocalized => true,
+            PoseOrigin::Given => !enters_segment,
+            PoseOrigin::First | PoseOrigin::Extrapolated => false,
+        };
         // After a guess the motion from the guessed pose, so that motions lead from pose to pose.
         let last_motion = || {
             if over_several {
@@ -139,7 +145,7 @@ impl<'s> Localization<'s> {
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
         let camera =
             CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
-        Located { camera, found }
+        Located { camera, found, enters_segment }
     }
 
     /// Moves the camera on as before.

@@ -353,7 +353,8 @@ impl<'s> Mapper<'s> {
         self.static_map.volume.stream_out(store)
     }
 
-    /// The static map's triangles, one after the other, in world coordinates. How many there were.
+    /// The static map's triangles in the camera's segment, one after the other, in its world
+    /// coordinates. How many there were.
     pub fn triangles(&self, sink: &mut impl FnMut(Triangle)) -> u64 {
         self.static_map.volume.triangles(&self.config.mesh, sink)
     }

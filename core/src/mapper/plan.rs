@@ -169,8 +169,7 @@ impl<'s> Mapper<'s> {
     fn add_object(&self, fit: &mut BoxFit, posed: &PosedObject<'_, '_>) {
         let (volume, grid) = (posed.object.volume(), self.planning.grid());
         let voxel_m = f64::from(volume.config().voxel_size_m);
-        for slot in volume.pool().live() {
-            let Some(coord) = volume.blocks().coord(slot) else { continue };
+        for (slot, coord) in volume.current_blocks() {
             crossings(volume, slot, coord, self.config.planning.min_weight, |crossing| {
                 let point = posed.t_world_object.transform_point(crossing.point_m(voxel_m));
                 fit.add(grid.of_world(point).map(|c| c * grid.cell_m()));

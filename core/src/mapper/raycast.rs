@@ -3,8 +3,8 @@
 use super::Mapper;
 use crate::{
     Stage,
-    geometry::Transform,
-    objects::PosedObject,
+    geometry::{MapSegment, Transform},
+    objects::{MAX_OBJECTS, PosedObject},
     parallel::Executor,
     view::{RaycastError, RaycastView, Raycaster},
     volume::Viewpoint,
@@ -30,7 +30,8 @@ impl<'s> Mapper<'s> {
     /// mapper.step(&StereoFrame::pair(image, image), &Serial)?;
     /// let view = mapper.raycast(&Transform::IDENTITY, &Serial)?;
     /// assert!(view.depth_m().unwrap().pixels().iter().all(|&depth_m| depth_m == 0.0), "an empty map");
-    /// let preview = mapper.raycast(RaycastView { t_world_camera: Transform::IDENTITY, every: 4 }, &Serial)?;
+    /// let preview = RaycastView { every: 4, ..RaycastView::from(&Transform::IDENTITY) };
+    /// let preview = mapper.raycast(preview, &Serial)?;
     /// assert_eq!(preview.depth_m().map(|depth_m| [depth_m.width(), depth_m.height()]), Some([80, 24]));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -39,16 +40,17 @@ impl<'s> Mapper<'s> {
         view: impl Into<RaycastView>,
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(view.into())?;
+        let (view, segment) = self.viewpoint(view.into())?;
         let map = &mut self.static_map;
-        executor.stage(Stage::Raycast, || map.raycaster.cast(&map.volume, &view, executor))?;
+        executor.stage(Stage::Raycast, || map.cast_segment(segment, &view, executor))?;
         Ok(&map.raycaster)
     }
 
-    /// Raycasts the map like [`Mapper::raycast`], and every object at its current pose: each pixel
-    /// shows the nearest surface (the compositing of Section III-E). [`Raycaster::layer`] is 0 for
-    /// the static map and n for the n-th of [`Mapper::posed_objects`]. Time: one raycast, and one
-    /// more for each object; there are at most [`crate::objects::MAX_OBJECTS`].
+    /// Raycasts the map like [`Mapper::raycast`], and where the segment is the camera's every
+    /// object at its current pose: each pixel shows the nearest surface (the compositing of Section
+    /// III-E). [`Raycaster::layer`] is 0 for the static map and n for the n-th of
+    /// [`Mapper::posed_objects`]. Time: one raycast, and one more for each object; there are at
+    /// most [`crate::objects::MAX_OBJECTS`].
     ///
     /// ```
     /// # use dynvox_core::{
@@ -82,12 +84,14 @@ impl<'s> Mapper<'s> {
         view: impl Into<RaycastView>,
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(view.into())?;
+        let (view, segment) = self.viewpoint(view.into())?;
         let map = &mut self.static_map;
+        let objects = if segment == map.volume.segment() { MAX_OBJECTS } else { 0 };
         executor.stage(Stage::Raycast, || {
-            map.raycaster.cast(&map.volume, &view, executor)?;
+            map.cast_segment(segment, &view, executor)?;
+            let posed = self.objects.posed(&self.tracker).take(objects);
             // The static map is layer 0.
-            for (layer, posed) in (1..=u8::MAX).zip(self.objects.posed(&self.tracker)) {
+            for (layer, posed) in (1..=u8::MAX).zip(posed) {
                 // An object too far away for its coordinates is too far away to be seen.
                 let _ = map.raycaster.cast_over(
                     posed.object.volume(),
@@ -136,7 +140,7 @@ impl<'s> Mapper<'s> {
         view: impl Into<RaycastView>,
         executor: &E,
     ) -> Result<&Raycaster<'s>, RaycastError> {
-        let view = self.viewpoint(view.into())?;
+        let (view, _) = self.viewpoint(view.into())?;
         let posed = self
             .objects
             .posed(&self.tracker)
@@ -155,9 +159,12 @@ impl<'s> Mapper<'s> {
         self.objects.posed(&self.tracker)
     }
 
+    /// Viewpoint and segment of a view.
     #[inline(always)]
-    fn viewpoint(&self, view: RaycastView) -> Result<Viewpoint, RaycastError> {
-        self.whole_view(&view.t_world_camera)?.thinned(view.every).ok_or(RaycastError::ImageSize)
+    fn viewpoint(&self, view: RaycastView) -> Result<(Viewpoint, MapSegment), RaycastError> {
+        let segment = view.segment.unwrap_or(self.static_map.volume.segment());
+        let whole = self.whole_view(&view.t_world_camera)?;
+        Ok((whole.thinned(view.every).ok_or(RaycastError::ImageSize)?, segment))
     }
 
     fn whole_view(&self, t_world_camera: &Transform) -> Result<Viewpoint, RaycastError> {

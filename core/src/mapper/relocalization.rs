@@ -1,5 +1,5 @@
-//! Position of a camera that was lost: found again in the map, or at the start of another segment
-//! of it.
+//! Position of a camera that was lost: found again in the map's current segment, or at the origin
+//! of another one.
 //!
 //! The guessed pose is refined by registering the frame's depth with the map (ICP, twice). The pose
 //! from which the map has most of the image's edges is believed if it has enough of them, and fewer

@@ -4,7 +4,7 @@ use super::StageDigests;
 use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
-    geometry::Transform,
+    geometry::{MapSegment, Transform},
     objects::ObjectsReport,
     rectify::RectifyReport,
     rectify::self_calibration::{CalibrationState, SelfCalibrationReport},
@@ -156,11 +156,11 @@ pub struct Report {
     pub scene_flow: FlowReport,
     /// Source of the pose: measured, extrapolated, or given.
     pub pose: PoseOrigin,
-    /// Number of the map's segment, from 0. A camera lost for
+    /// Segment of the map that the pose lies in and that frames are fused into. A camera lost for
     /// [`crate::egomotion::MAX_REFERENCE_FRAMES`] frames that is not found in the map begins
-    /// another one, [`crate::egomotion::SEGMENT_GAP_M`] above its guessed pose. Poses and map of a
-    /// segment are right among themselves; where one stands beside another is not known.
-    pub segment: u32,
+    /// another one, whose first camera is its origin. Poses and map of a segment are right among
+    /// themselves; where one segment lies in another is not known.
+    pub segment: MapSegment,
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose
     /// was given.
     pub egomotion: Option<MotionEstimate>,
@@ -231,7 +231,7 @@ impl Report {
             + self.objects.refusals()
             + self.internal_faults;
         if self.pose == PoseOrigin::Extrapolated
-            || self.segment > 0
+            || self.segment > MapSegment::FIRST
             || refused > 0
             || self.self_calibration.is_uncorrected()
         {

@@ -88,7 +88,11 @@ impl<E: fmt::Display> fmt::Display for RestoreError<E> {
             Self::Source(error) => write!(f, "the snapshot cannot be read: {error}"),
             Self::Foreign => f.write_str("the bytes are not a snapshot of a mapper"),
             Self::Version(found) => {
-                write!(f, "the snapshot is of version {found}, this mapper reads version {VERSION}")
+                write!(
+                    f,
+                    "the snapshot is of version {found}, this mapper reads version {VERSION}: go \
+                     on with the release that wrote it, or map the frames anew"
+                )
             }
             Self::Capacity => f.write_str("the snapshot is of a mapper with another capacity"),
             Self::Config => f.write_str("the snapshot is of a mapper with another configuration"),
@@ -298,6 +302,7 @@ impl<'s> Mapper<'s> {
 
     /// Rebuilds what is not in a snapshot. Whether what was read can be.
     fn rebuild(&mut self) -> bool {
+        self.static_map.volume.enter_segment(self.localization.camera.segment());
         self.tracker.set_frame_interval_s(self.clock.interval_s());
         self.scene_flow.rebuild(&self.config.scene_flow, self.rectifier.invalid().as_ref());
         self.objects.rebuild() && self.static_map.volume.rebuild()

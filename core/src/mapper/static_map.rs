@@ -4,12 +4,13 @@ use super::matched::MatchedFrame;
 use crate::{
     Capacity, Executor, Stage,
     egomotion::icp::{self, IcpConfig, IcpReport, MapPicture, MeasuredDepth},
+    geometry::MapSegment,
     image::ViewMut,
     memory::{Carver, region_bytes},
     segmentation::MotionSegmenter,
     state::Visitor,
     tracking::{CameraMotion, Tracked},
-    view::Raycaster,
+    view::{RaycastError, RaycastReport, Raycaster},
     volume::{
         AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth,
         Viewpoint, Volume,
@@ -119,6 +120,20 @@ impl<'s> StaticMap<'s> {
     /// Looks at the map from a pose; whether that could be done.
     pub fn cast<E: Executor>(&mut self, view: &Viewpoint, executor: &E) -> bool {
         self.raycaster.cast(&self.volume, view, executor).is_ok()
+    }
+
+    /// Looks at a segment of the map from a pose in it.
+    pub fn cast_segment<E: Executor>(
+        &mut self,
+        segment: MapSegment,
+        view: &Viewpoint,
+        executor: &E,
+    ) -> Result<RaycastReport, RaycastError> {
+        let current = self.volume.segment();
+        self.volume.enter_segment(segment);
+        let report = self.raycaster.cast(&self.volume, view, executor);
+        self.volume.enter_segment(current);
+        report
     }
 
     /// Registers a frame's depth with the map as it was cast last.

@@ -165,6 +165,14 @@ impl Mapper<'_> {
         let mask = assigned.egomotion_mask();
         let locate = || localization.locate(&seen, &mask, static_map, executor);
         let located = executor.stage(Stage::Egomotion, locate);
+        // Another segment has its own frame of reference: what was known in the one before is not.
+        static_map.volume.enter_segment(localization.camera.segment());
+        if located.enters_segment {
+            assigned.restart_motions();
+            segmenter.forget();
+            objects.restart(sink);
+            planning.forget();
+        }
         // (B) Moving objects that no detector found, and (D) the objects' motions.
         let (rig, camera) = (seen.config.scaled_rig(), located.camera);
         let fused = located.found.origin != PoseOrigin::Extrapolated && seen.is_due();
@@ -256,7 +264,7 @@ impl Mapper<'_> {
         let Outcome {
             stereo,
             scene_flow,
-            located: Located { camera, found },
+            located: Located { camera, found, .. },
             ground,
             segmentation,
             tracking,

@@ -1,6 +1,7 @@
 //! The mapper as a whole, in a scene with known geometry.
 
 mod errors;
+mod lost;
 mod mutations;
 mod plan;
 mod random_runs;

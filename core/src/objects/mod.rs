@@ -37,6 +37,8 @@ pub struct Objects<'s> {
     crops: Crops<'s>,
     volumes: ObjectVolumes<'s>,
     report: ObjectsReport,
+    /// Objects that retired before the frame's report began.
+    restarted: u32,
 }
 
 impl<'s> Objects<'s> {
@@ -56,6 +58,7 @@ impl<'s> Objects<'s> {
             crops: Crops::new_in(capacity, carver),
             volumes: ObjectVolumes::new_in(capacity, config, carver),
             report: ObjectsReport::default(),
+            restarted: 0,
         }
     }
 

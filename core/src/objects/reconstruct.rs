@@ -52,7 +52,8 @@ impl<'s> Objects<'s> {
         sink: &mut impl ObjectSink,
     ) {
         let tracker = tracked.tracker();
-        self.report = ObjectsReport::default();
+        let retired = core::mem::take(&mut self.restarted);
+        self.report = ObjectsReport { retired, ..ObjectsReport::default() };
         // The crops of a trajectory segment that ended do not connect to what follows.
         let is_new_segment = |track: &&Track| track.segment_len <= 1;
         tracker
@@ -235,11 +236,20 @@ impl<'s> Objects<'s> {
 
     /// Ends a sequence: retires every object. Returns how many.
     pub(crate) fn finish(&mut self, sink: &mut impl ObjectSink) -> u32 {
+        self.retire_all(Retirement::Finished, sink)
+    }
+
+    /// Retires every object, whose poses lie in a frame of reference that the camera has left.
+    pub(crate) fn restart(&mut self, sink: &mut impl ObjectSink) {
+        self.restarted = self.retire_all(Retirement::Restarted, sink);
+    }
+
+    fn retire_all(&mut self, reason: Retirement, sink: &mut impl ObjectSink) -> u32 {
         let config = &self.config;
         self.volumes
             .objects
             .iter_mut()
-            .map(|object| u32::from(object.retire(config, Retirement::Finished, sink)))
+            .map(|object| u32::from(object.retire(config, reason, sink)))
             .sum()
     }
 }

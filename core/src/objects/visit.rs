@@ -28,7 +28,7 @@ impl Objects<'_> {
 
     /// Visits all that outlives a frame; [`Objects::rebuild`] must follow a reading.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { crops, volumes, config: _, report: _ } = self;
+        let Self { crops, volumes, config: _, report: _, restarted: _ } = self;
         crops.visit(visitor);
         volumes.objects.iter_mut().for_each(|object| object.visit(visitor));
     }

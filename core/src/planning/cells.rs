@@ -172,6 +172,12 @@ impl<'s> Cells<'s> {
         visitor.bytes(bits);
     }
 
+    /// Makes every cell unknown.
+    pub fn forget(&mut self) {
+        self.observed_at.fill(0);
+        self.bits.fill(0);
+    }
+
     /// Starts the next frame.
     pub fn advance(&mut self) {
         if self.clock >= MAX_STAMP {
@@ -237,8 +243,7 @@ impl<'s> Cells<'s> {
         let far =
             shifts.iter().zip(self.size).any(|(shift, size)| shift.unsigned_abs() >= size as u64);
         if far {
-            self.observed_at.fill(0);
-            self.bits.fill(0);
+            self.forget();
             return;
         }
         let [dx, dy, dz] = shifts;

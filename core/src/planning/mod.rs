@@ -244,6 +244,12 @@ impl<'s> Planning<'s> {
         }
     }
 
+    /// Forgets what was observed, as when the camera enters another segment of the map.
+    pub(crate) fn forget(&mut self) {
+        self.cells.forget();
+        (self.level, self.box_count) = (Level::default(), 0);
+    }
+
     /// Reads the map into the window, finds the ground, and forgets the moving objects of the last
     /// update.
     pub(crate) fn read(&mut self, volume: &Volume<'_>) {
@@ -256,8 +262,7 @@ impl<'s> Planning<'s> {
     pub(crate) fn add_static(&mut self, volume: &Volume<'_>, t_world_object: &Transform) {
         let voxel_m = f64::from(volume.config().voxel_size_m);
         let Self { grid, cells, config, .. } = self;
-        for slot in volume.pool().live() {
-            let Some(coord) = volume.blocks().coord(slot) else { continue };
+        for (slot, coord) in volume.current_blocks() {
             crossings(volume, slot, coord, config.min_weight, |crossing| {
                 // From the object's frame into the world's, and from there into the window's cells.
                 let point = t_world_object.transform_point(crossing.point_m(voxel_m));

@@ -217,8 +217,7 @@ pub(super) fn sweep(
     let voxel_m = f64::from(volume.config().voxel_size_m);
     let block_m = voxel_m * BLOCK_SIDE as f64;
     // Blocks in the order of the pool; the nearest touch wins, so that the order does not matter.
-    for slot in volume.pool().live() {
-        let Some(coord) = volume.blocks().coord(slot) else { continue };
+    for (slot, coord) in volume.current_blocks() {
         let center = to_grid_m(coord.origin().map(|c| f64::from(c) * voxel_m + 0.5 * block_m));
         // Half a block's diagonal, and a voxel.
         if !legs().any(|leg| leg.is_within(center, robot, block_m)) {

@@ -180,10 +180,8 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
         up_is_positive: up_along > 0,
     };
     let mut points = 0u32;
-    for slot in volume.pool().live() {
-        if let Some(coord) =
-            volume.blocks().coord(slot).filter(|&coord| window.meets(coord, cells.size))
-        {
+    for (slot, coord) in volume.current_blocks() {
+        if window.meets(coord, cells.size) {
             crossings(volume, slot, coord, window.min_weight, |crossing| {
                 points += u32::from(mark(&window, &crossing, cells))
             });

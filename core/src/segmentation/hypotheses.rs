@@ -178,6 +178,11 @@ impl<'s> Hypotheses<'s> {
         }
     }
 
+    /// Drops all hypotheses.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
     /// Drops the hypothesis at that position.
     pub fn remove(&mut self, index: usize) {
         if index < self.len {

@@ -187,6 +187,11 @@ impl<'s> MotionSegmenter<'s> {
         hypotheses.visit(visitor);
     }
 
+    /// Forgets all groups, whose positions lie in a frame of reference that the camera has left.
+    pub(crate) fn forget(&mut self) {
+        self.hypotheses.clear();
+    }
+
     /// Visits where objects were before they were known to move.
     pub(crate) fn take_trails(&mut self, t_world_camera: &Transform, visit: impl FnMut(&Trail)) {
         self.hypotheses.take_trails(t_world_camera, visit);

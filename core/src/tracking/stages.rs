@@ -2,7 +2,7 @@
 
 use super::{
     CameraMotion, Class, EgomotionMask, FrameMatches, GuidedMatching, Instance, MotionInput,
-    OwnerCode, Tracker, TrackingReport,
+    OwnerCode, Track, Tracker, TrackingReport,
 };
 use crate::{egomotion::Estimator, geometry::StereoRig, image::ViewMut, masks::PixelBox};
 
@@ -86,6 +86,12 @@ impl<'t, 'm, 's> Assigned<'t, 'm, 's> {
     /// matches that no instance has.
     pub(crate) fn associate_from(&mut self, first: usize) {
         self.tracker.associate_from(first, &self.matches);
+    }
+
+    /// Forgets the motion and the poses of all tracks, which lie in a frame of reference that the
+    /// camera has left. Tracks keep their numbers, masks and classes.
+    pub(crate) fn restart_motions(&mut self) {
+        self.tracker.tracks.all_mut().iter_mut().for_each(Track::restart_motion);
     }
 
     /// Estimates each track's motion, state and pose. `search` is where more matches are searched

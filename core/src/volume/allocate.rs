@@ -19,7 +19,7 @@
 //! [`MAX_BLOCKS_PER_RAY`](super::MAX_BLOCKS_PER_RAY).
 
 use super::{
-    BLOCK_SIDE, BlockCoord, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
+    BLOCK_SIDE, BlockCoord, BlockKey, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
     request::{Band, Rays},
 };
 use crate::{
@@ -103,8 +103,9 @@ impl Volume<'_> {
             report.beyond += 1;
             return;
         };
+        let key = self.key(coord);
         // Asking again for a block that exists costs one probe.
-        let (found, probes) = self.index.probe(coord, |slot| self.blocks.coord(slot));
+        let (found, probes) = self.index.probe(key, |slot| self.blocks.key(slot));
         if probes > report.probes_most {
             report.probes_most = probes;
         }
@@ -116,12 +117,12 @@ impl Volume<'_> {
                     report.refused += 1;
                     return;
                 }
-                let Some(slot) = self.make(coord) else {
+                let Some(slot) = self.make(key) else {
                     report.refused += 1;
                     return;
                 };
                 report.made += 1;
-                report.eviction.loaded += u32::from(self.load_into(slot, coord, store));
+                report.eviction.loaded += u32::from(self.load_into(slot, key, store));
                 slot
             }
         };
@@ -137,10 +138,10 @@ impl Volume<'_> {
     }
 
     /// Takes a slot for a new, empty block.
-    pub(super) fn make(&mut self, coord: BlockCoord) -> Option<Slot> {
+    pub(super) fn make(&mut self, key: BlockKey) -> Option<Slot> {
         let slot = self.pool.take().ok()?;
-        self.blocks.clear(slot, coord);
-        if self.index.insert(coord, slot, |slot| self.blocks.coord(slot)).is_err() {
+        self.blocks.clear(slot, key);
+        if self.index.insert(key, slot, |slot| self.blocks.key(slot)).is_err() {
             self.pool.free(slot);
             return None;
         }
@@ -159,8 +160,10 @@ impl Volume<'_> {
             if self.visible.is_marked(slot) || !self.pool.is_live(slot) {
                 continue;
             }
-            let Some(coord) = self.blocks.coord(slot) else { continue };
-            let center = Vector3::from(coord.origin().map(|c| (f64::from(c) + 3.5) * voxel_m));
+            // Blocks of another segment lie in a lattice of their own.
+            let current = |key: &BlockKey| key.segment == self.segment;
+            let Some(key) = self.blocks.key(slot).filter(current) else { continue };
+            let center = Vector3::from(key.coord.origin().map(|c| (f64::from(c) + 3.5) * voxel_m));
             let at = camera_from_world * (center - camera.coords);
             let u = view.rig.focal_px * at.x + view.rig.center_u_px * at.z;
             let v = view.rig.focal_px * at.y + view.rig.center_v_px * at.z;

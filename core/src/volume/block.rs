@@ -1,9 +1,11 @@
 //! What blocks hold: an array of records, and beside it one for what is read without the voxels and
 //! one for colour (docs/decisions/0017-blocks-as-records.md).
 //!
-//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, and a header of 16.
+//! Memory: 1,536 bytes of voxels a block, 3,072 with colour, a header of 16, and one of least
+//! weight.
 
 use super::Slot;
+use crate::geometry::MapSegment;
 use crate::memory::{Capacity, Carver, region_bytes};
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
@@ -60,6 +62,28 @@ impl BlockCoord {
     }
 }
 
+/// Name of a block among all blocks of a map: coordinates are those of its segment's lattice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BlockKey {
+    /// Segment of the map that the block is of.
+    pub segment: MapSegment,
+    /// Coordinates in the segment's lattice.
+    pub coord: BlockCoord,
+}
+
+impl BlockKey {
+    /// Key of the block at `coord` in the first segment.
+    pub const fn in_first(coord: BlockCoord) -> Self {
+        Self { segment: MapSegment::FIRST, coord }
+    }
+
+    /// Key of the block `offset` blocks away in the same segment; `None` beyond the map.
+    pub(crate) fn offset(self, offset: [i32; 3]) -> Option<Self> {
+        Some(Self { coord: self.coord.offset(offset)?, ..self })
+    }
+}
+
 /// A block without its colour: what every stage that visits it reads together.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -95,23 +119,20 @@ pub(super) struct Header {
     /// Digest of the block's coordinates and content; 0 until the block is first fused.
     pub digest: u64,
     coord: [i16; 3],
-    /// Least weight of the observed voxels, so that pruning need not read them; 0 where it is not
-    /// known.
-    pub min_weight: u8,
-    reserved: u8,
+    segment: MapSegment,
 }
 
 impl Header {
     /// Returns the header of an empty block.
-    pub fn new(coord: BlockCoord) -> Self {
-        Self { coord: [coord.x, coord.y, coord.z], ..Self::default() }
+    pub fn new(BlockKey { segment, coord }: BlockKey) -> Self {
+        Self { digest: 0, coord: [coord.x, coord.y, coord.z], segment }
     }
 
-    /// Returns the block's coordinates.
+    /// Returns the block's key.
     #[inline]
-    pub fn coord(&self) -> BlockCoord {
+    pub fn key(&self) -> BlockKey {
         let [x, y, z] = self.coord;
-        BlockCoord { x, y, z }
+        BlockKey { segment: self.segment, coord: BlockCoord { x, y, z } }
     }
 }
 
@@ -119,6 +140,9 @@ impl Header {
 #[derive(Debug)]
 pub struct Blocks<'s> {
     pub(super) header: &'s mut [Header],
+    /// Least weight of the observed voxels, so that pruning need not read them; 0 where it is not
+    /// known.
+    pub(super) min_weight: &'s mut [u8],
     pub(super) voxels: &'s mut [Voxels],
     /// Empty without colour.
     pub(super) colour: &'s mut [Colour],
@@ -128,6 +152,7 @@ impl<'s> Blocks<'s> {
     /// Bytes of the slab.
     pub(crate) const fn bytes(blocks: usize, colour: bool) -> usize {
         region_bytes::<Header>(blocks)
+            + region_bytes::<u8>(blocks)
             + region_bytes::<Voxels>(blocks)
             + if colour { region_bytes::<Colour>(blocks) } else { 0 }
     }
@@ -136,6 +161,7 @@ impl<'s> Blocks<'s> {
     pub(crate) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
             header: carver.alloc("volume.header", capacity.blocks),
+            min_weight: carver.alloc("volume.min_weight", capacity.blocks),
             voxels: carver.alloc_as_found("volume.voxels", capacity.blocks),
             colour: if capacity.colour {
                 carver.alloc_as_found("volume.colour", capacity.blocks)
@@ -145,16 +171,20 @@ impl<'s> Blocks<'s> {
         }
     }
 
-    /// Visits the block in a slot: its coordinates, its voxels and what they were last summed up
-    /// to. The digest of a block that was made and never fused is 0, which its voxels would not
-    /// tell.
+    /// Visits the block in a slot: its segment and coordinates, its voxels and what they were last
+    /// summed up to. The digest of a block that was made and never fused is 0, which its voxels
+    /// would not tell.
     pub(super) fn visit(&mut self, slot: Slot, visitor: &mut impl Visitor) {
-        let Self { header, voxels, colour } = self;
-        if let (Some(header), Some(voxels)) =
-            (header.get_mut(slot.index()), voxels.get_mut(slot.index()))
-        {
-            let (Header { coord, digest, min_weight, reserved: _ }, Voxels { sdf, weight }) =
-                (header, voxels);
+        let Self { header, min_weight, voxels, colour } = self;
+        if let (Some(header), Some(min_weight), Some(voxels)) = (
+            header.get_mut(slot.index()),
+            min_weight.get_mut(slot.index()),
+            voxels.get_mut(slot.index()),
+        ) {
+            let (Header { coord, segment, digest }, Voxels { sdf, weight }) = (header, voxels);
+            let mut number = segment.get();
+            visitor.u16s(core::slice::from_mut(&mut number));
+            *segment = MapSegment::new(number);
             visitor.i16s(coord);
             visitor.i16s(sdf);
             visitor.bytes(weight);
@@ -164,10 +194,13 @@ impl<'s> Blocks<'s> {
         colour.get_mut(slot.index()).into_iter().flatten().for_each(|plane| visitor.bytes(plane));
     }
 
-    /// Makes a slot an empty block at `coord`.
-    pub(super) fn clear(&mut self, slot: Slot, coord: BlockCoord) {
+    /// Makes a slot the empty block of a key.
+    pub(super) fn clear(&mut self, slot: Slot, key: BlockKey) {
         if let Some(header) = self.header.get_mut(slot.index()) {
-            *header = Header::new(coord);
+            *header = Header::new(key);
+        }
+        if let Some(min_weight) = self.min_weight.get_mut(slot.index()) {
+            *min_weight = 0;
         }
         if let Some(Voxels { sdf, weight }) = self.voxels.get_mut(slot.index()) {
             sdf.fill(0);
@@ -178,10 +211,23 @@ impl<'s> Blocks<'s> {
         }
     }
 
-    /// Returns the coordinates of the block in a slot.
+    /// Returns the segment and the coordinates of the block in a slot.
+    #[inline]
+    pub fn key(&self, slot: Slot) -> Option<BlockKey> {
+        self.header.get(slot.index()).map(Header::key)
+    }
+
+    /// Returns the coordinates of the block in a slot, in the lattice of its segment.
     #[inline]
     pub fn coord(&self, slot: Slot) -> Option<BlockCoord> {
-        self.header.get(slot.index()).map(Header::coord)
+        self.key(slot).map(|key| key.coord)
+    }
+
+    /// Returns true if every observed voxel of the block in a slot is known to have a weight above
+    /// `weight`.
+    #[inline]
+    pub(super) fn exceeds(&self, slot: Slot, weight: u8) -> bool {
+        self.min_weight.get(slot.index()).is_some_and(|least| *least > weight)
     }
 
     /// Signed distances of the block in a slot.

@@ -11,7 +11,8 @@ use super::{BLOCK_SIDE, BlockCoord, Slot, Volume, block::Voxels};
 use crate::geometry::OrientedBox;
 
 impl Volume<'_> {
-    /// Resets the voxels within a box that were seen in at most so many frames. Returns how many.
+    /// Resets the current segment's voxels within a box that were seen in at most so many frames.
+    /// Returns how many.
     pub(crate) fn erase(&mut self, within: &OrientedBox, frames: u32) -> u32 {
         let weight_most =
             u8::try_from(frames.saturating_mul(self.config.observation_weight.most()))
@@ -29,7 +30,9 @@ impl Volume<'_> {
         if blocks > self.pool.len() as i64 {
             let mut from = 0;
             while let Some(slot) = self.pool.next_live(from) {
-                reset += self.erase_block(slot, within, weight_most);
+                if self.blocks.key(slot).is_some_and(|key| key.segment == self.segment) {
+                    reset += self.erase_block(slot, within, weight_most);
+                }
                 from = slot.get() + 1;
             }
             return reset;
@@ -48,7 +51,7 @@ impl Volume<'_> {
     fn erase_block(&mut self, slot: Slot, within: &OrientedBox, weight_most: u8) -> u32 {
         // A block whose least weight is above the limit has nothing to erase.
         let at = slot.index();
-        if self.blocks.header.get(at).is_some_and(|header| header.min_weight > weight_most) {
+        if self.blocks.exceeds(slot, weight_most) {
             return 0;
         }
         let Some(origin) = self.blocks.coord(slot).map(BlockCoord::origin) else { return 0 };

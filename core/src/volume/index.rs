@@ -1,4 +1,4 @@
-//! From block coordinates to the block's slot: a hash table whose entries are integers.
+//! From a block's segment and coordinates to its slot: a hash table whose entries are integers.
 //!
 //! The table is `hashbrown::HashTable<Slot>`: entries are slots of the block pool, keys stay in the
 //! pool. It is built once, in the slab, for twice the blocks it will ever hold, so that deletion
@@ -7,7 +7,7 @@
 //!
 //! Memory: 5 bytes a bucket; buckets are the power of two at or above 16/7 of the blocks.
 
-use super::{BlockCoord, Full, Slot};
+use super::{BlockKey, Full, Slot};
 use crate::memory::{Carver, OneShot, region_bytes};
 use hashbrown::HashTable;
 
@@ -28,12 +28,14 @@ impl core::fmt::Debug for BlockIndex<'_> {
     }
 }
 
-/// Coordinates mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit
+/// A block's key mixed by constants (the multipliers of Teschner et al., 2003, then a 64-bit
 /// finaliser: hashbrown looks at both ends).
-pub(super) fn hash(coord: BlockCoord) -> u64 {
+pub(super) fn hash(BlockKey { segment, coord }: BlockKey) -> u64 {
     let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
     let mixed =
         x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
+    // The first segment's hash is that of its coordinates.
+    let mixed = mixed ^ u64::from(segment.get()).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
     let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     mixed ^ (mixed >> 29)
 }
@@ -69,58 +71,50 @@ impl<'s> BlockIndex<'s> {
         self.table.is_empty()
     }
 
-    /// The slot of the block at `coord`; `coord_of` tells where the block in a slot lies.
+    /// The slot of the block of a key; `key_of` tells the key of the block in a slot.
     #[inline]
-    pub fn find(
-        &self,
-        coord: BlockCoord,
-        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
-    ) -> Option<Slot> {
-        self.table.find(hash(coord), |&slot| coord_of(slot) == Some(coord)).copied()
+    pub fn find(&self, key: BlockKey, key_of: impl Fn(Slot) -> Option<BlockKey>) -> Option<Slot> {
+        self.table.find(hash(key), |&slot| key_of(slot) == Some(key)).copied()
     }
 
-    /// Finds a block like [`BlockIndex::find`], and counts the blocks whose coordinates were
-    /// compared: 1 if nothing collides.
+    /// Finds a block like [`BlockIndex::find`], and counts the blocks whose keys were compared:
+    /// 1 if nothing collides.
     #[inline]
     pub fn probe(
         &self,
-        coord: BlockCoord,
-        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+        key: BlockKey,
+        key_of: impl Fn(Slot) -> Option<BlockKey>,
     ) -> (Option<Slot>, u32) {
         let mut compared = 0;
         let same = |&slot: &Slot| {
             compared += 1;
-            coord_of(slot) == Some(coord)
+            key_of(slot) == Some(key)
         };
-        (self.table.find(hash(coord), same).copied(), compared)
+        (self.table.find(hash(key), same).copied(), compared)
     }
 
-    /// Enters `slot`, whose block `coord_of` must say lies at `coord`, and which must not be in the
+    /// Enters `slot`, whose block must have that key by `key_of`, and which must not be in the
     /// index yet.
     pub fn insert(
         &mut self,
-        coord: BlockCoord,
+        key: BlockKey,
         slot: Slot,
-        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
+        key_of: impl Fn(Slot) -> Option<BlockKey>,
     ) -> Result<(), Full> {
-        let rehash = |&slot: &Slot| coord_of(slot).map_or(0, hash);
+        let rehash = |&slot: &Slot| key_of(slot).map_or(0, hash);
         self.table.try_reserve(1, rehash).map_err(|_| Full)?;
         // Known from the line above to the table, but not to the compiler, which else keeps the way
         // to a panic.
         if self.table.capacity() == self.table.len() {
             return Err(Full);
         }
-        self.table.insert_unique(hash(coord), slot, rehash);
+        self.table.insert_unique(hash(key), slot, rehash);
         Ok(())
     }
 
-    /// Removes the block at `coord`. Whether it was there.
-    pub fn remove(
-        &mut self,
-        coord: BlockCoord,
-        coord_of: impl Fn(Slot) -> Option<BlockCoord>,
-    ) -> bool {
-        match self.table.find_entry(hash(coord), |&slot| coord_of(slot) == Some(coord)) {
+    /// Removes the block of a key. Whether it was there.
+    pub fn remove(&mut self, key: BlockKey, key_of: impl Fn(Slot) -> Option<BlockKey>) -> bool {
+        match self.table.find_entry(hash(key), |&slot| key_of(slot) == Some(key)) {
             Ok(entry) => {
                 entry.remove();
                 true
@@ -132,7 +126,9 @@ impl<'s> BlockIndex<'s> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::BlockCoord;
     use super::*;
+    use crate::geometry::MapSegment;
     use crate::random::Random;
     use std::{collections::BTreeMap, vec, vec::Vec};
 
@@ -145,13 +141,14 @@ mod tests {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut slab);
         let mut carver = Carver::new(&mut bytes[start..], BlockIndex::bytes(BLOCKS)).unwrap();
         let mut index = BlockIndex::new_in(BLOCKS, &mut carver);
-        let mut coords = [BlockCoord::default(); BLOCKS];
+        let mut coords = [BlockKey::default(); BLOCKS];
         let mut free: Vec<Slot> = (0..BLOCKS as u32).map(Slot::new).collect();
         let mut model = BTreeMap::new();
         let mut random = Random::new(5);
         for _ in 0..200_000 {
-            let [x, y, z] = [(); 3].map(|()| random.below(14) as i32 - 7);
-            let coord = BlockCoord::new(x, y, z).unwrap();
+            let [x, y, z] = [(); 3].map(|()| random.below(10) as i32 - 5);
+            let segment = MapSegment::new(random.below(3) as u16);
+            let coord = BlockKey { segment, coord: BlockCoord::new(x, y, z).unwrap() };
             if let Some(slot) = model.remove(&coord) {
                 assert_eq!(index.find(coord, |slot| Some(coords[slot.index()])), Some(slot));
                 assert!(index.remove(coord, |slot| Some(coords[slot.index()])));
@@ -214,8 +211,8 @@ mod tests {
                     apart * (at % 32 - 16),
                     apart * (at / 32 % 32 - 16),
                     apart * (at / 1_024 - 16),
-                )
-                .unwrap();
+                );
+                let coord = BlockKey::in_first(coord.unwrap());
                 let (bucket, tag) = ((hash(coord) % 256) as usize, (hash(coord) >> 57) as usize);
                 buckets[bucket] += 1;
                 tags[tag] += 1;
@@ -237,7 +234,7 @@ mod tests {
         let mut carver =
             Carver::new(bytemuck::cast_slice_mut(&mut slab), BlockIndex::bytes(8)).unwrap();
         let mut index = BlockIndex::new_in(8, &mut carver);
-        let coord = BlockCoord::new(3, -2, 1).unwrap();
+        let coord = BlockKey::in_first(BlockCoord::new(3, -2, 1).unwrap());
         // Two slots whose blocks lie at the same place: the table cannot tell, but both are
         // compared until one is right.
         let (wrong, right) = (Slot::new(4), Slot::new(7));

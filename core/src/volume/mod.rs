@@ -7,6 +7,11 @@
 //! fused in two steps: blocks within the truncation of its surface are made ([`Volume::allocate`]),
 //! then every visible block is updated by integer averages ([`Volume::fuse`]); what was visible a
 //! fixed lag ago is rid of noise (`Volume::prune`).
+//!
+//! A map has segments, each with a lattice of its own; a block's record names its segment, and
+//! blocks of several may be in the pool. One segment is current: frames are fused into it, and
+//! pictures, surfaces and samples are of it unless another one is named
+//! (docs/decisions/0061-segments-by-number.md).
 
 mod allocate;
 pub(crate) mod block;
@@ -32,7 +37,7 @@ mod visit;
 
 pub use allocate::AllocationReport;
 pub(crate) use allocate::is_within_map;
-pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, Blocks};
+pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockKey, Blocks};
 pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, VolumeConfig, WhenFull};
 pub use fuse::Observation;
 pub use history::VisibleHistory;
@@ -49,6 +54,7 @@ pub(crate) use surroundings::{BLOCK, EDGE_Q8, Surroundings};
 pub use viewpoint::Viewpoint;
 pub use visible::VisibleList;
 
+use crate::geometry::MapSegment;
 use crate::memory::{Capacity, Carver, Footprint};
 
 /// A map of blocks.
@@ -62,6 +68,7 @@ pub struct Volume<'s> {
     requested: request::RequestedCache<'s>,
     history: VisibleHistory<'s>,
     lru: LruList<'s>,
+    segment: MapSegment,
     digest: u64,
 }
 
@@ -88,6 +95,7 @@ impl<'s> Volume<'s> {
             requested: request::RequestedCache::new_in(carver),
             history: VisibleHistory::new_in(capacity, carver),
             lru: LruList::new_in(capacity.blocks, carver),
+            segment: MapSegment::FIRST,
             digest: 0,
         }
     }
@@ -117,18 +125,46 @@ impl<'s> Volume<'s> {
         &self.history
     }
 
-    /// The block at `coord`.
+    /// Segment that frames are fused into.
+    pub fn segment(&self) -> MapSegment {
+        self.segment
+    }
+
+    /// Makes a segment the current one. Blocks of the others stay in the pool until they are
+    /// unseen for longest.
+    pub fn enter_segment(&mut self, segment: MapSegment) {
+        self.segment = segment;
+    }
+
+    /// Slots and coordinates of the current segment's blocks, by slot.
+    pub fn current_blocks(&self) -> impl Iterator<Item = (Slot, BlockCoord)> + Clone + '_ {
+        let current =
+            |slot: &Slot| self.blocks.key(*slot).filter(|key| key.segment == self.segment);
+        self.pool.live().filter_map(move |slot| Some((slot, current(&slot)?.coord)))
+    }
+
+    /// The block at `coord` in the current segment.
     pub(crate) fn find(&self, coord: BlockCoord) -> Option<Slot> {
-        self.index.find(coord, |slot| self.blocks.coord(slot))
+        self.find_key(self.key(coord))
     }
 
-    /// A reader of single voxels.
+    /// The block of a key.
+    pub(crate) fn find_key(&self, key: BlockKey) -> Option<Slot> {
+        self.index.find(key, |slot| self.blocks.key(slot))
+    }
+
+    /// Key of the block at `coord` in the current segment.
+    pub(crate) fn key(&self, coord: BlockCoord) -> BlockKey {
+        BlockKey { segment: self.segment, coord }
+    }
+
+    /// A reader of single voxels of the current segment.
     pub fn sampler(&self) -> Sampler<'_, 's> {
-        Sampler::new(&self.index, &self.blocks)
+        Sampler::new(self)
     }
 
-    /// Digest of the coordinates and contents of all blocks, in any order they were made: the
-    /// wrapping sum of theirs.
+    /// Digest of the segments, coordinates and contents of all blocks, in any order they were made:
+    /// the wrapping sum of theirs.
     pub fn digest(&self) -> u64 {
         self.digest
     }
@@ -137,13 +173,14 @@ impl<'s> Volume<'s> {
     /// difference.
     fn update_digest(&mut self, slot: Slot) {
         let at = slot.index();
-        if let (Some(header), Some(voxels)) =
-            (self.blocks.header.get_mut(at), self.blocks.voxels.get(at))
+        let Blocks { header, min_weight, voxels, colour } = &mut self.blocks;
+        if let (Some(header), Some(least), Some(voxels)) =
+            (header.get_mut(at), min_weight.get_mut(at), voxels.get(at))
         {
-            let new = fuse::block_digest(header.coord(), voxels, self.blocks.colour.get(at));
+            let new = fuse::block_digest(header.key(), voxels, colour.get(at));
             self.digest = self.digest.wrapping_sub(header.digest).wrapping_add(new);
             header.digest = new;
-            header.min_weight = block::least_weight(&voxels.weight);
+            *least = block::least_weight(&voxels.weight);
         }
     }
 
@@ -151,6 +188,7 @@ impl<'s> Volume<'s> {
     pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         let (now, peak) = (self.pool.len(), self.pool.peak());
         footprint.set_use::<block::Header>("volume.header", now, peak);
+        footprint.set_use::<u8>("volume.min_weight", now, peak);
         footprint.set_use::<block::Voxels>("volume.voxels", now, peak);
         footprint.set_use::<block::Colour>("volume.colour", now, peak);
         let [history, history_peak] = self.history.words_in_use();

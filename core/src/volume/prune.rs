@@ -123,9 +123,7 @@ impl Volume<'_> {
     pub(super) fn prune_block(&mut self, slot: Slot, rule: PruneRule) -> (u32, bool) {
         let (at, prune_weight, by_distance) = (slot.index(), rule.weight, rule.distance > 0.0);
         // Most blocks are known to hold no voxel of low weight without reading them.
-        if !by_distance
-            && self.blocks.header.get(at).is_some_and(|header| header.min_weight > prune_weight)
-        {
+        if !by_distance && self.blocks.exceeds(slot, prune_weight) {
             return (0, false);
         }
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else {
@@ -151,8 +149,8 @@ impl Volume<'_> {
 
     /// Takes a block out of the map.
     pub(super) fn free_block(&mut self, slot: Slot) {
-        let Some(coord) = self.blocks.coord(slot) else { return };
-        self.index.remove(coord, |slot| self.blocks.coord(slot));
+        let Some(key) = self.blocks.key(slot) else { return };
+        self.index.remove(key, |slot| self.blocks.key(slot));
         self.digest = self
             .digest
             .wrapping_sub(self.blocks.header.get(slot.index()).map_or(0, |header| header.digest));

@@ -1,7 +1,7 @@
 //! Reading voxels one lattice point after the other, along a ray or around a cell: most reads fall
 //! into the block of the last one.
 
-use super::{BlockCoord, BlockIndex, Blocks, Slot};
+use super::{BlockCoord, Slot, Volume};
 
 /// A voxel as it stands in the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,15 +15,14 @@ pub struct VoxelSample {
 /// A reader with a memory of one block.
 #[derive(Debug)]
 pub struct Sampler<'v, 's> {
-    index: &'v BlockIndex<'s>,
-    blocks: &'v Blocks<'s>,
+    volume: &'v Volume<'s>,
     last: Option<(BlockCoord, Option<Slot>)>,
 }
 
 impl<'v, 's> Sampler<'v, 's> {
-    /// A reader of the map made of `index` and `blocks`.
-    pub(super) fn new(index: &'v BlockIndex<'s>, blocks: &'v Blocks<'s>) -> Self {
-        Self { index, blocks, last: None }
+    /// A reader of a map's current segment.
+    pub(super) fn new(volume: &'v Volume<'s>) -> Self {
+        Self { volume, last: None }
     }
 
     /// The slot of a block, if the block exists.
@@ -32,7 +31,7 @@ impl<'v, 's> Sampler<'v, 's> {
         match self.last {
             Some((last, slot)) if last == coord => slot,
             _ => {
-                let slot = self.index.find(coord, |slot| self.blocks.coord(slot));
+                let slot = self.volume.find(coord);
                 self.last = Some((coord, slot));
                 slot
             }
@@ -44,7 +43,7 @@ impl<'v, 's> Sampler<'v, 's> {
     pub fn voxel(&mut self, point: [i32; 3]) -> Option<VoxelSample> {
         let slot = self.slot(BlockCoord::of_lattice(point)?)?.index();
         let voxel = ((point[0] & 7) | (point[1] & 7) << 3 | (point[2] & 7) << 6) as usize;
-        let voxels = self.blocks.voxels.get(slot)?;
+        let voxels = self.volume.blocks.voxels.get(slot)?;
         let (sdf, weight) = (*voxels.sdf.get(voxel)?, *voxels.weight.get(voxel)?);
         (weight > 0).then_some(VoxelSample { sdf, weight })
     }

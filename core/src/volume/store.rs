@@ -4,14 +4,17 @@
 //! was visible in this frame or the last: then the pool is too small for what is in view, and the
 //! new block is refused. What is still within the pruning window when it leaves is pruned first, as
 //! it would have been had it stayed. Constant work per block made, for maps of any size.
+//!
+//! Blocks of earlier segments are not handed over when another segment begins: they leave like
+//! others that are not seen any more, and without a store they are lost then, and counted.
 
-use super::{BLOCK_VOXELS, BlockCoord, Slot, Volume, block::Voxels, config::WhenFull};
+use super::{BLOCK_VOXELS, BlockKey, Slot, Volume, block::Voxels, config::WhenFull};
 
 /// A block as it leaves the map.
 #[derive(Clone, Copy, Debug)]
 pub struct EvictedBlock<'b> {
-    /// Coordinates of the block.
-    pub coord: BlockCoord,
+    /// Segment and coordinates of the block.
+    pub key: BlockKey,
     /// Signed distances.
     pub sdf: &'b [i16; BLOCK_VOXELS],
     /// Weights.
@@ -23,8 +26,8 @@ pub struct EvictedBlock<'b> {
 /// A block to be filled from the store; all zero before.
 #[derive(Debug)]
 pub struct LoadedBlock<'b> {
-    /// Coordinates of the block.
-    pub coord: BlockCoord,
+    /// Segment and coordinates of the block.
+    pub key: BlockKey,
     /// Signed distances.
     pub sdf: &'b mut [i16; BLOCK_VOXELS],
     /// Weights.
@@ -35,12 +38,12 @@ pub struct LoadedBlock<'b> {
 
 /// The caller's memory for blocks: evicted blocks are stored in it and loaded from it.
 pub trait BlockStore {
-    /// Stores a block that leaves the map; the last one stored at its coordinates counts. `false`
-    /// when it cannot be stored: it is lost, and counted.
+    /// Stores a block that leaves the map; the last one stored with its key counts. `false` when
+    /// it cannot be stored: it is lost, and counted.
     fn store(&mut self, block: EvictedBlock<'_>) -> bool;
 
-    /// Fills a block that is made again; `false` when none is stored at its coordinates; the block
-    /// must then stay all zero.
+    /// Fills a block that is made again; `false` when none is stored with its key; the block must
+    /// then stay all zero.
     fn load(&mut self, block: LoadedBlock<'_>) -> bool;
 }
 
@@ -104,7 +107,7 @@ impl Volume<'_> {
     /// Returns the contents of a slot.
     fn evicted(&self, slot: Slot) -> Option<EvictedBlock<'_>> {
         Some(EvictedBlock {
-            coord: self.blocks.coord(slot)?,
+            key: self.blocks.key(slot)?,
             sdf: self.blocks.sdf(slot)?,
             weight: self.blocks.weight(slot)?,
             colour: self.blocks.colour(slot),
@@ -127,15 +130,15 @@ impl Volume<'_> {
         report
     }
 
-    /// Loads the block stored at `coord` into the map, as when a map on disk is viewed part by
+    /// Loads the block stored with a key into the map, as when a map on disk is viewed part by
     /// part. Whether the block is in the map now; where none is stored, or no slot is free, it is
     /// not.
-    pub fn load<S: BlockStore>(&mut self, coord: BlockCoord, store: &mut S) -> bool {
-        if self.find(coord).is_some() {
+    pub fn load<S: BlockStore>(&mut self, key: BlockKey, store: &mut S) -> bool {
+        if self.find_key(key).is_some() {
             return true;
         }
-        let Some(slot) = self.make(coord) else { return false };
-        let loaded = self.load_into(slot, coord, store);
+        let Some(slot) = self.make(key) else { return false };
+        let loaded = self.load_into(slot, key, store);
         if !loaded {
             self.free_block(slot);
         }
@@ -146,13 +149,13 @@ impl Volume<'_> {
     pub(super) fn load_into<S: BlockStore>(
         &mut self,
         slot: Slot,
-        coord: BlockCoord,
+        key: BlockKey,
         store: &mut S,
     ) -> bool {
         let at = slot.index();
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return false };
         let colour = self.blocks.colour.get_mut(at);
-        let returned = store.load(LoadedBlock { coord, sdf, weight, colour });
+        let returned = store.load(LoadedBlock { key, sdf, weight, colour });
         if returned {
             self.update_digest(slot);
         }

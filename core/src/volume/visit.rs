@@ -13,10 +13,11 @@ impl Volume<'_> {
             visible,
             history,
             lru,
-            // Rebuilt, given by the caller, or of one frame alone.
+            // Rebuilt, given by the caller, told by the camera, or of one frame only.
             index: _,
             digest: _,
             config: _,
+            segment: _,
             requested: _,
         } = self;
         pool.visit(visitor);
@@ -54,14 +55,14 @@ impl Volume<'_> {
     }
 
     /// Inserts the blocks that were read into the index, in slot order, and sums their digests.
-    /// Returns true if the blocks can be in one map: no coordinates twice, space for all. Nothing
-    /// that comes later depends on the order of insertion: the index answers for one block, and
-    /// nothing walks it.
+    /// Returns true if the blocks can be in one map: no key twice, space for all. Nothing that
+    /// comes later depends on the order of insertion: the index answers for one block, and nothing
+    /// walks it.
     pub(crate) fn rebuild(&mut self) -> bool {
         for slot in self.pool.live() {
-            let Some(coord) = self.blocks.coord(slot) else { return false };
-            if self.index.find(coord, |slot| self.blocks.coord(slot)).is_some()
-                || self.index.insert(coord, slot, |slot| self.blocks.coord(slot)).is_err()
+            let Some(key) = self.blocks.key(slot) else { return false };
+            if self.find_key(key).is_some()
+                || self.index.insert(key, slot, |slot| self.blocks.key(slot)).is_err()
             {
                 return false;
             }

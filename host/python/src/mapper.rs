@@ -11,10 +11,11 @@ use super::running::{Recipe, Running, State};
 use super::{options, pose};
 use dynvox::Request;
 use dynvox::request::MapperPlan;
-use dynvox::run::store;
+use dynvox::run::store::{self, OneSegment};
 use dynvox::slab::HostSlab;
 use dynvox_core::tracking::TrackReport;
 use dynvox_core::view::{RaycastView, Triangle};
+use dynvox_core::volume::BlockKey;
 use dynvox_core::{Report, StereoFrame};
 use hashbrown::HashSet;
 use numpy::{PyArray2, PyArray3};
@@ -166,8 +167,8 @@ impl Mapper {
         let from = t_world_camera.map(|pose| pose::given("t_world_camera", &pose)).transpose()?;
         let (shown, ids) = self.with(py, |Running { mapper, threads, .. }| {
             mapper.with_dependent_mut(|_, mapper| {
-                let view =
-                    RaycastView { t_world_camera: from.unwrap_or(*mapper.t_world_camera()), every };
+                let from = from.unwrap_or(*mapper.t_world_camera());
+                let view = RaycastView { every, ..(&from).into() };
                 let ids: Vec<u32> = mapper.posed_objects().map(|posed| posed.summary.id).collect();
                 let cast = threads.run(|| match objects {
                     true => mapper.raycast_composed(view, threads).map(Raycast::of),
@@ -286,13 +287,15 @@ impl Mapper {
     }
 }
 
-/// Triangles of the static map: of the blocks in memory, and of those that are in the store alone.
+/// Triangles of the static map in the camera's segment: of the blocks in memory, and of those that
+/// are only in the store.
 fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
     let mut triangles = Triangles::default();
-    let in_memory: HashSet<_> = running.mapper.with_dependent(|_, mapper| {
+    let (segment, in_memory): (_, HashSet<_>) = running.mapper.with_dependent(|_, mapper| {
         mapper.triangles(&mut |triangle| triangles.add(triangle));
         let volume = mapper.static_map();
-        volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)).collect()
+        let in_memory = volume.current_blocks().map(|(_, coord)| BlockKey::in_first(coord));
+        (volume.segment(), in_memory.collect())
     });
     if let Some(file) = running.blocks.file_mut() {
         let (config, colour) = (&running.plan.config, running.plan.capacity.colour);
@@ -300,7 +303,7 @@ fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
             .ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
         let how = (&config.volume, &config.mesh);
         store::mesh::triangles(
-            file,
+            &mut OneSegment::new(file, segment),
             how,
             (slab.bytes_mut(), colour),
             &in_memory,

@@ -8,7 +8,7 @@ use super::tile_folder::tiles;
 use crate::owned::DraftFolder;
 use crate::run::BLOCKS_FILE;
 use crate::run::store::BlockFile;
-use dynvox_core::volume::{BlockStore, EvictedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock};
 use std::fs::File;
 use std::path::Path;
 
@@ -44,7 +44,7 @@ impl Averages {
         let resolved = resolve(folder, |resolved| {
             let average = &resolved.average;
             let block = EvictedBlock {
-                coord: resolved.coord,
+                key: BlockKey::in_first(resolved.coord),
                 sdf: &average.sdf,
                 weight: &average.weight,
                 colour: average.colour.as_deref(),

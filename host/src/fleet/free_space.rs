@@ -12,7 +12,7 @@
 //! **Memory.** 1 KiB a block of the map, and 8 bytes a free block.
 
 use super::distance_field::DistanceField;
-use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::geometry::{MapSegment, StereoRig, Transform};
 use dynvox_core::volume::{BLOCK_SIDE, BlockCoord};
 use std::collections::BTreeMap;
 
@@ -44,9 +44,9 @@ pub struct Camera {
 pub struct CameraPose {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// Segment of the map: another one begins above where the camera was lost.
-    pub segment: u32,
-    /// The camera in the map.
+    /// Segment of the map that the pose lies in.
+    pub segment: MapSegment,
+    /// The camera in the segment, as far as it is the first: files show others apart.
     pub t_map_camera: Transform,
 }
 

@@ -137,7 +137,7 @@ fn targets(
 ) -> (Vec<(WorldTile, BlockCoord)>, u64) {
     let (mut targets, mut beyond) = (Vec::new(), 0);
     for tile in store.tiles() {
-        for source in store.blocks_of(tile) {
+        for source in store.blocks_of(tile).into_iter().map(|key| key.coord) {
             let [low, high] = reach(source, way);
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {

@@ -1,7 +1,7 @@
 //! Submap: the blocks of a run in its own lattice, and the path of its camera.
 //!
-//! Where the camera was lost, a run begins another segment of its map high above, whose place is
-//! not known: only the first segment is kept.
+//! Where the camera was lost, a run begins another segment of its map, whose place is not known:
+//! only the first segment is kept.
 //!
 //! Values are taken over as they are: a map is carried into the world once, when it is known where
 //! it lies. A folder holds `map.blocks`, and `submap.json`, whose checksum covers every record: a
@@ -17,8 +17,9 @@ use crate::formats::read_text_within;
 use crate::owned::DraftFolder;
 use crate::run::store::{BlockFile, Position};
 use crate::run::{BLOCKS_FILE, write_whole};
+use dynvox_core::geometry::MapSegment;
 use dynvox_core::volume::{
-    BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock,
+    BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockKey, BlockStore, EvictedBlock, LoadedBlock,
 };
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -27,7 +28,7 @@ use std::path::Path;
 
 /// Version of what a map consists of: its blocks, those that are added to them, and what is known
 /// of it.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// Name of what is known of a map.
 const HEAD_FILE: &str = "submap.json";
 
@@ -67,13 +68,14 @@ impl Source {
             weight: [0; BLOCK_VOXELS],
             colour: colour.then(|| Box::new([[0; BLOCK_VOXELS]; 3])),
         });
+        let key = BlockKey::in_first(coord);
         let into = LoadedBlock {
-            coord,
+            key,
             sdf: &mut source.sdf,
             weight: &mut source.weight,
             colour: source.colour.as_deref_mut(),
         };
-        (store.holds(coord) && store.load(into)).then_some(source)
+        (store.holds(key) && store.load(into)).then_some(source)
     }
 }
 
@@ -91,44 +93,18 @@ pub fn lattice_point(coord: BlockCoord, voxel: usize) -> [i32; 3] {
     std::array::from_fn(|axis| i32::from(blocks[axis]) * BLOCK_SIDE as i32 + offset[axis] as i32)
 }
 
-/// All blocks of a store, tile by tile, ascending within a tile.
+/// All blocks of a store's first segment, tile by tile, ascending within a tile.
 pub fn blocks(store: &mut BlockFile<File>) -> Vec<BlockCoord> {
-    store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect()
-}
-
-/// The first segment of a run's map.
-struct FirstSegment {
-    camera: Camera,
-    left_out_frames: usize,
-    /// Blocks are of later segments where their y, which points down, is less.
-    top: i16,
-}
-
-impl FirstSegment {
-    /// `None` where segments lie at one height.
-    fn of(camera: &Camera, block_m: f64) -> Option<Self> {
-        let (first, later): (Vec<CameraPose>, Vec<CameraPose>) =
-            // Segment 0 is the map before the camera was lost; later ones lie above it.
-            camera.poses.iter().partition(|pose| pose.segment == 0);
-        let height = |pose: &CameraPose| pose.t_map_camera.translation_m[1];
-        let top_m = first.iter().map(height).fold(f64::INFINITY, f64::min);
-        let bottom_m = later.iter().map(height).fold(f64::NEG_INFINITY, f64::max);
-        let top = if later.is_empty() {
-            i16::MIN
-        } else {
-            (0.5 * (top_m + bottom_m) / block_m).floor() as i16
-        };
-        let camera = Camera { poses: first, ..*camera };
-        (bottom_m < top_m).then_some(Self { camera, left_out_frames: later.len(), top })
-    }
+    let tiles = store.tiles().into_iter().filter(|tile| tile.segment == MapSegment::FIRST);
+    tiles.flat_map(|tile| store.blocks_of(tile)).map(|key| key.coord).collect()
 }
 
 /// Keeps the newest record of each block of a run's first segment in a new folder, and the blocks
 /// that its camera saw to be free. Returns their number.
 ///
 /// # Errors
-/// The folder exists, a block cannot be read, segments cannot be told apart, or the disk refuses.
-/// Nothing half-written stays behind.
+/// The folder exists, a block cannot be read, or the disk refuses. Nothing half-written stays
+/// behind.
 pub fn keep(
     store: &mut BlockFile<File>,
     lattice: &Lattice,
@@ -141,16 +117,11 @@ pub fn keep(
     let draft = DraftFolder::begin(out).map_err(FleetError::io(out))?;
     let path = draft.path().join(BLOCKS_FILE);
     let (mut kept, _) = BlockFile::open(&path, lattice.voxel_size_m, lattice.truncation_m)?;
-    // Segments after a loss stand apart, above the first: only the first is kept.
-    let apart = FirstSegment::of(camera, f64::from(lattice.voxel_size_m) * BLOCK_SIDE as f64);
-    let FirstSegment { camera, left_out_frames, top } = apart.ok_or_else(|| {
-        FleetError::content(
-            out,
-            "is not made: the camera was lost, and climbed where the map went \
-                                  on. End the run before, with --frames",
-        )
-    })?;
-    for coord in blocks(store).into_iter().filter(|coord| coord.y >= top) {
+    // Where segments after a loss lie in the first is not known: only the first is kept.
+    let (first, later): (Vec<CameraPose>, Vec<CameraPose>) =
+        camera.poses.iter().partition(|pose| pose.segment == MapSegment::FIRST);
+    let (camera, left_out_frames) = (Camera { poses: first, ..*camera }, later.len());
+    for coord in blocks(store) {
         let source = Source::load(store, coord, lattice.colour).ok_or_else(|| {
             FleetError::content(
                 out,
@@ -158,7 +129,7 @@ pub fn keep(
             )
         })?;
         let block = EvictedBlock {
-            coord,
+            key: BlockKey::in_first(coord),
             sdf: &source.sdf,
             weight: &source.weight,
             colour: source.colour.as_deref(),
@@ -176,7 +147,7 @@ pub fn keep(
         // A free block has the largest distance everywhere, and as weight its number of views.
         let (sdf, weight) = ([i16::MAX; BLOCK_VOXELS], [views; BLOCK_VOXELS]);
         if !kept.store(EvictedBlock {
-            coord,
+            key: BlockKey::in_first(coord),
             sdf: &sdf,
             weight: &weight,
             colour: colour.as_deref(),
@@ -232,7 +203,7 @@ impl Submap {
     /// The folder is no map.
     pub fn cameras(folder: &Path) -> Result<Vec<CameraPose>, FleetError> {
         let camera = |(frame, rows): (usize, [f64; 12])| {
-            Some(CameraPose { frame, segment: 0, t_map_camera: transform(&rows)? })
+            Some(CameraPose { frame, segment: MapSegment::FIRST, t_map_camera: transform(&rows)? })
         };
         let cameras =
             SubmapHeader::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
@@ -275,7 +246,7 @@ mod tests {
         for (x, weight) in [(3, 1), (-2, 5), (3, 9)] {
             let (sdf, weight) = ([-7; BLOCK_VOXELS], [weight; BLOCK_VOXELS]);
             assert!(store.store(EvictedBlock {
-                coord: BlockCoord { x, y: 0, z: 0 },
+                key: BlockKey::in_first(BlockCoord { x, y: 0, z: 0 }),
                 sdf: &sdf,
                 weight: &weight,
                 colour: None
@@ -287,7 +258,7 @@ mod tests {
             StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
         let pose = CameraPose {
             frame: 7,
-            segment: 0,
+            segment: MapSegment::FIRST,
             t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]),
         };
         // Two blocks, although three were stored.
@@ -320,12 +291,14 @@ mod tests {
     fn only_the_first_segment_of_a_map_is_kept() {
         let root = tempfile::TempDir::new().unwrap();
         let (mut store, _) = BlockFile::open(&root.path().join("run.blocks"), 0.1, 0.5).unwrap();
-        // Blocks of 0.8 m: one about the camera, one 30 m above it on a hill, one about the camera
-        // 100 m up.
-        for y in [1, -37, -120] {
-            let (sdf, weight) = ([-7; BLOCK_VOXELS], [9; BLOCK_VOXELS]);
+        let second = MapSegment::new(1);
+        // Two segments share a lattice: one block of either lies where the other has one as well.
+        for (segment, x, distance) in
+            [(MapSegment::FIRST, 3, -7), (second, 3, 5), (second, 4, 5), (MapSegment::FIRST, 9, -7)]
+        {
+            let (sdf, weight) = ([distance; BLOCK_VOXELS], [9; BLOCK_VOXELS]);
             assert!(store.store(EvictedBlock {
-                coord: BlockCoord { x: 3, y, z: 0 },
+                key: BlockKey { segment, coord: BlockCoord { x, y: 0, z: 0 } },
                 sdf: &sdf,
                 weight: &weight,
                 colour: None
@@ -334,26 +307,28 @@ mod tests {
         let lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: false };
         let rig =
             StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
-        let pose = |frame: usize, segment: u32, y: f64| CameraPose {
+        // The camera climbed before it was lost: no height tells its segments apart.
+        let pose = |frame: usize, segment: MapSegment, y: f64| CameraPose {
             frame,
             segment,
             t_map_camera: Transform::from_translation([0.0, y, 0.0]),
         };
-        let camera = |poses: &[CameraPose]| Camera { rig, size: (100, 40), poses: poses.to_vec() };
-        let two = [pose(0, 0, 0.0), pose(1, 0, -2.0), pose(2, 1, -98.0)];
+        let poses = vec![
+            pose(0, MapSegment::FIRST, 0.0),
+            pose(1, MapSegment::FIRST, -120.0),
+            pose(2, second, -100.0),
+        ];
         let out = root.path().join("map");
-        assert_eq!(keep(&mut store, &lattice, &camera(&two), &out).unwrap(), 2);
+        let camera = Camera { rig, size: (100, 40), poses };
+        assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
         assert_eq!(
             (Submap::cameras(&out).unwrap().len(), Submap::left_out_frames(&out).unwrap()),
             (2, 1)
         );
-        let mixed = keep(
-            &mut store,
-            &lattice,
-            &camera(&[pose(0, 0, 0.0), pose(1, 1, 1.0)]),
-            &root.path().join("mixed"),
-        );
-        assert!(mixed.unwrap_err().to_string().contains("the camera was lost, and climbed"));
-        assert!(!root.path().join("mixed").exists());
+        let mut map = Submap::open(&out).unwrap();
+        let kept = blocks(&mut map.store);
+        assert_eq!(kept.iter().map(|coord| coord.x).collect::<Vec<_>>(), [3, 9]);
+        let source = Source::load(&mut map.store, kept[0], false).unwrap();
+        assert_eq!(source.sdf[5], -7, "the first segment's, not the newest record's");
     }
 }

@@ -23,6 +23,7 @@ pub mod rle;
 mod rows;
 mod rows_of_file;
 mod run_files;
+mod segments;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -48,4 +49,5 @@ pub use run_files::{
     BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, SETTINGS_FILE, SUMMARY_FILE, TIMED_TRAJECTORY_FILE,
     TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
 };
+pub use segments::{SEGMENT_GAP_M, ShownSegment, shown_pose};
 pub use times::{TimeTable, TimeUnit, parse_seconds, read_stamped_names, read_times};

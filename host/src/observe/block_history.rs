@@ -7,12 +7,16 @@
 use super::tables::{BlockFate, block_rows};
 use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
 use crate::formats::BLOCKS_TABLE_FILE;
-use dynvox_core::volume::{BlockCoord, Volume};
+use dynvox_core::geometry::MapSegment;
+use dynvox_core::volume::{BlockCoord, BlockKey, Volume};
 use serde::{Deserialize, Serialize};
 use std::io;
 
+/// Segment and coordinates of a block.
+type SavedKey = (MapSegment, [i16; 3]);
+
 /// A block, and the number of the frame it was last visible in.
-type Sighting = ([i16; 3], u32);
+type Sighting = (SavedKey, u32);
 
 /// Watches which blocks the pool holds.
 #[derive(Debug, Serialize, Deserialize)]
@@ -49,8 +53,8 @@ impl Observer for BlockHistoryObserver {
             left.extend(self.take_absent(volume));
         }
         // A block that eviction did not name was freed by pruning.
-        let fate = |coord: &[i16; 3]| {
-            if frame.evicted.contains(&key_of(*coord)) {
+        let fate = |saved_key: &SavedKey| {
+            if frame.evicted.contains(&key_of(*saved_key)) {
                 BlockFate::Evicted
             } else {
                 BlockFate::Pruned
@@ -80,7 +84,7 @@ impl BlockHistoryObserver {
     fn note_visible(&mut self, volume: &Volume<'_>, frame: u32) -> Vec<Sighting> {
         let mut left = Vec::new();
         for &slot in volume.visible().slots() {
-            let Some(coord) = volume.blocks().coord(slot).map(key) else { continue };
+            let Some(coord) = volume.blocks().key(slot).map(saved_key) else { continue };
             if self.sightings.len() <= slot.index() {
                 self.sightings.resize(slot.index() + 1, None);
             }
@@ -106,7 +110,7 @@ impl BlockHistoryObserver {
     fn write(
         &mut self,
         run: &ObservedRun<'_>,
-        rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>,
+        rows: impl Iterator<Item = (SavedKey, u32, BlockFate)>,
     ) -> Result<(), ObserveError> {
         let failed = |source: io::Error| ObserveError::Write {
             path: run.folder.join(BLOCKS_TABLE_FILE),
@@ -117,10 +121,10 @@ impl BlockHistoryObserver {
     }
 }
 
-fn key(coord: BlockCoord) -> [i16; 3] {
-    [coord.x, coord.y, coord.z]
+fn saved_key(BlockKey { segment, coord }: BlockKey) -> SavedKey {
+    (segment, [coord.x, coord.y, coord.z])
 }
 
-fn key_of([x, y, z]: [i16; 3]) -> BlockCoord {
-    BlockCoord { x, y, z }
+fn key_of((segment, [x, y, z]): SavedKey) -> BlockKey {
+    BlockKey { segment, coord: BlockCoord { x, y, z } }
 }

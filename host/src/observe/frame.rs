@@ -1,10 +1,13 @@
 //! Record of every frame.
 
 use super::DepthCensus;
+use crate::formats::shown_pose;
 use crate::input::MaskRefusals;
 use dynvox_core::egomotion::icp::IcpStatus;
 use dynvox_core::egomotion::{MotionStatus, RightAhead};
+use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::rectify::self_calibration::SelfCalibrationReport;
+use dynvox_core::view::RaycastView;
 use dynvox_core::{PoseOrigin, Report, Severity, Stage};
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +62,17 @@ pub struct FrameRow {
 }
 
 impl FrameRow {
+    /// View of the map from the frame's pose, in its segment.
+    pub fn view(&self) -> RaycastView {
+        let Report { segment, t_world_camera, .. } = &self.report;
+        RaycastView { segment: Some(*segment), ..t_world_camera.into() }
+    }
+
+    /// Pose of the camera as files show it: later segments of the map above the first.
+    pub fn shown_t_world_camera(&self) -> Transform {
+        shown_pose(self.report.segment, &self.report.t_world_camera)
+    }
+
     /// Returns the frame's time, ns: by its stamp, else by an assumed rate.
     pub fn time_ns(&self) -> u64 {
         self.stamp_ns.unwrap_or((self.time_s * 1e9).round() as u64)
@@ -139,10 +153,10 @@ impl FrameRow {
             (&self.report.allocate, self.motion(), &self.mask_refusals);
         let Report { tracking, segmentation, objects, .. } = &self.report;
         // A frame may have several causes, the gravest first.
-        let lost = (self.report.segment > 0).then(|| {
+        let lost = (self.report.segment > MapSegment::FIRST).then(|| {
             format!(
                 "segment {} of the map, apart from the others: the camera was lost before",
-                self.report.segment
+                self.report.segment.get()
             )
         });
         let guessed = self.is_extrapolated().then(|| {

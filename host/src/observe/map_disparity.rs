@@ -6,8 +6,9 @@ use super::{
 };
 use crate::formats::{Image, write_png_deep};
 use crate::input::InputError;
-use dynvox_core::geometry::{DisparityCorrection, StereoRig, Transform};
+use dynvox_core::geometry::{DisparityCorrection, StereoRig};
 use dynvox_core::image::View;
+use dynvox_core::view::RaycastView;
 use serde::{Deserialize, Serialize};
 
 /// Units of a disparity in a file, per px.
@@ -16,9 +17,9 @@ const UNITS_PER_PX: f32 = 256.0;
 /// Saves disparities where [`ObservedRun::map_disparity_folder`] says so.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct MapDisparityObserver {
-    /// Names of the frames, and their poses. No checkpoint has them: such a run has none.
+    /// Names of the frames, and what is looked at. No checkpoint has them: such a run has none.
     #[serde(skip)]
-    frames: Vec<(String, Transform)>,
+    frames: Vec<(String, RaycastView)>,
 }
 
 impl Observer for MapDisparityObserver {
@@ -30,10 +31,8 @@ impl Observer for MapDisparityObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         if run.map_disparity_folder.as_deref().is_some() {
-            self.frames.push((
-                stem(run.plan.dataset.as_ref(), frame.row.frame),
-                frame.row.report.t_world_camera,
-            ));
+            let name = stem(run.plan.dataset.as_ref(), frame.row.frame);
+            self.frames.push((name, frame.row.view()));
         }
         Ok(())
     }
@@ -49,10 +48,10 @@ impl Observer for MapDisparityObserver {
             end.last.map(|last| last.report.self_calibration).filter(|report| report.corrected);
         let correction = calibration.and_then(|report| report.found()).unwrap_or_default();
         // Frames are drawn at the end, when the map knows most.
-        for (name, t_world_camera) in self.frames.drain(..) {
+        for (name, view) in self.frames.drain(..) {
             let seen = end
                 .view
-                .raycast((&t_world_camera).into())
+                .raycast(view)
                 .and_then(|seen| disparities(&run.plan.config.rig, &correction, seen.depth_m()?));
             if let Some(disparity) = seen {
                 write_png_deep(&folder.join(format!("{name}.png")), &disparity)

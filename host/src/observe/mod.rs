@@ -46,7 +46,9 @@ pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use map_disparity::MapDisparityObserver;
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
 pub use overview::overview;
-pub use planning::{BoxDescription, PlanningObserver, write_folder as write_planning};
+pub use planning::{
+    BoxDescription, PlanningObserver, WindowCamera, write_folder as write_planning,
+};
 pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, ReferenceObserver, ReferencePlan, ReferenceSection};
@@ -65,7 +67,7 @@ use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
 use dynvox_core::planning::PlanningReport;
 use dynvox_core::view::{RaycastView, Raycaster};
-use dynvox_core::volume::{BlockCoord, PruneReport};
+use dynvox_core::volume::{BlockKey, PruneReport};
 use hashbrown::HashSet;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -142,7 +144,7 @@ pub struct FrameContext<'a, 's> {
     /// Objects that left the mapper in this step.
     pub retired: &'a [RetiredVolume],
     /// Blocks of the static map that were evicted in this step.
-    pub evicted: &'a HashSet<BlockCoord>,
+    pub evicted: &'a HashSet<BlockKey>,
     /// The map.
     pub view: &'a mut dyn MapView<'s>,
     /// Pictures of it that were made already.

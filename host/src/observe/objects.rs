@@ -10,7 +10,7 @@ use super::{
 use crate::evaluate::objects::true_object;
 use crate::evaluate::surfaces::{SeenSide, SurfaceFigures, TrueView};
 use crate::evaluate::swept::Swept;
-use crate::formats::{Axes, Mesh, PlyWriter, tum_line, write_numbered};
+use crate::formats::{Axes, Mesh, PlyWriter, shown_pose, tum_line, write_numbered};
 use crate::owned;
 use crate::scene::OBJECTS_FOLDER;
 use dynvox_core::geometry::Transform;
@@ -134,7 +134,7 @@ impl Observer for ObjectsObserver {
             self.paths.entry((object.id, object.segment_id)).or_default().push(PosedAt {
                 frame: frame.row.frame,
                 time_ns: frame.row.time_ns(),
-                t_world_object: object.t_world_object,
+                t_world_object: shown_pose(frame.row.report.segment, &object.t_world_object),
             });
         }
         self.note_truth(run, frame);
@@ -188,8 +188,10 @@ impl ObjectsObserver {
         };
         // The map's world and the true one differ by the drift so far.
         let t_map_world = frame.row.report.t_world_camera * truth.t_world_camera.inverse();
+        // What was swept is compared with the mesh's file.
+        let t_shown_world = shown_pose(frame.row.report.segment, &t_map_world);
         let swept = self.swept.get_or_insert_default();
-        truth.objects.iter().for_each(|object| swept.add(object, &t_map_world));
+        truth.objects.iter().for_each(|object| swept.add(object, &t_shown_world));
         let Some(depth_m) = exact.depth_m.view() else { return };
         let view = TrueView {
             rig: &run.plan.config.rig,

@@ -225,10 +225,8 @@ pub fn disparity(disparity_q8: &View<'_, u16>) -> RgbImage {
 
 /// A view of the map that is not wider than `widest_px`.
 fn looking(widest_px: usize, view: &dyn MapView<'_>, t_world_camera: &Transform) -> RaycastView {
-    RaycastView {
-        t_world_camera: *t_world_camera,
-        every: step(widest_px, view.mapper().disparity_q8().width()),
-    }
+    let every = step(widest_px, view.mapper().disparity_q8().width());
+    RaycastView { every, ..t_world_camera.into() }
 }
 
 /// The static map: its colours, or clay grey where it has none, lit from behind the camera.

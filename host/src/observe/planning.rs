@@ -5,6 +5,7 @@ use super::planning_maps::{MapGeometry, MapMode, png};
 use super::{EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::owned;
 use crate::scene::{PLANNING_FOLDER, WindowScales};
+use dynvox_core::geometry::MapSegment;
 use dynvox_core::planning::{Cell, CellState, MovingBox, Planning, PlanningReport};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -105,17 +106,27 @@ impl PlanningObserver {
             return Ok(());
         }
         let report = view.plan(0.0);
-        let camera = view.mapper().t_world_camera().translation_m;
-        write_folder(
-            &run.folder.join(PLANNING_FOLDER),
+        let mapper = view.mapper();
+        let camera = WindowCamera {
             frame,
-            camera,
-            report,
-            view.mapper().planning(),
-        )?;
+            segment: mapper.static_map().segment(),
+            position_m: mapper.t_world_camera().translation_m,
+        };
+        write_folder(&run.folder.join(PLANNING_FOLDER), &camera, report, mapper.planning())?;
         self.written = true;
         Ok(())
     }
+}
+
+/// Camera in whose frame a window is written.
+#[derive(Clone, Copy, Debug)]
+pub struct WindowCamera {
+    /// Number of the frame in the data set.
+    pub frame: usize,
+    /// Segment of the map that the window is of.
+    pub segment: MapSegment,
+    /// Position of the camera in the segment's world, m.
+    pub position_m: [f64; 3],
 }
 
 /// Writes all files of a window.
@@ -124,8 +135,7 @@ impl PlanningObserver {
 /// The disk refuses.
 pub fn write_folder(
     folder: &Path,
-    frame: usize,
-    camera_world: [f64; 3],
+    camera: &WindowCamera,
     report: PlanningReport,
     planning: &Planning<'_>,
 ) -> Result<(), ObserveError> {
@@ -136,7 +146,7 @@ pub fn write_folder(
         owned::write(&path, bytes).map_err(|source| ObserveError::Write { path, source })
     };
     let columns = Columns { planning };
-    let description = describe(&columns, frame, camera_world, report);
+    let description = describe(&columns, camera, report);
     // The states are gathered once for all three maps.
     let states = columns.states();
     for mode in MapMode::ALL {
@@ -151,8 +161,7 @@ pub fn write_folder(
 
 fn describe(
     columns: &Columns<'_, '_>,
-    frame: usize,
-    camera_world: [f64; 3],
+    &WindowCamera { frame, segment, position_m }: &WindowCamera,
     report: PlanningReport,
 ) -> Description {
     let planning = columns.planning;
@@ -165,9 +174,10 @@ fn describe(
     let lowest = heights.fold(f64::INFINITY, f64::min);
     Description {
         frame,
-        camera_m: grid.of_world(camera_world).map(|c| c * cell_m),
+        camera_m: grid.of_world(position_m).map(|c| c * cell_m),
         cells: planning.size(),
         scales: WindowScales {
+            segment,
             cell_m,
             origin_m: planning.origin().map(|c| f64::from(c) * cell_m),
             right_world: axis([1.0, 0.0, 0.0]),

@@ -7,6 +7,7 @@ use crate::evaluate::reference::{
     ReferenceFigures, Region, Sample, SurfaceErrors, project_scan, sample_exact_depth,
 };
 use crate::formats::Image;
+use crate::formats::shown_pose;
 use crate::input::InstanceMask;
 use crate::input::{FrameSource, StereoImages};
 use crate::request::{Plan, Reference};
@@ -135,8 +136,8 @@ impl Observer for ReferenceObserver {
         let Some(due) = self.pending.step(plan.delay, pending) else { return Ok(()) };
         // Object poses of past frames are not kept: later the background is viewed alone.
         let seen = match plan.delay {
-            0 => frame.view.raycast_with_objects((&due.t_world_camera).into()),
-            _ => frame.view.raycast((&due.t_world_camera).into()),
+            0 => frame.view.raycast_with_objects(due.view),
+            _ => frame.view.raycast(due.view),
         };
         if let Some((depth_m, normal)) =
             seen.and_then(|seen| Some((seen.depth_m()?, seen.normal()?)))
@@ -181,6 +182,8 @@ impl ReferenceObserver {
         self.outcomes.push(PointOutcomes::from_frame(due, &shown_px, enlarged));
         // Depth errors count where the static map shows a surface, at the points of static
         // surfaces.
+        let t_shown_camera =
+            shown_pose(due.view.segment.unwrap_or_default(), &due.view.t_world_camera);
         let depth_m = |px: f32| focal_baseline_px_m / f64::from(px);
         for (sample, &shown_px) in
             due.samples.iter().zip(&shown_px).filter(|(sample, _)| sample.region == Region::Static)
@@ -190,7 +193,7 @@ impl ReferenceObserver {
                 let (ray, along_normal) = (ray(rig, sample), along_normal(rig, normal, sample));
                 self.depth_errors.add(shown_m, true_m, along_normal);
                 if let Some(along_normal) = along_normal {
-                    let at = due.t_world_camera.transform_point(ray.map(|part| part * shown_m));
+                    let at = t_shown_camera.transform_point(ray.map(|part| part * shown_m));
                     self.surface_errors.add(at, ((shown_m - true_m) * along_normal).abs());
                 }
             }
@@ -259,13 +262,8 @@ fn pending(
     };
     let region = |u: i32, v: i32| region(run, mapper, images, u, v);
     Ok(scan.map(|scan| {
-        let mut pending = PendingFrame::new(
-            frame.row.frame,
-            frame.row.report.t_world_camera,
-            &scan,
-            input_px,
-            region,
-        );
+        let mut pending =
+            PendingFrame::new(frame.row.frame, frame.row.view(), &scan, input_px, region);
         let rectified = mapper.rectified_pair().map(|[left, _]| Image::from_view(&left));
         // Pictures are taken of a few frames only.
         pending.picture = plan

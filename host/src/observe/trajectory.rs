@@ -5,7 +5,7 @@ use super::{Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Obse
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
 use crate::formats::{TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, kitti_line, tum_line};
 use dynvox_core::egomotion::icp::IcpStatus;
-use dynvox_core::geometry::Transform;
+use dynvox_core::geometry::{MapSegment, Transform};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -129,21 +129,21 @@ impl Observer for TrajectoryObserver {
         run: &ObservedRun<'_>,
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        let (row, pose) = (frame.row, frame.row.report.t_world_camera);
+        let (row, pose) = (frame.row, frame.row.shown_t_world_camera());
         self.kitti.append(kitti_line(&pose).as_bytes());
         // The recording's own stamp, or its time in seconds.
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
         self.path.add(pose.translation_m);
         // Later segments are apart from the first by an unknown motion.
-        if run.plan.dataset.truth().is_some() && row.report.segment == 0 {
+        if run.plan.dataset.truth().is_some() && row.report.segment == MapSegment::FIRST {
             self.compared.push((row.frame, pose));
         }
         if row.is_extrapolated() {
             self.extrapolated_frames += 1;
             *self.extrapolated_because.entry(row.motion().replace('_', " ")).or_default() += 1;
         }
-        self.segments = row.report.segment + 1;
+        self.segments = self.segments.max(u32::from(row.report.segment.get()) + 1);
         // Only depth registration reports its failures as a status.
         if let Some(status) =
             row.report.icp.map(|icp| icp.status).filter(|status| *status != IcpStatus::Tracked)

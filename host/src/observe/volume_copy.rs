@@ -5,7 +5,7 @@ use dynvox_core::Capacity;
 use dynvox_core::memory::Carver;
 use dynvox_core::view::{MeshConfig, MeshSink};
 use dynvox_core::volume::{
-    BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig,
+    BLOCK_VOXELS, BlockKey, BlockStore, EvictedBlock, LoadedBlock, Volume, VolumeConfig,
 };
 use std::io::{Error, ErrorKind};
 
@@ -17,7 +17,7 @@ pub struct VolumeCopy {
 }
 
 struct Block {
-    coord: BlockCoord,
+    key: BlockKey,
     sdf: [i16; BLOCK_VOXELS],
     weight: [u8; BLOCK_VOXELS],
     /// All 0 without colour.
@@ -38,11 +38,11 @@ impl VolumeCopy {
         for slot in pool.live() {
             let colour = blocks.colour(slot);
             copy.colour |= colour.is_some();
-            if let (Some(coord), Some(&sdf), Some(&weight)) =
-                (blocks.coord(slot), blocks.sdf(slot), blocks.weight(slot))
+            if let (Some(key), Some(&sdf), Some(&weight)) =
+                (blocks.key(slot), blocks.sdf(slot), blocks.weight(slot))
             {
                 copy.blocks.push(Block {
-                    coord,
+                    key,
                     sdf,
                     weight,
                     colour: colour.copied().unwrap_or([[0; BLOCK_VOXELS]; 3]),
@@ -86,7 +86,7 @@ impl VolumeCopy {
         carver.check().map_err(misfit)?;
         // In the order of the pool, so that the mesh has the order that the object's had.
         for block in &self.blocks {
-            volume.load(block.coord, &mut One(block));
+            volume.load(block.key, &mut One(block));
         }
         Ok(volume.mesh(mesh, |_| true, sink))
     }

@@ -6,9 +6,9 @@ use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
+use crate::formats::SEGMENT_GAP_M;
 use crate::observe::Sections;
 use crate::run::RunRecord;
-use dynvox_core::egomotion::SEGMENT_GAP_M;
 use std::path::Path;
 
 /// The figures of a run whose folder is `folder`, line by line.
@@ -197,8 +197,8 @@ fn pose_lines(run: &RunRecord) -> Vec<(&'static str, String)> {
             let extrapolated = ("poses extrapolated", format!("in {frames} frames: {reasons}"));
             // Above, so that two segments do not look like one map.
             let apart = format!(
-                "{}: the camera was lost, and each stands {SEGMENT_GAP_M} m above \
-                                 the one before",
+                "{}: the camera was lost, and where one lies in another is not known. Files show \
+                 each {SEGMENT_GAP_M} m above the one before",
                 trajectory.segments
             );
             [extrapolated]

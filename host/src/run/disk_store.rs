@@ -3,15 +3,16 @@
 use super::map_objects::add_objects;
 use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter};
+use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter, ShownSegment};
 use crate::observe::StoreStats;
 use crate::owned;
 use crate::request::{MapObjects, Streaming};
 use crate::slab::HostSlab;
 use dynvox_core::memory::SlabError;
-use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, EvictionReport, LoadedBlock};
 use dynvox_core::{Capacity, Config, Mapper};
 use hashbrown::HashSet;
+use std::collections::BTreeSet;
 use std::fs::File;
 
 /// Name of the file in the run folder.
@@ -22,12 +23,12 @@ pub const BLOCKS_FILE: &str = "map.blocks";
 pub struct DiskStore {
     file: Option<BlockFile<File>>,
     /// Blocks evicted since they were last taken.
-    evicted: HashSet<BlockCoord>,
+    evicted: HashSet<BlockKey>,
 }
 
 impl BlockStore for DiskStore {
     fn store(&mut self, block: EvictedBlock<'_>) -> bool {
-        self.evicted.insert(block.coord);
+        self.evicted.insert(block.key);
         self.file.as_mut().is_some_and(|file| file.store(block))
     }
 
@@ -42,7 +43,7 @@ impl DiskStore {
     }
 
     /// The blocks that were evicted since this was last asked, stored or lost.
-    pub fn take_evicted(&mut self) -> HashSet<BlockCoord> {
+    pub fn take_evicted(&mut self) -> HashSet<BlockKey> {
         std::mem::take(&mut self.evicted)
     }
 
@@ -104,7 +105,7 @@ pub struct MeshOutput {
     /// True if blocks of the file are not in the mesh yet.
     file_is_due: bool,
     /// Blocks that are in the mesh already.
-    meshed: HashSet<BlockCoord>,
+    meshed: HashSet<BlockKey>,
     failed: Option<std::io::Error>,
     report: EvictionReport,
 }
@@ -130,10 +131,17 @@ impl MeshOutput {
         {
             None => {
                 let volume = mapper.static_map();
+                let keys = volume.pool().live().filter_map(|slot| volume.blocks().key(slot));
+                meshed.extend(keys);
+                let segments: BTreeSet<_> =
+                    meshed.iter().map(|key: &BlockKey| key.segment).collect();
                 if let Ok(ply) = &mut ply {
-                    volume.mesh(&mapper.config().mesh, |_| true, ply);
+                    for segment in segments {
+                        let of_segment = |key: BlockKey| key.segment == segment;
+                        let mut shown = ShownSegment::new(segment, ply);
+                        volume.mesh(&mapper.config().mesh, of_segment, &mut shown);
+                    }
                 }
-                meshed.extend(volume.pool().live().filter_map(|slot| volume.blocks().coord(slot)));
             }
             Some(file) if !keeps_file => {
                 if let Ok(ply) = &mut ply {

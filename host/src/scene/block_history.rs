@@ -1,7 +1,7 @@
 //! `blocks.csv` as a viewer shows it: when each place was last seen, and which blocks pruning took.
 
 use super::{neighbourhood, tables::read_rows};
-use crate::formats::{BLOCKS_TABLE_FILE, FormatError, SETTINGS_FILE, read_text};
+use crate::formats::{BLOCKS_TABLE_FILE, FormatError, SEGMENT_GAP_M, SETTINGS_FILE, read_text};
 use hashbrown::HashMap;
 use serde::Deserialize;
 use std::path::Path;
@@ -12,6 +12,8 @@ const BLOCK_VOXELS: f32 = 8.0;
 /// A row of `blocks.csv`.
 #[derive(Debug, Deserialize)]
 struct BlockColumns {
+    #[serde(default)]
+    segment: u16,
     x: i32,
     y: i32,
     z: i32,
@@ -59,7 +61,9 @@ impl BlockHistory {
         let side_m = BLOCK_VOXELS * settings.volume.voxel_size_m;
         let (mut last_seen, mut pruned) = (HashMap::new(), Vec::new());
         read_rows(&table, |row: BlockColumns| {
-            let coord = [row.x, row.y, row.z];
+            // The mesh shows later segments higher up.
+            let above = (SEGMENT_GAP_M as f32 * f32::from(row.segment) / side_m).round() as i32;
+            let coord = [row.x, row.y - above, row.z];
             // The last row of a block says what became of it.
             if row.fate == "pruned" {
                 last_seen.remove(&coord);

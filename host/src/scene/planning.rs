@@ -1,6 +1,7 @@
 //! The planner's window as a viewer shows it: what is free and occupied, on the ground.
 
-use crate::formats::{FormatError, Picture, read_picture, read_png_deep, read_text};
+use crate::formats::{FormatError, Picture, read_picture, read_png_deep, read_text, shown_pose};
+use dynvox_core::geometry::{MapSegment, Transform};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -14,6 +15,9 @@ pub const OCCUPIED_GREY: u8 = 0;
 /// Scales of the other files, as `window.json` has them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WindowScales {
+    /// Segment of the map that the world below is of.
+    #[serde(default)]
+    pub segment: MapSegment,
     /// Side of a cell, and where the first one begins, m.
     pub cell_m: f64,
     /// See `cell_m`.
@@ -106,8 +110,10 @@ impl PlanningWindow {
             };
             // Zero stands for no distance.
             let distance = distances.get(u, v).filter(|&value| value > 0);
+            let middle = Transform::from_translation([0, 1, 2].map(along));
+            let shown = shown_pose(of.segment, &middle);
             Some(PlanningCell {
-                position_m: [0, 1, 2].map(|axis| along(axis) as f32),
+                position_m: shown.translation_m.map(|along| along as f32),
                 occupied,
                 distance_m: distance.map(|value| {
                     ((f64::from(value) - f64::from(of.distance_zero)) * of.distance_unit_m) as f32

@@ -179,8 +179,8 @@ pub fn store(bytes: &[u8]) -> bool {
         return false;
     };
     for tile in file.tiles() {
-        for coord in file.blocks_of(tile) {
-            file.holds(coord);
+        for key in file.blocks_of(tile) {
+            file.holds(key);
         }
     }
     file.holds(BlockCoord { x: 0, y: 0, z: 0 });

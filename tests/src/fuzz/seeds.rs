@@ -2,7 +2,8 @@
 
 use dynvox::formats::{Image, write_png_deep};
 use dynvox::run::store::BlockFile;
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock};
+use dynvox_core::geometry::MapSegment;
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockKey, BlockStore, EvictedBlock};
 
 use super::files::{SIZE, TRUNCATION_M, VOXEL_M, written};
 
@@ -130,7 +131,10 @@ pub fn store() -> Vec<Vec<u8>> {
                 .expect("the temporary folder can be written to");
             for x in 0..blocks {
                 let block = EvictedBlock {
-                    coord: BlockCoord { x, y: 0, z: 9 },
+                    key: BlockKey {
+                        segment: MapSegment::new(x as u16 & 1),
+                        coord: BlockCoord { x, y: 0, z: 9 },
+                    },
                     sdf: &[x; BLOCK_VOXELS],
                     weight: &[3; BLOCK_VOXELS],
                     colour: None,

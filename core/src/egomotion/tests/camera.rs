@@ -75,7 +75,7 @@ fn after_dark_frames_the_camera_is_found_from_the_last_frame_seen() {
         }
         let (distance, _) = between(camera.t_world_camera(), &t_world_camera);
         let guessed = camera.extrapolated_frames() > 0;
-        assert_eq!((guessed, camera.segment()), (frame == 2 || frame == 3, 0));
+        assert_eq!((guessed, camera.segment().get()), (frame == 2 || frame == 3, 0));
         // A guess is wrong by what the camera moved otherwise; afterwards the error must be gone.
         assert!(distance < if guessed { 0.3 } else { 0.03 }, "frame {frame}: {distance} m");
     }
@@ -148,7 +148,7 @@ fn a_camera_stands_at_once_where_it_could_brake() {
 }
 
 #[test]
-fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
+fn a_camera_lost_for_long_begins_a_segment_at_its_origin() {
     let mut camera = Egomotion::default();
     camera.set_pose(&Transform::from_translation([0.0, 0.0, 1.0]));
     // Until then the reference is kept, and each frame guesses the last motion again.
@@ -158,7 +158,10 @@ fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
     }
     // Lost: the guess goes on, and a segment begins only when told.
     for frame in 0..20 {
-        assert_eq!((camera.is_lost(), camera.segment(), camera.since_reference()), (true, 0, 0));
+        assert_eq!(
+            (camera.is_lost(), camera.segment().get(), camera.since_reference()),
+            (true, 0, 0)
+        );
         assert!(
             (camera.t_world_camera().translation_m[2]
                 - 1.0
@@ -168,15 +171,35 @@ fn a_camera_lost_for_long_begins_a_segment_above_its_guess() {
         );
         camera.hold(0.1);
     }
-    let guess = camera.t_world_camera().translation_m;
     camera.begin_segment();
-    assert_eq!(
-        (camera.t_world_camera().translation_m, camera.segment()),
-        // Above the guess, so that the new segment does not lie in the map of the old one.
-        ([guess[0], guess[1] - SEGMENT_GAP_M, guess[2]], 1)
-    );
+    let second = MapSegment::new(1);
+    assert_eq!((*camera.t_world_camera(), camera.segment()), (Transform::IDENTITY, second));
     let pose = Transform::from_translation([3.0, 0.0, 2.0]);
     camera.relocalize(&pose);
     // A pose that was found again belongs to the same segment.
-    assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, 1));
+    assert_eq!((*camera.t_world_camera(), camera.segment()), (pose, second));
+}
+
+#[test]
+fn a_pose_given_after_a_loss_lies_in_the_first_segment() {
+    let mut camera = Egomotion::default();
+    camera.begin_segment();
+    let motion = Transform::from_translation([0.0, 0.0, -1.0]);
+    camera.advance(Some(motion));
+    let given = Transform::from_translation([40.0, 0.0, 7.0]);
+    camera.set_pose(&given);
+    assert_eq!((*camera.t_world_camera(), camera.segment()), (given, MapSegment::FIRST));
+    assert_eq!(*camera.t_current_previous(), motion, "no motion leads from one to the other");
+    camera.begin_segment();
+    assert_eq!(camera.segment(), MapSegment::new(2), "a number is used once");
+}
+
+#[test]
+fn a_camera_stays_lost_where_no_number_is_left_for_a_segment() {
+    let mut camera = Egomotion::default();
+    (0..u16::MAX).for_each(|_| camera.begin_segment());
+    let last = MapSegment::new(u16::MAX);
+    assert_eq!((camera.segment(), camera.is_lost()), (last, false));
+    camera.begin_segment();
+    assert_eq!((camera.segment(), camera.is_lost()), (last, true));
 }

@@ -1,11 +1,7 @@
-//! Looking at what was made, and finding a camera again by it.
+//! Looking at what was made.
 
 use super::*;
-use crate::{
-    PoseOrigin,
-    egomotion::MAX_REFERENCE_FRAMES,
-    view::{RaycastError, RaycastView},
-};
+use crate::view::{RaycastError, RaycastView};
 
 fn depths(
     mapper: &mut Mapper<'_>,
@@ -45,14 +41,14 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
         }
         // A thinned picture shows the same pixels, fewer of them.
         for every in [2, 4] {
-            let preview = RaycastView { t_world_camera, every };
+            let preview = RaycastView { every, ..RaycastView::from(&t_world_camera) };
             let thinned =
                 depths(mapper, |mapper| mapper.raycast_composed(preview, &Serial).map(|_| ()));
             let kept =
                 composed.chunks(WIDTH).step_by(every).flat_map(|row| row.iter().step_by(every));
             assert!(thinned.iter().eq(kept), "every {every}");
         }
-        let none = RaycastView { t_world_camera, every: 0 };
+        let none = RaycastView { every: 0, ..RaycastView::from(&t_world_camera) };
         assert_eq!(mapper.raycast(none, &Serial).err(), Some(RaycastError::ImageSize));
         // Its mask is the object's place in the image, but for where it has moved on.
         let [left, top, width, height] = Walk::CAR.map(|px| px as usize);
@@ -80,59 +76,4 @@ fn a_composed_view_shows_what_is_nearest_of_the_map_and_the_objects() {
         );
         assert_eq!(mapper.posed_objects().count(), 0);
     });
-}
-
-/// Frames until the camera is covered, and the first that is seen again.
-const SEEN: usize = 5;
-const AGAIN: usize = SEEN + MAX_REFERENCE_FRAMES as usize + 1;
-
-/// Walks, is covered until it is lost, and goes on; the last report, and how far its pose is from
-/// where the camera is, m.
-fn lost(capacity: &Capacity) -> (Report, f64) {
-    let pose = |at: usize| {
-        Transform::new(
-            Vector3::new(0.0, 0.003 * at as f64, 0.0),
-            Vector3::new(0.0, 0.0, 0.06) * at as f64,
-        )
-    };
-    let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
-    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
-    let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab[start..]).unwrap();
-    let dark = vec![0u8; WIDTH * HEIGHT];
-    // Black images in between: the camera is lost, and then sees the scene again.
-    let mut last = Report::default();
-    for at in 0..AGAIN + 2 {
-        let pair =
-            if (SEEN..AGAIN).contains(&at) { [dark.clone(), dark.clone()] } else { see(&pose(at)) };
-        let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
-        last = mapper.step(&StereoFrame::pair(left, right), &Serial).unwrap();
-        let expected = if at == 0 {
-            PoseOrigin::First
-        } else if at < SEEN {
-            PoseOrigin::Estimated
-        } else {
-            PoseOrigin::Extrapolated
-        };
-        assert!(last.pose == expected || at == AGAIN + 1, "frame {at}: {:?}", last.pose);
-        assert!(
-            !last.fused || last.pose != PoseOrigin::Extrapolated,
-            "a frame whose pose is a guess is not fused"
-        );
-    }
-    let difference = last.t_world_camera.inverse() * pose(AGAIN + 1);
-    (last, difference.distance_m())
-}
-
-#[test]
-fn a_camera_that_was_lost_is_found_where_the_map_looks_like_the_image() {
-    let (report, off_m) = lost(&Capacity { colour: true, ..CAPACITY });
-    assert_eq!((report.pose, report.segment), (PoseOrigin::Relocalized, 0));
-    assert!(off_m < 0.1, "{off_m} m");
-}
-
-#[test]
-fn a_camera_that_was_lost_begins_a_segment_where_the_map_has_no_picture() {
-    let (report, off_m) = lost(&CAPACITY);
-    assert_eq!((report.pose, report.segment), (PoseOrigin::Estimated, 1));
-    assert!((off_m - crate::egomotion::SEGMENT_GAP_M).abs() < 1.0, "{off_m} m above");
 }

@@ -103,6 +103,13 @@ impl Track {
         self.tracked_only = instance.tracked_only;
     }
 
+    /// Forgets motion, state and poses, and ends the trajectory segment.
+    pub fn restart_motion(&mut self) {
+        (self.filter, self.motion_state) = (MotionFilter::default(), MotionHysteresis::default());
+        (self.t_world_object, self.t_world_origin) = (Transform::IDENTITY, Transform::IDENTITY);
+        (self.segment_len, self.sigma_m_s) = (0, 0.0);
+    }
+
     pub fn class(&self) -> Class {
         Class::from_code(self.class)
     }

@@ -23,7 +23,7 @@ mod tests;
 pub use config::MeshConfig;
 pub use sink::{MeshSink, Triangle, Vertex};
 
-use crate::volume::{BLOCK_SIDE, BlockCoord, Blocks, Slot, Volume};
+use crate::volume::{BLOCK_SIDE, BlockKey, Blocks, Slot, Volume};
 use cases::CASES;
 use names::{CellEdge, VertexNames};
 
@@ -33,25 +33,26 @@ const SIDE: usize = BLOCK_SIDE + 1;
 const UNSEEN: i16 = i16::MIN;
 
 impl Volume<'_> {
-    /// Hands every triangle of the map to `sink` and returns how many there were.
+    /// Hands every triangle of the current segment to `sink` and returns how many there were.
     pub fn triangles(&self, config: &MeshConfig, sink: &mut impl FnMut(Triangle)) -> u64 {
-        self.mesh(config, |_| true, sink)
+        self.mesh(config, |key| key.segment == self.segment(), sink)
     }
 
     /// Hands the surface in the blocks that `is_selected` picks to `sink` and returns how many
     /// triangles it has; the other blocks only lend their points. So a map can be drawn piece by
-    /// piece: a block's triangles need the blocks after it on each axis, and no more.
+    /// piece: a block's triangles need the blocks after it on each axis, and no more. Positions are
+    /// in the frame of a block's segment.
     pub fn mesh(
         &self,
         config: &MeshConfig,
-        is_selected: impl Fn(BlockCoord) -> bool,
+        is_selected: impl Fn(BlockKey) -> bool,
         sink: &mut impl MeshSink,
     ) -> u64 {
         let (mut count, mut names) = (0, VertexNames::new());
         // In the order of the pool, which is the same on every machine.
         for slot in self.pool().live() {
-            if let Some(coord) = self.blocks().coord(slot).filter(|&coord| is_selected(coord)) {
-                let patch = Patch::load(self, slot, coord, config.min_weight);
+            if let Some(key) = self.blocks().key(slot).filter(|&key| is_selected(key)) {
+                let patch = Patch::load(self, slot, key, config.min_weight);
                 names.clear();
                 patch.cells(|cell, inside| {
                     count += patch.polygonise(cell, inside, &mut names, sink)
@@ -82,17 +83,17 @@ struct LatticePoint {
 }
 
 impl<'v, 's> Patch<'v, 's> {
-    fn load(volume: &'v Volume<'s>, slot: Slot, coord: BlockCoord, min_weight: u8) -> Self {
+    fn load(volume: &'v Volume<'s>, slot: Slot, key: BlockKey, min_weight: u8) -> Self {
         // The block and its seven neighbours on the far sides: cubes reach one voxel into them.
         let mut slots = [None; 8];
         for (n, entry) in (0i32..).zip(&mut slots) {
-            let beside = || volume.find(coord.offset([n & 1, n >> 1 & 1, n >> 2])?);
+            let beside = || volume.find_key(key.offset([n & 1, n >> 1 & 1, n >> 2])?);
             *entry = if n == 0 { Some(slot) } else { beside() };
         }
         let mut patch = Self {
             blocks: volume.blocks(),
             slots,
-            origin: coord.origin(),
+            origin: key.coord.origin(),
             voxel_size_m: volume.config().voxel_size_m,
             sdf: [UNSEEN; SIDE * SIDE * SIDE],
         };

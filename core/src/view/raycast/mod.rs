@@ -44,7 +44,7 @@ pub use config::RaycastConfig;
 pub(crate) use signs::of_block as signs_of_block;
 
 use crate::{
-    geometry::{Transform, scalar::min_f32},
+    geometry::{MapSegment, Transform, scalar::min_f32},
     image::View,
     memory::{Capacity, Carver, Footprint, region_bytes},
     parallel::{Executor, each, zip2},
@@ -96,11 +96,13 @@ pub struct RaycastView {
     /// the number of pixels; where it is a power of two, they show what they show in the whole
     /// picture, to the last bit.
     pub every: usize,
+    /// Segment of the map that the pose lies in and that is looked at; `None` for the camera's.
+    pub segment: Option<MapSegment>,
 }
 
 impl From<&Transform> for RaycastView {
     fn from(t_world_camera: &Transform) -> Self {
-        Self { t_world_camera: *t_world_camera, every: 1 }
+        Self { t_world_camera: *t_world_camera, every: 1, segment: None }
     }
 }
 

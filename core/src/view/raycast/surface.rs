@@ -131,8 +131,8 @@ impl<'s> Surface<'s> {
         // Cells of the block before this one end at this block's first points: the box is one
         // longer on that side.
         let half = (BLOCK_SIDE as f32 + 1.0) * 0.5;
-        let blocks = volume.pool().live().filter_map(|slot| {
-            let local = ray_camera.local(volume.blocks().coord(slot)?)?;
+        let blocks = volume.current_blocks().filter_map(|(slot, coord)| {
+            let local = ray_camera.local(coord)?;
             let center = local.map(|c| (c * BLOCK_SIDE as i32) as f32 + half - 1.0);
             let extent = ray_camera.extent(center, [half; 3], near_m, far_m);
             (!extent.is_empty()).then_some((slot, local, extent.rows, extent.depth_m[0]))

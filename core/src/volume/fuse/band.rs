@@ -10,6 +10,7 @@ pub(super) struct Band<'b> {
     pub(super) slots: &'b [Slot],
     pub(super) first: usize,
     pub(super) header: &'b mut [Header],
+    pub(super) min_weight: &'b mut [u8],
     pub(super) voxels: &'b mut [Voxels],
     pub(super) colour: &'b mut [Colour],
 }
@@ -27,6 +28,7 @@ impl<'b> Band<'b> {
             slots,
             first: 0,
             header: blocks.header,
+            min_weight: blocks.min_weight,
             voxels: blocks.voxels,
             colour: blocks.colour,
         }
@@ -38,15 +40,17 @@ impl<'b> Band<'b> {
         let border = high.first().map_or(self.first, |slot| slot.index());
         let at = border - self.first;
         let (header, header_high) = parts(self.header, at);
+        let (min_weight, min_weight_high) = parts(self.min_weight, at);
         let (voxels, voxels_high) = parts(self.voxels, at);
         let (colour, colour_high) = parts(self.colour, at);
         let high = Band {
             slots: high,
             first: border,
             header: header_high,
+            min_weight: min_weight_high,
             voxels: voxels_high,
             colour: colour_high,
         };
-        (Band { slots: low, first: self.first, header, voxels, colour }, high)
+        (Band { slots: low, first: self.first, header, min_weight, voxels, colour }, high)
     }
 }

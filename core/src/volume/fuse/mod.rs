@@ -31,7 +31,7 @@ use self::{
     layer::{LayerAt, Scratch, Shares},
 };
 use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
-use super::{BLOCK_SIDE, BlockCoord, DepthImage, Viewpoint, Volume, VolumeConfig};
+use super::{BLOCK_SIDE, BlockCoord, BlockKey, DepthImage, Viewpoint, Volume, VolumeConfig};
 use crate::{
     digest::Digest,
     geometry::scalar::{floor_i32, max_f32, min_f32},
@@ -167,16 +167,18 @@ impl Work for FuseBand<'_, '_> {
         let mut scratch = Scratch::new();
         for &slot in band.slots {
             let at = slot.index().wrapping_sub(band.first);
-            let (Some(header), Some(voxels)) = (band.header.get_mut(at), band.voxels.get_mut(at))
+            let (Some(header), Some(least), Some(voxels)) =
+                (band.header.get_mut(at), band.min_weight.get_mut(at), band.voxels.get_mut(at))
             else {
                 continue;
             };
             let mut colour = band.colour.get_mut(at);
-            if fusion.block(header.coord(), &mut scratch, voxels, colour.as_deref_mut()) {
-                let new = block_digest(header.coord(), voxels, colour.as_deref());
+            let key = header.key();
+            if fusion.block(key.coord, &mut scratch, voxels, colour.as_deref_mut()) {
+                let new = block_digest(key, voxels, colour.as_deref());
                 change = change.wrapping_add(new).wrapping_sub(header.digest);
                 header.digest = new;
-                header.min_weight = least_weight(&voxels.weight);
+                *least = least_weight(&voxels.weight);
             }
         }
         change
@@ -278,18 +280,18 @@ fn greatest(corners: &[f32; CORNERS]) -> f32 {
     corners.iter().fold(f32::MIN, |greatest, &corner| max_f32(greatest, corner))
 }
 
-/// Digest of a block's coordinates and content.
+/// Digest of a block's segment, coordinates and content.
 #[inline(always)]
 pub(super) fn block_digest(
-    coord: BlockCoord,
+    BlockKey { segment, coord }: BlockKey,
     Voxels { sdf, weight }: &Voxels,
     colour: Option<&Colour>,
 ) -> u64 {
     let mut digest = Digest::default();
     digest.u64(
-        [coord.x, coord.y, coord.z, 0]
+        [coord.x as u16, coord.y as u16, coord.z as u16, segment.get()]
             .iter()
-            .fold(0, |packed, &along| packed << 16 | u64::from(along as u16)),
+            .fold(0, |packed, &along| packed << 16 | u64::from(along)),
     );
     digest.whole_i16s(sdf);
     digest.whole_bytes(weight);

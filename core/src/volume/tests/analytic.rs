@@ -28,10 +28,7 @@ pub fn fill(
 ) {
     let scale = 32_767.0 / volume.config.truncation_m;
     for coord in coords {
-        let slot = volume.pool.take().unwrap();
-        volume.blocks.clear(slot, coord);
-        volume.index.insert(coord, slot, |slot| volume.blocks.coord(slot)).unwrap();
-        let slot = slot.index();
+        let slot = volume.make(volume.key(coord)).unwrap().index();
         let origin = coord.origin();
         for voxel in 0..BLOCK_VOXELS {
             let [x, y, z] = [voxel & 7, voxel >> 3 & 7, voxel >> 6].map(|c| c as i32);

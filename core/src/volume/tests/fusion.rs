@@ -138,8 +138,8 @@ fn threads_change_nothing_and_the_digest_is_that_of_the_content() {
                 })
                 .map(|slot| {
                     let blocks = volume.blocks();
-                    let coord = blocks.coord(slot).unwrap();
-                    fuse::block_digest(coord, &blocks.voxels[slot.index()], blocks.colour(slot))
+                    let key = blocks.key(slot).unwrap();
+                    fuse::block_digest(key, &blocks.voxels[slot.index()], blocks.colour(slot))
                 })
                 .fold(0u64, u64::wrapping_add);
             assert_eq!(volume.digest(), of_content);
@@ -160,7 +160,9 @@ fn blocks_that_swap_contents_or_planes_change_the_digest() {
     let sum = |order: [usize; 2], planes: &[[u8; BLOCK_VOXELS]; 3]| {
         let blocks = coords.iter().zip(order.map(|at| &contents[at]));
         blocks
-            .map(|(&coord, voxels)| fuse::block_digest(coord, voxels, Some(planes)))
+            .map(|(&coord, voxels)| {
+                fuse::block_digest(BlockKey::in_first(coord), voxels, Some(planes))
+            })
             .fold(0u64, u64::wrapping_add)
     };
     let swapped = [planes[1], planes[0], planes[2]];

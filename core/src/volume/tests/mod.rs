@@ -6,6 +6,7 @@ mod eviction;
 mod fusion;
 mod history;
 mod pruning;
+mod segments;
 
 use super::*;
 use crate::{

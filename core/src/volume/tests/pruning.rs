@@ -19,7 +19,7 @@ fn by_weight(weight: u8) -> PruneRule {
 
 /// Makes a block whose voxels all have that weight, with its digest entered.
 fn plant(volume: &mut Volume<'_>, coord: BlockCoord, weight: impl Fn(usize) -> u8) -> Slot {
-    let slot = volume.make(coord).unwrap();
+    let slot = volume.make(volume.key(coord)).unwrap();
     let at = slot.index();
     for voxel in 0..BLOCK_VOXELS {
         volume.blocks.voxels[at].weight[voxel] = weight(voxel);
@@ -131,7 +131,7 @@ fn a_half_noisy_block_keeps_its_good_voxels() {
             assert_eq!(here, if voxel % 2 == 0 { (0, 0, 0) } else { (2, 100 + voxel as i16, 9) });
         }
         let content = fuse::block_digest(
-            BlockCoord::default(),
+            BlockKey::default(),
             &volume.blocks.voxels[0],
             volume.blocks.colour.first(),
         );
@@ -158,10 +158,10 @@ fn blocks_left_unread_have_no_voxel_of_low_weight() {
                 {
                     let least =
                         weight.iter().copied().filter(|&weight| weight > 0).min().unwrap_or(0);
-                    assert_eq!(volume.blocks.header[slot].min_weight, least, "slot {slot}");
+                    assert_eq!(volume.blocks.min_weight[slot], least, "slot {slot}");
                 }
                 if !known {
-                    volume.blocks.header.iter_mut().for_each(|header| header.min_weight = 0);
+                    volume.blocks.min_weight.fill(0);
                 }
                 digests.push((
                     volume.prune_whole(prune_weight),
@@ -342,7 +342,7 @@ fn a_million_blocks_made_and_freed_leak_nothing() {
             if let Some(slot) = model.remove(&coord) {
                 volume.free_block(slot);
             } else {
-                let made = volume.make(coord);
+                let made = volume.make(volume.key(coord));
                 assert_eq!(made.is_some(), model.len() < BLOCKS);
                 if let Some(slot) = made {
                     model.insert(coord, slot);
@@ -359,7 +359,8 @@ fn six_blocks_of_one_bucket_can_be_removed_in_any_order() {
     with_volume(&capacity, &pruning(1, 1), |volume| {
         let all = (0..64).flat_map(|x| (0..64).map(move |z| BlockCoord::new(x, 0, z).unwrap()));
         // The table has 256 buckets: equal low bytes of the hash share one.
-        let mates: Vec<_> = all.filter(|&coord| index::hash(coord) & 255 == 17).take(6).collect();
+        let of_bucket = |&coord: &BlockCoord| index::hash(BlockKey::in_first(coord)) & 255 == 17;
+        let mates: Vec<_> = all.filter(of_bucket).take(6).collect();
         assert_eq!(mates.len(), 6);
         let mut orders = vec![vec![]];
         for _ in 0..6 {
@@ -375,7 +376,8 @@ fn six_blocks_of_one_bucket_can_be_removed_in_any_order() {
         }
         assert_eq!(orders.len(), 720);
         for order in orders {
-            let slots: Vec<Slot> = mates.iter().map(|&coord| volume.make(coord).unwrap()).collect();
+            let made = |&coord: &BlockCoord| volume.make(volume.key(coord)).unwrap();
+            let slots: Vec<Slot> = mates.iter().map(made).collect();
             for (removed, &which) in order.iter().enumerate() {
                 volume.free_block(slots[which]);
                 for (i, (&coord, &slot)) in mates.iter().zip(&slots).enumerate() {

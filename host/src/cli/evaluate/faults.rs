@@ -165,7 +165,7 @@ fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
             pose: report.pose,
             severity: report.severity(),
             fused: report.fused,
-            segment: report.segment,
+            segment: report.segment.get().into(),
         });
     }
     Ok(frames)

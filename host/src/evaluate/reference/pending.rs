@@ -3,8 +3,8 @@
 
 use super::{Counts, EvaluatedFrame, ProjectedPoint, ProjectedScan, Region, ScanCount};
 use crate::formats::Image;
-use dynvox_core::geometry::Transform;
 use dynvox_core::image::View;
+use dynvox_core::view::RaycastView;
 use std::collections::VecDeque;
 
 /// A point of a frame that waits.
@@ -23,8 +23,8 @@ pub struct Sample {
 pub struct PendingFrame {
     /// Number of the frame in the data set.
     pub frame: usize,
-    /// The camera's estimated pose.
-    pub t_world_camera: Transform,
+    /// View of the map from the camera's estimated pose.
+    pub view: RaycastView,
     /// The scan's points by outcome.
     pub count: ScanCount,
     /// The points.
@@ -37,7 +37,7 @@ impl PendingFrame {
     /// Fixes region and input disparity of a frame's points: `input_px` and `region` by pixel.
     pub fn new(
         frame: usize,
-        t_world_camera: Transform,
+        view: RaycastView,
         scan: &ProjectedScan,
         input_px: impl Fn(usize, usize) -> f32,
         region: impl Fn(i32, i32) -> Region,
@@ -49,7 +49,7 @@ impl PendingFrame {
             region: region(point.u.into(), point.v.into()),
         };
         let samples = scan.points.iter().map(sample).collect();
-        Self { frame, t_world_camera, count: scan.count, samples, picture: None }
+        Self { frame, view, count: scan.count, samples, picture: None }
     }
 
     /// Compares with a view of the map from the frame's pose; `focal_baseline_px_m` turns its depth

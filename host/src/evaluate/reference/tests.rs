@@ -92,7 +92,9 @@ fn pending(frame: usize, hits: &[Hit], masks: &Masks) -> (PendingFrame, Vec<f32>
         }
     }
     (
-        PendingFrame::new(frame, Transform::IDENTITY, &scanned, input, |u, v| masks.region(u, v)),
+        PendingFrame::new(frame, (&Transform::IDENTITY).into(), &scanned, input, |u, v| {
+            masks.region(u, v)
+        }),
         map_depth_m,
     )
 }

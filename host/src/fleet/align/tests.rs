@@ -4,7 +4,7 @@ use crate::fleet::{Camera, Given, keep};
 use crate::request::Request;
 use crate::run::store::BlockFile;
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock};
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockKey, BlockStore, EvictedBlock};
 
 const LATTICE: Lattice = Lattice { voxel_size_m: 0.2, truncation_m: 0.8, colour: false };
 const UNCERTAINTY: Uncertainty = Uncertainty { position_m: 0.3, rotation_rad: 0.026 };
@@ -39,7 +39,8 @@ fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
                 (sdf[voxel], weight[voxel]) = ((share.min(1.0) * 32_767.0) as i16, 9);
             }
         }
-        assert!(store.store(EvictedBlock { coord, sdf: &sdf, weight: &weight, colour: None }));
+        let key = BlockKey::in_first(coord);
+        assert!(store.store(EvictedBlock { key, sdf: &sdf, weight: &weight, colour: None }));
     }
     let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
     keep(

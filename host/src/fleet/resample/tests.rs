@@ -1,7 +1,7 @@
 use super::*;
 use crate::fleet::tile_file::TileReader;
 use crate::fleet::tile_folder::tiles;
-use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, LoadedBlock};
 
 const LATTICE: Lattice = Lattice { voxel_size_m: 0.1, truncation_m: 0.5, colour: true };
 /// Units of distance in a voxel.
@@ -30,7 +30,7 @@ fn map(folder: &Path) -> Submap {
             }
         }
         assert!(store.store(EvictedBlock {
-            coord,
+            key: BlockKey::in_first(coord),
             sdf: &sdf,
             weight: &weight,
             colour: Some(&[[50; BLOCK_VOXELS]; 3])
@@ -75,7 +75,7 @@ fn lattices_that_coincide_keep_every_value() {
             let (mut sdf, mut weight, mut colour) =
                 ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS], [[0; BLOCK_VOXELS]; 3]);
             assert!(map.store.load(LoadedBlock {
-                coord: source,
+                key: BlockKey::in_first(source),
                 sdf: &mut sdf,
                 weight: &mut weight,
                 colour: Some(&mut colour)

@@ -1,9 +1,10 @@
 //! Messages of a recording. Frames of reference: `world` is the first camera's, `left` the left
 //! camera's.
 
+use crate::formats::shown_pose;
 use crate::observe::{FrameRow, PlanningLayers, pictures, state_name};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use dynvox_core::geometry::{StereoRig, Transform};
+use dynvox_core::geometry::{MapSegment, StereoRig, Transform};
 use dynvox_core::view::Raycaster;
 use dynvox_core::volume::{BLOCK_SIDE, Volume};
 use dynvox_core::{Mapper, Severity};
@@ -78,14 +79,16 @@ pub fn calibration(stamp: Stamp, rig: &StereoRig, full_width: usize, size: (u32,
     })
 }
 
-/// The box of each object, in the colour of its state. Every message replaces those before.
-pub fn objects(stamp: Stamp, mapper: &Mapper<'_>) -> Value {
+/// The box of each object in a segment of the map, in the colour of its state. Every message
+/// replaces those before.
+pub fn objects((stamp, segment): (Stamp, MapSegment), mapper: &Mapper<'_>) -> Value {
     let entity = |(summary, object): (
         &dynvox_core::objects::ObjectSummary,
         &dynvox_core::objects::Object<'_>,
     )| {
         // An object without a block has no box.
-        let ([low, high], t_world_object) = (box_of(object.volume())?, summary.t_world_object);
+        let t_world_object = shown_pose(segment, &summary.t_world_object);
+        let [low, high] = box_of(object.volume())?;
         let middle =
             Transform::from_translation([0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis])));
         let [r, g, b] =

@@ -9,6 +9,7 @@ use super::{
     EndContext, Finished, FrameContext, ObserveError, ObservedRun, Observer, PlanningLayers,
     frame_pictures, frame_pictures::Shown, pictures,
 };
+use crate::formats::shown_pose;
 use crate::owned;
 use dynvox_core::geometry::Transform;
 use dynvox_core::view::RaycastView;
@@ -105,10 +106,11 @@ impl Recording {
         run: &ObservedRun<'_>,
     ) -> Result<(), mcap::McapError> {
         let (time_ns, t_world_camera) = (frame.row.time_ns(), frame.row.report.t_world_camera);
-        let stamp = Stamp(time_ns);
-        self.note_pose(frame.position, &t_world_camera);
-        self.write(Topic::Transform, time_ns, &messages::transform(stamp, &t_world_camera))?;
-        self.write(Topic::Pose, time_ns, &messages::pose(stamp, &t_world_camera))?;
+        let (stamp, segment) = (Stamp(time_ns), frame.row.report.segment);
+        let shown = frame.row.shown_t_world_camera();
+        self.note_pose(frame.position, &shown);
+        self.write(Topic::Transform, time_ns, &messages::transform(stamp, &shown))?;
+        self.write(Topic::Pose, time_ns, &messages::pose(stamp, &shown))?;
         // The picture may be missing, as in a run on depth only.
         if let Some(left) = frame_pictures::left(frame) {
             self.write(
@@ -125,19 +127,26 @@ impl Recording {
         }
         let disparity = frame.jpeg(Shown::Disparity);
         self.write(Topic::Disparity, time_ns, &messages::image(stamp, &disparity))?;
-        self.write(Topic::Objects, time_ns, &messages::objects(stamp, frame.view.mapper()))?;
+        self.write(
+            Topic::Objects,
+            time_ns,
+            &messages::objects((stamp, segment), frame.view.mapper()),
+        )?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
         // Clouds are large: one every few frames.
+        let view = RaycastView::from(&t_world_camera);
         if frame.position.is_multiple_of(MAP_EVERY)
             && let Some(seen) =
-                frame.view.raycast(RaycastView { t_world_camera, every: messages::POINT_EVERY })
+                frame.view.raycast(RaycastView { every: messages::POINT_EVERY, ..view })
             && let Some(cloud) = messages::cloud(stamp, seen, &run.plan.config.rig)
         {
             self.write(Topic::Map, time_ns, &cloud)?;
         }
         if frame.position.is_multiple_of(MAP_EVERY) && !frame.view.mapper().planning().is_empty() {
             frame.view.plan(0.0);
-            if let Some(layers) = PlanningLayers::from_planning(frame.view.mapper().planning()) {
+            let layers = PlanningLayers::from_planning(frame.view.mapper().planning());
+            if let Some(mut layers) = layers {
+                layers.t_world_corner = shown_pose(segment, &layers.t_world_corner);
                 self.write(Topic::Planning, time_ns, &messages::planning(stamp, &layers))?;
             }
         }

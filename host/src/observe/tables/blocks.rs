@@ -1,6 +1,7 @@
 //! `blocks.csv`: one row for each block of the static map, whenever it left memory and at the end.
 
 use super::csv_text;
+use dynvox_core::geometry::MapSegment;
 use serde::Serialize;
 use std::io;
 
@@ -19,6 +20,7 @@ pub enum BlockFate {
 /// Coordinates count blocks of 8 voxels from the first camera.
 #[derive(Serialize)]
 struct BlockColumns {
+    segment: u16,
     x: i16,
     y: i16,
     z: i16,
@@ -26,17 +28,24 @@ struct BlockColumns {
     fate: BlockFate,
 }
 
-/// The rows of some blocks: coordinates, the frame each was last visible in, and what became of it;
-/// with the header before the first.
+/// The rows of some blocks: segment and coordinates, the frame each was last visible in, and what
+/// became of it; with the header before the first.
 ///
 /// # Errors
 /// A value cannot be written as a cell.
 pub fn block_rows(
-    rows: impl Iterator<Item = ([i16; 3], u32, BlockFate)>,
+    rows: impl Iterator<Item = ((MapSegment, [i16; 3]), u32, BlockFate)>,
     first: bool,
 ) -> io::Result<Vec<u8>> {
     csv_text(
         first,
-        rows.map(|([x, y, z], last_frame, fate)| BlockColumns { x, y, z, last_frame, fate }),
+        rows.map(|((segment, [x, y, z]), last_frame, fate)| BlockColumns {
+            segment: segment.get(),
+            x,
+            y,
+            z,
+            last_frame,
+            fate,
+        }),
     )
 }

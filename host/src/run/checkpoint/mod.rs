@@ -43,7 +43,7 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: [u8; 8] = *b"DVXSNAP\0";
 /// Version of the layout and of the host's state. Another one is refused: there is no conversion.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 /// Magic, version, length.
 const HEAD: usize = 20;
 /// Checksum.

@@ -11,7 +11,7 @@
 use super::block_index::{BlockIndexOnDisk, Tile, tile_of};
 use super::record::{self, HEADER, Header, LONGEST};
 use crate::owned;
-use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, LoadedBlock};
 use hashbrown::HashMap;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -20,8 +20,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// First bytes of a store, without its version, which is a digit.
+const NAME: &[u8; 7] = b"dynvoxB";
 /// First bytes of a store; the last digit is the version.
-const MAGIC: [u8; 8] = *b"dynvoxB2";
+const MAGIC: [u8; 8] = *b"dynvoxB3";
 /// Magic, then voxel size and truncation (`f32`, little endian).
 const PREAMBLE: usize = 16;
 /// Bytes read at once while following a tile's records backwards.
@@ -45,6 +47,19 @@ pub enum StoreError {
     Foreign {
         /// The file.
         path: PathBuf,
+    },
+    /// The file is a store of another version.
+    #[error(
+        "{path} is a block store of version {found}, this release reads version {reads}. Map the \
+         recording again, or go on with the release that wrote the file"
+    )]
+    OtherVersion {
+        /// The file.
+        path: PathBuf,
+        /// Version of the file.
+        found: char,
+        /// Version that can be read.
+        reads: char,
     },
     /// It existed at the checkpoint.
     #[error(
@@ -145,8 +160,9 @@ impl BlockFile<File> {
         let mut store = Self::over(file);
         if len < PREAMBLE as u64 {
             // New, or incomplete within its first bytes: it has no record.
-            if !MAGIC.starts_with(&store.head(len.min(8)).map_err(at)?) {
-                return Err(StoreError::Foreign { path: path.to_owned() });
+            let head = store.head(len.min(8)).map_err(at)?;
+            if !MAGIC.starts_with(&head) {
+                return Err(not_of_this_version(path, &head));
             }
             store.file.set_len(0).map_err(at)?;
             let preamble = preamble(voxel_m, truncation_m);
@@ -217,7 +233,7 @@ impl BlockFile<File> {
             .head(PREAMBLE as u64)
             .map_err(|source| StoreError::Io { path: path.to_owned(), source })?;
         if found[..8] != MAGIC {
-            return Err(StoreError::Foreign { path: path.to_owned() });
+            return Err(not_of_this_version(path, &found));
         }
         if found != preamble(voxel_m, truncation_m) {
             let float = |at: usize| {
@@ -232,6 +248,19 @@ impl BlockFile<File> {
             });
         }
         Ok(())
+    }
+}
+
+/// Refusal of a file that begins otherwise than a store of this version.
+fn not_of_this_version(path: &Path, head: &[u8]) -> StoreError {
+    let path = path.to_owned();
+    match head.strip_prefix(NAME).and_then(<[u8]>::first) {
+        Some(version @ b'0'..=b'9') => StoreError::OtherVersion {
+            path,
+            found: char::from(*version),
+            reads: char::from(MAGIC[7]),
+        },
+        _ => StoreError::Foreign { path },
     }
 }
 
@@ -292,29 +321,29 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     /// Returns true if a block is stored.
-    pub fn holds(&mut self, coord: BlockCoord) -> bool {
-        self.newest_record(coord).is_some()
+    pub fn holds(&mut self, key: BlockKey) -> bool {
+        self.newest_record(key).is_some()
     }
 
-    /// The tiles in which blocks are stored, ascending.
+    /// The tiles in which blocks are stored, ascending: segment by segment.
     pub fn tiles(&self) -> Vec<Tile> {
         self.index.tiles()
     }
 
     /// The blocks stored in a tile, ascending.
-    pub fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
+    pub fn blocks_of(&mut self, tile: Tile) -> Vec<BlockKey> {
         self.load_index(tile);
-        let mut coords: Vec<_> =
-            self.index.records(tile).into_iter().flatten().map(|(coord, _)| *coord).collect();
-        coords.sort_unstable();
-        coords
+        let mut keys: Vec<_> =
+            self.index.records(tile).into_iter().flatten().map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys
     }
 
     /// Returns the offset of a block's newest record.
-    fn newest_record(&mut self, coord: BlockCoord) -> Option<u64> {
-        let tile = tile_of(coord);
+    fn newest_record(&mut self, key: BlockKey) -> Option<u64> {
+        let tile = tile_of(key);
         self.load_index(tile);
-        self.index.records(tile)?.get(&coord).copied()
+        self.index.records(tile)?.get(&key).copied()
     }
 
     /// Reads the positions of a tile's records, unless they are known or the tile has no records.
@@ -334,7 +363,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         &mut self,
         tile: Tile,
         newest: u64,
-        records: &mut HashMap<BlockCoord, u64>,
+        records: &mut HashMap<BlockKey, u64>,
     ) -> io::Result<()> {
         let (mut window, mut first) = (Vec::new(), 0);
         let mut at = newest;
@@ -352,9 +381,9 @@ impl<F: Read + Write + Seek> BlockFile<F> {
                 .and_then(Header::read);
             // Each record lies before the one that names it, so the walk ends.
             let header =
-                header.filter(|header| tile_of(header.coord) == tile && header.previous < at);
+                header.filter(|header| tile_of(header.key) == tile && header.previous < at);
             let header = header.ok_or(io::ErrorKind::InvalidData)?;
-            records.entry(header.coord).or_insert(at);
+            records.entry(header.key).or_insert(at);
             at = header.previous;
         }
         Ok(())
@@ -384,7 +413,7 @@ impl<F: Read + Write + Seek> BlockFile<F> {
             if payload.len() < read.len || !read.fits(&header, &payload) {
                 return Ok(());
             }
-            self.index.enter(read.coord, self.end);
+            self.index.enter(read.key, self.end);
             self.checksum.update(&header);
             self.checksum.update(&payload);
             self.records += 1;
@@ -394,11 +423,11 @@ impl<F: Read + Write + Seek> BlockFile<F> {
     }
 
     /// The payload of the record at `at`, into `record`.
-    fn fetch(&mut self, coord: BlockCoord, at: u64) -> io::Result<bool> {
+    fn fetch(&mut self, key: BlockKey, at: u64) -> io::Result<bool> {
         let mut header = [0; HEADER];
         self.file.seek(SeekFrom::Start(at))?;
         self.file.read_exact(&mut header)?;
-        let Some(read) = Header::read(&header).filter(|read| read.coord == coord) else {
+        let Some(read) = Header::read(&header).filter(|read| read.key == key) else {
             return Ok(false);
         };
         self.record.resize(read.len, 0);
@@ -420,11 +449,11 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
         if self.failure.is_some() {
             return false;
         }
-        let previous = self.index.newest(tile_of(block.coord)).unwrap_or(0);
+        let previous = self.index.newest(tile_of(block.key)).unwrap_or(0);
         record::write(&block, previous, &mut self.scratch, &mut self.record);
         match self.append() {
             Ok(()) => {
-                self.index.enter(block.coord, self.end);
+                self.index.enter(block.key, self.end);
                 self.checksum.update(&self.record);
                 self.records += 1;
                 self.end += self.record.len() as u64;
@@ -440,8 +469,8 @@ impl<F: Read + Write + Seek> BlockStore for BlockFile<F> {
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
         // The record stays: should the run end before the block is evicted again, it is still
         // stored.
-        let Some(at) = self.newest_record(block.coord) else { return false };
-        let came = self.fetch(block.coord, at).unwrap_or(false)
+        let Some(at) = self.newest_record(block.key) else { return false };
+        let came = self.fetch(block.key, at).unwrap_or(false)
             && record::read(&self.record, block, &mut self.scratch);
         self.unreadable += u64::from(!came);
         came

@@ -2,10 +2,11 @@
 //! and the layer behind it.
 
 use super::{BlockFile, Tile};
+use crate::formats::ShownSegment;
 use dynvox_core::Capacity;
 use dynvox_core::memory::{Carver, SlabError};
 use dynvox_core::view::{MeshConfig, MeshSink};
-use dynvox_core::volume::{BlockCoord, BlockStore, NoStore, Volume, VolumeConfig};
+use dynvox_core::volume::{BlockCoord, BlockKey, BlockStore, NoStore, Volume, VolumeConfig};
 use hashbrown::HashSet;
 use std::io::{Read, Seek, Write};
 
@@ -36,7 +37,7 @@ pub trait BlockSource: BlockStore {
     fn tiles(&self) -> Vec<Tile>;
 
     /// The blocks in a tile, ascending.
-    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord>;
+    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockKey>;
 }
 
 impl<F: Read + Write + Seek> BlockSource for BlockFile<F> {
@@ -44,7 +45,7 @@ impl<F: Read + Write + Seek> BlockSource for BlockFile<F> {
         Self::tiles(self)
     }
 
-    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
+    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockKey> {
         Self::blocks_of(self, tile)
     }
 }
@@ -55,8 +56,8 @@ pub fn slab_bytes(colour: bool) -> usize {
 }
 
 /// Hands the triangles of all blocks in `store` but those in `without` to `sink`, in an order that
-/// depends on the blocks alone. `slab` holds a cube at a time: any profile's is large enough.
-/// Returns the number of triangles.
+/// depends on the blocks only; each segment is shown above the one before ([`ShownSegment`]).
+/// `slab` holds a cube at a time: any profile's is large enough. Returns the number of triangles.
 ///
 /// # Errors
 ///
@@ -65,7 +66,7 @@ pub fn triangles(
     store: &mut impl BlockSource,
     (volume, mesh): (&VolumeConfig, &MeshConfig),
     (slab, colour): (&mut [u8], bool),
-    without: &HashSet<BlockCoord>,
+    without: &HashSet<BlockKey>,
     sink: &mut impl MeshSink,
 ) -> Result<u64, SlabError> {
     let capacity = cube_capacity(colour);
@@ -75,20 +76,22 @@ pub fn triangles(
     let mut count = 0;
     for tile in store.tiles() {
         let mut blocks = store.blocks_of(tile);
-        let cube_of = |coord: &BlockCoord| [coord.x, coord.y, coord.z].map(|c| c >> CUBE_BITS);
-        blocks.sort_unstable_by_key(|coord| (cube_of(coord), *coord));
+        // All blocks of a tile are of one segment.
+        let cube_of =
+            |BlockKey { coord, .. }: &BlockKey| [coord.x, coord.y, coord.z].map(|c| c >> CUBE_BITS);
+        blocks.sort_unstable_by_key(|key| (cube_of(key), *key));
         for blocks in blocks.chunk_by(|a, b| cube_of(a) == cube_of(b)) {
             let Some(cube) = blocks.first().map(cube_of) else { continue };
-            for &coord in blocks {
-                volume.load(coord, store);
+            for &key in blocks {
+                volume.load(key, store);
             }
             for coord in behind(cube) {
-                volume.load(coord, store);
+                volume.load(BlockKey { segment: tile.segment, coord }, store);
             }
             count += volume.mesh(
                 mesh,
-                |coord| cube_of(&coord) == cube && !without.contains(&coord),
-                sink,
+                |key| cube_of(&key) == cube && !without.contains(&key),
+                &mut ShownSegment::new(tile.segment, sink),
             );
             // Empties the volume: its blocks are still in the store.
             volume.stream_out(&mut NoStore);

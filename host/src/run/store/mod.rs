@@ -5,9 +5,11 @@ mod file;
 pub mod mesh;
 mod pool;
 mod record;
+mod segment;
 #[cfg(test)]
 mod tests;
 
 pub use block_index::Tile;
 pub use file::{BlockFile, Opened, Position, StoreError};
 pub use pool::PoolAndFile;
+pub use segment::OneSegment;

@@ -6,7 +6,7 @@
 use super::BlockFile;
 use super::block_index::{Tile, tile_of};
 use super::mesh::BlockSource;
-use dynvox_core::volume::{BlockCoord, BlockStore, EvictedBlock, LoadedBlock, Slot, Volume};
+use dynvox_core::volume::{BlockKey, BlockStore, EvictedBlock, LoadedBlock, Slot, Volume};
 use hashbrown::HashMap;
 use std::io::{Read, Seek, Write};
 
@@ -15,8 +15,8 @@ pub struct PoolAndFile<'a, 's, F> {
     volume: &'a Volume<'s>,
     file: &'a mut BlockFile<F>,
     /// The pool's blocks that hold anything.
-    slots: HashMap<BlockCoord, Slot>,
-    by_tile: HashMap<Tile, Vec<BlockCoord>>,
+    slots: HashMap<BlockKey, Slot>,
+    by_tile: HashMap<Tile, Vec<BlockKey>>,
 }
 
 impl<'a, 's, F: Read + Write + Seek> PoolAndFile<'a, 's, F> {
@@ -27,9 +27,9 @@ impl<'a, 's, F: Read + Write + Seek> PoolAndFile<'a, 's, F> {
         for slot in volume.pool().live() {
             let holds_any =
                 blocks.weight(slot).is_some_and(|weight| weight.iter().any(|&weight| weight > 0));
-            if let Some(coord) = blocks.coord(slot).filter(|_| holds_any) {
-                slots.insert(coord, slot);
-                by_tile.entry(tile_of(coord)).or_default().push(coord);
+            if let Some(key) = blocks.key(slot).filter(|_| holds_any) {
+                slots.insert(key, slot);
+                by_tile.entry(tile_of(key)).or_default().push(key);
             }
         }
         Self { volume, file, slots, by_tile }
@@ -45,12 +45,12 @@ impl<F: Read + Write + Seek> BlockSource for PoolAndFile<'_, '_, F> {
         tiles
     }
 
-    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockCoord> {
-        let mut coords = self.file.blocks_of(tile);
-        coords.extend(self.by_tile.get(&tile).into_iter().flatten());
-        coords.sort_unstable();
-        coords.dedup();
-        coords
+    fn blocks_of(&mut self, tile: Tile) -> Vec<BlockKey> {
+        let mut keys = self.file.blocks_of(tile);
+        keys.extend(self.by_tile.get(&tile).into_iter().flatten());
+        keys.sort_unstable();
+        keys.dedup();
+        keys
     }
 }
 
@@ -60,7 +60,7 @@ impl<F: Read + Write + Seek> BlockStore for PoolAndFile<'_, '_, F> {
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
-        let Some(&slot) = self.slots.get(&block.coord) else { return self.file.load(block) };
+        let Some(&slot) = self.slots.get(&block.key) else { return self.file.load(block) };
         let blocks = self.volume.blocks();
         let (Some(sdf), Some(weight)) = (blocks.sdf(slot), blocks.weight(slot)) else {
             return false;

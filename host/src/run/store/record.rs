@@ -1,11 +1,12 @@
 //! One block as bytes: a header with a checksum, then the voxels, compressed.
 //!
-//! Header, 24 bytes, little endian: x, y, z (`i16`), flags (`u16`, bit 0: colour), where the last
-//! record of the same tile begins (`u64`, 0 none), length of the payload (`u32`), CRC-32 of the
-//! first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`), 512 weights, and with
-//! colour three planes of 512 bytes.
+//! Header, 24 bytes, little endian: x, y, z (`i16`), segment of the map (`u16`), where the last
+//! record of the same tile begins (`u64`, 0 none), length of the payload and flags (`u16` each, bit
+//! 0: colour), CRC-32 of the first 20 bytes and the payload. Payload: LZ4 of 512 distances (`i16`),
+//! 512 weights, and with colour three planes of 512 bytes.
 
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, EvictedBlock, LoadedBlock};
+use dynvox_core::geometry::MapSegment;
+use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockKey, EvictedBlock, LoadedBlock};
 
 /// Bytes of a record's header.
 pub(super) const HEADER: usize = 24;
@@ -14,12 +15,13 @@ const PLAIN: usize = BLOCK_VOXELS * 3;
 const COLOURED: usize = BLOCK_VOXELS * 6;
 /// No payload is longer: LZ4's worst case for a coloured block.
 pub(super) const LONGEST: usize = lz4_flex::block::get_maximum_output_size(COLOURED);
+const _: () = assert!(LONGEST <= u16::MAX as usize, "a length is 16 bits");
 const HAS_COLOUR: u16 = 1;
 
 /// Fields of a record's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
-    pub coord: BlockCoord,
+    pub key: BlockKey,
     /// Offset of the previous record of the same tile; 0 for the first one.
     pub previous: u64,
     pub len: usize,
@@ -30,15 +32,16 @@ pub(super) struct Header {
 impl Header {
     /// Reads a header; `None` when it cannot be one.
     pub fn read(bytes: &[u8; HEADER]) -> Option<Self> {
-        let half = |at: usize| i16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let half = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let [x, y, z] = [0, 2, 4].map(|at| half(at) as i16);
         let word = |at: usize| {
             u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
         };
         let header = Self {
-            coord: BlockCoord { x: half(0), y: half(2), z: half(4) },
-            flags: half(6) as u16,
+            key: BlockKey { segment: MapSegment::new(half(6)), coord: BlockCoord { x, y, z } },
             previous: u64::from(word(8)) | u64::from(word(12)) << 32,
-            len: word(16) as usize,
+            len: usize::from(half(16)),
+            flags: half(18),
             checksum: word(CHECKED),
         };
         (header.len <= LONGEST && header.flags <= HAS_COLOUR).then_some(header)
@@ -76,13 +79,14 @@ pub(super) fn write(
     record.truncate(HEADER + len);
     let flags = if block.colour.is_some() { HAS_COLOUR } else { 0 };
     let mut header = [0; HEADER];
-    for (at, value) in
-        [block.coord.x, block.coord.y, block.coord.z, flags as i16].into_iter().enumerate()
-    {
+    let BlockKey { segment, coord } = block.key;
+    let words = [coord.x as u16, coord.y as u16, coord.z as u16, segment.get()];
+    for (at, value) in words.into_iter().enumerate() {
         header[2 * at..2 * at + 2].copy_from_slice(&value.to_le_bytes());
     }
     header[8..16].copy_from_slice(&previous.to_le_bytes());
-    header[16..CHECKED].copy_from_slice(&(len as u32).to_le_bytes());
+    header[16..18].copy_from_slice(&(len as u16).to_le_bytes());
+    header[18..CHECKED].copy_from_slice(&flags.to_le_bytes());
     let sum = checksum(&header, &record[HEADER..]);
     header[CHECKED..].copy_from_slice(&sum.to_le_bytes());
     record[..HEADER].copy_from_slice(&header);

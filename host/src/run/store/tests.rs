@@ -1,7 +1,13 @@
 //! The store through wear and tear.
 
+use super::mesh::BlockSource;
 use super::{record::HEADER, *};
-use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockStore, EvictedBlock, LoadedBlock};
+use dynvox_core::geometry::MapSegment;
+use dynvox_core::view::{MeshConfig, Triangle};
+use dynvox_core::volume::{
+    BLOCK_VOXELS, BlockCoord, BlockKey, BlockStore, EvictedBlock, LoadedBlock, VolumeConfig,
+};
+use hashbrown::HashSet;
 use std::{
     fs,
     io::{self, Cursor, Read, Seek, SeekFrom, Write},
@@ -27,14 +33,17 @@ fn content(seed: u32) -> Content {
     }
 }
 
-fn coord(i: u32) -> BlockCoord {
-    BlockCoord::new(i as i32 - 3, -(i as i32), 7).expect("within the map")
+/// Blocks of two segments, in turn.
+fn key(i: u32) -> BlockKey {
+    let segment = MapSegment::new((i % 2) as u16);
+    let coord = BlockCoord::new(i as i32 / 2 - 3, -(i as i32) / 2, 7).expect("within the map");
+    BlockKey { segment, coord }
 }
 
 fn store_block(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
     let content = content(seed);
     store.store(EvictedBlock {
-        coord: coord(number),
+        key: key(number),
         sdf: &content.sdf,
         weight: &content.weight,
         colour: Some(&content.colour),
@@ -49,7 +58,7 @@ fn is_loaded(store: &mut impl BlockStore, number: u32, seed: u32) -> bool {
         colour: [[0; BLOCK_VOXELS]; 3],
     };
     let came = store.load(LoadedBlock {
-        coord: coord(number),
+        key: key(number),
         sdf: &mut back.sdf,
         weight: &mut back.weight,
         colour: Some(&mut back.colour),
@@ -71,9 +80,52 @@ fn keeps_blocks_over_a_restart_and_the_newest_counts() {
     assert_eq!(opened, Opened { records: 51, cut_bytes: 0 });
     (0..50).for_each(|i| assert!(is_loaded(&mut store, i, if i == 7 { 1_007 } else { i })));
     assert!(!is_loaded(&mut store, 99, 99), "what was never kept does not come back");
-    let blocks: Vec<BlockCoord> =
+    let blocks: Vec<BlockKey> =
         store.tiles().into_iter().flat_map(|tile| store.blocks_of(tile)).collect();
-    assert!(blocks.len() == 50 && (0..50).all(|i| blocks.contains(&coord(i))), "each block once");
+    assert!(blocks.len() == 50 && (0..50).all(|i| blocks.contains(&key(i))), "each block once");
+}
+
+#[test]
+fn a_block_is_read_back_with_its_segment() {
+    let mut file = BlockFile::over(Cursor::new(vec![0; 16]));
+    let [first, second] = [0, 1].map(MapSegment::new);
+    let at = |segment| BlockKey { segment, coord: BlockCoord { x: 1, y: -2, z: 3 } };
+    for (segment, weight) in [(first, 4), (second, 9)] {
+        let (sdf, weight) = ([-5; BLOCK_VOXELS], [weight; BLOCK_VOXELS]);
+        let key = at(segment);
+        assert!(file.store(EvictedBlock { key, sdf: &sdf, weight: &weight, colour: None }));
+    }
+    assert_eq!(file.tiles().iter().map(|tile| tile.segment).collect::<Vec<_>>(), [first, second]);
+    let loaded = |file: &mut dyn BlockStore, key| {
+        let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
+        let block = LoadedBlock { key, sdf: &mut sdf, weight: &mut weight, colour: None };
+        file.load(block).then_some(weight[77])
+    };
+    let both = [first, second].map(|segment| loaded(&mut file, at(segment)));
+    assert_eq!((both, loaded(&mut file, at(MapSegment::new(2)))), ([Some(4), Some(9)], None));
+    // A segment read as a map of its own.
+    let mut own = OneSegment::new(&mut file, second);
+    let keys: Vec<_> = own.tiles().into_iter().flat_map(|tile| own.blocks_of(tile)).collect();
+    assert_eq!(keys, [at(first)]);
+    assert_eq!(loaded(&mut own, keys[0]), Some(9));
+}
+
+#[test]
+fn a_file_of_another_version_is_refused_by_its_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.blocks");
+    for (head, expected) in [
+        (&b"dynvoxB2"[..], "a block store of version 2, this release reads version 3. Map the"),
+        (b"dynvoxB2 and its records, longer than a preamble", "of version 2, this release reads"),
+        (b"dynvoxB9aaaabbbb", "of version 9, this release reads version 3"),
+        (b"dynvoxBB", "is not a block store"),
+        (b"ply\nformat binary", "is not a block store"),
+    ] {
+        fs::write(&path, head).unwrap();
+        let message = BlockFile::open(&path, 0.05, 0.75).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+        assert_eq!(fs::read(&path).unwrap(), head, "the file stays as it is");
+    }
 }
 
 #[test]
@@ -122,7 +174,7 @@ fn a_flipped_bit_ends_the_store_before_its_record() {
         damaged[at] ^= 4;
         fs::write(&path, &damaged).unwrap();
         let (mut store, opened) = BlockFile::open(&path, 0.05, 0.75).unwrap();
-        assert_eq!((opened.records, store.holds(coord(1))), (1, false), "byte {at}");
+        assert_eq!((opened.records, store.holds(key(1))), (1, false), "byte {at}");
     }
 }
 
@@ -208,7 +260,7 @@ fn a_store_is_reopened_at_its_mark_and_later_records_are_removed() {
         (store.records(), store.bytes(), fs::metadata(&path).unwrap().len()),
         (5, marked.bytes, marked.bytes)
     );
-    assert!(is_loaded(&mut store, 3, 3) && !store.holds(coord(9)));
+    assert!(is_loaded(&mut store, 3, 3) && !store.holds(key(9)));
     // Storing the same blocks again gives the same file.
     assert!(store_block(&mut store, 3, 30) && store_block(&mut store, 9, 9));
     assert_eq!(store.position().unwrap(), after);
@@ -251,4 +303,32 @@ fn a_full_store_stays_full_when_it_is_reopened() {
     let mut store = BlockFile::reopen(&path, 0.05, 0.3, &marked).unwrap();
     assert!(!store_block(&mut store, 2, 2) && is_loaded(&mut store, 1, 1));
     assert_eq!(store.failure().unwrap().to_string(), failure);
+}
+
+#[test]
+fn every_segment_is_in_the_mesh_and_later_ones_stand_higher() {
+    let mut file = BlockFile::over(Cursor::new(vec![0; 16]));
+    // A wall across the block: at another depth in the second segment.
+    for (segment, wall) in [(0, 3), (1, 5)] {
+        let distance = |voxel: usize| 1_000 * (wall - (voxel / 64) as i16) + 500;
+        let (sdf, weight) = (std::array::from_fn(distance), [9; BLOCK_VOXELS]);
+        let key = BlockKey { segment: MapSegment::new(segment), coord: BlockCoord::default() };
+        assert!(file.store(EvictedBlock { key, sdf: &sdf, weight: &weight, colour: None }));
+    }
+    let config = VolumeConfig { voxel_size_m: 0.1, ..VolumeConfig::default() };
+    let how = (&config, &MeshConfig::default());
+    let mut slab = vec![0; mesh::slab_bytes(false) + 64];
+    let start = slab.as_ptr().align_offset(64);
+    let mut corners = Vec::new();
+    let mut take = |triangle: Triangle| {
+        corners.extend(triangle.vertices.map(|corner| corner.position_m));
+    };
+    let memory = (&mut slab[start..], false);
+    mesh::triangles(&mut file, how, memory, &HashSet::new(), &mut take).unwrap();
+    let (first, second) = corners.split_at(corners.len() / 2);
+    assert!(first.len() >= 3 * 49, "{} corners", first.len());
+    let is_at = |of: &[[f32; 3]], y: f32, z: f32| {
+        of.iter().all(|at| (y..y + 0.8).contains(&at[1]) && (at[2] - z).abs() < 1e-4)
+    };
+    assert!(is_at(first, 0.0, 0.35) && is_at(second, -100.0, 0.55), "{corners:?}");
 }

@@ -42,9 +42,9 @@ static POSE: &[FrameColumn] = &[
     column(
         "segment",
         "",
-        "number of the map's segment: another one begins, 100 m above, where the camera was lost \
-         and not found again",
-        |row| row.report.segment.into(),
+        "number of the map's segment, from 0: another one begins where the camera was lost and not \
+         found again",
+        |row| u32::from(row.report.segment.get()).into(),
     ),
     charted("matches", "", "matches that the pose was estimated from", |row| {
         row.matches().0.into()

@@ -1,6 +1,7 @@
 //! Digests of each frame, read from `frames.csv`.
 
 use crate::formats::bounds::TABLE_TEXT;
+use dynvox_core::geometry::MapSegment;
 use serde::Deserialize;
 use std::io::Read;
 
@@ -11,7 +12,7 @@ pub struct FrameDigests {
     pub frame: usize,
     /// Segment of the map.
     #[serde(default)]
-    pub segment: u32,
+    pub segment: MapSegment,
     /// Digest of all stages.
     pub digest: String,
     /// Digest of the decoded input.
