@@ -320,8 +320,10 @@ typedef struct {
 
 // An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
 typedef struct {
-  // Coordinates, blocks.
+  // Coordinates in the segment's lattice, blocks.
   int16_t coord[3];
+  // Number of the map's segment that the block is of; a segment has a lattice of its own.
+  uint16_t segment;
   // 512 signed distances, 1/32767 of the truncation.
   const int16_t *sdf;
   // 512 weights.
@@ -333,8 +335,10 @@ typedef struct {
 // A block that becomes visible again, all zero, to be filled from the store. Valid during the
 // call.
 typedef struct {
-  // Coordinates, blocks.
+  // Coordinates in the segment's lattice, blocks.
   int16_t coord[3];
+  // Number of the map's segment that the block is of; a segment has a lattice of its own.
+  uint16_t segment;
   // 512 signed distances.
   int16_t *sdf;
   // 512 weights.
@@ -348,10 +352,10 @@ typedef struct {
 typedef struct {
   // Handed to both functions.
   void *context;
-  // Stores an evicted block; the last one stored at its coordinates counts. False when it
-  // cannot: the block is lost, and counted. Null: all are lost.
+  // Stores an evicted block; the last one stored with its segment and coordinates counts. False
+  // when it cannot: the block is lost, and counted. Null: all are lost.
   bool (*store)(void *context, const DynvoxBlock *block);
-  // Fills a block; false when none is stored at its coordinates. Null: none is.
+  // Fills a block; false when none is stored with its segment and coordinates. Null: none is.
   bool (*load)(void *context, const DynvoxLoadedBlock *block);
 } DynvoxStore;
 
@@ -361,13 +365,13 @@ typedef struct {
   uint32_t frame;
   // The worst that happened.
   DynvoxSeverity severity;
-  // Pose of the left camera in the world.
+  // Pose of the left camera in the world, which is that of its segment of the map.
   DynvoxPose t_world_camera;
   // True if the frame was fused into the map.
   bool fused;
-  // Number of the map's segment, from 0: another one begins, 100 m above, where the camera was
-  // lost and not found again.
-  uint32_t segment;
+  // Number of the map's segment, from 0: another one begins where the camera was lost and is not
+  // found again, with that camera as its world. Where one segment lies in another is not known.
+  uint16_t segment;
   // Pixels with a disparity.
   uint32_t disparities;
   // Matches the camera's motion rests on.
@@ -447,7 +451,7 @@ typedef struct {
 
 // A corner of a triangle.
 typedef struct {
-  // Position in the world, m.
+  // Position in the world of the camera's segment, m.
   float position_m[3];
   // Red, green, blue.
   uint8_t colour[3];
@@ -720,7 +724,7 @@ DynvoxStatus dynvox_step_with(DynvoxMapper *mapper,
 // uses it; `pose` is null or points to a pose.
 DynvoxStatus dynvox_pose(DynvoxMapper *mapper, DynvoxPose *pose);
 
-// Renders the static map from a pose.
+// Renders the static map in the camera's segment from a pose in it.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
@@ -728,8 +732,8 @@ DynvoxStatus dynvox_pose(DynvoxMapper *mapper, DynvoxPose *pose);
 // buffers are as large as it says and overlap nothing.
 DynvoxStatus dynvox_raycast(DynvoxMapper *mapper, const DynvoxPose *pose, DynvoxPicture *picture);
 
-// Hands every triangle of the static map to `sink`, and writes how many there were to `count`,
-// which may be null.
+// Hands every triangle of the static map in the camera's segment to `sink`, and writes how many
+// there were to `count`, which may be null.
 //
 // # Safety
 // `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread

@@ -31,7 +31,7 @@ pub struct DynvoxPicture {
     pub height: usize,
 }
 
-/// Renders the static map from a pose.
+/// Renders the static map in the camera's segment from a pose in it.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
@@ -81,8 +81,8 @@ unsafe fn fill<T: Copy>(
     Ok(())
 }
 
-/// Hands every triangle of the static map to `sink`, and writes how many there were to `count`,
-/// which may be null.
+/// Hands every triangle of the static map in the camera's segment to `sink`, and writes how many
+/// there were to `count`, which may be null.
 ///
 /// # Safety
 /// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread

@@ -32,3 +32,5 @@ def test_another_street_is_a_segment_of_its_own():
     found = list(reports(4))
     assert [report["segment"] for report in found[:COVERED]] == [0] * COVERED
     assert found[-1]["segment"] == 1
+    began = next(report for report in found if report["segment"] == 1)
+    assert began["fused"] and np.allclose(began["t_world_camera"]["translation_m"], 0.0)

@@ -125,6 +125,7 @@ fn saved_key(BlockKey { segment, coord }: BlockKey) -> SavedKey {
     (segment, [coord.x, coord.y, coord.z])
 }
 
-fn key_of((segment, [x, y, z]): SavedKey) -> BlockKey {
+fn key_of(key: SavedKey) -> BlockKey {
+    let (segment, [x, y, z]) = key;
     BlockKey { segment, coord: BlockCoord { x, y, z } }
 }

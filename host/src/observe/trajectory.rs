@@ -56,7 +56,8 @@ pub struct ThinnedPath {
 }
 
 impl ThinnedPath {
-    fn add(&mut self, position_m: [f64; 3]) {
+    /// Adds a position; the way to it counts where it is `connected` to the one before.
+    fn add(&mut self, position_m: [f64; 3], connected: bool) {
         if self.frames.is_multiple_of(1 << self.doublings) {
             // Every second point goes, and from now on half as many come.
             if self.points_m.len() == MAX_POINTS {
@@ -68,6 +69,7 @@ impl ThinnedPath {
         // The length counts every step, also those whose points are left out.
         let step = self
             .last_m
+            .filter(|_| connected)
             .map(|last| nalgebra::Vector3::from(position_m) - nalgebra::Vector3::from(last));
         self.length_m += step.map_or(0.0, |step| step.norm());
         self.last_m = Some(position_m);
@@ -96,6 +98,8 @@ pub struct TrajectoryObserver {
     extrapolated_frames: usize,
     extrapolated_because: BTreeMap<String, usize>,
     segments: u32,
+    /// Segment of the last frame.
+    segment: MapSegment,
     /// Frames the depth tracker lost, and number and cause of the first.
     lost_frames: usize,
     first_lost: Option<(usize, IcpStatus)>,
@@ -111,6 +115,7 @@ impl Default for TrajectoryObserver {
             extrapolated_frames: 0,
             extrapolated_because: BTreeMap::new(),
             segments: 1,
+            segment: MapSegment::FIRST,
             lost_frames: 0,
             first_lost: None,
         }
@@ -134,7 +139,8 @@ impl Observer for TrajectoryObserver {
         // The recording's own stamp, or its time in seconds.
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
-        self.path.add(pose.translation_m);
+        self.path.add(pose.translation_m, row.report.segment == self.segment);
+        self.segment = row.report.segment;
         // Later segments are apart from the first by an unknown motion.
         if run.plan.dataset.truth().is_some() && row.report.segment == MapSegment::FIRST {
             self.compared.push((row.frame, pose));
@@ -196,13 +202,16 @@ mod tests {
     #[test]
     fn a_long_path_is_thinned_and_keeps_its_length_and_its_end() {
         let mut path = ThinnedPath::default();
-        (0..10_000).for_each(|at| path.add([0.0, 0.0, 0.5 * f64::from(at)]));
+        (0..10_000).for_each(|at| path.add([0.0, 0.0, 0.5 * f64::from(at)], true));
         let points: Vec<[f64; 3]> = path.points_m().collect();
         assert!(points.len() <= MAX_POINTS && path.doublings == 2, "{}", points.len());
         assert_eq!(
             (points[1][2], points[points.len() - 1][2], path.length_m()),
             (2.0, 4_999.5, 4_999.5)
         );
+        path.add([0.0, -100.0, 0.0], false);
+        path.add([0.0, -100.0, 0.5], true);
+        assert_eq!(path.length_m(), 5_000.0, "no way leads to another segment");
         assert_eq!(ThinnedPath::default().points_m().count(), 0);
     }
 }

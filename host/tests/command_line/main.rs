@@ -27,6 +27,7 @@ mod requests;
 mod resume;
 mod run_folder;
 mod same_run;
+mod segments;
 mod stream;
 mod sweep;
 mod viewer;

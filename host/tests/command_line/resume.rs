@@ -33,7 +33,7 @@ const STREET: [&str; 18] = [
 ];
 
 /// Runs the binary until it prints `line`, and kills it there.
-fn killed_at(folder: &Path, args: &[&str], line: &str) {
+pub(super) fn killed_at(folder: &Path, args: &[&str], line: &str) {
     let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
         .args(args)
         .current_dir(folder)

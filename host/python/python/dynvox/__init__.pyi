@@ -205,7 +205,8 @@ class Mapper:
         time_ns: int | None = None,
         detections: Iterable[Detection] | None = None,
     ) -> dict[str, Any]:
-        """Maps one pair and returns the report, with the fields of `dynvox_core::Report` and `severity`.
+        """Maps one pair and returns the report, with the fields of `dynvox_core::Report` and `severity`. `segment` numbers the segment of the map
+        that the pose lies in, from 0: another one begins, with that camera as its world, where the camera was lost and is not found again.
 
         Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then fused in colour, and grey is computed.
         No grey picture, colour, disparity or mask is copied; rows may lie apart, as in a part of a larger array. `t_world_camera` replaces the
@@ -220,7 +221,7 @@ class Mapper:
         """What is tracked after the last step, oldest first."""
 
     def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True, every: int = 1) -> Raycast:
-        """The map seen from a pose, the last one of the camera without one; with the objects where they are now. Of the image's columns and rows every so many
+        """The map's current segment seen from a pose in it, the last one of the camera without one; with the objects where they are now. Of the image's columns and rows every so many
         are looked at."""
 
     def plan(self, ahead_s: float = 0.0) -> Plan:
@@ -228,7 +229,7 @@ class Mapper:
         made without `planning`."""
 
     def triangles(self, object: int | None = None) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Triangles of the static map, evicted blocks included, or of one track's object, in the world: positions in metres and colours, both
+        """Triangles of the static map in the camera's segment, evicted blocks included, or of one track's object, in the world: positions in metres and colours, both
         triangles x corners x 3. Corners run counter-clockwise seen from free space."""
 
     @property

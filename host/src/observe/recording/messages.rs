@@ -81,7 +81,7 @@ pub fn calibration(stamp: Stamp, rig: &StereoRig, full_width: usize, size: (u32,
 
 /// The box of each object in a segment of the map, in the colour of its state. Every message
 /// replaces those before.
-pub fn objects((stamp, segment): (Stamp, MapSegment), mapper: &Mapper<'_>) -> Value {
+pub fn objects(stamp: Stamp, segment: MapSegment, mapper: &Mapper<'_>) -> Value {
     let entity = |(summary, object): (
         &dynvox_core::objects::ObjectSummary,
         &dynvox_core::objects::Object<'_>,

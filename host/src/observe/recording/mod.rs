@@ -130,7 +130,7 @@ impl Recording {
         self.write(
             Topic::Objects,
             time_ns,
-            &messages::objects((stamp, segment), frame.view.mapper()),
+            &messages::objects(stamp, segment, frame.view.mapper()),
         )?;
         self.write(Topic::Figures, time_ns, &messages::figures(stamp, frame.row))?;
         // Clouds are large: one every few frames.
