@@ -20,13 +20,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bytes = std::fs::read(&path)?;
     let (size, pixels) = pgm(&bytes).ok_or("not a binary PGM of 8 bits")?;
     let [width, height] = size;
+    // The field counts squared distances in cells, which bounds its sides.
     if width.max(height) > MAX_SIDE_CELLS || pixels.len() != width * height {
         return Err("the map is too large, or its file too short".into());
     }
+    // Grey levels of map servers: black is occupied, white free.
     let is_obstacle: Vec<u8> = pixels.iter().map(|grey| u8::from(*grey < 100)).collect();
+    // One longest side is enough for both passes.
     let bytes = DistanceField::bytes(pixels.len(), width);
     let mut slab = vec![0; bytes + SLAB_ALIGN];
     let mut field = DistanceField::new_in(pixels.len(), width, &mut Carver::new(&mut slab, bytes)?);
+    // Processor time: other programs do not count.
     let begin = ThreadTime::now();
     for _ in 0..ROUNDS {
         field.transform(&is_obstacle, [width, height, 1]);
@@ -35,6 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "{width} x {height}: {:.3} ms of CPU",
         begin.elapsed().as_secs_f64() * 1e3 / f64::from(ROUNDS)
     );
+    // As little-endian numbers, for comparison with other programs.
     let squared = (0..pixels.len())
         .flat_map(|at| field.get(at).map_or(NO_OBSTACLE, |(squared, _)| squared).to_le_bytes());
     std::io::stdout().write_all(&squared.collect::<Vec<u8>>())?;

@@ -12,6 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for number in 0..5 {
         mapper.step(&wall::Pair::new(number).frame()?, &Serial)?;
     }
+    // Where the last frame stood; any other pose will do.
     let t_world_camera = *mapper.t_world_camera();
     let view = mapper.raycast(&t_world_camera, &Serial)?;
     let mut depth_m: Vec<f32> = view

@@ -10,6 +10,7 @@ use std::io::{self, Read};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (capacity, config) = (Capacity::TINY, Config::for_rig(wall::RIG));
+    // Two mappers, and so two slabs.
     let mut slabs = [0, 1].map(|_| vec![0; capacity.bytes() + SLAB_ALIGN]);
     let [first, second] = &mut slabs;
     let mut mapper = Mapper::new(&capacity, &config, first)?;
@@ -17,6 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         mapper.step(&wall::Pair::new(number).frame()?, &Serial)?;
     }
     let mut bytes = Vec::new();
+    // A file or a socket would do as well: the mapper hands out one part after the other.
     mapper.save(&mut |piece: &[u8]| {
         bytes.extend_from_slice(piece);
         Ok::<(), io::Error>(())
@@ -25,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut restored = Mapper::restore(&capacity, &config, second, &mut |piece: &mut [u8]| {
         file.read_exact(piece)
     })?;
+    // If the restored mapper goes on as the first one does, the digests are equal.
     let next = wall::Pair::new(3);
     let digests = [
         mapper.step(&next.frame()?, &Serial)?.digest,

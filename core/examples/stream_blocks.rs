@@ -31,6 +31,7 @@ impl BlockStore for Memory {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // Too few blocks for the wall, so that some must leave.
     let capacity = Capacity { blocks: 600, ..Capacity::TINY };
     let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&capacity, &Config::for_rig(wall::RIG), &mut slab)?;
@@ -49,6 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             store.0.len()
         );
     }
+    // What is still in the map leaves as well, so that the store has all of it.
     mapper.stream_out(&mut store);
     println!("{} blocks in all", store.0.len());
     Ok(())

@@ -318,6 +318,7 @@ impl Truth {
 
 /// Errors of heights, m, and of slopes, degrees.
 fn print_heights(mut errors: Vec<f32>, mut slopes: Vec<f32>, missed: usize) {
+    // The mean keeps its sign: a bias shows in it alone.
     let bias = errors.iter().sum::<f32>() / errors.len().max(1) as f32;
     errors.iter_mut().for_each(|error| *error = error.abs());
     for values in [&mut errors, &mut slopes] {

@@ -131,17 +131,20 @@ struct Car {
 impl Car {
     /// Distance of a point from the car, some seconds later, m; below 0 inside.
     fn distance_m(&self, [x, z]: [f64; 2], time_s: f64) -> f64 {
+        // The car drives straight on at its speed.
         let way = self.speed_m_s * time_s;
         let [dx, dz] = [
             x - self.center[0] - self.heading[0] * way,
             z - self.center[1] - self.heading[1] * way,
         ];
+        // The point in the car's axes: across and along.
         let [sin, cos] = self.heading;
         let outside = [
             (cos * dx - sin * dz).abs() - self.half[0],
             (sin * dx + cos * dz).abs() - self.half[1],
         ];
         let beyond = outside.map(|side| side.max(0.0));
+        // Inside, the side that is nearest counts.
         if outside.iter().all(|side| *side < 0.0) {
             outside[0].max(outside[1])
         } else {
@@ -210,7 +213,9 @@ fn add_walls(walls: &mut HashMap<[i32; 2], [f64; 2]>, street: &Street, frame: &S
             (v - rig.center_v_px) * z / rig.focal_px,
             z,
         ]);
+        // What a robot can hit: above the ground, and not above its head.
         if (0.35..2.0).contains(&(ground_m - y)) {
+            // A point for each 5 cm is enough.
             walls.entry([(x * 20.0) as i32, (z * 20.0) as i32]).or_insert([x, z]);
         }
     }
@@ -361,6 +366,7 @@ fn move_along(truth: &Truth, way: impl Iterator<Item = [f64; 2]>) -> ((f64, f64)
     for to in way {
         let from = last.replace(to).unwrap_or(to);
         let leg = (to[0] - from[0]).hypot(to[1] - from[1]);
+        // In ten steps a leg, since the car moves as well.
         for n in 1..=10 {
             let share = f64::from(n) / 10.0;
             let time_s = (length + share * leg) / SPEED_M_S;

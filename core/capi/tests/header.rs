@@ -8,6 +8,7 @@ fn the_header_is_what_the_source_says() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml"))
         .expect("the configuration can be read");
+    // In the order in which the header has them: types before the functions that take them.
     let modules = [
         "status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks",
         "plan", "raw", "retired", "snapshot",
@@ -20,6 +21,7 @@ fn the_header_is_what_the_source_says() {
     builder.generate().expect("the source can be read").write(&mut bytes);
     let written = String::from_utf8(bytes).expect("text");
     let path = here.join("include/dynvox.h");
+    // As with other generated files: written on request, compared otherwise.
     if std::env::var_os("DYNVOX_BLESS").is_some() {
         fs::write(&path, &written).expect("the header can be written");
     }
@@ -40,6 +42,7 @@ fn compiles(variable: &str, default: &str, language: &str, standard: &str) {
                 { DynvoxConfig config; return config.settings_len == 0 ? 0 : (int)sizeof(DynvoxTrack); }\n";
     fs::write(
         &source,
+        // C and C++ zero a struct in two ways.
         text.replace("DynvoxConfig config;", "DynvoxConfig config = {0};")
             .replace("{0}", if language == "c" { "{0}" } else { "{}" }),
     )

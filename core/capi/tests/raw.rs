@@ -97,6 +97,7 @@ fn raw_pairs_give_the_digests_of_the_core() {
         unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) },
         DynvoxStatus::Ok
     );
+    // The named profiles hold no raw images.
     (capacity.raw_width, capacity.raw_height) = (RAW[0], RAW[1]);
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
     let mut buffer = vec![0u8; len + dynvox_alignment()];
@@ -112,6 +113,7 @@ fn raw_pairs_give_the_digests_of_the_core() {
         unsafe { dynvox_create(&raw const capacity, &raw const config, at, len, &raw mut mapper) },
         DynvoxStatus::Ok
     );
+    // Disparities of 4 px.
     let (left, right) = (pixels(0), pixels(4));
     let image = |pixels: &[u8]| DynvoxImage { pixels: pixels.as_ptr(), stride: RAW[0] };
     let frame = DynvoxFrame {
@@ -127,6 +129,7 @@ fn raw_pairs_give_the_digests_of_the_core() {
         disparity_q8: ptr::null(),
     };
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
+    // The second frame is matched with the first.
     for _ in 0..2 {
         assert_eq!(
             unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) },

@@ -80,6 +80,7 @@ fn a_restore_that_fails_ends_the_mapper_that_lived_there() {
     let (capacity, config) = (capacity(), config());
     let mut other = config;
     assert_eq!(set(&mut other, c"volume.far_m", c"17"), DynvoxStatus::Ok);
+    // Fewer blocks fit the buffer, but not the snapshot.
     let fewer = DynvoxCapacity { blocks: capacity.blocks - 64, ..capacity };
     type Story = (&'static str, fn(&mut Vec<u8>), DynvoxStatus);
     let stories: [Story; 5] = [
@@ -101,6 +102,7 @@ fn a_restore_that_fails_ends_the_mapper_that_lived_there() {
         let mut bytes = living.snapshot.clone();
         damage(&mut bytes);
         assert_eq!(living.restore((&capacity, &config), &bytes), (expected, UNTOUCHED), "{story}");
+        // The mapper that lived there is gone in each case.
         living.assert_ended(story);
     }
     for (story, bounds, settings) in
@@ -119,6 +121,7 @@ fn a_restore_that_fails_ends_the_mapper_that_lived_there() {
 
 #[test]
 fn what_is_refused_before_a_byte_is_written_leaves_the_mapper_alone() {
+    // The twin is stepped alike and asked nothing.
     let (mut living, twin) = (Living::new(), Living::new());
     let (capacity, config, bytes) = (capacity(), config(), living.snapshot.clone());
     let mut broken = config;
@@ -175,6 +178,7 @@ fn raw_lenses_beyond_the_capacity_leave_the_mapper_alone() {
 #[test]
 fn a_mapper_made_where_one_lives_takes_its_handle_over() {
     let mut living = Living::new();
+    // Fewer blocks, so that the report tells which mapper answered.
     let smaller = DynvoxCapacity { blocks: 200, visible_blocks: 200, ..capacity() };
     let (config, len, start) = (config(), living.buffer.len, living.buffer.at(0));
     let mut made = UNTOUCHED;
@@ -222,6 +226,7 @@ extern "C" fn step_while_reading(context: *mut c_void, bytes: *mut u8, len: usiz
 #[test]
 fn a_read_callback_cannot_reach_the_mapper_it_replaces() {
     let (mut living, twin) = (Living::new(), Living::new());
+    // The callback steps the mapper on each call, and notes what came of it.
     let mut reading = Reading {
         rest: Vec::leak(living.snapshot.clone()),
         mapper: living.mapper,
@@ -235,6 +240,7 @@ fn a_read_callback_cannot_reach_the_mapper_it_replaces() {
     let status =
         unsafe { dynvox_restore(bounds, settings, start, len, read, context, &raw mut restored) };
     assert_eq!(status, DynvoxStatus::Ok);
+    // A snapshot is read in many parts.
     assert!(reading.statuses.len() > 100);
     assert!(reading.statuses.iter().all(|&status| status == DynvoxStatus::NoMapper));
     assert_eq!(living.step(), twin.step());
@@ -257,6 +263,7 @@ fn poses_that_are_none_are_refused_wherever_one_is_given() {
     let good = DynvoxPose { rotation: [1.0, 0.0, 0.0, 0.0], translation_m: [0.0; 3] };
     let at = |x| DynvoxPose { translation_m: [x, 0.0, 0.0], ..good };
     let turned = |w| DynvoxPose { rotation: [w, 0.0, 0.0, 0.0], ..good };
+    // Not finite, beyond the 16 bits of blocks, and quaternions of another length.
     let wrong = [
         at(f64::NAN),
         at(f64::INFINITY),

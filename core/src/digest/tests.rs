@@ -81,10 +81,12 @@ fn notices_every_single_bit_of_a_block() {
     for mut bytes in planes() {
         let mut seen = Vec::from([of_bytes(&bytes)]);
         for bit in 0..512 * 8 {
+            // One bit flipped and flipped back.
             bytes[bit / 8] ^= 1 << (bit % 8);
             seen.push(of_bytes(&bytes));
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
+        // Of 4,096 bits each gives a digest of its own, and so do the bytes as they were.
         assert_eq!(all_different(seen), 4097);
     }
     let mut values = [0i16; 512];
@@ -111,6 +113,7 @@ fn notices_every_two_bits_of_a_run() {
             }
             bytes[one / 8] ^= 1 << (one % 8);
         }
+        // 1,536 bits by pairs.
         assert_eq!(all_different(seen), 1_178_880);
     }
 }
@@ -173,10 +176,12 @@ fn millions_of_small_edits_meet_nowhere() {
         let (mut known, mut seen) = (HashSet::new(), Vec::new());
         for _ in 0..500_000 {
             let mut bytes = plane;
+            // Two to five bytes, each by one at most: as noise changes voxels.
             for _ in 0..2 + random.below(4) {
                 let at = random.below(512) as usize;
                 bytes[at] = bytes[at].wrapping_add(random.below(3) as u8).wrapping_sub(1);
             }
+            // Edits that come to the same bytes count once.
             let edit: Vec<(usize, u8)> =
                 (0..512).filter(|&at| bytes[at] != plane[at]).map(|at| (at, bytes[at])).collect();
             if known.insert(edit) {

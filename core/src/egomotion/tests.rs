@@ -54,6 +54,7 @@ fn walk(motions: &[Transform]) -> Vec<(MotionEstimate, Transform)> {
                 at_10_hz(matcher.bucketed()),
                 &mut estimator,
             );
+            // Estimates are motions of the scene against the camera: the inverse.
             estimates.push((estimate, motions[frame - 1].inverse()));
         }
         if let Some(motion) = motions.get(frame) {
@@ -76,6 +77,7 @@ fn estimates_the_trajectory_through_a_textured_scene() {
             Vector3::new(0.1 * metres, -0.02, metres),
         )
     };
+    // Ahead, in curves, backwards, turning on the spot, and standing.
     let motions = [
         motion(0.5, 0.02, 0.0),
         motion(0.5, 0.02, 0.004),
@@ -123,6 +125,7 @@ fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Rando
             let ([previous_left, previous_right], [mut current_left, mut current_right]) =
                 (project(&point), project(&motion.transform_point(point)));
             if i < outliers {
+                // Both images are wrong, and not in the same way.
                 for pixel in [&mut current_left, &mut current_right] {
                     *pixel =
                         [uniform(random, 0.0, 400.0) as f32, uniform(random, 0.0, 160.0) as f32];
@@ -195,6 +198,7 @@ fn inliers_that_are_off_together_pull_a_robust_refinement_less() {
 #[test]
 fn equal_seeds_give_equal_bits_and_a_warm_start_the_same_answer() {
     let matches = matches(300, 120, &motion(), &mut Random::new(4));
+    // The bits: the search must not depend on anything but the seed.
     assert_eq!(estimate(&matches, &RIG, 7), estimate(&matches, &RIG, 7));
     let mut slab = Box::new(Slab([0; BYTES]));
     let mut estimator = estimator(&mut slab);
@@ -221,6 +225,7 @@ fn too_little_gives_a_status_and_no_motion() {
     );
     assert_eq!(estimate(&[], &RIG, 1).0.status, MotionStatus::TooFewMatches);
     let (lost, inliers) = estimate(&matches(60, 60, &motion(), &mut Random::new(6)), &RIG, 1);
+    // Outliers alone may agree by chance, but then with as many as the least.
     assert_ne!(lost.status, MotionStatus::TooFewMatches);
     assert!(lost.t_current_previous.is_none() || lost.inliers >= 6);
     assert_eq!(inliers.len(), lost.inliers as usize);
@@ -241,6 +246,7 @@ fn too_little_gives_a_status_and_no_motion() {
 #[test]
 fn what_is_not_finite_or_behind_is_left_out() {
     let mut matches = matches(80, 0, &motion(), &mut Random::new(9));
+    // In each of the four positions, and values whose squares overflow.
     for (i, value) in
         [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e30].into_iter().enumerate()
     {
@@ -249,6 +255,7 @@ fn what_is_not_finite_or_behind_is_left_out() {
         matches[i + 20].current_left[1] = value;
         matches[i + 30].current_right[0] = value;
     }
+    // Disparity below 0: behind the camera.
     matches[45].previous_right[0] = matches[45].previous_left[0] + 3.0;
     let (estimate, inliers) = estimate(&matches, &RIG, 1);
     let (distance, angle) = between(&estimate.t_current_previous.unwrap(), &motion());

@@ -49,6 +49,7 @@ fn overlap_by_words_is_overlap_by_pixels_at_any_shift() {
         a.clear();
         b.clear();
         let mut fill = |store: &mut MaskStore<'_>| {
+            // Boxes of many sizes and positions, with two thirds of their pixels set.
             let mut below = |bound| random.below(bound) as i32;
             let pixels = PixelBox {
                 left: below(150),
@@ -66,6 +67,7 @@ fn overlap_by_words_is_overlap_by_pixels_at_any_shift() {
         let (mine, theirs) = (fill(&mut a), fill(&mut b));
         let shift = [random.below(99) as i32 - 49, random.below(9) as i32 - 4];
         let (mut both, mut any) = (0, 0);
+        // Pixel by pixel, beyond both boxes.
         for v in -10..60 {
             for u in -60..400 {
                 let (x, y) =

@@ -13,6 +13,7 @@ use std::{vec, vec::Vec};
 
 /// One of each model, with parameters as real lenses have them.
 fn lenses() -> [Lens; 9] {
+    // Focal lengths differ by 1 % and the principal point is off the middle, as in real cameras.
     let lens = |focal: f64, model| Lens::new([focal, 1.01 * focal], [310.0, 236.0], model).unwrap();
     [
         lens(400.0, LensModel::IDEAL),
@@ -89,8 +90,10 @@ fn every_lens_takes_back_what_it_projects_over_its_whole_image() {
     for lens in lenses() {
         let mut seen = 0;
         for at in 0..64 * 48 {
+            // Every tenth pixel, not in its middle.
             let pixel = [f64::from(at % 64) * 10.0 + 0.3, f64::from(at / 64) * 10.0 + 0.7];
             let Some(ray) = lens.unproject(pixel) else { continue };
+            // Three times as far: depth must not matter.
             let back = lens.project(ray.map(|x| 3.0 * x)).unwrap();
             assert!(
                 (back[0] - pixel[0]).hypot(back[1] - pixel[1]) < 1e-9,
@@ -126,6 +129,7 @@ fn beyond_the_fold_of_a_polynomial_there_is_nothing() {
 
 #[test]
 fn absurd_lenses_are_refused() {
+    // Each has one fault, and the rest is sound.
     let make = |focal: f64, model| Lens::new([focal, 400.0], [0.0; 2], model).unwrap_err();
     assert_eq!(make(0.0, LensModel::IDEAL), LensProblem::Focal);
     assert_eq!(make(f64::NAN, LensModel::IDEAL), LensProblem::Focal);
@@ -212,6 +216,7 @@ fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
         let (rectification, rig) =
             Rectification::new(&raw, Sizing::Automatic { max_width: 400, max_height: 300 })
                 .unwrap();
+        // Raw pictures of one plane, 2 m away, by each camera's own lens.
         let left = see_raw(&raw.left, &Matrix3::identity(), &Vector3::zeros());
         let right = see_raw(&raw.right, &raw.r_right_left, &raw.t_right_left_m);
         let [left, right] = [&left, &right].map(|pixels| View::new(pixels, 640, 480).unwrap());
@@ -231,8 +236,10 @@ fn a_rectified_pair_shows_what_an_ideal_pair_would_see() {
                             (v as f64 - rig.center_v_px) / rig.focal_px,
                             1.0,
                         );
+                        // The rectified cameras look along other axes than the left raw one.
                         let (origin, ray) =
                             (r.transpose() * Vector3::new(shift_m, 0.0, 0.0), r.transpose() * ray);
+                        // Where the ray meets the plane: what an ideal camera would see there.
                         let meets = origin + ray * ((2.0 - origin.z) / ray.z);
                         let difference = (pattern([meets.x, meets.y]) - f64::from(grey)).abs();
                         (sum, worst) =
@@ -257,6 +264,7 @@ fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
         let covered = |u: i64, v: i64| {
             let raw = rectification.left.raw_pixel(&rig, [u as f64, v as f64]);
             raw.is_some_and(|[u, v]| {
+                // Up to a sixteenth of a pixel beyond the image, as the map rounds.
                 (-0.0625..=639.0625).contains(&u) && (-0.0625..=479.0625).contains(&v)
             })
         };
@@ -269,6 +277,7 @@ fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
         let white = vec![255u8; 640 * 480];
         let view = View::new(&white, 640, 480).unwrap();
         let frame = rectifier.rectify(&pair(view, view), images, &Serial).unwrap();
+        // White where it is covered, black where it is not.
         assert_eq!((frame.left.get(200, 150), frame.left.get(0, 0)), (Some(255), Some(0)));
         let report = rectifier.report(&frame).unwrap();
         assert_eq!(
@@ -285,6 +294,7 @@ fn threads_change_nothing_and_rows_may_be_padded() {
         Rectification::new(&raw, Sizing::Automatic { max_width: 400, max_height: 300 }).unwrap();
     let noise: Vec<u8> =
         (0..700 * 480u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    // 60 px of padding with other noise: rows must not run into it.
     let padded = View::with_stride(&noise, 640, 480, 700).unwrap();
     let tight: Vec<u8> = padded.rows().flatten().copied().collect();
     let tight = View::new(&tight, 640, 480).unwrap();

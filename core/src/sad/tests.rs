@@ -22,12 +22,14 @@ impl Equal {
 
 impl Comparison for Equal {
     fn run(self, kernels: &impl Kernels) {
+        // The base is in the result's upper bits, and must not disturb the comparison.
         for base in [0, 7, 65_280 << 8 | 255] {
             assert_eq!(self.least(base, kernels), self.least(base, &Plain));
         }
         let Self { a, b, most } = self;
         assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
         assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
+        // Each lane with operands of its own, so that a swapped lane shows.
         let twos = [
             [b[3], a[1]],
             [a[0], b[6]],
@@ -41,12 +43,14 @@ impl Comparison for Equal {
         let two = kernels.sums_of_two(&a, twos.each_ref());
         assert_eq!(two, Plain.sums_of_two(&a, twos.each_ref()));
         assert_eq!(two, [0, 1].map(|step| Plain.sums(&a, &twos.map(|two| two[step]))));
+        // The largest of both signs, small ones, and one from the random bits.
         let dividends = [126_480, -126_480, 0, 31, -31, 30, -1, most as i32 >> 7];
         let divisors = [4_080, 4_080, 1, 31, 32, 7, 1, 1 + (most as i32 >> 19)];
         let quotients = kernels.quotients(dividends, divisors);
         assert_eq!(quotients, Plain.quotients(dividends, divisors));
         assert!((0..LANES).all(|lane| quotients[lane] == dividends[lane] / divisors[lane]));
         let (sought, others) = ([a[5], b[2]], bytemuck::cast([a, b]));
+        // On the borders of the spans below, just beyond them, and at the ends of 16 bits.
         for (at, offset) in [
             [[7u16, 9]; LANES],
             [[8, 65_535], [9, 0], [8, 0], [65_535, 65_535], [0, 0], [7, 9], [107, 9], [108, 12]],
@@ -74,6 +78,7 @@ impl Comparison for Equal {
         kernels.costs(&point, columns, &mut costs);
         Plain.costs(&point, columns, &mut twin);
         assert_eq!(costs, twin);
+        // The fourth column has two entries, and the shortest decides.
         assert_eq!(costs[2], [-1; LANES], "one of the four has two");
     }
 }

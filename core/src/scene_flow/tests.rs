@@ -91,6 +91,7 @@ fn another_size_or_too_large_a_frame_begins_anew() {
     let mut slab = slab();
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
+    // One grey level, an image one column wider than the capacity.
     let pixels = vec![7; (WIDTH + 1) * HEIGHT];
     let mut push = |left: [usize; 2], right: [usize; 2]| {
         let image = |[width, height]: [usize; 2]| View::new(&pixels, width, height).unwrap();
@@ -98,6 +99,7 @@ fn another_size_or_too_large_a_frame_begins_anew() {
     };
     assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::First);
     assert_eq!(push([WIDTH, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Repeated);
+    // Another size begins anew; unlike images are refused and forget the one before.
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH, HEIGHT]), FlowStatus::Refused);
     assert_eq!(push([WIDTH - 1, HEIGHT], [WIDTH - 1, HEIGHT]), FlowStatus::First);
@@ -109,6 +111,7 @@ fn a_standing_camera_whose_right_rows_are_moved_anew_is_not_frozen() {
     let [left, right] = see(&Transform::IDENTITY);
     let other = see(&forward(0.4, 0.01));
     for (left_after, right_moved, status) in [
+        // Left equal and right moved by the caller is no frozen camera.
         (&left, false, FlowStatus::Frozen),
         (&left, true, FlowStatus::Repeated),
         (&other[0], true, FlowStatus::Matched),
@@ -130,6 +133,7 @@ fn noise_and_the_smallest_images_do_no_harm() {
     let mut matcher = FlowMatcher::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig { response_min: 1, support_min: 0, ..SceneFlowConfig::default() };
     let mut random = Random::new(5);
+    // From one pixel to the largest, and widths that are no multiple of the lanes.
     for [width, height] in [
         [1, 1],
         [5, 5],
@@ -147,6 +151,7 @@ fn noise_and_the_smallest_images_do_no_harm() {
             });
             let image = |pixels| View::new(pixels, width, height).unwrap();
             let report = matcher.push(&config, image(&left), image(&right), &Serial);
+            // Each step can only take from the one before.
             assert!(report.bucketed <= report.refined && report.refined <= report.dense.closed);
         }
     }
@@ -175,6 +180,7 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     let render = |du: f64, dv: f64, gain: f64, offset: f64| -> Vec<u8> {
         (0..64 * 64)
             .map(|i| {
+                // Four pictures of one texture: shifted by parts of a pixel, brighter, and darker.
                 (gain * texture(f64::from(i % 64) - du, f64::from(i / 64) - dv) + offset).round()
                     as u8
             })
@@ -183,6 +189,7 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     let images = [
         render(0.0, 0.0, 1.0, 0.0),
         render(-6.3, 0.0, 1.15, 9.0),
+        // Up to two pixels off in each image.
         render(2.45, -1.7, 1.0, 0.0),
         render(-3.8, -1.62, 1.15, -7.0),
     ];
@@ -249,12 +256,14 @@ fn what_comes_nearer_stays_the_same_point() {
     );
 }
 
+// Matches a row below, with one disparity before and after.
 #[test]
 fn bins_search_where_their_matches_or_their_neighbours_went() {
     let mut slab = slab();
     let mut prior = Prior::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
     let at = |u: f32, disparity: f32, flow: f32| Match {
+        // Two in one bin, and one in a bin far to the right.
         previous_left: [u, 75.0],
         previous_right: [u - disparity, 75.0],
         current_left: [u + flow, 76.0],
@@ -271,6 +280,7 @@ fn bins_search_where_their_matches_or_their_neighbours_went() {
     assert_eq!(near.to_current_right, [-40, -18, -9, 11]);
     assert_eq!(prior.reach([10, 110]), Some(near), "a bin beside it learns the same");
     let between = prior.reach([210, 60]).unwrap();
+    // The greatest of both: what lies between may belong to either.
     assert_eq!(
         between.to_previous_right,
         [-34, -1, -2, 2],

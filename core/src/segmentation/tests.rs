@@ -85,6 +85,7 @@ impl World {
     /// Casts a ray from a camera moved to the right.
     fn cast_from(&self, right_m: f64, frame: u32, [u, v]: [f64; 2]) -> (f64, usize) {
         let [x, y] = [(u - RIG.center_u_px) / RIG.focal_px, (v - RIG.center_v_px) / RIG.focal_px];
+        // Nothing is farther than 40 m.
         let mut best = (40.0, 0);
         if y > 0.0 && GROUND_M / y < best.0 {
             best.0 = GROUND_M / y;
@@ -92,6 +93,7 @@ impl World {
         for (number, car) in (1..).zip(&self.cars) {
             let [car_x, car_z] = car.at_frame(frame);
             let z = car_z - self.camera_z(frame);
+            // A car is a box without depth, 1.8 m wide and 1.4 m high on the ground.
             let inside =
                 (right_m + x * z - car_x).abs() < 0.9 && y * z < GROUND_M && y * z > GROUND_M - 1.4;
             if z > 1.0 && inside && z < best.0 {
@@ -122,6 +124,7 @@ impl World {
                 z,
             ];
             let motion = number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].motion);
+            // The same point before: without the car's own motion, and the camera a step back.
             let before = [now[0] - motion[0], now[1], z - motion[1] + self.step_m];
             let mut noise = || (random.below(2001) as f32 / 1000.0 - 1.0) * self.noise_px;
             let [current_left, current_right] =
@@ -158,6 +161,7 @@ impl World {
         mut detect: impl FnMut(u32) -> Vec<(PixelBox, Vec<u8>)>,
     ) -> Vec<(Vec<TrackReport>, SegmentationReport)> {
         let mut config = TrackingConfig::default();
+        // No least sizes: the pictures are small.
         (config.instances.area_min_px, config.instances.track_area_min_px) = (0, 0);
         let segmentation = SegmentationConfig { enabled: true, ..SegmentationConfig::default() };
         let bytes = Tracker::bytes(&CAPACITY)
@@ -193,6 +197,7 @@ impl World {
                     })
                     .collect();
                 let camera = self.camera(frame);
+                // The segmentation reads the same matches as the tracker, and no sparse ones.
                 let matches = FrameMatches { refined: &matches, sparse: &[] };
                 let mut assigned =
                     tracker.detect(frame, &detections, [WIDTH, HEIGHT], matches).assign_matches();
@@ -219,6 +224,7 @@ impl World {
     /// The mask of the first car, in its box.
     fn mask(&self, frame: u32) -> (PixelBox, Vec<u8>) {
         let on_car = |u: i32, v: i32| self.cast(frame, u as usize, v as usize).1 == 1;
+        // Pixel by pixel, by the rays that meet the car.
         let pixels = || {
             (0..HEIGHT as i32)
                 .flat_map(|v| (0..WIDTH as i32).map(move |u| (u, v)))
@@ -386,6 +392,7 @@ fn a_detector_that_comes_later_takes_the_track_over() {
 
 #[test]
 fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
+    // The car moves for three frames, and stands from then on.
     let world = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.2 };
     let static_world =
         World { cars: vec![Car { motion: [0.0, 0.0], ..OVERTAKING }], step_m: 0.8, noise_px: 0.2 };
@@ -414,10 +421,12 @@ fn a_car_that_is_hidden_from_the_matches_is_predicted_for_three_frames() {
             sparse: Owned { matches: &[], codes: &[], variance: SPARSE_VARIANCE },
             lattice: &lattice,
         };
+        // Without images: matches alone.
         segmenter.observe(&contradictions, None);
         confirmed.push(
             segmenter.hypotheses.all().iter().filter(|hypothesis| hypothesis.is_shown()).count(),
         );
     }
+    // Confirmed in the second frame, and predicted three frames beyond the third.
     assert_eq!(confirmed, [0, 1, 1, 1, 1, 1, 0, 0]);
 }

@@ -46,6 +46,7 @@ impl Everything {
             numbers: [7, u32::MAX],
             signed: -5,
             wide: 1 << 60,
+            // -0 has other bits than 0, and must come back as it is.
             single: -0.0,
             double: 1e-300,
             row: core::array::from_fn(|at| -(at as i16)),
@@ -82,10 +83,12 @@ impl Everything {
         visitor.f64(double);
         visitor.i16s(row);
         visitor.u16s(column);
+        // A number of entries that may be at most ten.
         visitor.count(used, 10);
         visitor.code(kind, u32::from, |code| code == 1);
         visitor.option(maybe, || 0, Visitor::u32);
         visitor.transform(pose);
+        // The digest has the content's digest, a snapshot the content.
         visitor.content(u64::from(*digested), |visitor| visitor.u32(digested));
     }
 }

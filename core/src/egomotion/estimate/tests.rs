@@ -201,6 +201,8 @@ fn as_many_inliers_as_asked_for_are_enough_and_one_fewer_is_not() {
                 ])
             })
             .collect();
+        // The first ten are off by 20 px and more, each by another amount, so that they agree with
+        // nothing.
         some.iter_mut()
             .take(10)
             .enumerate()
@@ -219,6 +221,7 @@ fn as_many_inliers_as_asked_for_are_enough_and_one_fewer_is_not() {
             );
             (estimate.status, estimate.inliers)
         };
+        // Half of the matches are inliers: by share and by number, at the bound and beyond it.
         assert_eq!(status(0.5, 3), (MotionStatus::Estimated, 10));
         assert_eq!(status(0.51, 3), (MotionStatus::TooFewInliers, 10));
         assert_eq!(status(0.0, 10), (MotionStatus::Estimated, 10));

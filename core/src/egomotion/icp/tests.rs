@@ -47,6 +47,7 @@ fn render(planes: &[Plane], t_world_camera: &Transform) -> Picture {
             1.0,
         );
         let (origin, direction) = (t_world_camera.translation(), t_world_camera.rotate(ray));
+        // Each plane's depth along the ray; the nearest one in front is seen.
         let hits = planes.iter().filter_map(|(normal, away_m)| {
             let normal = Vector3::from(*normal);
             let depth = -(normal.dot(&origin) + away_m) / normal.dot(&direction);
@@ -85,6 +86,7 @@ fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
 
 #[test]
 fn small_motions_are_found() {
+    // No motion, one along the view, and one along all axes.
     for (turn, way_m) in [
         ([0.0; 3], [0.0; 3]),
         ([0.0, 0.01, 0.0], [0.02, 0.0, 0.08]),
@@ -93,6 +95,7 @@ fn small_motions_are_found() {
         let motion = walk(turn, way_m);
         let report = tracked(&IcpConfig::default(), &SCENE, &motion);
         assert_eq!(report.status, IcpStatus::Tracked, "{report:?}");
+        // The product of a motion and its inverse is what the estimate is off.
         let error = report.t_current_previous * motion;
         assert!(error.distance_m() < 0.005 && error.angle_rad() < 0.001, "{way_m:?}: {error:?}");
         assert!(

@@ -33,6 +33,7 @@ fn the_sums_of_points_are_those_of_their_errors_derivatives() {
     for point in points() {
         sums.add(&point, &RotationMatrix::new(&motion()), &RIG, |squared| 1.0 / (1.0 + squared));
         let errors = residual_after(&point, [0.0; N]);
+        // Central differences in each of the motion's six parameters.
         let derivative: [[f64; 4]; N] = core::array::from_fn(|by| {
             let shifted = |sign: f64| {
                 residual_after(
@@ -44,12 +45,14 @@ fn the_sums_of_points_are_those_of_their_errors_derivatives() {
             core::array::from_fn(|row| (high[row] - low[row]) / (2.0 * STEP))
         });
         let squared: f64 = errors.iter().map(|error| error * error).sum();
+        // Cauchy's weight, as the closure above gives it.
         let weight = 1.0 / (1.0 + squared);
         for i in 0..N {
             let product = |other: &[f64; 4]| -> f64 {
                 (0..4).map(|row| derivative[i][row] * other[row]).sum()
             };
             expected.vector[i] += weight * product(&errors);
+            // The lower triangle alone, as the sums have it.
             (0..=i).for_each(|j| expected.matrix[i][j] += weight * product(&derivative[j]));
         }
         expected.error += weight * squared;
@@ -88,9 +91,11 @@ fn a_point_behind_the_camera_adds_nothing() {
 #[test]
 fn the_sums_of_a_row_are_its_products() {
     let mut sums = NormalEquations::ZERO;
+    // Products of two of these are all different.
     let row = [1.0, 2.0, 3.0, 5.0, 7.0, 11.0];
     sums.add_row([0.5; N], 4.0, 2.0);
     sums.add_row(row, -3.0, 0.5);
+    // -3 times 0.5 is -1.5.
     for i in 0..N {
         assert_eq!(sums.vector[i], 4.0 - 1.5 * row[i]);
         for j in 0..N {

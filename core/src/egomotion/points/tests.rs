@@ -21,6 +21,7 @@ fn matches(count: usize) -> Vec<Match> {
         |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
     (0..count)
         .map(|index| {
+            // Within the field of view: shares of the depth.
             let z = within(3.0, 30.0);
             let point = [within(-0.6, 0.6) * z, within(-0.25, 0.25) * z, z];
             let seen = |point: [f64; 3]| {
@@ -31,6 +32,7 @@ fn matches(count: usize) -> Vec<Match> {
             };
             let ([previous_left, previous_right], [mut current_left, mut current_right]) =
                 (seen(point), seen(motion().transform_point(point)));
+            // Off in one coordinate alone, each of the four in turn.
             if index % 3 == 0 {
                 let off = within(-6.0, 6.0) as f32;
                 let [left_u, left_v] = &mut current_left;
@@ -108,6 +110,7 @@ fn a_match_is_a_point_before_and_two_observations_now() {
 fn points_without_depth_are_left_out_and_the_others_keep_numbers() {
     with_points(5, |points, matches| {
         let mut some = Vec::from(matches);
+        // No disparity, not a number, and infinite.
         some[0].previous_right = some[0].previous_left;
         some[2].current_left[1] = f32::NAN;
         some[3].current_right[0] = f32::INFINITY;
@@ -116,6 +119,7 @@ fn points_without_depth_are_left_out_and_the_others_keep_numbers() {
             (5, 2),
             "a fill forgets the one before"
         );
+        // The sources of the two that are left.
         assert_eq!([0, 1].map(|index| points.source(index)), [Some(1), Some(4)]);
         let many = [some[1]; MATCHES + 9];
         assert_eq!(
@@ -129,6 +133,7 @@ fn points_without_depth_are_left_out_and_the_others_keep_numbers() {
 #[test]
 fn scores_and_selections_are_the_points_within_the_distance() {
     with_points(MATCHES, |points, _| {
+        // A motion that is nearly right, so that fewer are within the distance.
         let nearly = motion() * Transform::new([0.0, 0.002, 0.0], [0.01, 0.0, 0.005]);
         for (motion, px) in
             [(motion(), 0.5), (motion(), 2.0), (motion(), 4.0), (nearly, 2.0), (nearly, 4.0)]
@@ -140,11 +145,13 @@ fn scores_and_selections_are_the_points_within_the_distance() {
             let count = points.select(&motion, &RIG, px as f32, &mut inliers);
             assert_eq!(inliers[..count], expected);
             assert_eq!(
+                // A list too short for all keeps the first ones.
                 points.select(&motion, &RIG, px as f32, &mut inliers[..7]),
                 7,
                 "no more than fit"
             );
         }
+        // Moved back by more than the farthest point's depth.
         let behind = Transform::from_translation([0.0, 0.0, -31.0]);
         assert_eq!(points.score(&behind, &RIG, 1e6, 0), 0, "points behind the camera are nowhere");
     });

@@ -92,7 +92,9 @@ fn the_time_of_frames_without_matches_counts_in_the_motion_over_them() {
         (estimator(&mut slab), Egomotion::default(), Random::new(5));
     let config = EgomotionConfig::default();
     camera.step(&config, &RIG, at_10_hz(&matches(60, 0, &motion(), &mut random)), &mut estimator);
+    // A frame without matches, of a tenth of a second.
     camera.hold(0.1);
+    // The next matches span both frames.
     let over_two = matches(60, 30, &(motion() * motion()), &mut random);
     let estimate = camera.step(&config, &RIG, at_10_hz(&over_two), &mut estimator);
     assert_eq!(
@@ -121,6 +123,7 @@ fn after_one_frame(then: &Transform, outliers: usize) -> (MotionEstimate, Egomot
 
 #[test]
 fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
+    // A metre back within a frame is more than the acceleration allows.
     let leap = motion() * Transform::from_translation([0.0, 0.0, -1.0]);
     let (estimate, camera) = after_one_frame(&leap, 30);
     assert_eq!(
@@ -134,6 +137,7 @@ fn a_leap_is_believed_of_many_matches_that_agree_and_not_of_few() {
         MotionStatus::Estimated,
         "half of the matches are enough for what was expected"
     );
+    // Of 60 matches 50 are outliers: too few are left.
     assert_eq!(after_one_frame(&motion(), 50).0.status, MotionStatus::TooFewInliers);
 }
 

@@ -95,6 +95,7 @@ fn a_motion_is_doubted_where_few_matches_agree_on_what_cannot_be() {
 
 #[test]
 fn what_few_matches_leave_open_is_doubted_after_a_gap_alone() {
+    // 5 cm ahead with a deviation of 25 cm says nothing about synchrony.
     let open = MotionEstimate {
         right_ahead: Some(RightAhead { distance_m: 0.05, sigma_m: 0.25 }),
         ..estimated(40)
@@ -152,6 +153,7 @@ fn a_held_camera_expects_the_way_since_its_reference_and_one_frame_more() {
     assert!(is_near(&camera.expected(), &turn));
     for frames in 1..MAX_REFERENCE_FRAMES {
         camera.hold(0.1);
+        // One motion for each frame held, and one for the next.
         let whole = (0..=frames).fold(Transform::IDENTITY, |way, _| turn * way);
         assert!(is_near(&camera.expected(), &whole), "after {frames} frames");
         assert_eq!((camera.since_reference(), camera.extrapolated_frames()), (frames, frames));
@@ -162,6 +164,7 @@ fn a_held_camera_expects_the_way_since_its_reference_and_one_frame_more() {
                 && is_near(&camera.t_world_reference, &Transform::IDENTITY)
         );
     }
+    // One frame more than a reference is kept.
     camera.hold(0.1);
     assert!(
         camera.is_lost() && is_near(&camera.expected(), &turn),
@@ -180,6 +183,7 @@ fn a_given_pose_tells_the_motion_and_ends_what_was_held() {
         (*camera.t_world_camera(), Transform::new([0.0, 0.3, 0.0], [2.0, 0.0, 5.0]));
     camera.set_pose(&pose);
     assert!(is_near(camera.t_world_camera(), &pose) && is_near(&camera.t_world_reference, &pose));
+    // The motion told is that between the two poses.
     assert!(is_near(&(before * camera.t_current_previous().inverse()), &pose));
     assert_eq!((camera.extrapolated_frames(), camera.motion_s), (0, 0.0));
     camera.advance(Some(ahead(-0.5)));
@@ -193,6 +197,7 @@ fn a_given_pose_tells_the_motion_and_ends_what_was_held() {
 
 #[test]
 fn every_field_and_every_figure_of_the_estimate_is_in_the_digest() {
+    // A change of each field, which must change the digest.
     let fields: [fn(&mut Egomotion); 11] = [
         |camera| camera.t_world_camera.translation_m[2] += 1.0,
         |camera| camera.t_world_reference.translation_m[2] += 1.0,
@@ -227,5 +232,6 @@ fn every_field_and_every_figure_of_the_estimate_is_in_the_digest() {
     }
     digests.sort_unstable();
     digests.dedup();
+    // 17 changes, and the two unchanged ones.
     assert_eq!(digests.len(), 19, "each has its own");
 }

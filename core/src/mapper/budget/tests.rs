@@ -35,6 +35,7 @@ fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
             match solve(bytes, image, &options) {
                 Ok(capacity) => {
                     assert!(
+                        // No more than the budget, and at most 3 % left unused.
                         capacity.bytes() <= bytes && capacity.bytes() * 100 >= bytes * 97,
                         "{mib} MiB, {image:?}: {}",
                         capacity.bytes()
@@ -45,6 +46,7 @@ fn budgets_are_filled_and_never_exceeded_or_the_least_is_named() {
                 }
                 Err(BudgetError::TooSmall { least }) => {
                     assert!(least > bytes && mib < 256, "{mib} MiB, {image:?}");
+                    // The least works, and one byte less does not.
                     assert!(
                         solve(least, image, &options).is_ok()
                             && solve(least - 1, image, &options).is_err()
@@ -62,6 +64,7 @@ fn any_budget_is_kept_or_refused_with_the_least_that_works() {
     let mut random = Random::new(5);
     let mut answered = 0;
     for at in 0..10_000 {
+        // From 1 MiB to 2 GiB, as likely in each power of two.
         let exponent = 20 + random.below(11);
         let bytes = (1usize << exponent) + random.below(1 << exponent) as usize;
         let image = (64 + random.below(2_000) as usize, 32 + random.below(1_200) as usize);
@@ -141,6 +144,7 @@ fn the_profiles_are_valid_and_what_cannot_be_is_named() {
     );
     assert_eq!(
         solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }),
+        // A budget without limit still gives a capacity within its own limits.
         Err(BudgetError::VoxelSize)
     );
     assert!(matches!(solve(0, (640, 480), &plain), Err(BudgetError::TooSmall { .. })));

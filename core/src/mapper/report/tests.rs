@@ -80,6 +80,7 @@ fn what_was_made_good_within_the_frame_is_recovered() {
     for (at, counter) in counters.iter().enumerate() {
         assert_eq!(severity_of(|report| *counter(report) = 1), Severity::Recovered, "counter {at}");
     }
+    // Powers of two: each counter adds its own bit to the sum.
     let mut all = Report::default();
     for (at, counter) in counters.iter().enumerate().take(4) {
         *counter(&mut all) = 1 << at;
@@ -101,6 +102,7 @@ fn a_rig_that_is_off_recovers_if_corrected_and_affects_the_map_if_not() {
             }
         })
     };
+    // Which way the rig is off does not matter.
     for sign in [1.0, -1.0] {
         for (offset_px, corrected, expected) in [
             (0.3, true, Severity::Info),

@@ -26,6 +26,7 @@ fn all_differ<E: Error>(errors: &[E]) -> Vec<std::string::String> {
 
 #[test]
 fn a_refused_frame_is_told_what_is_wrong_with_it() {
+    // A text for each variant, none of them twice.
     let texts = all_differ(&[
         StepError::SizesDiffer,
         StepError::TooLarge { width: 641, height: 193 },
@@ -52,6 +53,7 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
 
 #[test]
 fn a_snapshot_that_is_refused_says_why() {
+    // What the slab says is handed on word for word.
     let slab = SlabError::TooSmall { missing: 72 };
     let texts = all_differ(&[
         RestoreError::New(NewError::Slab(slab)),

@@ -26,10 +26,12 @@ fn named_by(
             ..mapper.digests(last.egomotion.as_ref())
         })
     };
+    // Digests are computed from the state, so that a change in it shows without a step.
     assert_eq!(digests(mapper), last.digests, "nothing changes by itself");
     change(mapper);
     let after = digests(mapper);
     let named = last.digests.first_difference(&after);
+    // The whole digest differs where a stage does, but for the input.
     if named != Some(Digested::Input) {
         assert_eq!(named.is_some(), last.digests.whole(last.frame) != after.whole(last.frame));
     }
@@ -41,6 +43,7 @@ fn a_bit_of_a_voxel_of_the_background() {
     let walk = Walk::new(FRAMES);
     with_mapper(&walk, FRAMES, |mapper, reports| {
         let slot = mapper.static_map.volume.visible().slots()[0];
+        // 16 bits of the distance and 8 of the weight; the first voxel, the last, and one between.
         for bit in 0..24 {
             for voxel in [0, 77, 511] {
                 let flip =
@@ -50,6 +53,7 @@ fn a_bit_of_a_voxel_of_the_background() {
                     Some(Digested::StaticMap),
                     "voxel {voxel}, bit {bit}"
                 );
+                // The same flip undoes itself.
                 flip(mapper);
             }
         }

@@ -31,6 +31,7 @@ fn a_window_changes_no_digest_and_without_one_nothing_is_planned() {
     let walk = Walk::new(FRAMES);
     let digests =
         |reports: &[Report]| reports.iter().map(|report| report.digest).collect::<Vec<_>>();
+    // A window is planned from the map, and the map must not know.
     let with = mapped(&WITH_WINDOW, &walk, |mapper, reports| {
         let report = mapper.update_planning_maps(0.0);
         assert!(report.occupied > 50 && report.free > 50, "{report:?}");
@@ -64,6 +65,7 @@ fn asking_for_a_plan_changes_no_later_frame() {
     let walk = Walk::new(FRAMES + 1);
     let asked = mapped(&WITH_WINDOW, &walk, |mapper, _| {
         mapper.update_planning_maps(0.0);
+        // A plan for three seconds ahead leaves predicted boxes behind in the window.
         mapper.plan_ahead(3.0);
         let report = walk.step(FRAMES, mapper);
         mapper.update_planning_maps(0.0);

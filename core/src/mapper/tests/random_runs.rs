@@ -102,6 +102,7 @@ impl Coverage {
     }
 
     fn least(&self) -> u32 {
+        // By name, so that a new counter must be listed.
         let Self {
             measured,
             objects,
@@ -125,6 +126,7 @@ fn a_thousand_runs_resumed_anywhere_equal_those_that_never_stopped() {
     let mut slab = vec![0u8; SMALL.bytes() + SLAB_ALIGN];
     for seed in 0..RUNS {
         let (frames, config) = (run(seed), config(seed));
+        // Before any frame but the first.
         let stop = 1 + Random::new(seed ^ 0x5EED).below(FRAMES as u32 - 1) as usize;
         let mut mapper = Mapper::new(&SMALL, &config, &mut slab).unwrap();
         for frame in &frames[..stop] {
@@ -133,6 +135,7 @@ fn a_thousand_runs_resumed_anywhere_equal_those_that_never_stopped() {
         }
         let bytes = saved(&mut mapper);
         let expected: Vec<Report> =
+            // The same mapper goes on: what it does is what a resumed one must do.
             frames[stop..].iter().map(|frame| step(&mut mapper, frame)).collect();
         let end = saved(&mut mapper);
         let resumed = restored(&SMALL, &config, &bytes, |mapper| {
@@ -149,11 +152,13 @@ fn a_thousand_runs_resumed_anywhere_equal_those_that_never_stopped() {
             }
             saved(mapper)
         });
+        // To the byte, which covers state that no digest has.
         assert!(
             resumed.unwrap() == end,
             "run {seed} stopped before {stop}: the states at the end differ"
         );
     }
     println!("{RUNS} runs: {coverage:?}");
+    // Each situation must have come up in many of the runs.
     assert!(coverage.least() >= 80, "{coverage:?}");
 }

@@ -19,6 +19,7 @@ fn config(focal_px: Option<f64>) -> Config {
     };
     let lens = Lens::new([RIG.focal_px; 2], [RIG.center_u_px, RIG.center_v_px], model).unwrap();
     let camera = RawCamera { lens, width: WIDTH as u32, height: HEIGHT as u32 };
+    // The right camera is rolled by 4 mrad.
     let (sine, cosine) = (0.004f64.sin(), 0.004f64.cos());
     let raw = RawRig {
         left: camera,
@@ -44,11 +45,13 @@ fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
         assert!(mapper.rectifier.invalid().is_none());
         let step = |at| {
             let report = walk.step(at, mapper);
+            // What the rectifier made of each pair, to be given to a mapper that does not rectify.
             rectified.push(mapper.rectified_pair().unwrap().map(|image| image.pixels().to_vec()));
             report
         };
         (0..4).map(step).collect()
     });
+    // Its twin gets the rectified pictures.
     let ready = Walk { pairs: rectified, ..walk };
     let plain = Config { rectification: None, ..config };
     let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
@@ -78,6 +81,7 @@ fn every_profile_has_regions_left_for_raw_pairs() {
 
 #[test]
 fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
+    // A shorter focal length: the rectified image reaches beyond the raw one.
     let (walk, config) = (Walk::new(3), config(Some(0.7 * RIG.focal_px)));
     with_raw_mapper(&config, |mapper| {
         let mut valid = 0;
@@ -92,6 +96,7 @@ fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
             let shows = |invalid: &InvalidPixels<'_>, at: [f32; 2]| {
                 !invalid.contains(at[0] as usize, at[1] as usize)
             };
+            // Matches of both images, each with its own invalid pixels.
             assert!(mapper.scene_flow.sparse().iter().all(|m| shows(
                 &invalid.left,
                 m.current_left
@@ -106,6 +111,7 @@ fn pixels_that_show_nothing_have_neither_disparity_nor_match() {
 
 #[test]
 fn a_raw_mapper_goes_on_from_its_snapshot_and_refuses_other_sizes() {
+    // With invalid pixels, which a restored mapper must know again.
     let (walk, config) = (Walk::new(4), config(Some(0.7 * RIG.focal_px)));
     let mut saved = Vec::new();
     let next = with_raw_mapper(&config, |mapper| {
@@ -131,10 +137,12 @@ fn a_raw_mapper_goes_on_from_its_snapshot_and_refuses_other_sizes() {
     let restored = walk.step(3, &mut mapper);
     assert_eq!((restored.digest, restored.digests), (next.digest, next.digests));
 
+    // Another size than the calibration's.
     let small = vec![0u8; 100 * 80];
     let small = View::new(&small, 100, 80).unwrap();
     let refused = mapper.step(&StereoFrame::pair(small, small), &Serial);
     assert_eq!(refused.unwrap_err(), StepError::RawSizeDiffers { width: WIDTH, height: HEIGHT });
+    // A capacity without raw images cannot rectify.
     let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
     let refused = Mapper::new(&CAPACITY, &config, &mut slab).unwrap_err();
     assert_eq!(

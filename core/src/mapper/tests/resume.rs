@@ -31,6 +31,7 @@ pub(super) fn restored<R>(
     bytes: &[u8],
     go_on: impl FnOnce(&mut Mapper<'_>) -> R,
 ) -> Result<R, RestoreError<Ended>> {
+    // Not zeros: a restored mapper must not rely on a fresh slab.
     let mut slab = vec![0xA5u8; capacity.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut rest = bytes;
@@ -70,6 +71,7 @@ fn a_run_resumed_anywhere_has_the_digests_of_one_that_never_stopped() {
         let (reports, snapshots) = uninterrupted(&walk, &capacity, |_| true);
         let last = reports.last().unwrap();
         assert!(last.objects.objects == 1 && last.prune.visited > 0, "{last:?}");
+        // Blocks that left the map or were never made.
         let left: u32 = reports
             .iter()
             .map(|report| report.allocate.eviction.lost + report.allocate.refused)
@@ -80,6 +82,7 @@ fn a_run_resumed_anywhere_has_the_digests_of_one_that_never_stopped() {
             "the pool is too small where it should be: {:?}",
             last.blocks
         );
+        // Each frame is a place to stop.
         for (at, bytes) in &snapshots {
             let went_on: Vec<Report> = restored(&capacity, &Walk::config(), bytes, |mapper| {
                 (*at..FRAMES).map(|at| walk.step(at, mapper)).collect()
@@ -104,8 +107,10 @@ fn a_run_resumed_anywhere_has_the_digests_of_one_that_never_stopped() {
 
 #[test]
 fn a_small_track_stays_small_when_resumed_and_missed() {
+    // The car is seen three times, and missed twice.
     const SEEN: usize = 3;
     let walk = Walk::new(SEEN + 2);
+    // Too small to be reconstructed: it is tracked only.
     let small = Detection {
         left: 250,
         top: 60,
@@ -191,12 +196,14 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
     let refusal = |capacity: &Capacity, config: &Config, bytes: &[u8]| {
         restored(capacity, config, bytes, |_| ()).unwrap_err()
     };
+    // The magic begins at byte 0, the version at byte 8.
     let with = |at: usize, byte: u8| {
         let mut changed = bytes.clone();
         changed[at] = byte;
         refusal(&CAPACITY, &Walk::config(), &changed)
     };
     assert_eq!(with(0, b'x'), RestoreError::Foreign);
+    // Snapshots of the version before cannot be read.
     let previous = snapshot::VERSION - 1;
     assert_eq!(with(8, previous as u8), RestoreError::Version(previous));
     assert_eq!(
@@ -204,6 +211,7 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
         RestoreError::Capacity
     );
     let mut other = Walk::config();
+    // Digests of settings are of their bits.
     other.egomotion.confidence = f64::from_bits(other.egomotion.confidence.to_bits() + 1);
     assert_eq!(
         refusal(&CAPACITY, &other, &bytes),
@@ -211,6 +219,7 @@ fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
         "one last bit of one setting"
     );
     assert_eq!(refusal(&CAPACITY, &Walk::config(), &[]), RestoreError::Source(Ended));
+    // Within the head, the settings and the state.
     for len in [7, 20, 40, bytes.len() / 2, bytes.len() - 1] {
         assert_eq!(
             refusal(&CAPACITY, &Walk::config(), &bytes[..len]),
@@ -256,6 +265,7 @@ impl Window {
     /// The snapshot behind so many frames, and what came of the last.
     fn snapshot(frames: usize) -> (Vec<u8>, Report) {
         let (walk, [width, height]) = (Walk::new(frames), Self::SIZE);
+        // A part of the walk's pictures, so that the snapshot stays small.
         let of = |pixels: &[u8]| -> Vec<u8> {
             let rows = pixels.chunks(WIDTH).skip(Self::AT[1]).take(height);
             rows.flat_map(|row| &row[Self::AT[0]..Self::AT[0] + width]).copied().collect()
@@ -277,6 +287,7 @@ impl Window {
             let [left, right] = walk.pairs[at].each_ref().map(|pixels| of(pixels));
             let [left, right] =
                 [&left, &right].map(|pixels| View::new(pixels, width, height).unwrap());
+            // Given poses: the part is too small to estimate any.
             let pose = Transform::new(
                 Vector3::new(0.0, 0.01 * at as f64, 0.0),
                 Vector3::new(0.02, 0.0, 0.15) * at as f64,

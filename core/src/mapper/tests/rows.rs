@@ -16,6 +16,7 @@ fn turned(image: &[u8], angle_rad: f32) -> Vec<u8> {
     let [middle_u, middle_v] = [WIDTH, HEIGHT].map(|side| side as f32 / 2.0);
     let source = |at: usize| {
         let (u, v) = ((at % WIDTH) as f32, (at / WIDTH) as f32);
+        // For small angles the sine is the angle and the cosine 1.
         let column = clamp_f32(u - angle_rad * (v - middle_v), 0.0, (WIDTH - 1) as f32);
         let row = clamp_f32(v + angle_rad * (u - middle_u), 0.0, (HEIGHT - 1) as f32);
         let along = |row: usize| {

@@ -48,6 +48,7 @@ fn shifted(picture: &Grey, by_px: f64) -> Grey {
     let (width, height) = (*width, *height);
     let whole = (-by_px).floor();
     let t = -by_px - whole;
+    // The weights of Catmull and Rom, by the fraction.
     let weights = [
         -0.5 * t + t * t - 0.5 * t * t * t,
         1.0 - 2.5 * t * t + 1.5 * t * t * t,
@@ -104,10 +105,12 @@ fn driven(by_px: f64) -> (SelfCalibrationReport, f64) {
 #[test]
 fn an_offset_planted_in_real_pictures_is_found() {
     let (own, way_m) = driven(0.0);
+    // In both directions: an offset of one sign could be a bias of the search.
     for planted in [-0.7, 0.7] {
         let (found, planted_way_m) = driven(planted);
         println!("{planted}: {found:?}; {planted_way_m} m for {way_m} m");
         assert!(
+            // The recording has an offset of its own, to which the planted one adds.
             (found.offset_px - own.offset_px - planted).abs() < 0.05,
             "{planted}: {found:?}, {own:?}"
         );

@@ -18,6 +18,7 @@ struct Field {
 /// All fields that have keys; the calibration has none.
 fn fields(config: &Config) -> Vec<Field> {
     let (mut path, mut found) = (Vec::<String>::new(), Vec::new());
+    // From the printed fields, so that none can be forgotten here.
     for (line, text) in format!("{config:#?}").lines().enumerate() {
         let text = text.trim().trim_end_matches(',');
         if let Some(struct_name) = text.strip_suffix(" {") {
@@ -119,6 +120,7 @@ fn a_choice_takes_each_of_its_names_and_no_other() {
 #[test]
 fn what_is_no_key_or_no_value_changes_nothing() {
     let base = Walk::config();
+    // The configuration must be the same after a refusal, in every field.
     let refusal = |key: &str, value: &str| {
         let mut config = base;
         let refused = config.set(key, value).unwrap_err();
@@ -139,11 +141,13 @@ fn what_is_no_key_or_no_value_changes_nothing() {
     ] {
         assert_eq!(refusal(key, "1"), SetError::Key, "{key}");
     }
+    // Values that suit no kind of setting.
     for Field { key, value, .. } in fields(&base) {
         for text in ["", "x", "1 2", "1,"] {
             assert_eq!(refusal(&key, text), SetError::Value, "{key} = {text} (now {value})");
         }
     }
+    // Too few, too many, too large, too small, and none.
     for (count, last) in [
         (2, "1"),
         (CLASS_COUNT - 1, "1"),
@@ -166,6 +170,7 @@ fn no_setting_may_be_less_than_nothing_or_no_number() {
         fields(&base).into_iter().filter(|field| field.value.parse::<f64>().is_ok())
     {
         let mut config = base;
+        // Settings that take a number which is none must be found by validation.
         if config.set(&key, "NaN").is_ok() {
             checked += 1;
             let problems = config.validate();
@@ -185,6 +190,7 @@ fn problems_beyond_the_list_are_dropped_and_the_first_ones_kept() {
     let (mut config, base) = (Walk::config(), Walk::config());
     for Field { key, .. } in fields(&base) {
         let _ = config.set(&key, "NaN");
+        // NaN where that is a problem, else 0.
         if config.validate().len() < MAX_PROBLEMS {
             let _ = config.set(&key, "0");
         }

@@ -6,6 +6,7 @@ use crate::{planning::distance::DistanceField, random::Random};
 /// Squared distance to the nearest cell of the other kind, and which: the one with the lowest z,
 /// then x, then y.
 fn by_search(is_obstacle: &[u8], [width, length, height]: [usize; 3]) -> Vec<Option<(u32, usize)>> {
+    // The order of cells in memory differs from the order of the search.
     let at = |[x, y, z]: [usize; 3]| (y * width + x) * height + z;
     let all = || {
         (0..height)
@@ -17,6 +18,7 @@ fn by_search(is_obstacle: &[u8], [width, length, height]: [usize; 3]) -> Vec<Opt
             let squared =
                 cell.iter().zip(other).map(|(a, b)| (a.abs_diff(b) as u32).pow(2)).sum::<u32>();
             let entry = &mut found[at(cell)];
+            // Only a nearer one replaces the first.
             if entry.is_none_or(|(least, _)| squared < least) {
                 *entry = Some((squared, at(other)));
             }

@@ -26,10 +26,12 @@ fn a_ray_ends_at_the_first_surface_or_where_nothing_was_seen() {
     let ray = |from: [f64; 3], direction: [f64; 3], far_m: f64| {
         scene.planning.ray(&scene.volume, from, direction, far_m)
     };
+    // A direction of any length; distances are in metres.
     let wall = ray([-1.0, 0.0, 2.0], [0.0, 0.0, 3.0], 20.0);
     assert_eq!(wall.end, PathEnd::Surface);
     assert!((wall.free_m - 6.0).abs() < 0.05, "{wall:?}");
     assert_eq!(
+        // The wall is farther than what is asked for.
         ray([-1.0, 0.0, 2.0], [0.0, 0.0, 1.0], 3.0),
         FreePath { end: PathEnd::Free, free_m: 3.0 }
     );

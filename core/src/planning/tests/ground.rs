@@ -11,6 +11,7 @@ fn heights(
     let mut errors = Vec::new();
     for z in depths {
         for x in -10..10 {
+            // The middle of a column.
             let (x, z) = (0.2 * f64::from(x) + 0.1, 0.2 * f64::from(z) + 0.1);
             let cell = scene.cell_of([x, 0.0, z]);
             if let Some(height_m) = scene.planning.column(cell).and_then(|column| column.ground_m())
@@ -94,6 +95,7 @@ fn a_car_is_not_ground() {
     let street = |camera: [f64; 3], ray: [f64; 3]| {
         nearest([
             ground(1.5, 0.0)(camera, ray),
+            // A car, 0.9 m high.
             solid([-1.0, 0.6, 5.0], [0.8, 1.5, 8.0])(camera, ray),
         ])
     };

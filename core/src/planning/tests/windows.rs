@@ -49,14 +49,17 @@ fn sees_a_wall_a_thin_pole_free_space_before_them_and_nothing_behind() {
     }
     scene.planning.update(&scene.volume);
     let state = |point: [f64; 3]| scene.planning.cell(scene.cell_of(point)).0;
+    // Its column is occupied although most rays pass the pole.
     assert_eq!(state([1.05, 0.0, 4.01]), CellState::Occupied, "a pole thinner than a cell");
     let along = |z: f64| state([-1.0, -0.3, z]);
     assert!([2.0, 4.0, 6.0, 7.0].into_iter().all(|z| along(z) == CellState::Free));
+    // The wall's surface lies within one of these cells.
     assert!((75..85).map(|z| along(f64::from(z) / 10.0)).any(|state| state == CellState::Occupied));
     assert_eq!([along(9.5), along(11.0)], [CellState::Unknown; 2], "behind the wall");
     assert_eq!(state([1.0, 0.0, -2.0]), CellState::Unknown, "behind the camera");
     assert_eq!(scene.planning.slice_state(scene.cell_of([-1.0, 0.0, 6.0])), CellState::Free);
     assert_eq!(scene.planning.slice_state(scene.cell_of([1.05, 0.0, 4.01])), CellState::Occupied);
+    // A metre, give or take the size of cells.
     let near = scene.planning.slice_distance(scene.cell_of([1.05, 0.0, 3.01])).unwrap();
     assert!((0.79..1.01).contains(&near.distance_m), "a metre before the pole: {near:?}");
 }
@@ -67,6 +70,7 @@ fn ages_count_frames_since_the_last_look() {
     let ahead = [0.0, 0.0, 4.0];
     scene.observe(at(0.0, 0.0), wall_and_pole);
     assert_eq!(scene.planning.cell(scene.cell_of(ahead)), (CellState::Free, Some(0)));
+    // Frames without depth only let time pass.
     for _ in 0..3 {
         scene.observe(at(0.0, 0.0), |_, _| None);
     }
@@ -85,6 +89,7 @@ fn ages_stay_exact_when_stamps_are_lowered() {
     let mut cells = Cells::new_in(&CAPACITY, &mut carver);
     cells.advance();
     cells.observed_at[7] = cells.now();
+    // More frames than lead to lowered stamps.
     for _ in 0..30_000 {
         cells.advance();
     }
@@ -93,6 +98,7 @@ fn ages_stay_exact_when_stamps_are_lowered() {
         cells.advance();
     }
     assert_eq!(
+        // The older of the two has lost its exact age.
         cells.age(cells.observed_at[8]),
         40_000.min(cells.age(1)),
         "an age too large for its stamp is the largest there is"

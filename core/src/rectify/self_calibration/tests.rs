@@ -71,6 +71,7 @@ fn driven(
     let (mut random, mut calibration) = (Random::new(11), SelfCalibration::new(config));
     let motion = Transform::new(motion.turn, motion.way_m);
     for _ in 0..frames {
+        // What is applied changes from frame to frame, and the next frame is seen through it.
         let correction = calibration.applied.for_rig(&RIG);
         let corrected = |seen: StereoObservation| {
             let [column, _] = correction.corrected(pixel(&seen));
@@ -180,6 +181,7 @@ fn a_run_begins_where_another_ended() {
 fn observations_that_make_no_sense_change_nothing() {
     let motion = Transform::new(DRIVING.turn, DRIVING.way_m);
     let mut calibration = SelfCalibration::new(&RigConfig::default());
+    // As a mismatch or a broken calibration may give them.
     let bad = [f64::NAN, f64::INFINITY, -1e300, 1e300].map(|value| {
         let seen = StereoObservation { u_left_px: value, v_px: value, u_right_px: 3.0 };
         [seen, seen]
@@ -189,6 +191,7 @@ fn observations_that_make_no_sense_change_nothing() {
     assert_eq!(calibration.report().frames, 0);
     let mut random = Random::new(1);
     let good = street(&offset(0.5), &motion, FAR_M, &mut random);
+    // A frame of bad and good observations must give what the good ones alone give.
     let mut mixed = calibration.clone();
     calibration.update(&RIG, good.clone(), &motion);
     mixed.update(&RIG, good.into_iter().chain(bad), &motion);
@@ -206,6 +209,7 @@ fn settings_out_of_range_are_named() {
     let mut problems = crate::settings::Problems::new();
     RigConfig::default().validate(&mut problems);
     assert!(problems.is_empty());
+    // Beyond the limits on both sides, and not a number.
     let wrong = DisparityCorrection {
         offset_px: 6.0,
         slope_px: f64::NAN,

@@ -14,6 +14,7 @@ fn scatter<'s>(
     count: usize,
 ) -> (Features<'s>, Vec<Candidate>) {
     let mut features = features_for(carver, count);
+    // Random gradients, so that descriptors are hardly ever alike.
     let gradient: Vec<u16> = (0..WIDTH * HEIGHT).map(|_| random.next_u32() as u16).collect();
     let position = |random: &mut Random| Candidate {
         u: 8 + random.below(WIDTH as u32 - 16) as u16,
@@ -172,9 +173,11 @@ fn each_cell_gives_its_best_few() {
     let mut slab = slab();
     let mut cells = Cells::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let matches = crowd();
+    // A permutation of the scores, since 37 and 60 have no common factor.
     let score: Vec<f32> = (0..matches.len()).map(|i| (i * 37 % 60) as f32).collect();
     let shape = Shape::new(WIDTH, HEIGHT, 50);
     let mut selection = [0; 100];
+    // Two for each cell, by search over all.
     let selected =
         select(Scored { matches: &matches, score: &score }, shape, 2, &mut cells, &mut selection);
     let mut expected = Vec::new();

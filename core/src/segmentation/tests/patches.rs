@@ -30,6 +30,7 @@ impl World {
             let [car_x, car_z] =
                 number.checked_sub(1).map_or([0.0; 2], |car| self.cars[car].at_frame(frame));
             test_scene::grey(Point3::new(
+                // Textures are fixed to the ground and to each car, and each car has its own.
                 x - car_x,
                 y,
                 z + self.camera_z(frame) - car_z + 20.0 * number as f64,
@@ -76,6 +77,7 @@ fn patches_find_a_car_with_few_matches_and_no_parked_one() {
 fn a_supposed_car_is_found_only_where_the_images_show_its_motion() {
     let overtaking = World { cars: vec![OVERTAKING], step_m: 0.8, noise_px: 0.1 };
     let parked = World { cars: vec![Car { motion: [0.0; 2], ..OVERTAKING }], ..overtaking };
+    // The extent is where the car is in this frame.
     for (world, extent_z_m, moves) in [(overtaking, 9.6, true), (parked, 8.2, false)] {
         with_matcher(|matcher| {
             for frame in 0..2 {
@@ -95,6 +97,7 @@ fn a_supposed_car_is_found_only_where_the_images_show_its_motion() {
             let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
             let (mut members, mut values) =
                 (vec![Candidate::default(); MAX_PATCHES], vec![0.0; MAX_CANDIDATES]);
+            // The space about the car, 20 cm deep.
             let extent = extent::Extent {
                 low: [1.8, 0.4, extent_z_m - 0.1],
                 high: [3.2, 1.4, extent_z_m + 0.1],
@@ -116,6 +119,7 @@ fn a_supposed_car_is_found_only_where_the_images_show_its_motion() {
                     moves,
                     "of a car that moves: {moves}, known: {known}"
                 );
+                // The search must not find what was only supposed.
                 assert!(
                     !is_found([1.4, 0.0, 0.0], known),
                     "of a car that does not move to the side, known: {known}"

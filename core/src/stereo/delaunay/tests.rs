@@ -43,17 +43,20 @@ fn hull_area(points: &[SupportPoint]) -> i64 {
     let half_hull = |points: &mut dyn Iterator<Item = SupportPoint>| {
         let mut hull: Vec<SupportPoint> = vec![];
         for p in points {
+            // Points that turn right or lie straight on are not of the hull.
             while hull.len() >= 2 && orientation(hull[hull.len() - 2], hull[hull.len() - 1], p) <= 0
             {
                 hull.pop();
             }
             hull.push(p);
         }
+        // The last point begins the other half.
         hull.pop();
         hull
     };
     let mut hull = half_hull(&mut points.iter().copied());
     hull.extend(half_hull(&mut points.iter().rev().copied()));
+    // By a fan of triangles from the first point.
     (1..hull.len().saturating_sub(1)).map(|i| orientation(hull[0], hull[i], hull[i + 1])).sum()
 }
 

@@ -102,6 +102,7 @@ impl Scene {
         let mut rows = [(); 2].map(|()| vec![Descriptor([0; 16]); self.width]);
         for v in MARGIN..self.height - MARGIN {
             for (gradients, row) in matching.gradients.iter().zip(&mut rows) {
+                // All rows within the margin have descriptors.
                 assert!(gradients.describe_row(v, row));
             }
             let best = |left: bool, u: usize| {
@@ -116,6 +117,7 @@ impl Scene {
             for u in 0..self.width {
                 let Some(d) = best(true, u) else { continue };
                 counts[0] += 1;
+                // Back from the right image, to about the same disparity.
                 if best(false, u - d).is_some_and(|back| {
                     back.abs_diff(d) <= usize::from(self.config.consistency_threshold)
                 }) {
@@ -161,7 +163,9 @@ impl Scene {
             let off = d as i32 - i32::from(plane & 255) + cost.radius as i32;
             let near = (0..=2 * cost.radius as i32).contains(&off).then(|| costs[off as usize]);
             let listed = (set[d / 64] >> (d % 64) & 1 == 1).then_some(cost.elsewhere);
+            // The left image's point lies further left in the right image.
             let column = if left { u - d } else { u + d };
+            // Near the plane or in the cell's list, at the lower cost; else no candidate.
             [near, listed]
                 .into_iter()
                 .flatten()
@@ -204,6 +208,7 @@ fn every_vector_level_equals_one_pixel_at_a_time() {
             ..preset
         },
     ];
+    // The least width, and such as are and are not multiples of the lanes.
     for (width, config) in [16, 61, 96, 130, 301, 330].into_iter().zip(configs.into_iter().cycle())
     {
         for _ in 0..4 {

@@ -32,6 +32,7 @@ fn score(estimate: &[u16], truth: &[u16]) -> [f64; 4] {
         .map(|(t, e)| t.abs_diff(*e))
         .collect();
     off.sort_unstable();
+    // 768 in 1/256 px are 3 px.
     let good = off.iter().take_while(|&&o| o <= 768).count();
     let mean = off[..good].iter().map(|&o| f64::from(o)).sum::<f64>() / good as f64 / 256.0;
     [
@@ -87,6 +88,7 @@ fn both_presets_are_as_true_as_published_on_kitti_2012() {
 fn agrees_with_the_published_implementation_where_both_see() {
     let clip =
         |folder: &str, frame: usize| format!("kitti-odometry/sequences/06/{folder}/{frame:06}.png");
+    // At the beginning, in the middle and near the end.
     for frame in [0, 25, 50] {
         let [left, right] = ["image_0", "image_1"].map(|camera| grey(&clip(camera, frame)));
         let published = deep(&clip("disp_elas", frame));

@@ -95,6 +95,7 @@ fn finds_slanted_surfaces_and_their_fractions() {
 
 #[test]
 fn a_right_image_moved_by_five_pixels_moves_the_result_by_five() {
+    // A slanted surface, so that disparities are no whole numbers.
     let truth = |u: f32, v: f32| 20.0 + 0.03 * u + 0.1 * v;
     let (left, right) = surface(400, 120, 3, truth);
     let (_, shifted) = surface(400, 120, 3, |u, v| truth(u, v) + 5.0);
@@ -107,6 +108,7 @@ fn a_right_image_moved_by_five_pixels_moves_the_result_by_five() {
         .map(|(a, b)| i32::from(*b) - i32::from(*a))
         .collect();
     differences.sort_unstable();
+    // At least half of the pixels have an answer in both.
     assert!(differences.len() > 400 * 120 / 2);
     assert!(
         (differences[differences.len() / 2] - 5 * 256).abs() <= 16,

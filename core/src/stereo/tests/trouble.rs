@@ -58,6 +58,7 @@ fn a_matcher_remembers_nothing_of_the_pair_before() {
 
 #[test]
 fn a_black_pair_has_no_support_and_no_disparity() {
+    // Black and white: overexposed is as bad as dark.
     for grey in [0, 255] {
         let (report, disparity) = disparity(
             &StereoConfig::default(),
@@ -71,6 +72,7 @@ fn a_black_pair_has_no_support_and_no_disparity() {
         );
         assert!(disparity.iter().all(|&d| d == 0));
     }
+    // One camera is dark.
     let (report, _) =
         disparity(&StereoConfig::default(), &noise(320, 96, 1), &flat(320, 96, 0), &Serial);
     assert_eq!(report.status, StereoStatus::TooFewSupportPoints);

@@ -80,9 +80,11 @@ fn euler(triangles: &[Triangle]) -> i64 {
 
 #[test]
 fn a_ball_across_many_blocks_becomes_a_closed_sphere_of_its_radius() {
+    // Not at lattice points, and with a radius of two blocks.
     let center = [3.3, -1.7, 5.9];
     let triangles = mesh(&filled([-3; 3], [3; 3], ball(center, 15.2)));
     assert_manifold(&triangles);
+    // A sphere: vertices less edges plus faces are 2.
     assert_eq!(euler(&triangles), 2);
     let mut sum = 0.0;
     for triangle in &triangles {
@@ -90,6 +92,7 @@ fn a_ball_across_many_blocks_becomes_a_closed_sphere_of_its_radius() {
             nalgebra::Vector3::from(v.position_m) / VOXEL_M - nalgebra::Vector3::from(center)
         });
         for corner in corners {
+            // In voxels: linear interpolation of a curved surface is off by a little.
             assert!((corner.norm() - 15.2).abs() < 0.03, "{}", corner.norm());
             sum += corner.norm() - 15.2;
         }
@@ -172,6 +175,7 @@ fn a_minimum_weight_cuts_away_what_was_seen_less_often() {
 #[test]
 fn colour_runs_along_the_edge_and_falls_back_to_the_coloured_end() {
     let volume = filled([0; 3], [0; 3], |p| {
+        // On the far half of x the near points have no colour.
         let colour = if p[2] <= 3 { [100, 0, 20] } else { [200, 0, 40] };
         Some((
             (p[2] as f32 - 3.25) * VOXEL_M,
@@ -192,6 +196,7 @@ fn order_follows_slots_and_two_blocks_agree_on_their_border() {
     let sample_at = ball([8.0, 4.1, 4.2], 2.7);
     let mut there = empty(&VolumeConfig::default(), 2);
     fill(&mut there, cuboid([0; 3], [1, 0, 0]), &sample_at);
+    // Two volumes of the same blocks, made in the other order.
     let mut back = empty(&VolumeConfig::default(), 2);
     fill(&mut back, cuboid([1, 0, 0], [1, 0, 0]).chain(cuboid([0; 3], [0; 3])), &sample_at);
     let (there, back) = (mesh(&there), mesh(&back));
@@ -229,6 +234,7 @@ impl MeshSink for Named {
 
 #[test]
 fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
+    // With and without distances of exactly 0, where vertices fall together.
     for (seed, zeros) in (0..10).flat_map(|seed| [(seed, 0), (seed, 30)]) {
         let (volume, mut named) = (noise(seed, zeros), Named::default());
         let count = volume.mesh(&MeshConfig::default(), |_| true, &mut named);
@@ -238,6 +244,7 @@ fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
         for (triangle, names) in &triangles {
             assert_eq!(triangle.vertices, names.map(|name| vertices[name].0));
         }
+        // In the order of first use.
         let first_uses: Vec<usize> = triangles.iter().flat_map(|(_, names)| names).copied().fold(
             Vec::new(),
             |mut first, name| {
@@ -261,6 +268,7 @@ fn vertices_come_once_in_a_block_and_again_only_where_it_is_said() {
 #[test]
 fn a_vertex_has_the_weight_of_the_nearer_point() {
     let weight = |p: [i32; 3]| if p[2] <= 3 { 10 } else { 20 };
+    // A quarter of the way to the next point, and three quarters.
     for (depth, expected) in [(3.25, 10), (3.75, 20)] {
         let volume = filled([0; 3], [1, 1, 0], |p| {
             Some(((p[2] as f32 - depth) * VOXEL_M, weight(p), [9; 3]))

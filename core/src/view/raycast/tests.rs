@@ -61,6 +61,7 @@ fn errors(
     far_m: f64,
 ) -> (Vec<f64>, f64) {
     let depth = caster.depth_m().unwrap();
+    // The truth comes from the scene itself, pixel by pixel.
     let origin = Point3::from(view.t_world_camera.translation());
     let (mut errors, mut true_hits, mut met) = (Vec::new(), 0.0, 0.0);
     for v in 0..view.height {
@@ -98,6 +99,7 @@ fn mean_of(values: &[f64]) -> f64 {
 
 #[test]
 fn planes_are_hit_at_their_depth_at_any_angle() {
+    // As the map was seen, and from a new place at another angle.
     let poses = [at([0.0; 3], [0.0; 3]), at([0.03, -0.2, 0.05], [0.6, -0.1, 0.3])];
     for (normal, bound) in [
         ([0.0, 0.0, -1.0], 0.01),
@@ -106,6 +108,7 @@ fn planes_are_hit_at_their_depth_at_any_angle() {
         ([0.02, -1.0, -0.15], 0.2),
     ] {
         let plane = Plane::new(normal, [0.1, 0.5, 3.017]);
+        // One map of true distances, and one as a camera at the origin measures them.
         let maps = [
             filled([-9, -7, 0], [9, 7, 12], true_distances(&plane)),
             filled([-9, -7, 0], [9, 7, 12], seen_from_origin(&plane)),
@@ -137,6 +140,7 @@ fn a_ball_is_met_within_a_fraction_of_a_voxel_from_new_poses() {
         let mut caster = raycaster(2_000, &RaycastConfig::default());
         let report = caster.cast(&volume, &view, &Serial).unwrap();
         let (errors, met) = errors(&caster, &view, &ball, 9.0);
+        // Nearly all rays that must meet the ball do.
         assert!(met > 0.99 && report.pixels > 1_000 && report.blocks_left_out == 0);
         assert!(
             median(&errors) < 0.03 && mean_of(&errors).abs() < 0.05,
@@ -164,6 +168,7 @@ fn normals_face_the_camera_and_colour_and_weight_are_those_of_the_surface() {
                 (v as f64 - RIG.center_v_px) / RIG.focal_px,
                 1.0,
             );
+            // The ball's normal where the ray met it, in camera axes.
             let truth =
                 view.t_world_camera.inverse().rotate(ball.normal(
                     view.t_world_camera.transform_point(Point3::from(ray * f64::from(depth))),
@@ -172,6 +177,7 @@ fn normals_face_the_camera_and_colour_and_weight_are_those_of_the_surface() {
                 normal.get(u, v).unwrap().map(|c| f64::from(c) / f64::from(NORMAL_ONE)),
             );
             assert!((seen - truth).norm() < 0.07, "{seen} {truth}");
+            // No surface is seen from behind.
             assert!(seen.dot(&ray) < 0.05);
             assert_eq!(
                 (caster.colour().unwrap().get(u, v), caster.weight().unwrap().get(u, v)),
@@ -186,10 +192,12 @@ fn normals_face_the_camera_and_colour_and_weight_are_those_of_the_surface() {
 fn points_never_seen_do_not_pull_the_surface_to_either_side() {
     let plane = Plane::new([0.5, 0.2, -0.8], [0.0, 0.0, 3.0]);
     let sample_at = true_distances(&plane);
+    // The more is missing, the fewer rays meet the surface; none may meet it elsewhere.
     for (seen_percent, least) in [(97, 0.98), (90, 0.95), (80, 0.85), (60, 0.55)] {
         let mut volume = empty(&VolumeConfig::default(), 5_000);
         fill(&mut volume, cuboid([-9, -7, 0], [9, 7, 12]), |point| {
             let seed =
+                // By the point, and not by the order of points, so that neighbouring blocks agree.
                 point.iter().fold(7u64, |seed, &c| seed.wrapping_mul(8_191).wrapping_add(c as u64));
             sample_at(point).filter(|_| Random::new(seed).below(100) < seen_percent)
         });
@@ -222,6 +230,7 @@ fn a_ray_from_behind_a_surface_or_unseen_space_meets_none() {
 
 #[test]
 fn a_sheet_one_lattice_point_thick_stops_every_ray_at_every_angle() {
+    // Behind the sheet the space is free again.
     let sheet = |point: [i32; 3]| Some((if point[2] == 60 { -0.002 } else { 0.75 }, 1, [0; 3]));
     let volume = filled([-12, -5, 5], [12, 5, 8], sheet);
     for delta in [0.0, 0.5, 1.0] {
@@ -233,6 +242,7 @@ fn a_sheet_one_lattice_point_thick_stops_every_ray_at_every_angle() {
             let world = Transform::new(Vector3::new(0.0, delta, 0.0), Vector3::zeros()).rotate(ray);
             let truth = 1.5 / world.z;
             let x = -4.0 * delta + world.x * truth;
+            // Where the ray meets the sheet within its extent.
             if world.z > 0.1 && x.abs() < 4.5 {
                 let seen = f64::from(depth.get(u, 48).unwrap());
                 assert!(
@@ -249,6 +259,7 @@ fn far_from_the_origin_the_picture_is_the_same() {
     let plane = Plane::new([0.4, 0.0, -0.9], [0.0, 0.0, 3.0]);
     let sample_at = true_distances(&plane);
     let mut pictures = Vec::new();
+    // Coordinates of blocks have 16 bits: nearly as far as they go.
     for shift in [0, 32_000] {
         let mut volume = empty(&VolumeConfig::default(), 5_000);
         let moved = cuboid([-9, -7, 0], [9, 7, 12])
@@ -265,6 +276,7 @@ fn far_from_the_origin_the_picture_is_the_same() {
         pictures.push(caster.depth_m.to_vec());
     }
     assert!(pictures[0].iter().filter(|&&depth| depth > 0.0).count() > 10_000);
+    // In f64 the camera is far away, and rays are relative to it.
     let equal =
         pictures[0].iter().zip(&pictures[1]).filter(|(a, b)| (*a - *b).abs() < 1e-4).count();
     assert!(equal + 5 > pictures[0].len(), "{equal}");
@@ -307,6 +319,7 @@ fn without_space_for_all_blocks_the_range_is_shorter_and_reported() {
     let mut full = raycaster(6_000, &RaycastConfig::default());
     let all = full.cast(&volume, &view, &Serial).unwrap();
     assert_eq!((all.blocks_left_out, all.far_m), (0, 30.0));
+    // Space for half of the blocks.
     let space = all.blocks_in_view as usize / 2;
     let mut small = raycaster(space, &RaycastConfig::default());
     let some = small.cast(&volume, &view, &Serial).unwrap();
@@ -316,6 +329,7 @@ fn without_space_for_all_blocks_the_range_is_shorter_and_reported() {
         "{some:?}"
     );
     assert!(some.pixels > 0 && some.pixels < all.pixels);
+    // What is shown is right: only what is farther is missing.
     for (full, some) in full.depth_m.iter().zip(small.depth_m.iter()) {
         assert!(*some == 0.0 || (full == some && *some <= 4.0));
     }
@@ -326,8 +340,10 @@ fn refuses_unusable_viewpoints_and_shows_no_picture() {
     let volume = empty(&VolumeConfig::default(), 1);
     let mut caster = raycaster(10, &RaycastConfig::default());
     let good = at([0.0; 3], [0.0; 3]);
+    // An empty map is no error, and shows nothing.
     assert_eq!(caster.cast(&volume, &good, &Serial).unwrap().pixels, 0);
     assert!(caster.depth_m().unwrap().rows().flatten().all(|&depth| depth == 0.0));
+    // A pixel too wide, no pixel, and a size that overflows.
     for (width, height) in [(161, 96), (0, 96), (160, 0), (usize::MAX, 2)] {
         assert_eq!(
             caster.cast(&volume, &Viewpoint { width, height, ..good }, &Serial),

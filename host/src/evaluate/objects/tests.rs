@@ -70,6 +70,7 @@ fn errors_of(
         let frame = at as u32;
         let now = truth(frame, moving);
         let before = truth(frame.saturating_sub(1), moving).objects[0].t_world_object;
+        // The motion in the world: the car's own, seen from where it was.
         let motion =
             before * (before.inverse() * now.objects[0].t_world_object * error) * before.inverse();
         let frame = TrackedFrame {
@@ -102,10 +103,13 @@ fn a_state_may_take_five_frames_and_no_more() {
         errors_of(states, moving, &Transform::IDENTITY, &Transform::IDENTITY).tracks()[&1].clone()
     };
     let (m, s) = (true, false);
+    // Five uncertain frames are allowed at the beginning, the sixth is late.
     assert_eq!(of(&[U, U, U, U, U, D, D], &[m; 7]).late_frames, 0);
     assert_eq!(of(&[U, U, U, U, U, U, D], &[m; 7]).late_frames, 1);
+    // A car that starts: the time begins anew.
     let starting = of(&[S, S, S, S, S, S, S, U, D, D], &[s, s, s, s, s, m, m, m, m, m]);
     assert_eq!((starting.late_frames, starting.flips), (0, 0), "{starting:?}");
+    // A static car whose state flickers.
     let flickering = of(&[S, S, S, S, S, S, D, S, U, D], &[s; 10]);
     assert_eq!(
         (flickering.late_frames, flickering.flips, flickering.confusion[0]),
@@ -121,6 +125,7 @@ fn what_overlaps_nothing_true_is_not_compared() {
         ..track(MotionState::Dynamic, Transform::IDENTITY)
     };
     let unseen =
+        // Predicted tracks were not seen in this frame.
         TrackReport { detected: false, ..track(MotionState::Dynamic, Transform::IDENTITY) };
     let frame = TrackedFrame {
         tracks: &[elsewhere, unseen],

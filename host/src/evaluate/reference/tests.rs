@@ -79,6 +79,7 @@ fn pending(frame: usize, hits: &[Hit], masks: &Masks) -> (PendingFrame, Vec<f32>
     let points: Vec<(i32, i32, f64)> =
         hits.iter().map(|&(u, v, true_px, ..)| (u, v, true_px)).collect();
     let scanned = project_scan(&scan(&points), &FIELD);
+    // The input's disparity at the pixels of the points, 0 elsewhere.
     let input = |u: usize, v: usize| {
         hits.iter().find(|hit| (hit.0 as usize, hit.1 as usize) == (u, v)).map_or(0.0, |hit| hit.3)
     };
@@ -210,6 +211,7 @@ fn frames_without_a_compared_point_are_left_out_of_the_means() {
             regions: [counts, Counts::default(), Counts::default()],
         }
     };
+    // Right and wrong, missing, and no point at all.
     let frames = [
         counts(&[[20.0, 20.0, 20.0], [20.0, 20.0, 30.0]]),
         counts(&[[20.0, 20.0, 0.0]]),

@@ -63,7 +63,9 @@ fn both_layouts_are_found_and_a_folder_without_truth_is_told() {
     assert!(
         find_stereo_set(root.path()).unwrap_err().to_string().contains("is not a stereo benchmark")
     );
+    // Names are enough: nothing is read yet.
     touch("training/image_2/000000_10.png");
+    // The second picture of a pair is for scene flow and no pair of its own.
     touch("training/image_2/000000_11.png");
     touch("training/image_3/000000_10.png");
     assert!(find_stereo_set(root.path()).unwrap_err().to_string().contains("disp_noc_0"));
@@ -76,6 +78,7 @@ fn both_layouts_are_found_and_a_folder_without_truth_is_told() {
             && set.pairs[0].truth[1].is_some()
             && set.pairs[0].objects.is_some()
     );
+    // The folder above is taken as well.
     assert_eq!(find_stereo_set(root.path()).unwrap(), set);
     assert!(find_stereo_set(Path::new("/nowhere")).unwrap_err().to_string().contains("no folder"));
 }

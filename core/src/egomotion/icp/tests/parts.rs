@@ -258,6 +258,7 @@ fn only_a_tracked_motion_is_one_to_follow_and_each_status_has_its_name() {
         ]
     );
     assert_eq!(IcpReport::unpaired().motion(), None);
+    // The matches agree, which must not turn a failure into a success.
     let mut off =
         IcpReport { status: IcpStatus::OffTheMap, matches: [0, 100], ..IcpReport::default() };
     off.check_matches();

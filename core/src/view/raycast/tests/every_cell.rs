@@ -8,6 +8,7 @@ use crate::geometry::scalar::max_f32;
 fn root(ends: [[f32; 3]; 2], field: &Field, first: f32, last: f32) -> f32 {
     let (mut low, mut high) = ([0.0, first], [1.0, last]);
     let (mut share, mut side) = (0.0f32, 0);
+    // Regula falsi with halved ends (the Illinois method).
     for _ in 0..hits::MAX_REFINEMENTS {
         share = low[0] + (high[0] - low[0]) * (low[1] / (low[1] - high[1]));
         let value = field.at(along(ends, share));
@@ -98,11 +99,13 @@ fn agrees_to_the_bit_with_a_walk_through_every_cell() {
         at([0.0, core::f64::consts::PI, 0.0], [0.2, 0.0, 5.0]),
         at([0.0; 3], [0.0, 0.0, 2.2]),
     ]) {
+        // Limits within the scene, so that both are met.
         let config = RaycastConfig { near_m: 0.35, far_m: 3.9, min_weight: 1 + (seed % 2) as u8 };
         let volume = rough(seed);
         let mut caster = raycaster(6_000, &config);
         caster.cast(&volume, &view, &Serial).unwrap();
         let depth = caster.depth_m().unwrap();
+        // Every third row: the walk through every cell is slow.
         for v in (0..96).step_by(3) {
             for u in 0..160 {
                 let (seen, plain) =

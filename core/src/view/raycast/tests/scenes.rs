@@ -115,9 +115,11 @@ pub(super) fn rough(seed: u64) -> Volume<'static> {
     let plane = Plane::new([0.3, -0.4, -0.8], [0.0, 0.0, 3.2]);
     let ball = Ball { center: Vector3::new(-0.3, 0.1, 2.0), radius: 0.5 };
     let mut random = Random::new(seed);
+    // One block in twenty is missing.
     let coords: Vec<_> = cuboid([-8, -6, 0], [8, 6, 12]).filter(|_| random.below(20) > 0).collect();
     let mut volume = empty(&VolumeConfig::default(), coords.len());
     fill(&mut volume, coords, |point| {
+        // A point's values depend on the point alone, so that blocks agree on their borders.
         let mut random = Random::new(
             point.iter().fold(seed, |seed, &c| seed.wrapping_mul(8_191).wrapping_add(c as u64)),
         );
@@ -127,6 +129,7 @@ pub(super) fn rough(seed: u64) -> Volume<'static> {
         } else {
             ball.distance(at)
         } as f32;
+        // Off by up to 5 cm, a voxel.
         let distance = distance + random.below(1_000) as f32 * 1e-4 - 0.05;
         let colour = [(); 3].map(|()| random.below(256) as u8);
         let is_observed = distance.abs() < 0.75 && random.below(100) < 93;
