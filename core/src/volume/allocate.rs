@@ -67,9 +67,11 @@ impl Volume<'_> {
         // camera has come.
         let camera = camera_in_blocks(&view.t_world_camera, self.config.voxel_size_m);
         let Some(base) = base_block(&camera) else {
+            // So far from the origin coordinates have no 16 bits: all pixels are beyond the map.
             report.beyond = depth_m.rows().flatten().filter(|&&depth| depth > 0.0).count() as u32;
             return report;
         };
+        // Where in its own block the camera stands, in blocks.
         let start = (camera
             - Vector3::new(f64::from(base[0]), f64::from(base[1]), f64::from(base[2])))
         .cast::<f32>();
@@ -77,6 +79,8 @@ impl Volume<'_> {
         // Out of the volume while its bands ask for blocks.
         let mut requested = core::mem::take(&mut self.requested);
         let mut bands = requested.bands(depth_m.height());
+        // Bands fill their lists in parallel; requests are then served one after the other, so that
+        // slots do not depend on the threads.
         while !bands.iter().all(Band::is_done) {
             each(executor, bands.each_mut(), |band| rays.walk(band));
             for band in &mut bands {
@@ -154,9 +158,11 @@ impl Volume<'_> {
         let (camera_from_world, camera) = view.camera_from_world();
         let voxel_m = f64::from(self.config.voxel_size_m);
         let [width, height] = [view.width as f64, view.height as f64];
+        // Behind the farthest surface the band is observed as well.
         let farthest = f64::from(self.config.far_m + self.config.truncation_m);
         for i in 0.. {
             let Some(slot) = self.visible.before(i) else { break };
+            // Listed in this frame already, or evicted meanwhile.
             if self.visible.is_marked(slot) || !self.pool.is_live(slot) {
                 continue;
             }

@@ -162,6 +162,8 @@ impl<'s> Blocks<'s> {
         Self {
             header: carver.alloc("volume.header", capacity.blocks),
             min_weight: carver.alloc("volume.min_weight", capacity.blocks),
+            // Not cleared: a block is when its slot is taken, and memory of free slots is never
+            // touched.
             voxels: carver.alloc_as_found("volume.voxels", capacity.blocks),
             colour: if capacity.colour {
                 carver.alloc_as_found("volume.colour", capacity.blocks)

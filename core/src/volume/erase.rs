@@ -14,11 +14,13 @@ impl Volume<'_> {
     /// Resets the current segment's voxels within a box that were seen in at most so many frames.
     /// Returns how many.
     pub(crate) fn erase(&mut self, within: &OrientedBox, frames: u32) -> u32 {
+        // The most weight that so many frames can have given.
         let weight_most =
             u8::try_from(frames.saturating_mul(self.config.observation_weight.most()))
                 .unwrap_or(u8::MAX);
         let block_m = f64::from(self.config.voxel_size_m) * BLOCK_SIDE as f64;
         let [low, high] =
+            // Down, also below 0: a box may begin in the middle of a block.
             within.bounds_m().map(|corner| corner.map(|c| libm::floor(c / block_m) as i32));
         // A box larger than the map visits the map's blocks instead of the box's.
         let sides = low
@@ -29,6 +31,7 @@ impl Volume<'_> {
         let mut reset = 0;
         if blocks > self.pool.len() as i64 {
             let mut from = 0;
+            // Erasing may free the slot on the way, which this walk allows.
             while let Some(slot) = self.pool.next_live(from) {
                 if self.blocks.key(slot).is_some_and(|key| key.segment == self.segment) {
                     reset += self.erase_block(slot, within, weight_most);
@@ -65,10 +68,12 @@ impl Volume<'_> {
                 index / BLOCK_SIDE % BLOCK_SIDE,
                 index / (BLOCK_SIDE * BLOCK_SIDE),
             ];
+            // Voxels lie at whole coordinates, a block's first one at its origin.
             let mut point_m = [0.0; 3];
             for ((point, origin), offset) in point_m.iter_mut().zip(origin).zip(offset) {
                 *point = voxel_m * (f64::from(origin) + offset as f64);
             }
+            // Weight 0 was never seen, and has nothing to reset.
             if (1..=weight_most).contains(weight) && within.contains(point_m) {
                 (*sdf, *weight) = (0, 0);
                 planes

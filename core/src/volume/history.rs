@@ -98,6 +98,7 @@ impl<'s> VisibleHistory<'s> {
     /// Appends the slots visible in `frame`, which must follow the last frame of the ring. The ring
     /// must not be full.
     pub(super) fn push(&mut self, frame: u32, visible: &[Slot]) {
+        // An empty ring begins wherever the frames are.
         if self.len == 0 {
             self.oldest = frame;
         }
@@ -118,10 +119,12 @@ impl<'s> VisibleHistory<'s> {
     pub(super) fn expire(&mut self) -> Option<u32> {
         self.len = self.len.checked_sub(1)?;
         let frame = self.oldest;
+        // Wrapping, as frames are numbered in 32 bits.
         self.oldest = frame.wrapping_add(1);
         let at = self.set_range(frame)?;
         let set = self.sets.get(at)?;
         for (i, (due, seen)) in self.due.iter_mut().zip(set).enumerate() {
+            // The bits are taken one by one, from the lowest.
             let mut bits = *seen;
             // Only visible slots whose block is as old as the frame are due.
             while bits != 0 {
@@ -143,6 +146,7 @@ impl<'s> VisibleHistory<'s> {
         visitor.u32(oldest);
         visitor.count(len, capacity);
         visitor.count(peak, capacity);
+        // Only the frames in the ring; the others are overwritten before they are read.
         for age in 0..*len as u32 {
             let at =
                 (oldest.wrapping_add(age) as usize).checked_rem(capacity).unwrap_or(0) * *words;
@@ -166,6 +170,7 @@ impl<'s> VisibleHistory<'s> {
     pub(super) fn take_due(&mut self, from: u32) -> Option<Slot> {
         let first = from as usize / 64;
         for (i, word) in self.due.iter_mut().enumerate().skip(first) {
+            // Bits below `from` in its own word belong to slots visited already.
             let below = if i == first { (1 << (from % 64)) - 1 } else { 0 };
             let bits = *word & !below;
             if bits != 0 {

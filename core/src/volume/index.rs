@@ -85,6 +85,7 @@ impl<'s> BlockIndex<'s> {
         key: BlockKey,
         key_of: impl Fn(Slot) -> Option<BlockKey>,
     ) -> (Option<Slot>, u32) {
+        // Equal hashes may belong to other blocks.
         let mut compared = 0;
         let same = |&slot: &Slot| {
             compared += 1;

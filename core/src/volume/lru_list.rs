@@ -45,9 +45,11 @@ impl<'s> LruList<'s> {
 
     /// Makes `slot` the one seen last; it need not be in the list yet.
     pub(super) fn touch(&mut self, slot: Slot) {
+        // The usual case: a block that is seen again and again.
         if self.ends[NEWER] == link(slot) {
             return;
         }
+        // From where it stands to the newer end.
         self.remove(slot);
         let last = self.ends[NEWER];
         self.link(link(slot), [last, 0]);
@@ -58,6 +60,7 @@ impl<'s> LruList<'s> {
     /// Takes `slot` out of the list; nothing happens when it is not in it.
     pub(super) fn remove(&mut self, slot: Slot) {
         let Some(&[older, newer]) = self.links.get(slot.index()) else { return };
+        // The only entry has no neighbours either.
         let alone = self.ends == [link(slot); 2];
         if [older, newer] == [0; 2] && !alone {
             return;

@@ -178,6 +178,7 @@ impl<'s> Volume<'s> {
             (header.get_mut(at), min_weight.get_mut(at), voxels.get(at))
         {
             let new = fuse::block_digest(header.key(), voxels, colour.get(at));
+            // The digest is a sum over blocks, so that one block's part can be exchanged.
             self.digest = self.digest.wrapping_sub(header.digest).wrapping_add(new);
             header.digest = new;
             *least = block::least_weight(&voxels.weight);

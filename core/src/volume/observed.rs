@@ -54,6 +54,7 @@ impl ObservedDepth<'_> {
 
     #[inline(always)]
     fn write_block(&self, first: usize, v: usize, depths: &mut [NotedDepth]) {
+        // `BLOCK` pixels of a row at a time, so that vectors are filled.
         let surroundings = Surroundings { disparity_q8: self.disparity_q8 };
         let here = surroundings.tap(first, v, [0, 0]);
         let range = DepthRange::new(self.rig, self.config.near_m, self.config.far_m);
@@ -71,6 +72,7 @@ impl ObservedDepth<'_> {
         // Not by `map` of an array, which compilers leave as a call for the baseline.
         let tap = |du, dv| surroundings.tap(first, v, [du, dv]);
         let levels = match self.config.distance {
+            // Along the ray the cosine is 1, the highest level.
             DistanceAlong::Ray => [LEVELS as u16 - 1; BLOCK],
             DistanceAlong::Normal => {
                 let along_u = slope(&here, &tap(SLOPE_REACH, 0), &tap(-SLOPE_REACH, 0));
@@ -83,6 +85,7 @@ impl ObservedDepth<'_> {
         for ((depth, &within), ((&disparity, (&behind, &spoiling)), &level)) in
             depths.iter_mut().zip(&within).zip(notes)
         {
+            // Nearer than something within reach: its colour may be mixed with that.
             let has_unreliable_colour = disparity > spoiling.saturating_add(EDGE_Q8);
             let noted = NotedDepth::new(within, level, has_unreliable_colour);
             *depth = if (within > 0.0) & (disparity <= behind.saturating_add(EDGE_Q8)) {
@@ -111,6 +114,7 @@ impl ObservedDepth<'_> {
             (0u16..).zip(squares.iter_mut().zip(here).zip(slopes))
         {
             let (d, x) = (f32::from(disparity) * (1.0 / 256.0), x_first + f32::from(i));
+            // The normal of a plane whose disparity has these slopes.
             let (nu, nv, nz) = (focal * a, focal * b, d - x * a - y * b);
             // The square of the cosine is compared: a root has no vectors everywhere. Without a
             // disparity it may be any number.
@@ -181,11 +185,13 @@ fn slope(here: &[u16; BLOCK], after: &[u16; BLOCK], before: &[u16; BLOCK]) -> [f
     for (slope, ((&here, &after), &before)) in
         slopes.iter_mut().zip(here.iter().zip(after).zip(before))
     {
+        // A neighbour across an edge tells nothing of this surface.
         let has_after = (after > 0) & (after.abs_diff(here) < SLOPE_MOST_Q8);
         let has_before = (before > 0) & (before.abs_diff(here) < SLOPE_MOST_Q8);
         // Differences so small have 16 bits with their signs.
         let (rise, fall) = (after.wrapping_sub(here) as i16, here.wrapping_sub(before) as i16);
         let sum = if has_after { rise } else { 0 } + if has_before { fall } else { 0 };
+        // Of two neighbours the mean, of one its own slope, of none 0.
         *slope = f32::from(sum) * if has_after & has_before { HALF } else { 2.0 * HALF };
     }
     slopes

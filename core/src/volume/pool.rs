@@ -73,6 +73,7 @@ impl<'s> SlotPool<'s> {
     pub(crate) fn new_in(carver: &mut Carver<'s>, slots: usize, names: [&'static str; 2]) -> Self {
         let [live, free_list] = names;
         Self {
+            // A bit for each slot.
             live: carver.alloc(live, slots.div_ceil(64)),
             freed: carver.alloc(free_list, slots),
             freed_len: 0,
@@ -113,6 +114,7 @@ impl<'s> SlotPool<'s> {
 
     /// Takes a slot.
     pub(crate) fn take(&mut self) -> Result<Slot, Full> {
+        // The slot freed last first, and fresh ones only when none is left.
         let slot = if let Some(last) = self.freed_len.checked_sub(1) {
             let slot = *self.freed.get(last).ok_or(Full)?;
             self.freed_len = last;
@@ -134,6 +136,7 @@ impl<'s> SlotPool<'s> {
     /// Gives a slot back, which must be taken.
     pub(crate) fn free(&mut self, slot: Slot) {
         debug_assert!(self.is_live(slot), "a slot is freed once");
+        // A slot that is freed twice would be given out twice.
         if self.is_live(slot)
             && let Some(entry) = self.freed.get_mut(self.freed_len)
         {

@@ -60,6 +60,7 @@ impl Volume<'_> {
             report.early += u32::from(self.history.capacity() < self.config.prune_lag as usize);
         }
         self.history.push(frame, self.visible.slots());
+        // Frames as old as the lag leave the window, and their blocks become due.
         while self
             .history
             .oldest()

@@ -89,6 +89,7 @@ impl<'s> RequestedCache<'s> {
     /// The bands of an image of that many rows, nothing met yet.
     pub fn bands(&mut self, rows: usize) -> [Band<'_>; BANDS] {
         self.caches.fill(0);
+        // Every `PIXEL_STEP`-th row, in four bands.
         let quarters = Bands::of(rows.div_ceil(PIXEL_STEP));
         let mut caches = self.caches.chunks_mut(CACHE_ENTRIES);
         let list_len = self.lists.len() / BANDS;
@@ -136,6 +137,7 @@ impl Band<'_> {
             entry.is_some() && self.len < self.list.len(),
             "a cache has an entry for each tag, and the list holds a ray"
         );
+        // A block whose entry another one took is listed again, which costs a lookup and no more.
         if let (Some(entry), Some(request)) = (entry, self.list.get_mut(self.len))
             && *entry != tag.0
         {
@@ -177,8 +179,10 @@ impl<'a> Rays<'a> {
             depth_m,
             start,
             rays: view.rays_world().map(|ray| (ray / block_m).cast::<f32>()),
+            // At least two voxels on each side of the surface.
             reach_m: [max_f32(config.allocation_m, 2.0 * config.voxel_size_m), config.truncation_m],
             far_m: config.far_m,
+            // Another of the 2 x 2 pixels in each frame.
             offset: [(frame / 2) as usize % PIXEL_STEP, frame as usize % PIXEL_STEP],
             // The larger change comes first: two steps from every frame, or every second one, to
             // the next.
@@ -234,6 +238,7 @@ impl<'a> Rays<'a> {
             let mut left_m =
                 first_u.checked_sub(PIXEL_STEP).and_then(|u| here.get(u)).copied().unwrap_or(0.0);
             for (i, (&depth_m, &above_m)) in depths.enumerate() {
+                // The neighbours' depths tell a steep surface, which a thin band would miss.
                 let beside_m = [above_m, core::mem::replace(&mut left_m, depth_m)];
                 if !(depth_m > 0.0 && depth_m <= self.far_m) {
                     continue;
@@ -243,6 +248,7 @@ impl<'a> Rays<'a> {
                 if !self.is_taken(steps, [row, first + i]) {
                     continue;
                 }
+                // The list is full: the band stops here, is emptied, and goes on with this ray.
                 if band.list.len() - band.len < MAX_BLOCKS_PER_RAY {
                     band.next = [row, first + i];
                     return;
@@ -274,10 +280,12 @@ impl Axis {
     #[inline(always)]
     fn new(from: f32, to: f32) -> Self {
         let (at, last) = (floor_i32(from), floor_i32(to));
+        // Blocks to cross along this axis.
         let (ahead, left) =
             (last > at, last.saturating_sub(at).saturating_abs().min(MAX_BLOCKS_PER_RAY as i32));
         // Unused where no border is crossed.
         let per_block = 1.0 / (to - from);
+        // The border crossed next, as a share of the way.
         let border = at as f32 + if ahead { 1.0 } else { 0.0 };
         Self {
             at,
@@ -305,8 +313,10 @@ fn walk(from: Vector3<f32>, to: Vector3<f32>, mut visit: impl FnMut([i32; 3])) {
     let mut y = Axis::new(from.y, to.y);
     let mut z = Axis::new(from.z, to.z);
     visit([x.at, y.at, z.at]);
+    // One block fewer: the first one is visited already.
     let steps = (x.left + y.left + z.left).min(MAX_BLOCKS_PER_RAY as i32 - 1);
     for _ in 0..steps {
+        // The axis whose border comes next; of equal ones x before y before z.
         let x_turn = (x.next <= y.next) & (x.next <= z.next);
         let z_turn = !x_turn & (z.next < y.next);
         x.advance(x_turn);

@@ -29,6 +29,7 @@ impl<'v, 's> Sampler<'v, 's> {
     #[inline]
     fn slot(&mut self, coord: BlockCoord) -> Option<Slot> {
         match self.last {
+            // Neighbouring samples mostly lie in one block.
             Some((last, slot)) if last == coord => slot,
             _ => {
                 let slot = self.volume.find(coord);

@@ -85,9 +85,11 @@ impl Volume<'_> {
         report: &mut EvictionReport,
     ) -> bool {
         let Some(slot) = self.lru.oldest() else { return false };
+        // What is visible now is needed now: no block is evicted for another one of the same view.
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
             return false;
         }
+        // Still in the window of pruning: it is pruned before it leaves, as it would be later.
         if self.config.prunes() && self.history.covers(self.visible.last_visible(slot)) {
             let (_, freed) = self.prune_block(slot, self.rule());
             if freed {
@@ -95,6 +97,7 @@ impl Volume<'_> {
                 return true;
             }
         }
+        // An empty block is no loss and takes no disk space.
         match self.evicted(slot) {
             Some(block) if block.weight.iter().all(|&weight| weight == 0) => report.empty += 1,
             Some(block) if store.store(block) => report.stored += 1,
@@ -156,6 +159,7 @@ impl Volume<'_> {
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else { return false };
         let colour = self.blocks.colour.get_mut(at);
         let returned = store.load(LoadedBlock { key, sdf, weight, colour });
+        // The digest of what came back.
         if returned {
             self.update_digest(slot);
         }

@@ -37,6 +37,7 @@ impl Surroundings<'_> {
     #[inline(always)]
     pub fn nearest(&self, first: usize, v: usize) -> [u16; BLOCK] {
         let mut nearest = [0; BLOCK];
+        // Rings of growing distance: along rows and columns only.
         for distance_px in 1..=EDGE_REACH_PX {
             for offset in beside(distance_px) {
                 let tap = self.tap(first, v, offset);

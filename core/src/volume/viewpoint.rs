@@ -27,6 +27,7 @@ impl Viewpoint {
         let scale = every as f64;
         (self.width, self.height) =
             (self.width.div_ceil(kept.get()), self.height.div_ceil(kept.get()));
+        // The baseline is a length in metres and stays.
         for length_px in
             [&mut self.rig.focal_px, &mut self.rig.center_u_px, &mut self.rig.center_v_px]
         {
@@ -51,6 +52,7 @@ impl Viewpoint {
             -self.rig.center_v_px / self.rig.focal_px,
             1.0,
         );
+        // From pixel to pixel at depth 1.
         let step = 1.0 / self.rig.focal_px;
         [
             rotation * corner,

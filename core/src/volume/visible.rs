@@ -61,9 +61,11 @@ impl<'s> VisibleList<'s> {
     /// Enters a slot unless it is entered already.
     pub(super) fn mark(&mut self, slot: Slot) -> Result<(), Full> {
         let last = self.last_visible.get_mut(slot.index()).ok_or(Full)?;
+        // `last_visible` is the mark: no other set is needed.
         if *last == self.frame {
             return Ok(());
         }
+        // A full list loses the block for this frame, and counts it.
         *self.slots.get_mut(self.len).ok_or(Full)? = slot;
         *last = self.frame;
         self.len += 1;

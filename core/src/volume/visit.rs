@@ -20,11 +20,13 @@ impl Volume<'_> {
             segment: _,
             requested: _,
         } = self;
+        // First the pool, which tells how far the other arrays are in use.
         pool.visit(visitor);
         if !pool.rebuild() {
             visitor.refuse();
         }
         let slots = pool.high_water();
+        // Free slots have no content.
         for slot in pool.live() {
             blocks.visit(slot, visitor);
         }
@@ -39,6 +41,7 @@ impl Volume<'_> {
             self.pool.len() <= self.pool.capacity(),
             "no more blocks are in use than the pool has",
         );
+        // A necessary condition that costs little; the list itself is not walked.
         invariants.require(
             self.pool.is_empty() == self.lru.oldest().is_none(),
             "every block in use is in the LRU list",

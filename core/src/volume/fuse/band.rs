@@ -36,7 +36,9 @@ impl<'b> Band<'b> {
 
     /// Splits before the block in the middle of the list.
     pub(super) fn halves(self) -> (Self, Self) {
+        // By the list, not the slots: halves have equally many blocks.
         let (low, high) = self.slots.split_at_checked(self.slots.len() / 2).unwrap_or_default();
+        // Slots are in ascending order, so that the memory can be cut where the list is.
         let border = high.first().map_or(self.first, |slot| slot.index());
         let at = border - self.first;
         let (header, header_high) = parts(self.header, at);

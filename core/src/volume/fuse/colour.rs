@@ -39,6 +39,7 @@ impl Fusion<'_> {
         [red, green, blue]: [&mut Layer<u8>; 3],
         weight: &Layer<u8>,
     ) {
+        // Away from the surface the colour would be that of something before or behind it.
         let near = self.near_surface(scratch);
         // Where none is near, no pixel need be read.
         if near.iter().fold(0, |any, near| any | near) == 0 {
@@ -93,6 +94,7 @@ impl Fusion<'_> {
         weight: &Layer<u8>,
     ) -> Layer<i16> {
         let [all, second, third, fourth, fifth, sixth] = COLOUR_SHARES;
+        // Depths without notes say nothing of colours: all count.
         let is_noted = self.is_noted;
         let mut share = [0; LAYER_VOXELS];
         for (share, &weight) in share.iter_mut().zip(weight) {
@@ -108,6 +110,7 @@ impl Fusion<'_> {
             *share &= -i16::from(!is_noted | !NotedDepth::wrap(observed_m).has_unreliable_colour());
         }
         for i in 0..LAYER_VOXELS {
+            // Black in all planes is what a voxel without colour has.
             let colourless = -i16::from(planes[0][i] | planes[1][i] | planes[2][i] == 0);
             share[i] = (all & colourless | share[i] & !colourless) & -i16::from(near[i]);
         }

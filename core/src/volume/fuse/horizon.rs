@@ -38,6 +38,7 @@ impl<'a> Horizon<'a> {
         let (width, height) = (depth_m.width(), depth_m.height());
         let columns_rows = |shift: u32| [width.div_ceil(1 << shift), height.div_ceil(1 << shift)];
         let tiles = |shift: u32| columns_rows(shift).iter().product::<usize>();
+        // The finest tiles whose two levels fit the memory.
         let shift = (TILE_SHIFT..usize::BITS - LEVEL_SHIFT)
             .find(|&shift| tiles(shift) + tiles(shift + LEVEL_SHIFT) <= memory.len())?;
         let (fine, coarse) = memory.split_at_mut_checked(tiles(shift))?;
@@ -64,6 +65,7 @@ impl<'a> Horizon<'a> {
         let few = across(self.fine.shift, columns) < MAX_TILES
             && across(self.fine.shift, rows) < MAX_TILES;
         let Tiles { depth_m, columns: stride, shift } = if few { self.fine } else { self.coarse };
+        // Tiles reach beyond the rectangle, which can only raise the bound.
         let [first, last] = columns.map(|column| column >> shift);
         let mut greatest_m = 0.0;
         for row in rows[0] >> shift..=rows[1] >> shift {

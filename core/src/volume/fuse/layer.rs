@@ -140,6 +140,7 @@ impl Scratch {
         let (pixels, stride) = image.strided();
         let padding = (stride as u32).wrapping_sub(image.width() as u32);
         if padding == 0 {
+            // The usual image has no padding, and needs no second index.
             return (pixels, &self.pixel);
         }
         for (padded, (&pixel, &row)) in self.padded.iter_mut().zip(self.pixel.iter().zip(&self.row))
@@ -181,6 +182,8 @@ impl Fusion<'_> {
         sdf: &mut Layer<i16>,
         weight: &mut Layer<u8>,
     ) -> bool {
+        // First where the voxels fall, then what is seen there, then what they differ by: where
+        // nothing is to be changed, the rest is left out.
         self.project(at.corner, at.z, scratch);
         self.observe(scratch);
         if !self.measure(scratch) {
@@ -200,6 +203,7 @@ impl Fusion<'_> {
     )]
     fn project(&self, corner: Vector3<f32>, z: usize, scratch: &mut Scratch) {
         let starts =
+            // The first voxels of the layer's rows; the others follow along x.
             core::array::from_fn(|y| corner + self.steps[1] * y as f32 + self.steps[2] * z as f32);
         let layers = [&mut scratch.x_m, &mut scratch.y_m, &mut scratch.z_m];
         for (axis, layer) in layers.into_iter().enumerate() {
@@ -237,12 +241,15 @@ impl Fusion<'_> {
         for i in 0..LAYER_VOXELS {
             let observed_m = scratch.observed_m[i];
             let along_z_m = observed_m - scratch.z_m[i];
+            // The distance along the normal is that along the ray times the cosine between them.
             let distance_m = if is_noted {
                 along_z_m * NotedDepth::wrap(observed_m).obliqueness()
             } else {
                 along_z_m
             };
             let hit = -i16::from(
+                // Behind a surface nothing is known beyond the truncation, nor beyond `behind_m`
+                // across it.
                 (observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m),
             );
             scratch.hit[i] = hit;
@@ -261,6 +268,7 @@ impl Fusion<'_> {
             .iter()
             .zip(&scratch.observed_m)
             .map(|(&weight, &observed_m)| self.past(weight, observed_m));
+        // Every observation counts one: shares come from the past alone.
         if self.plain_weights {
             scratch
                 .share
@@ -269,6 +277,7 @@ impl Fusion<'_> {
                 .for_each(|(share, past)| *share = share_of_one(past));
             return;
         }
+        // A weight has 8 bits, and the past is at most that.
         scratch.past.iter_mut().zip(pasts).for_each(|(to, past)| *to = past as u8);
         self.weigh(scratch);
         for ((share, &gain), &past) in
@@ -285,6 +294,7 @@ impl Fusion<'_> {
         for (gain, (&observed_m, &distance_m)) in
             scratch.gain.iter_mut().zip(scratch.observed_m.iter().zip(&scratch.distance_m))
         {
+            // A quarter in the free space before the surface's band.
             let at_1_m = if distance_m >= self.free_m { 25.0 } else { 100.0 };
             let weight = floored_i32(clamp_f32(at_1_m / observed_m, 1.0, most));
             *gain = weight as i16 & -i16::from(observed_m > 0.0);

@@ -129,8 +129,10 @@ impl<'a> Fusion<'a> {
             is_noted: seen.depth.is_noted(),
             width: depth_m.width() as u32,
             height: depth_m.height() as u32,
+            // The truncation takes all 16 bits of a distance.
             scale: 32_767.0 / config.truncation_m,
             colour_band_m: COLOUR_BAND * config.truncation_m,
+            // At least two voxels, so that the surface's own far side is observed.
             behind_m: max_f32(config.behind_m, 2.0 * config.voxel_size_m),
         }
     }
@@ -139,6 +141,7 @@ impl<'a> Fusion<'a> {
 impl Volume<'_> {
     /// Averages an observation from `view` into every visible block.
     pub fn fuse<E: Executor>(&mut self, view: &Viewpoint, seen: Observation<'_>, executor: &E) {
+        // The buffers of the block requests are free now.
         let horizon = Horizon::new(seen.depth.depth_m(), self.requested.scratch());
         let fusion = Fusion::new(&self.config, view, seen, horizon);
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
@@ -146,6 +149,7 @@ impl Volume<'_> {
         let changes = each(executor, [a, b, c, d], |band| {
             executor.vectors().run(FuseBand { fusion: &fusion, band })
         });
+        // A wrapping sum: the order of the bands does not matter.
         self.digest = changes.iter().fold(self.digest, |sum, change| sum.wrapping_add(*change));
     }
 }
@@ -163,6 +167,7 @@ impl Work for FuseBand<'_, '_> {
     #[inline(always)]
     fn run(self) -> u64 {
         let Self { fusion, band } = self;
+        // What the map's digest changes by.
         let mut change = 0u64;
         let mut scratch = Scratch::new();
         for &slot in band.slots {
@@ -196,6 +201,7 @@ impl Fusion<'_> {
         mut colour: Option<&mut Colour>,
     ) -> bool {
         let voxel_m = f64::from(self.config.voxel_size_m);
+        // In f64 up to the difference, which is small and keeps its digits in f32.
         let origin_m = Vector3::from(coord.origin().map(|c| f64::from(c) * voxel_m));
         let corner = (self.camera_from_world * (origin_m - self.camera.coords)).cast::<f32>();
         if self.is_hidden(corner) {
@@ -258,6 +264,7 @@ fn corners(steps: &[Vector3<f32>; 3]) -> [[f32; CORNERS]; 3] {
     let side = (BLOCK_SIDE - 1) as f32;
     [0, 1, 2].map(|axis| {
         core::array::from_fn(|n| {
+            // Bit by bit of the corner's number: along x, y, z.
             steps
                 .iter()
                 .enumerate()
@@ -288,6 +295,7 @@ pub(super) fn block_digest(
     colour: Option<&Colour>,
 ) -> u64 {
     let mut digest = Digest::default();
+    // 16 bits for each coordinate and for the segment.
     digest.u64(
         [coord.x as u16, coord.y as u16, coord.z as u16, segment.get()]
             .iter()
