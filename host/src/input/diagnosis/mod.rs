@@ -3,8 +3,8 @@
 //!
 //! Ten pairs spread over the sequence are matched patch by patch without the rule that rows agree
 //! (`patches`), and a run of consecutive left images is compared as thumbnails (`order`). What
-//! makes a map meaningless is refused, what is doubtful is a warning. Too few matches give no
-//! verdict.
+//! makes a map meaningless is refused, what is doubtful is a warning. Where matches are too few or
+//! too scattered for a verdict, that is said.
 
 mod agreement;
 mod correlation;
@@ -27,8 +27,12 @@ pub use rows::RowError;
 /// Pairs that are matched.
 const PAIRS: usize = 10;
 /// Fewest matches, over all pairs, that allow a verdict.
-const FEWEST_MATCHES: usize = 60;
-/// Median distance of matched rows that is still called rectified, px.
+const FEWEST_MATCHES: usize = 24;
+/// Standard deviation of the rows' distance above which there is no verdict, px.
+const UNKNOWN_ROWS_PX: f64 = 0.5;
+/// Median distance of matches from the fitted rows above which images are not rectified, px.
+const BENT_ROWS_PX: f64 = 1.0;
+/// Distance of rows that is still called rectified, px.
 const ROWS_PX: f64 = 0.5;
 /// Row difference above which a map is meaningless, px.
 const REFUSED_ROWS_PX: f64 = 1.0;
@@ -71,6 +75,8 @@ pub enum Fault {
     Saturated,
     /// Images are out of focus.
     Focus,
+    /// There are too few matches to tell whether the images are rectified.
+    Unknown,
 }
 
 /// One fault, in a sentence with the next action.
@@ -124,10 +130,12 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
     let mut pairs = Vec::new();
     for &index in indices.iter().step_by(step) {
         if let Ok(Some([left, right])) = rectified.pair(index) {
-            pairs.push(Pair::of(&left, &right));
+            pairs.push([left, right]);
         }
     }
-    findings.extend(diagnose(&pairs));
+    let count = pairs.len();
+    let pairs = pairs.iter().map(|[left, right]| Pair::new(left, right, count));
+    findings.extend(diagnose(&pairs.collect::<Vec<_>>()));
     let thumbnails = order::window(indices)
         .iter()
         .map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
@@ -153,7 +161,8 @@ struct Pair {
 }
 
 impl Pair {
-    fn of(left: &Image<u8>, right: &Image<u8>) -> Self {
+    /// Measures one of `pairs` pairs.
+    fn new(left: &Image<u8>, right: &Image<u8>, pairs: usize) -> Self {
         let count = left.pixels().len().max(1) as f64;
         let sum = |image: &Image<u8>| {
             image.pixels().iter().map(|&grey| u64::from(grey)).sum::<u64>() as f64 / count
@@ -162,7 +171,7 @@ impl Pair {
             left.pixels().iter().zip(right.pixels()).map(|(a, b)| u64::from(a.abs_diff(*b)));
         Self {
             width_px: left.width() as f64,
-            matches: patches::matches(left, right),
+            matches: patches::matches(left, right, patches::step_px(pairs)),
             difference: differences.sum::<u64>() as f64 / count,
             mean: 0.5 * (sum(left) + sum(right)),
             saturated: left.pixels().iter().filter(|grey| **grey >= 252).count() as f64 / count,
@@ -231,10 +240,22 @@ fn diagnose(pairs: &[Pair]) -> Vec<Finding> {
         }
     }
     let matches: Vec<&PatchMatch> = pairs.iter().flat_map(|pair| &pair.matches).collect();
-    if matches.len() >= FEWEST_MATCHES {
-        findings.extend(check_matches(&matches, pairs.first().map_or(0.0, |pair| pair.width_px)));
+    let (count, width_px) = (matches.len(), pairs.first().map_or(0.0, |pair| pair.width_px));
+    if count >= FEWEST_MATCHES {
+        findings.extend(check_matches(&matches, width_px));
+    } else if !pairs.is_empty() {
+        findings.push(unknown(&format!("{count} matches")));
     }
     findings
+}
+
+/// The doubt where matches give no verdict.
+fn unknown(found: &str) -> Finding {
+    let message = format!(
+        "whether the images are rectified could not be examined: {found}. Check with `dynvox \
+         calibration FILE --images DIR` that the same point lies in the same row of both images"
+    );
+    finding(Fault::Unknown, false, message)
 }
 
 fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
@@ -247,18 +268,7 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
                        images. Exchange the two folders or files";
         findings.push(finding(Fault::Exchanged, true, message.to_owned()));
     }
-    let RowError { shift_px, roll_deg, median_px } = RowError::of(matches, width_px);
-    if median_px > ROWS_PX || shift_px.abs() > ROWS_PX || roll_deg.abs() > ROLL_DEG {
-        let message = format!(
-            "these images are not rectified: matches lie {median_px:.1} px apart in height \
-             (median). Right images are {:.1} px too {} in the \
-             middle and rotated by {roll_deg:+.2} degrees (clockwise). Give the raw images with \
-             their calibration: --calibration FILE",
-            shift_px.abs(),
-            if shift_px > 0.0 { "low" } else { "high" }
-        );
-        findings.push(finding(Fault::NotRectified, median_px > REFUSED_ROWS_PX, message));
-    }
+    findings.extend(check_rows(&RowError::of(matches, width_px), matches.len(), width_px));
     let exposure = median(matches.iter().map(|one| one.brightness).collect());
     if !(1.0 / EXPOSURE..=EXPOSURE).contains(&exposure) {
         let message = format!(
@@ -268,4 +278,30 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
         findings.push(finding(Fault::Exposure, false, message));
     }
     findings
+}
+
+/// The verdict on rows.
+fn check_rows(rows: &RowError, matches: usize, width_px: f64) -> Option<Finding> {
+    let &RowError { shift_px, roll_deg, shift_sigma_px, rest_px, .. } = rows;
+    if shift_sigma_px.is_nan() || shift_sigma_px >= UNKNOWN_ROWS_PX {
+        return Some(unknown(&format!("{matches} matches contradict each other")));
+    }
+    let certain_px = rows.certain_px(width_px);
+    let apart = certain_px > ROWS_PX
+        || rows.certain_shift_px() > ROWS_PX
+        || rows.certain_roll_deg() > ROLL_DEG
+        || rest_px > BENT_ROWS_PX;
+    apart.then(|| {
+        let message = format!(
+            "these images are not rectified: rows lie {:.1} px apart in the middle, sigma \
+             {shift_sigma_px:.1} ({matches} matches). Right images are {:.1} px too {} there and \
+             rotated by {roll_deg:+.2} degrees (clockwise); {rest_px:.1} px are left besides. Give \
+             the raw images with their calibration: --calibration FILE",
+            shift_px.abs(),
+            shift_px.abs(),
+            if shift_px > 0.0 { "low" } else { "high" }
+        );
+        let refused = certain_px.max(rest_px) > REFUSED_ROWS_PX;
+        finding(Fault::NotRectified, refused, message)
+    })
 }

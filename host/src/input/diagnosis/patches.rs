@@ -5,15 +5,24 @@
 use super::correlation::{HALF, Score, SearchedImage};
 use crate::formats::Image;
 
-/// Pixels from one patch to the next.
+/// Pixels from one patch to the next, with so many pairs or more.
 const STEP_PX: usize = 28;
+const MANY_PAIRS: usize = 10;
+/// Fewest pixels from one patch to the next: nearer ones show the same.
+const STEP_LEAST_PX: usize = 11;
 /// Half side of patches at full size, px; at half size they are smaller.
 const FINE: i32 = 5;
 const COARSE: i32 = HALF as i32;
 /// Pixels of a patch at full size.
 const FINE_AREA: usize = ((2 * FINE + 1) * (2 * FINE + 1)) as usize;
-/// Reach of the search for a match to either side, as a share of the width.
+/// Reach of the search for a match to either side, as a share of the width, and in pixels where
+/// that is more: as far as stereo searches.
 const REACH: f64 = 0.12;
+const REACH_PX: usize = 255;
+/// Reach as a share of the width at most: of what is nearer both cameras see too little.
+const REACH_MOST: f64 = 0.4;
+/// Pixels at half size by which the way back from a match may miss its patch.
+const BACK_PX: i32 = 1;
 /// Reach of the search above and below, px.
 const REACH_ROWS_PX: usize = 10;
 /// Least similarity of a match.
@@ -100,50 +109,78 @@ fn has_corners(image: &Image<u8>, u: i32, v: i32) -> bool {
     smaller / count > TEXTURE
 }
 
-/// The matches of a pair.
-pub fn matches(left: &Image<u8>, right: &Image<u8>) -> Vec<PatchMatch> {
+/// Pixels from one patch to the next: few pairs are looked at more densely.
+pub fn step_px(pairs: usize) -> usize {
+    let share = (pairs.max(1) as f64 / MANY_PAIRS as f64).sqrt().min(1.0);
+    ((STEP_PX as f64 * share) as usize).max(STEP_LEAST_PX)
+}
+
+/// The matches of a pair, of patches `step_px` apart. Each is found from the left image and again
+/// from the right one.
+pub fn matches(left: &Image<u8>, right: &Image<u8>, step_px: usize) -> Vec<PatchMatch> {
     let (Some(small_left), Some(small_right)) = (half(left), half(right)) else {
         return Vec::new();
     };
-    let searched = SearchedImage::new(&small_right);
-    let centers = (STEP_PX..left.height())
-        .step_by(STEP_PX)
-        .flat_map(|v| (STEP_PX..left.width()).step_by(STEP_PX).map(move |u| (u, v)));
-    centers.filter_map(|(u, v)| find([left, right], &small_left, &searched, [u, v])).collect()
+    let search = Search {
+        from: [left, right],
+        small: [&small_left, &small_right],
+        searched: [&small_left, &small_right].map(SearchedImage::new),
+    };
+    let centers = (step_px..left.height())
+        .step_by(step_px)
+        .flat_map(|v| (step_px..left.width()).step_by(step_px).map(move |u| (u, v)));
+    centers.filter_map(|(u, v)| search.find([u, v])).collect()
 }
 
-fn find(
-    [left, right]: [&Image<u8>; 2],
-    small_left: &Image<u8>,
-    searched: &SearchedImage<'_>,
-    [u, v]: [usize; 2],
-) -> Option<PatchMatch> {
-    let (small_u, small_v) = (u / 2, v / 2);
-    if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u as i32, small_v as i32) {
-        return None;
+/// A pair at both sizes.
+struct Search<'i> {
+    from: [&'i Image<u8>; 2],
+    small: [&'i Image<u8>; 2],
+    searched: [SearchedImage<'i>; 2],
+}
+
+impl Search<'_> {
+    fn find(&self, [u, v]: [usize; 2]) -> Option<PatchMatch> {
+        let ([small_left, small_right], [left, right]) = (self.small, &self.searched);
+        let (small_u, small_v) = (u / 2, v / 2);
+        if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u as i32, small_v as i32) {
+            return None;
+        }
+        let there = clear_best(right, small_left, [small_u, small_v])?;
+        // A match that is not found again from the other side is a repeated pattern, or hidden.
+        let moved = |at: usize, by: i32| usize::try_from(at as i32 + by).ok();
+        let back_from = [moved(small_u, there.du)?, moved(small_v, there.dv)?];
+        let back = clear_best(left, small_right, back_from)?;
+        if (there.du + back.du).abs() > BACK_PX || (there.dv + back.dv).abs() > BACK_PX {
+            return None;
+        }
+        refined(
+            self.from,
+            [u, v].map(|at| at as i32),
+            [u as i32 + 2 * there.du, v as i32 + 2 * there.dv],
+        )
     }
-    let reach = [(REACH * small_left.width() as f64) as usize, REACH_ROWS_PX / 2];
-    let scores = searched.scores(small_left, [small_u, small_v], reach);
+}
+
+/// The best place of a patch; `None` where it is not much better than all others, or at the end of
+/// the search.
+fn clear_best(searched: &SearchedImage<'_>, image: &Image<u8>, at: [usize; 2]) -> Option<Score> {
+    let width = image.width() as f64;
+    let columns = (REACH * width).max((REACH_PX / 2) as f64).min(REACH_MOST * width) as usize;
+    let reach = [columns, REACH_ROWS_PX / 2];
+    let scores = searched.scores(image, at, reach);
     let &best = scores.iter().max_by(|a, b| a.similarity.total_cmp(&b.similarity))?;
     let apart = |other: &&Score| (other.du - best.du).abs() > 2 || (other.dv - best.dv).abs() > 2;
     let second = scores.iter().filter(apart).map(|score| score.similarity).fold(-1.0, f64::max);
     let at_the_end =
         best.du.unsigned_abs() as usize == reach[0] || best.dv.unsigned_abs() as usize == reach[1];
-    if best.similarity < SIMILAR || best.similarity - second < CLEAR || at_the_end {
-        return None;
-    }
-    refined(
-        left,
-        right,
-        [u, v].map(|at| at as i32),
-        [u as i32 + 2 * best.du, v as i32 + 2 * best.dv],
-    )
+    let clear = best.similarity >= SIMILAR && best.similarity - second >= CLEAR && !at_the_end;
+    clear.then_some(best)
 }
 
 /// The place at full size, below the pixel.
 fn refined(
-    left: &Image<u8>,
-    right: &Image<u8>,
+    [left, right]: [&Image<u8>; 2],
     [u, v]: [i32; 2],
     [near_u, near_v]: [i32; 2],
 ) -> Option<PatchMatch> {

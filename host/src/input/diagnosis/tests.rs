@@ -45,7 +45,7 @@ fn faults(right: impl Fn(f64, f64) -> ([f64; 2], f64)) -> Vec<Fault> {
                 let ([u, v], gain) = right(u, v);
                 gain * texture(u + shift, v)
             });
-            Pair::of(&left, &seen)
+            Pair::new(&left, &seen, 10)
         })
         .collect();
     assert!(
@@ -72,28 +72,39 @@ fn the_message_gives_the_size_of_the_fault_and_large_faults_are_refused() {
     let finding_for = |rows: f64| {
         let pairs = [0.0, 400.0, 800.0].map(|shift| {
             let left = image(|u, v| texture(u + shift, v));
-            Pair::of(&left, &image(|u, v| texture(u + shift + 12.0, v - rows)))
+            Pair::new(&left, &image(|u, v| texture(u + shift + 12.0, v - rows)), 10)
         });
         let findings = diagnose(&pairs);
         (findings[0].refused, findings[0].message.clone())
     };
     let (refused, message) = finding_for(3.0);
     assert!(
-        refused && message.contains("3.0 px apart in height") && message.contains("--calibration"),
+        refused && message.contains("rows lie 3.0 px apart") && message.contains("--calibration"),
         "{message}"
     );
     assert!(!finding_for(0.8).0, "a warning");
 }
 
 #[test]
-fn black_images_are_refused_and_few_matches_give_no_verdict() {
+fn black_images_are_refused_and_too_few_matches_are_said() {
     let black = image(|_, _| 0.0);
-    assert_eq!(diagnose(&[Pair::of(&black, &black)])[0].fault, Fault::Black);
+    assert_eq!(diagnose(&[Pair::new(&black, &black, 10)])[0].fault, Fault::Black);
     let grey = image(|u, _| 100.0 + u / 10.0);
     let other = image(|u, _| 90.0 + u / 10.0);
     assert!(
-        diagnose(&[Pair::of(&grey, &other)]).iter().all(|finding| finding.fault == Fault::Focus),
+        diagnose(&[Pair::new(&grey, &other, 1)]).iter().all(|finding| [
+            Fault::Focus,
+            Fault::Unknown
+        ]
+        .contains(&finding.fault)),
         "nothing can be matched"
+    );
+    let unknown = diagnose(&[Pair::new(&grey, &other, 1)]).pop().unwrap();
+    assert!(
+        unknown.fault == Fault::Unknown
+            && !unknown.refused
+            && unknown.message.contains("could not be examined: 0 matches"),
+        "{unknown:?}"
     );
 }
 
@@ -150,7 +161,32 @@ fn single_real_pairs_give_no_false_alarm() {
         let [left, right] = ["image_0", "image_1"].map(|camera| {
             read_picture(&folder.join(camera).join(name)).unwrap().to_8_bit(None).grey
         });
-        let findings = diagnose(&[Pair::of(&left, &right)]);
+        let findings = diagnose(&[Pair::new(&left, &right, 1)]);
         assert!(findings.is_empty(), "{name}: {findings:?}");
+    }
+}
+
+/// Pictures of a chessboard by a good rig: rows agree within 0.25 px, disparities reach 150 px.
+#[dynvox_needs::clips("other-cameras/opencv-lab")]
+#[test]
+fn a_good_rig_has_one_verdict_for_any_number_of_pictures() {
+    let folder = data("other-cameras/opencv-lab");
+    let scratch = tempfile::TempDir::new().unwrap();
+    let entries = |name: &str| {
+        let text = std::fs::read_to_string(folder.join(name)).unwrap();
+        text.replace("%YAML:1.0", "").replace("---", "")
+    };
+    let file = scratch.path().join("stereo.yml");
+    let head = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n";
+    let (lenses, poses) = (entries("intrinsics.yml"), entries("extrinsics.yml"));
+    std::fs::write(&file, format!("{head}{lenses}\n{poses}")).unwrap();
+    let options = OpenOptions { calibration: vec![file], ..OpenOptions::default() };
+    let source = open(&folder, &options).unwrap();
+    for count in [1, 2, 3, 5, 8, source.len()] {
+        let findings = examine(source.as_ref(), &(0..count).collect::<Vec<_>>()).unwrap();
+        let rows = findings
+            .iter()
+            .find(|finding| matches!(finding.fault, Fault::NotRectified | Fault::Unknown));
+        assert!(rows.is_none(), "{count} pairs: {rows:?}");
     }
 }
