@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Names of the two cameras: as folders, or as prefixes and suffixes of file names.
-pub const SIDES: [[&str; 2]; 15] = [
+pub const SIDES: [[&str; 2]; 31] = [
     ["left", "right"],
     ["Left", "Right"],
     ["LEFT", "RIGHT"],
@@ -23,10 +23,30 @@ pub const SIDES: [[&str; 2]; 15] = [
     ["infra1", "infra2"],
     ["image_left", "image_right"],
     ["camera_left", "camera_right"],
+    ["cam1", "cam2"],
+    ["cam_left", "cam_right"],
+    ["camera0", "camera1"],
+    ["camera1", "camera2"],
+    ["Camera_0", "Camera_1"],
+    ["stereo_left", "stereo_right"],
+    ["stereo_front_left", "stereo_front_right"],
+    ["frame_left", "frame_right"],
+    ["rectified_left", "rectified_right"],
+    ["left_rect", "right_rect"],
+    ["left_images", "right_images"],
+    ["img_left", "img_right"],
+    ["img0", "img1"],
+    ["im0", "im1"],
+    ["view0", "view1"],
+    ["I1", "I2"],
     ["l", "r"],
     ["L", "R"],
     ["0", "1"],
 ];
+/// Names at the end of the list that say something only together: a single letter or digit.
+const SHORT_SIDES: usize = 3;
+/// Letters of a name that is told from the number behind it without a separator: `left0001`.
+const WORD_LETTERS: usize = 4;
 /// Folder in which some recordings keep a camera's images, below that of the camera.
 const INNER: [&str; 3] = ["data", "data_rect", "images"];
 
@@ -37,7 +57,9 @@ pub fn side_folders(path: &Path) -> Option<[PathBuf; 2]> {
     let whole = both.iter().find(|sides| sides.iter().all(|folder| folder.is_dir()));
     // A single letter or digit is no sign of a stereo recording unless both are there.
     let half = || {
-        both.iter().take(SIDES.len() - 3).find(|sides| sides.iter().any(|folder| folder.is_dir()))
+        both.iter()
+            .take(SIDES.len() - SHORT_SIDES)
+            .find(|sides| sides.iter().any(|folder| folder.is_dir()))
     };
     whole.or_else(half).cloned()
 }
@@ -78,16 +100,23 @@ fn stamps_by_row(path: &Path, files: &[PathBuf]) -> Result<Vec<u64>, InputError>
 }
 
 /// Splits the images of one folder by a prefix or suffix that names the camera: `left_0008`,
-/// `0008_right`, `cam0-0008`. `None` where not every name has one.
+/// `0008_right`, `cam0-0008`, `left0008`, or a single pair `im0` and `im1`. `None` where not every
+/// name has one.
 pub fn split_by_mark(files: &[PathBuf]) -> Option<[Vec<PathBuf>; 2]> {
-    let separated = |rest: &str, at_end: bool| {
+    let separated = |rest: &str, mark: &str, at_end: bool| {
         let next = if at_end { rest.chars().next_back() } else { rest.chars().next() };
-        next.is_some_and(|c| ['_', '-', '.'].contains(&c))
+        // A word ends where digits begin; cam0 does not.
+        let is_word =
+            mark.len() >= WORD_LETTERS && mark.ends_with(|c: char| c.is_ascii_alphabetic());
+        next.is_some_and(|c| ['_', '-', '.'].contains(&c) || (is_word && c.is_ascii_digit()))
     };
     let has = |stem: &str, mark: &str, suffix: bool| {
         let rest = if suffix { stem.strip_suffix(mark) } else { stem.strip_prefix(mark) };
-        rest.is_some_and(|rest| separated(rest, suffix))
+        rest.is_some_and(|rest| separated(rest, mark, suffix))
     };
+    if let Some(pair) = one_pair(files) {
+        return Some(pair);
+    }
     for ([left, right], suffix) in
         SIDES.into_iter().flat_map(|sides| [(sides, false), (sides, true)])
     {
@@ -108,6 +137,22 @@ pub fn split_by_mark(files: &[PathBuf]) -> Option<[Vec<PathBuf>; 2]> {
     None
 }
 
+/// A folder with two images that are named as the two cameras.
+fn one_pair(files: &[PathBuf]) -> Option<[Vec<PathBuf>; 2]> {
+    let [first, second] = files else { return None };
+    let stems = [first, second].map(|path| stem_of(path));
+    let whole = SIDES.iter().take(SIDES.len() - SHORT_SIDES);
+    for sides in whole {
+        if stems == *sides {
+            return Some([vec![first.clone()], vec![second.clone()]]);
+        }
+        if stems == [sides[1], sides[0]] {
+            return Some([vec![second.clone()], vec![first.clone()]]);
+        }
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +168,11 @@ mod tests {
             ["8_l", "9_l", "8_r", "9_r"],
             ["cam0-8", "cam0-9", "cam1-8", "cam1-9"],
             ["0_8", "0_9", "1_8", "1_9"],
+            ["left0008", "left0009", "right0008", "right0009"],
+            ["left01", "left02", "right01", "right02"],
+            ["left-0000", "left-0001", "right-0000", "right-0001"],
+            ["I1_000000", "I1_000001", "I2_000000", "I2_000001"],
+            ["stereo_left_8", "stereo_left_9", "stereo_right_8", "stereo_right_9"],
         ] {
             let [left, right] = split_by_mark(&files(&names)).unwrap();
             assert_eq!((left, right), (files(&names[..2]), files(&names[2..])));
@@ -130,5 +180,9 @@ mod tests {
         assert_eq!(split_by_mark(&files(&["frame_0", "frame_1"])), None);
         assert_eq!(split_by_mark(&files(&["left_8", "left_9", "right_8", "right_9", "map"])), None);
         assert_eq!(split_by_mark(&files(&["000000", "000001", "000010", "000011"])), None);
+        assert_eq!(split_by_mark(&files(&["cam00", "cam01", "cam10", "cam11"])), None);
+        let pair = split_by_mark(&files(&["im0", "im1"])).unwrap();
+        assert_eq!(pair, [files(&["im0"]), files(&["im1"])]);
+        assert_eq!(split_by_mark(&files(&["0", "1"])), None, "two frames of one camera");
     }
 }

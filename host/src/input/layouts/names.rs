@@ -5,8 +5,12 @@ use crate::input::source::{InputError, read_failed};
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-/// Returns true if a file's name ends like a picture's.
+/// Returns true if a file's name ends like a picture's. Hidden files are none: some systems leave
+/// a `._0001.png` of their own beside `0001.png`.
 pub fn is_picture(path: &Path) -> bool {
+    if path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')) {
+        return false;
+    }
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     ending.is_some_and(|ending| PICTURE_ENDINGS.contains(&ending.as_str()))
 }

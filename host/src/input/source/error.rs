@@ -32,7 +32,7 @@ pub enum InputError {
         below: Vec<PathBuf>,
     },
     /// A file instead of a folder.
-    #[error("{path} is a file. Give the folder of the data set")]
+    #[error("{path} is a file. {}", file_action(.path))]
     File {
         /// Path as given.
         path: PathBuf,
@@ -301,5 +301,44 @@ impl InputError {
             FormatError::Content { path, reason, .. } => Self::Depth { path, reason },
             other => Self::Format(other),
         }
+    }
+}
+
+/// Endings of files that hold a video.
+const VIDEO_ENDINGS: [&str; 8] = ["mp4", "avi", "mov", "mkv", "m4v", "webm", "mjpeg", "h264"];
+
+/// The next step where a file is given instead of a folder.
+fn file_action(path: &Path) -> String {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    match ending.as_deref() {
+        Some(ending) if VIDEO_ENDINGS.contains(&ending) => {
+            "It is a video: write its images with `mkdir frames && ffmpeg -i VIDEO \
+             frames/%06d.png`, and map them with `dynvox run frames --side-by-side --calibration \
+             FILE`"
+                .to_owned()
+        }
+        Some("svo" | "svo2") => {
+            "It is a recording of ZED's own format: export its pairs as images \
+                                 with ZED's tools, and give their folder"
+                .to_owned()
+        }
+        Some("zip" | "tar" | "gz" | "tgz" | "7z") => {
+            "It is an archive: unpack it, and give the folder of the data set".to_owned()
+        }
+        _ => "Give the folder of the data set".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_no_folder_say_what_makes_one_of_them() {
+        let message = |name: &str| InputError::File { path: PathBuf::from(name) }.to_string();
+        assert!(message("drive.MP4").contains("ffmpeg -i VIDEO frames/%06d.png"));
+        assert!(message("a.svo2").contains("export its pairs"));
+        assert!(message("kitti.zip").contains("unpack it"));
+        assert!(message("notes.txt").ends_with("Give the folder of the data set"));
     }
 }
