@@ -15,6 +15,7 @@ mod health;
 mod instances;
 mod keyframes;
 mod map_disparity;
+mod mavlink;
 mod objects;
 mod overview;
 pub mod pictures;
@@ -44,6 +45,7 @@ pub use health::{HealthObserver, HealthSection};
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use map_disparity::MapDisparityObserver;
+pub use mavlink::{MavlinkObserver, MavlinkSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
 pub use overview::overview;
 pub use planning::{
@@ -258,6 +260,7 @@ pub struct Observers {
     instances: InstancesObserver,
     map_disparity: MapDisparityObserver,
     planning: PlanningObserver,
+    mavlink: MavlinkObserver,
 }
 
 /// Findings of all observers.
@@ -283,6 +286,8 @@ pub struct Sections {
     pub bounds: BoundsSection,
     /// Counts of everything refused.
     pub health: HealthSection,
+    /// Messages to an autopilot; `None` where the run sends none.
+    pub mavlink: Option<MavlinkSection>,
 }
 
 impl Observers {
@@ -333,6 +338,7 @@ impl Observer for Observers {
         self.health.frame(run, frame)?;
         self.instances.frame(run, frame)?;
         self.map_disparity.frame(run, frame)?;
+        self.mavlink.frame(run, frame)?;
         self.planning.frame(run, frame)
     }
 
@@ -365,6 +371,7 @@ impl Observer for Observers {
             blocks: self.blocks.finish(run, finished)?,
             bounds: self.bounds.finish(run, finished)?,
             health: self.health.finish(run, finished)?,
+            mavlink: self.mavlink.finish(run, finished)?,
         })
     }
 }

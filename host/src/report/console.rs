@@ -7,7 +7,7 @@ use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time}
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
 use crate::formats::SEGMENT_GAP_M;
-use crate::observe::Sections;
+use crate::observe::{MavlinkSection, Sections};
 use crate::run::RunRecord;
 use std::path::Path;
 
@@ -41,6 +41,9 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.extend(block_lines(run));
     lines.extend(poor_map::sentence(run).map(|sentence| ("map WARNING", sentence)));
     lines.push(("memory", bounds::sentence(run)));
+    lines.extend(run.sections.mavlink.map(|MavlinkSection { sent, failed }| {
+        ("MAVLink", format!("{sent} obstacle messages sent, {failed} refused by the system"))
+    }));
     lines.extend(pose_lines(run));
     // A miscalibrated rig is the one finding that makes all others doubtful.
     lines.push((

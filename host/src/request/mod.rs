@@ -39,7 +39,7 @@ pub use bounds::{Bounds, Memory, PlanningWindow, profile, solve};
 pub use checks::{check_bounds, resident_limit_bytes};
 pub use error::RequestError;
 pub use evaluation::{Evaluation, Reference};
-pub use exports::{Exports, MapObjects};
+pub use exports::{Exports, MapObjects, UdpAddress};
 pub use frames::{FrameNumbers, Frames, frame_interval_s};
 pub use input::{Input, Source};
 pub use limits::Limits;

@@ -4,7 +4,7 @@ use super::poses::Egomotion;
 use super::{
     Bounds, Bytes, Evaluation, Exports, Frames, ImageSize, Input, Limits, MapObjects, Masks,
     Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneScale,
-    Settings, Source, Storage, WindowSize, words,
+    Settings, Source, Storage, UdpAddress, WindowSize, words,
 };
 use crate::formats::Axes;
 use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
@@ -234,6 +234,10 @@ pub struct Options {
     /// of the map, figures
     #[arg(long, help_heading = "Results")]
     pub mcap: bool,
+    /// Send obstacle distances to an autopilot after every frame, as MAVLink: udp:127.0.0.1:14550
+    #[arg(long, value_name = "udp:HOST:PORT", requires = "planning", help_heading = "Results")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub mavlink: Option<UdpAddress>,
 }
 
 impl Options {
@@ -268,6 +272,7 @@ impl Options {
                 record: self.mcap,
                 instances: self.save_instances.clone(),
                 map_disparity: self.save_map_disparity.clone(),
+                mavlink: self.mavlink,
             },
             limits: Limits { strict: self.strict, ..Limits::default() },
         };

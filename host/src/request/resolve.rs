@@ -129,6 +129,11 @@ impl Request {
         let Self { frames, storage, evaluation, exports, .. } = self;
         // None of these can be continued from a snapshot.
         let snapshots = storage.snapshot_every.is_some();
+        if exports.mavlink.is_some() && self.bounds.planning.is_none() {
+            return Err(RequestError::invalid(
+                "--mavlink tells of a planner's window, and there is none. Add --planning 200x200x20",
+            ));
+        }
         let whole = [
             ("an evaluation", evaluation.reference.is_some()),
             ("a recording as MCAP", exports.record),

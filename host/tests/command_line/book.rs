@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 18] = [
+const PAGES: [&str; 19] = [
     "README.md",
     "docs/bits.md",
     "docs/fleet.md",
@@ -15,6 +15,7 @@ const PAGES: [&str; 18] = [
     "docs/measurements/robustness.md",
     "docs/measurements/speed.md",
     "docs/moving_objects.md",
+    "docs/onboard.md",
     "docs/own_camera.md",
     "docs/own_recording.md",
     "docs/pin_your_rig.md",

@@ -1,0 +1,58 @@
+//! Costs of columns, as costmaps of Nav2 hold them.
+
+use crate::columns::{ColumnState, Levels, state};
+use crate::sector::Band;
+use crate::vehicle::Vehicle;
+use dynvox_core::planning::Planning;
+
+/// Cost of a free column (`FREE_SPACE`).
+pub const COST_FREE: u8 = 0;
+/// Cost of a column that is in the way (`LETHAL_OBSTACLE`).
+pub const COST_LETHAL: u8 = 254;
+/// Cost of a column that is not known (`NO_INFORMATION`).
+pub const COST_UNKNOWN: u8 = 255;
+
+/// Size and place of a costmap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costmap {
+    /// Columns from left to right.
+    pub width: usize,
+    /// Columns from behind to ahead.
+    pub length: usize,
+    /// Side of a column, m.
+    pub resolution_m: f64,
+    /// Place of the first column's corner from the world's origin: to the right and ahead, m.
+    pub origin_m: [f64; 2],
+}
+
+/// Writes the cost of every column of the window, x fastest, and returns the map's size and place.
+/// `None` where `into` has fewer entries than there are columns; then nothing is written.
+///
+/// Around a vehicle whose pose is a guess all is unknown.
+pub fn costs(
+    planning: &Planning<'_>,
+    vehicle: &Vehicle,
+    band: &Band,
+    into: &mut [u8],
+) -> Option<Costmap> {
+    let ([width, length, _], [x0, y0, _]) = (planning.size(), planning.origin());
+    let cell_m = planning.grid().cell_m();
+    let columns = into.get_mut(..width.checked_mul(length)?)?;
+    let here = vehicle.on_grid(planning);
+    for (at, cost) in columns.iter_mut().enumerate() {
+        let [x, y] = [x0 + (at % width) as i32, y0 + (at / width) as i32];
+        let seen =
+            here.map(|here| state(planning, [x, y], Levels::new(&here, band), band.stale_frames));
+        *cost = match seen {
+            Some(ColumnState::Free { .. }) => COST_FREE,
+            Some(ColumnState::Occupied { .. }) => COST_LETHAL,
+            Some(ColumnState::Unknown) | None => COST_UNKNOWN,
+        };
+    }
+    Some(Costmap {
+        width,
+        length,
+        resolution_m: cell_m,
+        origin_m: [f64::from(x0) * cell_m, f64::from(y0) * cell_m],
+    })
+}
