@@ -105,7 +105,9 @@ fn a_map_of_one_frame_keeps_what_it_saw() {
             volume.visible.mark(slot).unwrap();
             volume.visible.sort(volume.pool.high_water());
             volume.prune();
-            (1..frames).for_each(|_| drop(frame(volume, &[])));
+            for _ in 1..frames {
+                frame(volume, &[]);
+            }
             volume.finish();
             assert_eq!(volume.pool.len(), left, "{frames} frames");
         });
