@@ -18,7 +18,7 @@ pub fn row_difference_px(pairs: &[[Image<u8>; 2]], calibration: &StereoCalibrati
     let mut matches = Vec::new();
     for pair in pairs {
         let [left, right] = rectifier.rectify(pair)?;
-        matches.extend(patches::matches(&left, &right));
+        matches.extend(patches::matches(&left, &right, patches::step_px(pairs.len())));
     }
     let matches: Vec<_> = matches.iter().collect();
     (matches.len() >= FEWEST_MATCHES)
@@ -36,11 +36,12 @@ pub fn row_error(
 ) -> Result<Option<RowError>, InputError> {
     let mut rectified = RectifiedSource::new(source)?;
     let step = indices.len().div_ceil(PAIRS).max(1);
+    let step_px = patches::step_px(indices.len().min(PAIRS));
     let (mut matches, mut width_px) = (Vec::new(), 0.0);
     for &index in indices.iter().step_by(step) {
         if let Ok(Some([left, right])) = rectified.pair(index) {
             width_px = left.width() as f64;
-            matches.extend(patches::matches(&left, &right));
+            matches.extend(patches::matches(&left, &right, step_px));
         }
     }
     let matches: Vec<_> = matches.iter().collect();

@@ -30,6 +30,8 @@ pub struct RowError {
     pub shift_sigma_px: f64,
     /// Standard deviation of the roll, degrees.
     pub roll_sigma_deg: f64,
+    /// Median distance of matched rows, px.
+    pub median_px: f64,
     /// Median distance of matched rows from the fitted line, px.
     pub rest_px: f64,
 }
@@ -51,6 +53,7 @@ impl RowError {
             roll_deg: slope.atan().to_degrees(),
             shift_sigma_px,
             roll_sigma_deg: slope_sigma.atan().to_degrees(),
+            median_px: median(matches.iter().map(|one| one.rows_px.abs()).collect()),
             rest_px: median(matches.iter().map(rest).collect()),
         }
     }
