@@ -4,7 +4,7 @@
 //! | module | gives | for |
 //! |---|---|---|
 //! | [`sectors`] | the nearest obstacle in each of 72 directions | MAVLink's `OBSTACLE_DISTANCE` |
-//! | [`points`] | the nearest obstacle of each direction as a point | MAVLink's `OBSTACLE_DISTANCE_3D` |
+//! | [`points`] | the nearest obstacles as points | MAVLink's `OBSTACLE_DISTANCE_3D` |
 //! | [`costs`] | a cost for each column | costmaps of Nav2 |
 //! | [`mavlink`] | bytes of the messages | a serial line or a socket |
 //!

@@ -1,7 +1,7 @@
 //! Bytes of MAVLink 2 messages.
 //!
 //! Written here because the crate that reads MAVLink has features for std and for embedded targets
-//! that exclude each other: a library that picks one breaks whoever needs the other. The tests read
+//! that exclude each other: a library that picks one breaks callers of the other. The tests read
 //! every message back with that crate.
 
 use crate::sector::{Direction, SECTOR_DEG, SECTORS, Sectors};
@@ -11,15 +11,22 @@ pub const MESSAGE_MAX_BYTES: usize = HEADER_BYTES + PAYLOAD_MAX_BYTES + 2;
 
 const HEADER_BYTES: usize = 10;
 const PAYLOAD_MAX_BYTES: usize = 167;
-/// Number and extra byte of the checksum of `OBSTACLE_DISTANCE`.
-const OBSTACLE_DISTANCE: (u32, u8) = (330, 23);
-/// Number and extra byte of the checksum of `OBSTACLE_DISTANCE_3D`.
-const OBSTACLE_DISTANCE_3D: (u32, u8) = (11_037, 130);
+/// Kind of a message.
+#[derive(Clone, Copy)]
+struct Kind {
+    /// Number of the kind.
+    number: u32,
+    /// Extra byte of the checksum, which tells versions of a kind apart.
+    extra: u8,
+}
+
+const OBSTACLE_DISTANCE: Kind = Kind { number: 330, extra: 23 };
+const OBSTACLE_DISTANCE_3D: Kind = Kind { number: 11_037, extra: 130 };
 /// `MAV_FRAME_BODY_FRD`: x ahead, y right, z down.
 const BODY_FRD: u8 = 12;
 /// `MAV_DISTANCE_SENSOR_UNKNOWN`: no kind of the list is a stereo camera.
 const SENSOR_UNKNOWN: u8 = 4;
-/// A direction of which nothing is known.
+/// An unknown direction.
 const UNKNOWN_CM: u16 = u16::MAX;
 /// The farthest distance that a message tells, one less than what says "nothing within".
 const FAR_MAX_CM: u16 = u16::MAX - 2;
@@ -55,7 +62,8 @@ impl Message {
 ///
 /// ```
 /// use dynvox_onboard::mavlink::{Sender, obstacle_distance};
-/// # use dynvox_core::{Capacity, Config, Mapper, geometry::{StereoRig, Transform}, memory::SLAB_ALIGN};
+/// # use dynvox_core::{Capacity, Config, Mapper, memory::SLAB_ALIGN};
+/// # use dynvox_core::geometry::{StereoRig, Transform};
 /// # use dynvox_onboard::{Band, Vehicle, sectors};
 /// # let rig =
 /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
@@ -63,7 +71,8 @@ impl Message {
 /// # let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
 /// # let band = Band { near_m: 1.0, far_m: 10.0, up_m: 0.5, down_m: 0.5, stale_frames: 10 };
 /// # let around = sectors(mapper.planning(), &Vehicle::new(&Transform::IDENTITY, true), &band);
-/// let message = obstacle_distance(&around, 1_000_000, Sender { system: 1, component: 196, sequence: 0 });
+/// let sender = Sender { system: 1, component: 196, sequence: 0 };
+/// let message = obstacle_distance(&around, 1_000_000, sender);
 /// assert_eq!((message.bytes()[0], message.bytes().len()), (0xFD, 179));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -89,8 +98,8 @@ pub fn obstacle_distance(sectors: &Sectors, time_us: u64, sender: Sender) -> Mes
     payload.message(OBSTACLE_DISTANCE, sender)
 }
 
-/// `OBSTACLE_DISTANCE_3D` of one obstacle at a point in the vehicle's axes, m. `time_ms` is the time
-/// since the start of the system.
+/// `OBSTACLE_DISTANCE_3D` of one obstacle at a point in the vehicle's axes, m. `time_ms` is the
+/// time since the start of the system.
 pub fn obstacle_distance_3d(
     point_m: [f32; 3],
     sectors: &Sectors,
@@ -135,10 +144,10 @@ impl Payload {
     }
 
     /// The message, with zeros at the end of the payload left out as MAVLink 2 has it.
-    fn message(&self, (number, extra): (u32, u8), sender: Sender) -> Message {
+    fn message(&self, kind: Kind, sender: Sender) -> Message {
         let payload = self.bytes.get(..self.len).unwrap_or_default();
         let used = payload.iter().rposition(|byte| *byte != 0).map_or(1, |last| last + 1);
-        let [low, middle, high, _] = number.to_le_bytes();
+        let [low, middle, high, _] = kind.number.to_le_bytes();
         let head = [
             0xFD,
             used as u8,
@@ -154,7 +163,7 @@ impl Payload {
         let mut message = Message { bytes: [0; MESSAGE_MAX_BYTES], len: HEADER_BYTES + used + 2 };
         let content = head.iter().chain(payload.iter().take(used)).copied();
         // The first byte marks the message and is not in its checksum.
-        let sum = content.clone().skip(1).chain([extra]).fold(u16::MAX, crc);
+        let sum = content.clone().skip(1).chain([kind.extra]).fold(u16::MAX, crc);
         let whole = content.chain(sum.to_le_bytes());
         message.bytes.iter_mut().zip(whole).for_each(|(to, from)| *to = from);
         message

@@ -65,8 +65,8 @@ impl Sectors {
         &self.directions
     }
 
-    /// Frames since the longest ago of the looks that a direction rests on: of the free cells before
-    /// its obstacle, or of all. 0 where it is unknown.
+    /// Frames since the oldest look that a direction rests on, of the free cells before its
+    /// obstacle, or of all. 0 where it is unknown.
     pub fn age_frames(&self) -> &[u32; SECTORS] {
         &self.age_frames
     }

@@ -28,7 +28,7 @@ const CAPACITY: Capacity = Capacity {
 };
 
 /// Windows of a vehicle that drives about between walls at random depths, one a frame.
-fn each_window(count: usize, mut look: impl FnMut(&Planning<'_>, &Transform, &mut Random)) {
+fn each_window(count: usize, mut check: impl FnMut(&Planning<'_>, &Transform, &mut Random)) {
     let mut random = Random::new(11);
     let mut config = Config::for_rig(RIG);
     config.volume.voxel_size_m = 0.1;
@@ -39,7 +39,7 @@ fn each_window(count: usize, mut look: impl FnMut(&Planning<'_>, &Transform, &mu
     let mut slab = vec![0; CAPACITY.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&CAPACITY, &config, &mut slab).unwrap();
     let grey = vec![90; WIDTH * HEIGHT];
-    let mut place = [0.0f64, 0.0];
+    let mut position = [0.0f64, 0.0];
     let mut heading = 0.0f64;
     for _ in 0..count {
         let disparity_q8: Vec<u16> = (0..8)
@@ -55,8 +55,8 @@ fn each_window(count: usize, mut look: impl FnMut(&Planning<'_>, &Transform, &mu
             })
             .collect();
         heading += f64::from(random.below(7)) * 0.05 - 0.15;
-        place = [place[0] + 0.2 * heading.sin(), place[1] + 0.2 * heading.cos()];
-        let pose = Transform::new([0.0, heading, 0.0], [place[0], 0.0, place[1]]);
+        position = [position[0] + 0.2 * heading.sin(), position[1] + 0.2 * heading.cos()];
+        let pose = Transform::new([0.0, heading, 0.0], [position[0], 0.0, position[1]]);
         let view = View::new(&grey, WIDTH, HEIGHT).unwrap();
         let frame = StereoFrame {
             disparity_q8: View::new(&disparity_q8, WIDTH, HEIGHT),
@@ -65,7 +65,7 @@ fn each_window(count: usize, mut look: impl FnMut(&Planning<'_>, &Transform, &mu
         };
         mapper.step(&frame, &Serial).unwrap();
         mapper.update_planning_maps(0.0);
-        look(mapper.planning(), &pose, &mut random);
+        check(mapper.planning(), &pose, &mut random);
     }
 }
 

@@ -131,7 +131,7 @@ impl Request {
         let snapshots = storage.snapshot_every.is_some();
         if exports.mavlink.is_some() && self.bounds.planning.is_none() {
             return Err(RequestError::invalid(
-                "--mavlink tells of a planner's window, and there is none. Add --planning 200x200x20",
+                "--mavlink needs a planner's window. Add --planning 200x200x20",
             ));
         }
         let whole = [
