@@ -1,5 +1,13 @@
 //! The host of dynvox: feeds the core, checks its limits, evaluates and shows its results.
 
+#![cfg_attr(
+    not(test),
+    deny(clippy::disallowed_methods, clippy::print_stdout, clippy::print_stderr)
+)]
+
+#[macro_use]
+mod terminal;
+
 pub mod cli;
 pub mod evaluate;
 pub mod fixtures;

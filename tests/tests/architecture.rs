@@ -176,14 +176,21 @@ const HOST: Layers = &[
     ("sentence", &[]),
     ("slab", &[]),
     ("owned", &[]),
+    ("terminal", &[]),
     ("formats", &["owned"]),
     ("synth", &["formats", "owned"]),
-    ("input", &["formats", "owned", "slab", "synth"]),
+    ("input", &["formats", "owned", "slab", "synth", "terminal"]),
     ("scene", &["formats"]),
     ("evaluate", &["formats", "input"]),
     ("request", &["evaluate", "formats", "input", "synth"]),
     ("observe", &["evaluate", "formats", "input", "owned", "request", "scene", "slab"]),
-    ("run", &["evaluate", "formats", "input", "observe", "owned", "request", "scene", "slab"]),
+    (
+        "run",
+        &[
+            "evaluate", "formats", "input", "observe", "owned", "request", "scene", "slab",
+            "terminal",
+        ],
+    ),
     ("report", &["evaluate", "formats", "observe", "request", "run", "scene"]),
     ("sweep", &["evaluate", "formats", "input", "observe", "owned", "report", "request", "run"]),
     ("fixtures", &["formats", "input", "owned", "request", "run", "slab"]),
@@ -192,7 +199,7 @@ const HOST: Layers = &[
         "cli",
         &[
             "evaluate", "fixtures", "fleet", "formats", "input", "observe", "owned", "report",
-            "request", "run", "scene", "sentence", "slab", "sweep", "synth",
+            "request", "run", "scene", "sentence", "slab", "sweep", "synth", "terminal",
         ],
     ),
 ];

@@ -23,11 +23,11 @@ pub struct DiffArgs {
 
 /// 0 for equal runs, 1 for different ones, 2 where they cannot be compared.
 pub fn main(args: &DiffArgs) -> ExitCode {
-    match run(args).and_then(|equal| super::output::finish().map(|()| equal)) {
+    match run(args).and_then(|equal| crate::terminal::finish().map(|()| equal)) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {}", super::sentence(&error));
+            errln!("error: {}", super::sentence(&error));
             ExitCode::from(2)
         }
     }

@@ -5,6 +5,7 @@ use crate::input::masks::MaskChoice;
 use crate::owned::check_overlap;
 use crate::request::{Bytes, Options, Request, RequestError, ScaleWord};
 use crate::run::replace_whole;
+use crate::terminal::quoted;
 use anyhow::bail;
 use dynvox_core::Serial;
 use serde_json::json;
@@ -142,10 +143,11 @@ fn new(args: &NewArgs) -> anyhow::Result<()> {
         );
         return Ok(());
     }
-    let (shown, mib) = (args.folder.display(), plan.capacity.bytes() as f64 / f64::from(1 << 20));
+    let (shown, quoted) = (args.folder.display(), quoted(&args.folder));
+    let mib = plan.capacity.bytes() as f64 / f64::from(1 << 20);
     outln!(
         "{shown}: {frames} frames, replayed in {mib:.1} MiB. Commit the folder, and compare with: \
-         dynvox fixtures verify {shown}"
+         dynvox fixtures verify {quoted}"
     );
     Ok(())
 }
@@ -163,7 +165,7 @@ fn verify(path: &Path, json: bool, junit: Option<&Path>) -> anyhow::Result<()> {
     if verdicts.iter().any(|verdict| !verdict.differences.is_empty()) {
         bail!(
             "digests have changed. If that is meant: dynvox fixtures bless {} --reason \"why\"",
-            path.display()
+            quoted(path)
         );
     }
     Ok(())

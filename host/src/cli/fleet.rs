@@ -179,7 +179,7 @@ fn each<'j, T>(
     let mut failed = Vec::new();
     for (job, of) in jobs {
         if let Err(error) = act(job, of) {
-            eprintln!("error: {}: {}", job.name, super::sentence(&error));
+            errln!("error: {}: {}", job.name, super::sentence(&error));
             failed.push(job.name.as_str());
         }
     }

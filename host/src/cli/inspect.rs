@@ -5,6 +5,7 @@ use crate::formats::calibration::CalibrationHints;
 use crate::formats::{SETTINGS_FILE, SUMMARY_FILE};
 use crate::input::diagnosis;
 use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout, OpenOptions};
+use crate::terminal::{name, quoted};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use serde::{Serialize, Serializer};
@@ -87,8 +88,8 @@ fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
     let (path, shown) = (&args.path, args.path.display());
     if path.join(SUMMARY_FILE).is_file() {
         let (evaluate, again) = (
-            format!("dynvox evaluate trajectory {shown} TRUTH"),
-            format!("dynvox run [PATH] --config {}", path.join(SETTINGS_FILE).display()),
+            format!("dynvox evaluate trajectory {} TRUTH", quoted(path)),
+            format!("dynvox run [PATH] --config {}", quoted(&path.join(SETTINGS_FILE))),
         );
         if args.json {
             outln!("{:#}", json!({ "path": path, "layout": "run", "commands": [evaluate, again] }));
@@ -101,7 +102,8 @@ fn other(args: &InspectArgs) -> Option<anyhow::Result<()>> {
     }
     match find_stereo_set(path) {
         Ok(set) => {
-            let (pairs, evaluate) = (set.pairs.len(), format!("dynvox evaluate stereo {shown}"));
+            let (pairs, evaluate) =
+                (set.pairs.len(), format!("dynvox evaluate stereo {}", quoted(path)));
             if args.json {
                 outln!(
                     "{:#}",
@@ -126,11 +128,11 @@ fn command(args: &InspectArgs, found: &Found) -> String {
     let sequence = found
         .sequence
         .as_ref()
-        .map(|sequence| format!(" --sequence {sequence}"))
+        .map(|sequence| format!(" --sequence {}", quoted(Path::new(sequence))))
         .unwrap_or_default();
-    let files = args.calibration.iter().map(|file| format!(" --calibration {}", file.display()));
+    let files = args.calibration.iter().map(|file| format!(" --calibration {}", quoted(file)));
     let hints = args.hints.options();
-    format!("dynvox run {}{sequence}{}{hints}", args.path.display(), files.collect::<String>())
+    format!("dynvox run {}{sequence}{}{hints}", quoted(&args.path), files.collect::<String>())
 }
 
 /// One sequence, or why it cannot be used.
@@ -143,7 +145,7 @@ impl SequenceFound {
     fn print(&self) {
         outln!("");
         if let Some(sequence) = &self.sequence {
-            outln!("sequence {sequence}");
+            outln!("sequence {}", name(sequence));
         }
         match &self.described {
             Ok(description) => description.print(),

@@ -1,15 +1,5 @@
 //! The command line. Errors become sentences here and nowhere else.
 
-/// Prints to standard output without a panic where it is closed.
-macro_rules! out {
-    ($($text:tt)*) => { $crate::cli::output::print(format_args!($($text)*)) };
-}
-
-/// `out` and a line's end.
-macro_rules! outln {
-    ($($text:tt)*) => { $crate::cli::output::print(format_args!("{}\n", format_args!($($text)*))) };
-}
-
 mod bench;
 mod budget;
 mod calibration;
@@ -19,7 +9,6 @@ mod fixtures;
 mod fleet;
 mod inspect;
 mod manual;
-mod output;
 mod rectified;
 mod run;
 mod settings;
@@ -29,6 +18,7 @@ mod synth;
 mod view;
 
 use crate::request::RequestError;
+use crate::terminal;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -133,7 +123,12 @@ pub fn main() -> ExitCode {
     if let Ok(program) = std::env::current_exe() {
         crate::input::masks::run_networks_in(program);
     }
-    let done = match Cli::parse().command {
+    terminal::expect(std::env::args_os().skip(1));
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return answer(&error),
+    };
+    let done = match cli.command {
         None => run::run(&run::RunArgs::default()),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Inspect(args)) => inspect::run(&args),
@@ -158,10 +153,10 @@ pub fn main() -> ExitCode {
             return crate::input::masks::serve_network(&network);
         }
     };
-    match done.and_then(|()| output::finish()) {
+    match done.and_then(|()| terminal::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", sentence(&error));
+            errln!("error: {}", sentence(&error));
             match () {
                 () if matches!(error.downcast_ref(), Some(RequestError::Refused(_))) => {
                     ExitCode::from(REFUSED_INPUT)
@@ -171,6 +166,17 @@ pub fn main() -> ExitCode {
             }
         }
     }
+}
+
+/// Prints what the command line's parser answers: help, the version, or what is wrong.
+fn answer(error: &clap::Error) -> ExitCode {
+    let text = error.render().to_string();
+    if error.use_stderr() {
+        errln!("{}", text.trim_end());
+        return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(1));
+    }
+    out!("{text}");
+    if terminal::finish().is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// An error with its causes, without how a command is used.

@@ -9,6 +9,7 @@ pub use finish::{IncompleteRun, record, write};
 use crate::owned::check_overlap;
 use crate::request::{Options, Request};
 use crate::run::{RunFolder, check_outputs};
+use crate::terminal::quoted;
 use finish::{finish, print_header};
 use std::path::{Path, PathBuf};
 
@@ -119,9 +120,9 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     if plan.progress {
         print_header(&plan);
         if plan.request.storage.snapshot_every.is_some() {
-            eprintln!(
+            errln!(
                 "note: if the run is interrupted, `dynvox run --resume {}` resumes it",
-                target.display()
+                quoted(&target)
             );
         }
     }

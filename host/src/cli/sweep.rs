@@ -109,7 +109,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         }
         let request = request(key)?;
         if !args.quiet && !args.json {
-            eprintln!("run {} of {}: {}", at + 1, keys.len(), request.words());
+            errln!("run {} of {}: {}", at + 1, keys.len(), request.words());
         }
         figures(&folder, &plan, key, &request)?.write(&folder.result(key))?;
         // The page is written after every run, so that an interrupted sweep has one, too.

@@ -3,6 +3,7 @@
 use crate::input::InputError;
 use crate::request::Settings;
 use crate::synth::{Street, write_kitti};
+use crate::terminal;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -30,9 +31,9 @@ pub fn run(args: &SynthArgs) -> anyhow::Result<()> {
     let written = write_kitti(&street, &args.out, |done, _| bar.set_position(u64::from(done)));
     bar.finish_and_clear();
     written?;
-    let folder = args.out.display();
+    let (folder, quoted) = (args.out.display(), terminal::quoted(&args.out));
     outln!(
-        "{} frames with their truth in {folder}\nmap it: dynvox run {folder} --images colour",
+        "{} frames with their truth in {folder}\nmap it: dynvox run {quoted} --images colour",
         street.config().frames
     );
     Ok(())

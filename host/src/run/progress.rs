@@ -48,8 +48,8 @@ impl Progress {
     /// Prints a warning, also where no progress is shown.
     pub fn warn(&self, warning: &str) {
         match self {
-            Self::Bar(bar) => bar.suspend(|| eprintln!("warning: {warning}")),
-            Self::Quiet | Self::Lines { .. } => eprintln!("warning: {warning}"),
+            Self::Bar(bar) => bar.suspend(|| errln!("warning: {warning}")),
+            Self::Quiet | Self::Lines { .. } => errln!("warning: {warning}"),
         }
     }
 
@@ -78,7 +78,7 @@ impl Progress {
                     None => (done == 1 || done.is_multiple_of(OPEN_EVERY), done.to_string()),
                 };
                 if due {
-                    eprintln!("frame {of}  {words}  {:.1} s", begin.elapsed().as_secs_f64());
+                    errln!("frame {of}  {words}  {:.1} s", begin.elapsed().as_secs_f64());
                 }
             }
         }

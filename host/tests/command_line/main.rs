@@ -30,4 +30,5 @@ mod same_run;
 mod segments;
 mod stream;
 mod sweep;
+mod terminal;
 mod viewer;

@@ -13,6 +13,7 @@ use crate::report::text::counted;
 use crate::request::{Plan, Request};
 use crate::run::store::BlockFile;
 use crate::run::{self, BLOCKS_FILE, RunFolder, stereo_frame};
+use crate::terminal::quoted;
 use anyhow::{Context, bail};
 use dynvox_core::digest::Digest;
 use std::path::{Path, PathBuf};
@@ -69,7 +70,7 @@ pub fn write(manifest: &Manifest, out: &Path) -> anyhow::Result<()> {
         "{} jobs in {}. Do them with: dynvox fleet run {}",
         manifest.jobs.len(),
         out.display(),
-        out.display()
+        quoted(out)
     );
     Ok(())
 }

@@ -5,6 +5,7 @@ use crate::fleet::{self, Alignment, Averages, JobState, Manifest, Report, Submap
 use crate::formats::Axes;
 use crate::owned::{check_overlap, create_folder};
 use crate::report::text::{counted, grouped};
+use crate::terminal::quoted;
 use anyhow::bail;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,7 @@ fn done_jobs(folder: &Path) -> anyhow::Result<Manifest> {
             "{} of {} are not done. Do them with: dynvox fleet run {}",
             open.join(", "),
             folder.display(),
-            folder.display()
+            quoted(folder)
         );
     }
     Ok(manifest)
@@ -82,9 +83,10 @@ pub fn resample(folder: &Path, shard: Shard) -> anyhow::Result<()> {
                     resampled.tiles
                 );
                 if resampled.beyond > 0 {
-                    eprintln!(
+                    errln!(
                         "warning: {} blocks of {} are beyond the world's coordinates",
-                        resampled.beyond, job.name
+                        resampled.beyond,
+                        job.name
                     );
                 }
                 Ok(())
@@ -110,10 +112,10 @@ fn sums_of(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
         .map(|(job, _)| job.name.as_str());
     let missing: Vec<&str> = missing.collect();
     if !missing.is_empty() {
-        let (missing, folder) = (missing.join(", "), folder.display());
+        let (missing, quoted, folder) = (missing.join(", "), quoted(folder), folder.display());
         bail!(
             "{missing} of {folder} are not in the world's lattice. Carry them there with: dynvox \
-             fleet resample {folder}"
+             fleet resample {quoted}"
         );
     }
     Ok(inputs)
@@ -150,7 +152,7 @@ pub fn mesh(map: &Path, out: &Path, min_weight: u8, axes: Axes) -> anyhow::Resul
         grouped(averages.blocks)
     );
     if averages.overflowed > 0 {
-        eprintln!(
+        errln!(
             "warning: {} voxels were seen too often for their sums and are left out",
             grouped(averages.overflowed)
         );

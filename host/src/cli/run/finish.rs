@@ -8,6 +8,7 @@ use crate::run::{
     self, BLOCKS_FILE, Checkpoint, Incomplete, PREVIOUS_SNAPSHOT_FILE, RunError, RunFolder,
     RunRecord, SNAPSHOT_FILE, has_snapshot,
 };
+use crate::terminal::quoted;
 use std::path::{Path, PathBuf};
 
 /// A run whose results are written, and incomplete.
@@ -28,7 +29,7 @@ impl IncompleteRun {
             format!(", without {}", incomplete.missing.join(", "))
         };
         let resume = if has_snapshot(&folder) {
-            format!("; `dynvox run --resume {}` resumes the run", folder.display())
+            format!("; `dynvox run --resume {}` resumes the run", quoted(&folder))
         } else {
             String::new()
         };
@@ -55,7 +56,7 @@ fn map(
         error if folder.has_snapshot() => {
             anyhow::anyhow!(
                 "{error}.\nThe last snapshot remains: `dynvox run --resume {}` resumes the run",
-                folder.target().display()
+                quoted(folder.target())
             )
         }
         error => error.into(),
@@ -94,7 +95,7 @@ pub fn finish(
     }
     let shows_map = record.plan.request.exports.map_disparity.is_some();
     if shows_map && record.sections.blocks.totals.stored > 0 {
-        eprintln!(
+        errln!(
             "warning: a part of the map was on disk in the end, and --save-map-disparity shows \
              what was in memory: choose a larger --profile"
         );
@@ -148,8 +149,8 @@ pub fn print_header(plan: &Plan) {
         .frames
         .count()
         .map_or_else(|| "a stream".to_owned(), |count| format!("{count} frames"));
-    eprintln!("{name}: {frames} of {width} x {height} px, profile {}, {threads}", plan.profile);
-    eprintln!("{}", scale_sentence(&plan.config));
-    plan.dataset.notes().iter().for_each(|note| eprintln!("note: {note}"));
-    plan.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    errln!("{name}: {frames} of {width} x {height} px, profile {}, {threads}", plan.profile);
+    errln!("{}", scale_sentence(&plan.config));
+    plan.dataset.notes().iter().for_each(|note| errln!("note: {note}"));
+    plan.warnings.iter().for_each(|warning| errln!("warning: {warning}"));
 }

@@ -11,14 +11,14 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
     let mut folder = RunFolder::reopen(&std::path::absolute(target)?)?;
     let (checkpoint, damage) = Checkpoint::read(&folder)?;
     if let Some(damage) = damage {
-        eprintln!("warning: {damage}. The snapshot before it is taken");
+        errln!("warning: {damage}. The snapshot before it is taken");
     }
     let manifest = checkpoint.manifest();
     if folder.is_complete() {
         let blocks_stay = manifest.request().storage.keep_blocks;
         let target = folder.commit(&temporary_files(blocks_stay, false))?;
         if !args.silent() {
-            eprintln!(
+            errln!(
                 "note: {} was complete but for files that it no longer needs; they are removed",
                 target.display()
             );
@@ -31,7 +31,7 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
     plan.progress = !args.silent();
     if plan.progress {
         print_header(&plan);
-        eprintln!(
+        errln!(
             "note: resuming after frame {} of {}",
             checkpoint.frames(),
             plan.frames.listed().len()

@@ -39,8 +39,9 @@ pub enum InputError {
     },
     /// A folder inside a data set.
     #[error(
-        "{path} is a part of the data set {root}. Give {root}; `dynvox inspect {root}` says what \
-         it holds"
+        "{path} is a part of the data set {root}. Give {root}; `dynvox inspect {quoted}` says what \
+         it holds",
+        quoted = crate::terminal::quoted(.root)
     )]
     Within {
         /// Folder looked at.

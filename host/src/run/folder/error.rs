@@ -1,5 +1,6 @@
 //! Why a run folder cannot be written, in sentences.
 
+use crate::terminal::quoted;
 use std::path::PathBuf;
 
 /// Reason why a run folder cannot be written.
@@ -74,8 +75,9 @@ pub enum FolderError {
     },
     /// An interrupted run has a snapshot there.
     #[error(
-        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {path}`, \
-         or start again with --overwrite"
+        "an interrupted run to {path} has a snapshot. Resume it with `dynvox run --resume {quoted}`, \
+         or start again with --overwrite",
+        quoted = quoted(.path)
     )]
     Interrupted {
         /// The folder asked for.
