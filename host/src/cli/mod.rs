@@ -123,6 +123,7 @@ pub fn main() -> ExitCode {
     if let Ok(program) = std::env::current_exe() {
         crate::input::masks::run_networks_in(program);
     }
+    signals::survive_file_size_limit();
     terminal::expect(std::env::args_os().skip(1));
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

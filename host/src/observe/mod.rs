@@ -347,13 +347,17 @@ impl Observer for Observers {
         run: &ObservedRun<'_>,
         end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
-        self.keyframes.end(run, end)?;
-        self.gallery.end(run, end)?;
-        self.recording.end(run, end)?;
-        self.objects.end(run, end)?;
-        self.block_history.end(run, end)?;
-        self.map_disparity.end(run, end)?;
-        self.planning.end(run, end)
+        // One that fails does not keep the others from their ends.
+        let ends = [
+            self.keyframes.end(run, end),
+            self.gallery.end(run, end),
+            self.recording.end(run, end),
+            self.objects.end(run, end),
+            self.block_history.end(run, end),
+            self.map_disparity.end(run, end),
+            self.planning.end(run, end),
+        ];
+        ends.into_iter().collect()
     }
 
     fn finish(self, run: &ObservedRun<'_>, finished: &Finished) -> Result<Sections, ObserveError> {

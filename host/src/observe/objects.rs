@@ -161,13 +161,12 @@ impl Observer for ObjectsObserver {
             .swept
             .as_ref()
             .filter(|_| mesh)
-            .map(|swept| swept.triangles(&finished.mesh_path))
-            .transpose();
-        let failed = |source| ObserveError::Write { path: finished.mesh_path.clone(), source };
+            .and_then(|swept| swept.triangles(&finished.mesh_path).ok());
+        // A mesh that cannot be read again has no such figure, and the run keeps the rest.
         Ok(ObjectsSection {
             objects: self.retired,
             unwritten: self.unwritten,
-            swept_triangles: swept.map_err(failed)?,
+            swept_triangles: swept,
         })
     }
 }

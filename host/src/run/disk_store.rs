@@ -119,7 +119,12 @@ impl MeshOutput {
         folder: &RunFolder,
         (axes, colour): (Axes, bool),
     ) -> Self {
-        let mut ply = PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
+        let begin = || PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
+        // A disk without a free entry has those of the reserve.
+        let mut ply = begin().or_else(|_| {
+            folder.release_reserve();
+            begin()
+        });
         let (mut report, mut meshed, mut failed) =
             (EvictionReport::default(), HashSet::new(), None);
         let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);

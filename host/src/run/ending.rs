@@ -40,7 +40,7 @@ impl Incomplete {
     pub(super) fn of(error: &RunError, frames_left: Option<usize>) -> Self {
         let cause = match error {
             RunError::Signal { .. } => IncompleteCause::Signal,
-            RunError::Resident { .. } => IncompleteCause::Memory,
+            RunError::Resident { .. } | RunError::AddressSpace { .. } => IncompleteCause::Memory,
             RunError::Strict { .. } => IncompleteCause::Strict,
             RunError::Folder(_) | RunError::Store(_) | RunError::Reopen(_) => IncompleteCause::Disk,
             RunError::Observe(ObserveError::Write { .. } | ObserveError::Changed { .. }) => {

@@ -107,6 +107,20 @@ pub enum RunError {
         /// The ceiling.
         limit_bytes: u64,
     },
+    /// The process comes close to the limit on its address space.
+    #[error(
+        "at frame {frame} the process uses {used_bytes} of the {limit_bytes} bytes of address space \
+         that `ulimit -v` allows, and its results need the rest. Allow more, or choose a smaller \
+         --memory or fewer --threads"
+    )]
+    AddressSpace {
+        /// Number of the frame.
+        frame: usize,
+        /// Bytes in use.
+        used_bytes: u64,
+        /// The limit.
+        limit_bytes: u64,
+    },
     /// An observer.
     #[error(transparent)]
     Observe(#[from] ObserveError),
@@ -134,6 +148,7 @@ impl RunError {
 /// `SIGINT` for 2.
 fn signal_name(signal: usize) -> String {
     match signal {
+        1 => "SIGHUP".to_owned(),
         2 => "SIGINT".to_owned(),
         15 => "SIGTERM".to_owned(),
         other => format!("signal {other}"),

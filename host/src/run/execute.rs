@@ -64,7 +64,12 @@ pub fn run(
     let sections = std::mem::take(&mut state.observers).finish(&observed, &finished)?;
     add_unwritten(&mut incomplete, &sections);
     if incomplete.is_none() {
-        [instances, map_disparity].into_iter().try_for_each(Saved::commit)?;
+        let options = ["the folder of --save-instances", "the folder of --save-map-disparity"];
+        for (saved, option) in [instances, map_disparity].into_iter().zip(options) {
+            if let Err(error) = saved.commit() {
+                Incomplete::add_missing(&mut incomplete, option, &error.to_string());
+            }
+        }
     }
     let mapping_seconds = state.timers.mapping().as_secs_f64();
     state.timers.add_since(&mut since);
@@ -146,8 +151,12 @@ fn map(
         None => Session::begin(run, folder, slab)?,
         Some(checkpoint) => Session::resume(run, folder, slab, checkpoint)?,
     };
-    let incomplete = session.frames()?.or_else(|| session.of_disk());
-    let pruned = session.end()?;
+    let mut incomplete = session.frames()?.or_else(|| session.of_disk());
+    // From here on frames are mapped, and no failure may lose them.
+    let pruned = session.end().unwrap_or_else(|error| {
+        incomplete.get_or_insert_with(|| Incomplete::of(&error, Some(0)));
+        PruneReport::default()
+    });
     let Session { mut mapper, store, state, since, .. } = session;
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),

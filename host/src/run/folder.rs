@@ -12,7 +12,7 @@ pub use error::FolderError;
 pub use target::{PREVIOUS_SNAPSHOT_FILE, SNAPSHOT_FILE, has_snapshot};
 pub use whole::{replace_whole, write_whole};
 
-use crate::formats::SUMMARY_FILE;
+use crate::formats::{FRAMES_FILE, SUMMARY_FILE};
 use crate::owned::{self, NotOwned, OwnedFolder, is_taken, sibling};
 use reserve::Reserve;
 use std::io::ErrorKind;
@@ -31,6 +31,7 @@ pub struct RunFolder {
     /// True if the folder belongs to a run that ended early; it goes back to its target unless the
     /// run ends anew.
     reopened: bool,
+    reserve: Reserve,
 }
 
 impl RunFolder {
@@ -48,17 +49,18 @@ impl RunFolder {
             return Err(FolderError::Interrupted { path: target });
         }
         // Results of a run that could not move them, or was killed before it did.
-        if path.join(SUMMARY_FILE).is_file() && !overwrite {
+        if path.join(FRAMES_FILE).is_file() && !Reserve::is_held(&path) && !overwrite {
             return Err(FolderError::Unmoved { partial: path, path: target });
         }
         if let Some(file) = partial.foreign_entry().map_err(in_the_way(&target))? {
             return Err(FolderError::ForeignFile { path, file });
         }
-        let mut folder = Self { partial, overwrite, keep: false, reopened: false, target };
+        let reserve = Reserve::default();
+        let mut folder = Self { partial, overwrite, keep: false, reopened: false, target, reserve };
         folder.partial.clear().map_err(in_the_way(&folder.target))?;
         remove_condemned(&folder.target);
         folder.try_rename()?;
-        Reserve::take(folder.path())?;
+        folder.reserve = Reserve::take(folder.path())?;
         Ok(folder)
     }
 
@@ -88,9 +90,15 @@ impl RunFolder {
         if ended_early {
             owned.rename(&partial).map_err(fixed(&target))?;
         }
-        let folder =
-            Self { target, partial: owned, overwrite: false, keep: false, reopened: ended_early };
-        Reserve::take(folder.path())?;
+        let mut folder = Self {
+            target,
+            partial: owned,
+            overwrite: false,
+            keep: false,
+            reopened: ended_early,
+            reserve: Reserve::default(),
+        };
+        folder.reserve = Reserve::take(folder.path())?;
         match owned::remove_file(&sibling(&folder.snapshot(), "partial")) {
             Err(source) if source.kind() != ErrorKind::NotFound => {
                 Err(FolderError::Write { path: folder.snapshot(), source })
@@ -113,7 +121,7 @@ impl RunFolder {
 
     /// Gives the disk space back that was kept for rows and tables.
     pub fn release_reserve(&self) {
-        Reserve::release(self.path());
+        self.reserve.release(self.path());
     }
 
     /// Gives the disk space back that was kept for the summary, which is written last.

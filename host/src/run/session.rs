@@ -3,6 +3,7 @@
 use super::checkpoint::{self, Checkpoint, ResumeError, RunManifest};
 use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
+use super::resident::address_space;
 use super::retired::RetiredVolumes;
 use super::state::RunState;
 use super::view::LiveMap;
@@ -22,6 +23,9 @@ use dynvox_core::volume::PruneReport;
 use dynvox_core::{Mapper, Report, Severity, Stage, StereoFrame};
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
+
+/// Address space that the end of a run needs: the mesh writer's window, the report, the viewer.
+const END_BYTES: u64 = 64 << 20;
 
 /// A run under way.
 pub(super) struct Session<'p, 's> {
@@ -342,6 +346,11 @@ impl<'p, 's> Session<'p, 's> {
         let Some(row) = self.state.frames.last() else { return Ok(()) };
         if self.plan.request.limits.strict && row.severity() >= Severity::MapAffected {
             return Err(RunError::Strict { frame: row.frame, cause: row.cause() });
+        }
+        if let Some((used_bytes, limit_bytes)) = address_space()
+            && used_bytes + END_BYTES > limit_bytes
+        {
+            return Err(RunError::AddressSpace { frame: row.frame, used_bytes, limit_bytes });
         }
         let limit_bytes = self.plan.rss_limit_bytes;
         match row.rss_bytes {

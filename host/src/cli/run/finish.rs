@@ -1,12 +1,12 @@
 //! Maps, writes the results, and gives the folder its name.
 
 use super::{RunArgs, results};
-use crate::formats::MAP_FILE;
+use crate::formats::{FRAMES_FILE, MAP_FILE, TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE};
 use crate::report::{self, Summary, text::counted};
 use crate::request::{Plan, RequestError, scale_sentence};
 use crate::run::{
-    self, BLOCKS_FILE, Checkpoint, Incomplete, PREVIOUS_SNAPSHOT_FILE, RunError, RunFolder,
-    RunRecord, SNAPSHOT_FILE, has_snapshot,
+    self, BLOCKS_FILE, Checkpoint, FolderError, Incomplete, PREVIOUS_SNAPSHOT_FILE, RunError,
+    RunFolder, RunRecord, SNAPSHOT_FILE, has_snapshot,
 };
 use crate::terminal::quoted;
 use std::path::{Path, PathBuf};
@@ -34,6 +34,21 @@ impl IncompleteRun {
             String::new()
         };
         Self { reason: incomplete.reason.clone(), more: missing + &resume, folder }
+    }
+
+    /// Results without a summary, in a folder that kept its partial name.
+    fn unwritten(error: &FolderError, partial: &Path) -> Self {
+        let kept = [MAP_FILE, TRAJECTORY_FILE, TIMED_TRAJECTORY_FILE, FRAMES_FILE];
+        let kept: Vec<&str> =
+            kept.into_iter().filter(|name| partial.join(name).is_file()).collect();
+        Self {
+            reason: error.to_string(),
+            folder: partial.to_path_buf(),
+            more: format!(
+                ", without its summary; {} can be read. Move the folder elsewhere",
+                if kept.is_empty() { "nothing".to_owned() } else { kept.join(", ") }
+            ),
+        }
     }
 }
 
@@ -129,7 +144,8 @@ fn written(
     let mut record = map(plan, &folder, checkpoint)?;
     // From here on there is something to lose.
     folder.keep();
-    let summary = results::write(&folder, &mut record)?;
+    let summary = results::write(&folder, &mut record)
+        .map_err(|error| IncompleteRun::unwritten(&error, folder.path()))?;
     let resumable = record.incomplete.is_some() && folder.has_snapshot();
     let blocks = resumable
         || record.keeps_blocks()

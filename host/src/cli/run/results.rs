@@ -41,6 +41,7 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
     if let Err(error) = folder.write("report.html", |out| report::html::write(out, run, &viewer)) {
         Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
     }
+    folder.release_last_reserve();
     let summary = Summary::new(run);
     folder.write(SUMMARY_FILE, |out| Ok(serde_json::to_writer_pretty(out, &summary)?))?;
     Ok(summary)

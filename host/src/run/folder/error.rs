@@ -53,8 +53,8 @@ pub enum FolderError {
     },
     /// Results of an earlier run were not moved to the target.
     #[error(
-        "the results of an earlier run are complete in {partial}, and were not moved to {path}. \
-         Move that folder, or start again with --overwrite"
+        "the results of an earlier run are in {partial}, and were not moved to {path}. Move that \
+         folder, or start again with --overwrite"
     )]
     Unmoved {
         /// Folder that holds the results.

@@ -1,11 +1,13 @@
-//! Disk space kept for what is written last, should the disk become full during the run.
+//! Space kept for what is written last, should disk or descriptors run out during the run.
 //!
-//! Two files hold it: one for rows, trajectories and tables, one for the summary. Each comes with
-//! empty files, which hold entries of the file system: a disk can run out of those first.
+//! Two files hold it on disk: one for rows, trajectories and tables, one for the summary. Each comes
+//! with empty files, which hold entries of the file system: a disk can run out of those first.
 
 use super::FolderError;
 use crate::owned;
-use std::path::Path;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Name of the file for rows, trajectories and tables.
 const RESERVE_FILE: &str = ".reserve";
@@ -19,16 +21,21 @@ const LAST_FILE: &str = ".reserve-last";
 const LAST_BYTES: usize = 256 << 10;
 /// Empty files next to it.
 const LAST_FILES: usize = 2;
+/// Descriptors: what is open at once while the results are written.
+const DESCRIPTORS: usize = 8;
 
 /// The reserve of a folder.
-pub(super) struct Reserve;
+#[derive(Debug, Default)]
+pub(super) struct Reserve {
+    descriptors: Mutex<Vec<File>>,
+}
 
 impl Reserve {
-    /// Takes the disk space and the files.
+    /// Takes disk space, files and descriptors.
     ///
     /// # Errors
-    /// The disk has not even these.
-    pub fn take(folder: &Path) -> Result<(), FolderError> {
+    /// The system has not even these.
+    pub fn take(folder: &Path) -> Result<Self, FolderError> {
         for (name, bytes, files) in
             [(RESERVE_FILE, RESERVE_BYTES, RESERVE_FILES), (LAST_FILE, LAST_BYTES, LAST_FILES)]
         {
@@ -40,11 +47,20 @@ impl Reserve {
                 })
                 .map_err(|source| FolderError::NoReserve { path, source })?;
         }
-        Ok(())
+        let path = folder.join(LAST_FILE);
+        let descriptors = (0..DESCRIPTORS).map(|_| File::open(&path)).collect::<Result<_, _>>();
+        let descriptors = descriptors.map_err(|source| FolderError::NoReserve { path, source })?;
+        Ok(Self { descriptors: Mutex::new(descriptors) })
+    }
+
+    /// Returns true if a folder's run has not come to its end: its reserve is held.
+    pub fn is_held(folder: &Path) -> bool {
+        folder.join(LAST_FILE).is_file()
     }
 
     /// Gives back what rows, trajectories and tables need.
-    pub fn release(folder: &Path) {
+    pub fn release(&self, folder: &Path) {
+        self.descriptors.lock().unwrap_or_else(PoisonError::into_inner).clear();
         remove(folder, RESERVE_FILE, RESERVE_FILES);
     }
 
@@ -54,7 +70,7 @@ impl Reserve {
     }
 }
 
-fn numbered(folder: &Path, name: &str, number: usize) -> std::path::PathBuf {
+fn numbered(folder: &Path, name: &str, number: usize) -> PathBuf {
     folder.join(format!("{name}-{number}"))
 }
 

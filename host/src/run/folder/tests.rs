@@ -149,15 +149,19 @@ fn earlier_results_that_a_killed_run_had_moved_away_come_back() {
 }
 
 #[test]
-fn complete_results_that_were_not_moved_are_not_removed_unasked() {
+fn results_that_were_not_moved_are_not_removed_unasked() {
     let root = TempDir::new().unwrap();
     let target = root.path().join("run");
     let mut folder = RunFolder::begin(&target, false).unwrap();
-    owned::write(&folder.file("summary.json"), b"{1}").unwrap();
+    owned::write(&folder.file("frames.csv"), b"rows").unwrap();
+    folder.release_last_reserve();
     folder.keep();
     drop(folder);
     let refused = RunFolder::begin(&target, false).unwrap_err().to_string();
-    assert!(refused.contains("are complete in") && refused.contains(".run.partial"), "{refused}");
+    assert!(
+        refused.contains("of an earlier run are in") && refused.contains(".run.partial"),
+        "{refused}"
+    );
     assert!(RunFolder::begin(&target, true).is_ok());
 }
 
@@ -174,4 +178,23 @@ fn a_link_at_the_target_is_refused_before_the_first_frame() {
         }
         fs::remove_file(target).unwrap();
     }
+}
+
+#[test]
+fn a_run_has_disk_space_and_files_in_reserve_until_its_end() {
+    let root = TempDir::new().unwrap();
+    let folder = RunFolder::begin(&root.path().join("run"), false).unwrap();
+    let held = || {
+        let files = fs::read_dir(folder.path()).unwrap().map(Result::unwrap);
+        let sizes: Vec<u64> = files
+            .filter(|file| file.file_name().to_string_lossy().starts_with(".reserve"))
+            .map(|file| file.metadata().unwrap().len())
+            .collect();
+        (sizes.len(), sizes.iter().sum::<u64>() >> 10)
+    };
+    assert_eq!(held(), (20, 2304));
+    folder.release_reserve();
+    assert_eq!(held(), (3, 256), "the summary's own, which no table may take");
+    folder.release_last_reserve();
+    assert_eq!(held(), (0, 0));
 }
