@@ -128,7 +128,7 @@ fn command(args: &InspectArgs, found: &Found) -> String {
     let sequence = found
         .sequence
         .as_ref()
-        .map(|sequence| format!(" --sequence {}", quoted(Path::new(sequence))))
+        .map(|sequence| format!(" --sequence {}", quoted(sequence.as_ref())))
         .unwrap_or_default();
     let files = args.calibration.iter().map(|file| format!(" --calibration {}", quoted(file)));
     let hints = args.hints.options();

@@ -1,5 +1,6 @@
 //! `dynvox completions` and `dynvox man`: the command line described for shells and for `man`.
 
+use crate::owned::create_folder;
 use anyhow::Context;
 use clap::Command;
 use std::path::PathBuf;
@@ -33,7 +34,6 @@ pub fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
         out!("{}", String::from_utf8_lossy(&page));
         return Ok(());
     };
-    let written =
-        std::fs::create_dir_all(folder).and_then(|()| clap_mangen::generate_to(command, folder));
+    let written = create_folder(folder).and_then(|()| clap_mangen::generate_to(command, folder));
     written.with_context(|| format!("{} cannot be written. Give another --out", folder.display()))
 }

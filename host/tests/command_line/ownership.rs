@@ -7,23 +7,13 @@ use std::path::Path;
 use std::process::Output;
 use tempfile::TempDir;
 
-/// A run of a tiny street.
-const STREET: [&str; 9] = [
-    "run",
-    "--quiet",
-    "--profile",
-    "tiny",
-    "--set",
-    "street.frames=2",
-    "--set",
-    "street.width=160",
-    "--out",
-];
-
-/// Maps a tiny street into `out`.
-fn street(root: &Path, out: &str, more: &[&str]) -> Output {
-    let height = ["--set", "street.height=64"];
-    dynvox(root, &[&STREET[..], &[out], &height[..], more].concat())
+/// Maps a small recording, which is made if it is not there yet, into `out`.
+fn map(root: &Path, out: &str, more: &[&str]) -> Output {
+    if !root.join("rig").exists() {
+        rig(root, 2);
+    }
+    let args = ["run", "rig", "--quiet", "--profile", "tiny", "--out", out];
+    dynvox(root, &[&args[..], more].concat())
 }
 
 fn assert_refused(run: &Output, sentence: &str) {
@@ -40,7 +30,7 @@ fn a_link_named_as_the_partial_folder_keeps_its_target() {
     fs::write(root.path().join("victim/a"), "x").unwrap();
     let link = root.path().join("shared/.res.partial");
     std::os::unix::fs::symlink(root.path().join("victim"), link).unwrap();
-    let run = street(root.path(), "shared/res", &[]);
+    let run = map(root.path(), "shared/res", &[]);
     assert_refused(&run, "is in the way of a run to shared/res: it is a link");
     assert_eq!(fs::read_to_string(root.path().join("victim/a")).unwrap(), "x");
     assert_eq!(names(&root.path().join("victim")), ["a"]);
@@ -52,22 +42,22 @@ fn a_folder_with_a_summary_of_someone_elses_is_not_overwritten() {
     fs::create_dir(root.path().join("d")).unwrap();
     fs::write(root.path().join("d/summary.json"), "{\"mine\":1}").unwrap();
     fs::write(root.path().join("d/thesis.tex"), "x").unwrap();
-    assert_refused(&street(root.path(), "d", &["--overwrite"]), "d is not a run folder");
+    assert_refused(&map(root.path(), "d", &["--overwrite"]), "d is not a run folder");
     assert_eq!(names(&root.path().join("d")), ["summary.json", "thesis.tex"]);
-    assert_eq!(names(root.path()), ["d"]);
+    assert_eq!(names(root.path()), ["d", "rig"]);
 }
 
 #[test]
 fn a_file_of_the_users_in_a_run_folder_stops_its_replacement_by_name() {
     let root = TempDir::new().unwrap();
-    assert!(street(root.path(), "result", &[]).status.success());
+    assert!(map(root.path(), "result", &[]).status.success());
     fs::write(root.path().join("result/pictures/mine.txt"), "x").unwrap();
-    let run = street(root.path(), "result", &["--overwrite"]);
+    let run = map(root.path(), "result", &["--overwrite"]);
     assert_refused(&run, "result/pictures/mine.txt is in the folder result, but was not made by");
     fs::rename(root.path().join("result/pictures/mine.txt"), root.path().join("mine")).unwrap();
-    let run = street(root.path(), "result", &["--overwrite"]);
+    let run = map(root.path(), "result", &["--overwrite"]);
     assert!(run.status.success(), "every other file is known: {}", output_text(&run));
-    assert_eq!(names(root.path()), ["mine", "result"]);
+    assert_eq!(names(root.path()), ["mine", "result", "rig"]);
 }
 
 #[test]
@@ -86,7 +76,7 @@ fn a_run_that_would_replace_what_it_reads_is_refused() {
     assert_eq!(names(&root.path().join("own")), before);
     assert_eq!(names(root.path()), ["own"]);
     // The settings of an earlier run, in the folder to be replaced.
-    assert!(street(root.path(), "first", &[]).status.success());
-    let run = street(root.path(), "first", &["--overwrite", "--config", "first/config.toml"]);
+    assert!(map(root.path(), "first", &[]).status.success());
+    let run = map(root.path(), "first", &["--overwrite", "--config", "first/config.toml"]);
     assert_refused(&run, "first contains first/config.toml");
 }

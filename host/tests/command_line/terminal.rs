@@ -1,23 +1,10 @@
 //! Printed text is for people: a closed output never ends a run, no name commands the terminal, and
 //! a printed command can be copied into a shell.
 
-use super::binary::{dynvox, names, output_text};
+use super::binary::{dynvox, names, rig};
 use std::fs;
-use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
-
-/// A tiny street.
-const STREET: [&str; 8] = [
-    "--profile",
-    "tiny",
-    "--set",
-    "street.frames=3",
-    "--set",
-    "street.width=160",
-    "--set",
-    "street.height=64",
-];
 
 /// Names that command a terminal, or a shell.
 const NAMES: [&str; 10] = [
@@ -50,6 +37,7 @@ fn assert_shown(run: &Output, name: &str) {
 #[test]
 fn a_run_whose_reader_goes_away_is_mapped_to_its_end() {
     let root = TempDir::new().unwrap();
+    rig(root.path(), 2);
     for (out, closed) in [("stderr", [true, false]), ("both", [true, true])] {
         let closed_pipe = || {
             let (reader, writer) = std::io::pipe().unwrap();
@@ -59,7 +47,7 @@ fn a_run_whose_reader_goes_away_is_mapped_to_its_end() {
         let [stderr, stdout] =
             closed.map(|closed| if closed { closed_pipe() } else { Stdio::null() });
         let run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
-            .args([&["run", "--out", out], &STREET[..]].concat())
+            .args(["run", "rig", "--profile", "tiny", "--out", out])
             .current_dir(root.path())
             .stdout(stdout)
             .stderr(stderr)
@@ -70,7 +58,7 @@ fn a_run_whose_reader_goes_away_is_mapped_to_its_end() {
         assert!(root.path().join(out).join("summary.json").is_file(), "{out}");
         assert!(root.path().join(out).join("map.ply").is_file(), "{out}");
     }
-    assert_eq!(names(root.path()), ["both", "stderr"]);
+    assert_eq!(names(root.path()), ["both", "rig", "stderr"]);
 }
 
 #[test]
@@ -110,22 +98,28 @@ fn no_name_commands_the_terminal() {
 #[test]
 fn a_printed_command_copied_into_a_shell_means_its_folder() {
     let root = TempDir::new().unwrap();
-    let small = &STREET[2..];
+    // The shell prints the words instead of running the program.
+    let words = |command: &str| -> Vec<String> {
+        let script = format!("dynvox() {{ printf '%s\\0' \"$@\"; }}; {command}");
+        let read = Command::new("bash").args(["-c", &script]).current_dir(root.path()).output();
+        let read = String::from_utf8(read.unwrap().stdout).unwrap();
+        read.split('\0').map(ToOwned::to_owned).collect()
+    };
     for name in NAMES {
         let given = if name.starts_with('-') { format!("./{name}") } else { name.to_owned() };
-        let run = dynvox(root.path(), &[&["synth", "--out", &given], small].concat());
-        assert!(run.status.success(), "{}", output_text(&run));
+        fs::create_dir(root.path().join(&given)).unwrap();
+        fs::write(root.path().join(&given).join("summary.json"), "{}").unwrap();
+        let run = dynvox(root.path(), &["inspect", &given]);
         assert_shown(&run, name);
         let text = String::from_utf8(run.stdout).unwrap();
-        let command = text.lines().find_map(|line| line.strip_prefix("map it: ")).unwrap();
-        // The shell prints the words instead of running the program.
-        let script = format!("dynvox() {{ printf '%s\\0' \"$@\"; }}; {command}");
-        let words =
-            Command::new("bash").args(["-c", &script]).current_dir(root.path()).output().unwrap();
-        let words = String::from_utf8(words.stdout).unwrap();
-        assert_eq!(words.split('\0').nth(1), Some(given.as_str()), "{command}");
-        assert_shown(&dynvox(root.path(), &["inspect", &given]), name);
-        fs::remove_dir_all(root.path().join(Path::new(&given))).unwrap();
+        let command = text.lines().find_map(|line| line.split_once("trajectory: ")).unwrap().1;
+        assert_eq!(words(command)[2], given, "{command}");
+        fs::remove_dir_all(root.path().join(&given)).unwrap();
     }
-    assert_eq!(names(root.path()), Vec::<String>::new(), "no command within a name was run");
+    let small = ["--frames", "1", "--set", "street.width=160", "--set", "street.height=64"];
+    let run = dynvox(root.path(), &[&["synth", "--out", NAMES[1]], &small[..]].concat());
+    let text = String::from_utf8(run.stdout).unwrap();
+    let command = text.lines().find_map(|line| line.strip_prefix("map it: ")).unwrap();
+    assert_eq!(words(command)[1], NAMES[1], "{command}");
+    assert_eq!(names(root.path()), [NAMES[1]], "no command within a name was run");
 }

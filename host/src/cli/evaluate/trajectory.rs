@@ -27,7 +27,7 @@ pub fn run(args: &TrajectoryArgs) -> anyhow::Result<()> {
     let estimate = read_trajectory(&args.estimate)?;
     let matched = matched(&estimate, &truth)?;
     for note in estimate.notes.iter().chain(&truth.notes) {
-        eprintln!("note: {note}");
+        errln!("note: {note}");
     }
     let MatchedPoses { first: estimate, second: truth, of: [of_estimate, of_truth] } = matched;
     let found = trajectory::errors(&truth, &estimate)
