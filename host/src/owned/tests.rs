@@ -69,11 +69,13 @@ fn only_files_of_the_ledger_are_removed() {
     write(&own.path().join("objects/deep/7.ply"), b"ply").unwrap();
     write(&own.path().join("map.ply"), b"ply").unwrap();
     assert_eq!(own.foreign_entry().unwrap(), None);
+    // A file that the user put there.
     fs::write(own.path().join("objects/notes.txt"), "mine").unwrap();
     assert_eq!(own.foreign_entry().unwrap(), Some(own.path().join("objects/notes.txt")));
     assert!(remove_file(&own.path().join("objects/notes.txt")).is_err());
     assert!(create_file(&own.path().join("objects/notes.txt")).is_err());
     let refused = own.remove().unwrap_err().to_string();
+    // All of dynvox's own is gone, and the user's file is still there.
     assert!(refused.contains("notes.txt") && refused.contains("left alone"), "{refused}");
     assert!(!own.path().join("map.ply").exists());
     assert_eq!(fs::read_to_string(own.path().join("objects/notes.txt")).unwrap(), "mine");
@@ -128,8 +130,10 @@ fn drafts_of_dead_processes_go_and_those_of_living_ones_stay() {
     let root = TempDir::new().unwrap();
     let target = root.path().join("street");
     let living = DraftFolder::begin(&target).unwrap();
+    // No process has its lock: it was dropped.
     let dead = root.path().join(".street.partial-1-1");
     drop(OwnedFolder::create(&dead).unwrap());
+    // It has the name of a draft, and no marker.
     let foreign = users(root.path(), ".street.partial-2-1");
     let draft = DraftFolder::begin(&target).unwrap();
     assert!(living.path().is_dir() && !dead.exists());
@@ -137,6 +141,7 @@ fn drafts_of_dead_processes_go_and_those_of_living_ones_stay() {
     write(&draft.path().join("a"), b"1").unwrap();
     draft.rename(&target).unwrap();
     drop(living);
+    // The target and the user's folder are left.
     assert_eq!(fs::read_dir(root.path()).unwrap().count(), 2);
     assert!(OwnedFolder::open(&target).is_ok(), "the marker stays");
 }
@@ -150,12 +155,14 @@ fn an_output_around_or_inside_an_input_is_refused() {
         (root.path().join("own"), "contains"),
         (data.join("out/street"), "lies within"),
         (data.clone(), " is "),
+        // A path with two dots in it.
         (root.path().join("own/../own"), "contains"),
         (root.path().join("poses.txt"), " is "),
     ] {
         let refused = check_overlap(&output, &inputs).unwrap_err().to_string();
         assert!(refused.contains(relation), "{refused}");
     }
+    // Names that begin alike, and siblings.
     for output in ["own/data-2", "out", "own/out"] {
         assert!(check_overlap(&root.path().join(output), &inputs).is_ok(), "{output}");
     }

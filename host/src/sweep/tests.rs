@@ -31,6 +31,7 @@ fn planned(kinds: &[Kind]) -> Plan {
 }
 
 fn result(request: &Request, digest: &str, accuracy: f64) -> RunResult {
+    // One share for the input and the map.
     let share = json!({"accuracy": accuracy, "completeness": 0.9, "f1": 0.85});
     RunResult {
         request: request.clone(),
@@ -111,14 +112,17 @@ fn a_folder_keeps_to_its_plan_and_to_its_results_requests() {
     let plan = planned(&[Kind::Scale]);
     let folder = SweepFolder::open(root.path(), &plan).unwrap();
     let (key, request) = plan.runs.iter().next().unwrap();
+    // The result of a run is of the request that the plan has.
     let made = result(request, "aa", 0.9);
     made.write(&folder.result(key)).unwrap();
     let again = SweepFolder::open(root.path(), &plan).unwrap();
     assert_eq!(again.results(&plan).unwrap(), Results::from([(key.clone(), made.clone())]));
     let other = SweepFolder::open(root.path(), &planned(&[Kind::Dynamic]));
     assert!(other.unwrap_err().to_string().contains("belongs to another sweep"));
+    // Under the name of one run the result of another.
     result(&Request::default(), "aa", 0.9).write(&folder.result(key)).unwrap();
     assert!(again.results(&plan).unwrap_err().to_string().contains("it is of another request"));
+    // As a full disk leaves a file.
     std::fs::write(folder.result(key), "{\"arg").unwrap();
     assert!(again.results(&plan).unwrap_err().to_string().contains("is not a file of a sweep"));
 }
@@ -128,6 +132,7 @@ fn parts_are_put_together_unless_they_disagree() {
     let [a, b, c] = [(); 3].map(|()| TempDir::new().unwrap());
     let plan = planned(&[Kind::Scale]);
     let all = results(&plan);
+    // Each part has made every second run.
     for (part, root) in [&a, &b].into_iter().enumerate() {
         let folder = SweepFolder::open(root.path(), &plan).unwrap();
         plan.keys()
@@ -142,6 +147,7 @@ fn parts_are_put_together_unless_they_disagree() {
     folder.draw(&merged, &found).unwrap();
     assert!(c.path().join("report.html").is_file() && c.path().join("scale.csv").is_file());
     let (key, request) = plan.runs.iter().next().unwrap();
+    // One run with two digests: the parts contradict each other.
     for (root, digest) in [(&a, "one"), (&b, "two")] {
         result(request, digest, 0.9)
             .write(&SweepFolder::open(root.path(), &plan).unwrap().result(key))

@@ -60,9 +60,11 @@ fn moved(a: &[u8], b: &[u8], [near_u, near_v]: [i32; 2]) -> [f64; 2] {
     let (width, height) = (WIDTH as i32, HEIGHT as i32);
     let at = |image: &[u8], u: i32, v: i32| i64::from(image[(v * width + u) as usize]);
     let difference = |du: i32, dv: i32| -> f64 {
+        // Without the border, so that the shift never leaves the image.
         let pixels = (10..height - 10).flat_map(|v| (10..width - 10).map(move |u| (u, v)));
         pixels.map(|(u, v)| (at(a, u, v) - at(b, u - du, v - dv)).pow(2)).sum::<i64>() as f64
     };
+    // The vertex of the parabola through three differences.
     let vertex = |before: f64, here: f64, after: f64| {
         assert!(here < before && here < after, "{before} {here} {after}");
         0.5 * (before - after) / (before + after - 2.0 * here)
@@ -85,6 +87,7 @@ fn raw_images_rectify_to_what_the_ideal_rig_sees() {
         let street = street(lens.clone(), RigError::default());
         let frame = street.frame(3);
         let [raw_width, raw_height] = frame.image_size;
+        // Raw images are larger than what they are rectified to.
         assert_ne!(frame.image_size, [WIDTH as usize, HEIGHT as usize]);
         assert_eq!(
             (&frame.depth_m, &frame.instances),
@@ -177,6 +180,7 @@ fn both_written_calibrations_tell_of_the_same_cameras() {
             *street.calibration().unwrap()
         );
         let Ok(kalibr) = read("camchain.yaml") else {
+            // Kalibr knows no rational model: such a camera has no camchain.
             assert!(
                 matches!(lens, StreetLens::Bent(LensModel::RadialTangential { radial, .. }) if radial[3] != 0.0),
                 "{lens:?}"

@@ -73,9 +73,11 @@ fn a_pixel_carried_to_the_right_image_by_its_depth_finds_its_own_grey() {
     let size = (frame.width, frame.height);
     let difference = |shift_px: f64| {
         let mut differences = Vec::new();
+        // Every third pixel: neighbours say the same.
         for v in (2..frame.height - 2).step_by(3) {
             for u in (2..frame.width - 2).step_by(3) {
                 let Some(point) = seen(&street, &frame, u, v) else { continue };
+                // Where the surface is flat, so that interpolation is right.
                 if !flat(&frame, u, v) {
                     continue;
                 }
@@ -94,10 +96,12 @@ fn a_pixel_carried_to_the_right_image_by_its_depth_finds_its_own_grey() {
         difference(-0.5),
         difference(0.5)
     );
+    // A smaller difference than a shift by half a pixel to either side gives.
     assert!(exact < 1.5 && difference(0.5) > exact && difference(-0.5) > exact);
 }
 
 #[test]
+// Without traffic all is static.
 fn a_static_pixel_carried_to_the_next_frame_finds_its_own_grey() {
     let street = Street::new(StreetConfig { traffic: Traffic::None, ..quiet(640, 192) }).unwrap();
     let (frame, next) = (street.frame(20), street.frame(21));
@@ -109,12 +113,14 @@ fn a_static_pixel_carried_to_the_next_frame_finds_its_own_grey() {
         for u in (2..frame.width - 2).step_by(2) {
             let Some(point) = seen(&street, &frame, u, v) else { continue };
             let moved = t_next_frame.transform_point(point);
+            // Behind the camera, or at an edge.
             if moved.z < 1.0 || !flat(&frame, u, v) {
                 continue;
             }
             let (x, y) = projected(&street, &moved);
             let Some(grey) = grey_at(&next.left_grey, size, (x, y)) else { continue };
             differences.push((grey - f64::from(frame.left_grey[v * frame.width + u])).abs());
+            // The nearest pixel there has its own depth.
             let (column, row) = ((x + 0.5) as usize, (y + 0.5) as usize);
             if let Some(there) = seen(&street, &next, column, row) {
                 depth_errors.push((there.z - moved.z).abs() / moved.z);
@@ -130,6 +136,7 @@ fn a_static_pixel_carried_to_the_next_frame_finds_its_own_grey() {
 fn a_frame_depends_neither_on_earlier_frames_nor_on_threads() {
     let config = StreetConfig { width: 200, height: 64, ..StreetConfig::default() };
     let street = Street::new(config.clone()).unwrap();
+    // Frames in any order, which fill and empty the caches.
     for index in [0, 90, 12, 400, 36] {
         street.frame(index);
     }
@@ -163,6 +170,7 @@ fn points_under_a_mask_lie_in_the_box_of_their_car() {
                     frame.t_world_camera.transform_point(seen(&street, &frame, u, v).unwrap());
                 let inside = object.t_world_object.inverse().transform_point(in_world);
                 let [width, height, length] = object.dimensions_m;
+                // A millimetre for rounding.
                 let slack = 1e-3;
                 assert!(
                     inside.x.abs() < 0.5 * width + slack && inside.z.abs() < 0.5 * length + slack,
@@ -173,12 +181,14 @@ fn points_under_a_mask_lie_in_the_box_of_their_car() {
                 counts[instance - 1] += 1;
             }
         }
+        // Cars of a few pixels do not count.
         cars += counts.iter().filter(|&&count| count > 50).count();
         assert!(
             frame.objects.iter().any(|object| object.moving)
                 && frame.objects.iter().any(|object| !object.moving)
         );
     }
+    // Three cars a frame are a street with traffic.
     assert!(cars >= 12, "a street with {cars} cars in four frames is empty");
 }
 
@@ -199,6 +209,7 @@ fn lidar_and_depth_agree_where_both_see() {
         }
         let (u, v) = projected(&street, &point);
         let (u, v) = ((u + 0.5) as isize, (v + 0.5) as isize);
+        // Two pixels off the border, where flatness is known.
         if u >= 2 && v >= 2 && u < frame.width as isize - 2 && v < frame.height as isize - 2 {
             let depth = f64::from(frame.depth_m[v as usize * frame.width + u as usize]);
             if depth > 0.0 && flat(&frame, u as usize, v as usize) {
@@ -206,6 +217,7 @@ fn lidar_and_depth_agree_where_both_see() {
             }
         }
     }
+    // A tenth: at edges the scanner sees past what the camera sees.
     let close = errors.iter().filter(|&&error| error < 0.1).count() as f64 / errors.len() as f64;
     println!(
         "{} echoes in view, {:.2} % within a tenth, median {:.4} %",
@@ -228,6 +240,7 @@ fn the_camera_and_every_car_move_smoothly() {
                 < 0.05
         );
         assert!((pair[0].inverse() * pair[1]).angle_rad() < 0.02);
+        // 9 m/s at ten frames a second.
         assert!((pair[0].distance_m() - 0.9).abs() < 0.06);
     }
     let angle_rad = poses[119].angle_rad();
@@ -252,6 +265,8 @@ fn one_scripted_car_starts_and_one_stops_and_speeds_match_the_way_driven() {
             let way = (Vector3::from(next.t_world_object.translation_m)
                 - Vector3::from(now.t_world_object.translation_m))
             .norm();
+            // The speed is that of an instant, the way of a tenth of a second: the mean of both
+            // ends.
             let speed = 0.5 * (now.speed_m_s + next.speed_m_s);
             assert!(
                 (way * 10.0 - speed).abs() < 0.1 + 0.06 * speed,
@@ -275,6 +290,7 @@ fn a_static_street_has_no_motion_and_no_two_cars_overlap() {
             for b in &objects[k + 1..] {
                 let offset =
                     Vector3::from((a.t_world_object.inverse() * b.t_world_object).translation_m);
+                // Lengths must not overlap, or widths by a tenth at most: mirrors and rounding.
                 let apart = offset.z.abs() > 0.5 * (a.dimensions_m[2] + b.dimensions_m[2])
                     || offset.x.abs() > 0.45 * (a.dimensions_m[0] + b.dimensions_m[0]);
                 assert!(apart, "frame {index}: {} meets {}", a.id, b.id);
@@ -316,6 +332,7 @@ fn noise_and_gain_are_as_configured() {
         picture.iter().map(|&value| f64::from(value)).sum::<f64>() / picture.len() as f64
     };
     assert_eq!(clean.left_grey, brighter.left_grey);
+    // The right camera alone has another gain.
     let ratio = mean(&brighter.right_grey) / mean(&clean.right_grey);
     assert!((1.004..1.03).contains(&ratio), "{ratio}");
 }
@@ -336,6 +353,7 @@ fn a_written_street_reads_back_as_it_was() {
     assert_eq!(progress, [(1, 3), (2, 3), (3, 3)]);
     let sequence = folder.join("sequences/00");
     for index in 0..3 {
+        // Every image as the frame has it, to the bit.
         let frame = street.frame(index);
         let open =
             |name: &str| image::open(sequence.join(format!("{name}/{index:06}.png"))).unwrap();
@@ -347,6 +365,7 @@ fn a_written_street_reads_back_as_it_was() {
         let (depth, disparity) =
             (open("depth").into_luma16().into_raw(), open("disp").into_luma16().into_raw());
         for ((&stored, &disparity), &z) in depth.iter().zip(&disparity).zip(&frame.depth_m) {
+            // The files have 1/256 m and 1/256 px.
             assert!((f32::from(stored) / 256.0 - z).abs() < 0.003);
             let true_disparity =
                 if z > 0.0 { street.rig().focal_baseline_px_m() as f32 / z } else { 0.0 };
@@ -363,11 +382,13 @@ fn a_written_street_reads_back_as_it_was() {
         poses.lines().last().unwrap().split(' ').map(|value| value.parse().unwrap()).collect();
     assert!((last[11] - street.t_world_camera(2).translation_m[2]).abs() < 1e-9);
     assert_eq!(text("sequences/00/times.txt").lines().count(), 3);
+    // KITTI's five keys.
     assert_eq!(
         text("sequences/00/calib.txt").lines().map(|line| &line[..2]).collect::<Vec<_>>(),
         ["P0", "P1", "P2", "P3", "Tr"]
     );
     let objects: usize = (0..3).map(|index| street.frame(index).objects.len()).sum();
+    // A line for each object, and the header.
     assert_eq!(text("sequences/00/objects.csv").lines().count(), 1 + objects);
     assert!(text("sequences/00/instances/000000.txt").lines().count() > 3);
     let again = write_kitti(&street, &folder, |_, _| {});
@@ -383,6 +404,7 @@ fn a_failed_writing_leaves_nothing_behind() {
     let street =
         Street::new(StreetConfig { width: 64, height: 32, frames: 1, ..StreetConfig::default() })
             .unwrap();
+    // The folder's name is taken by a file; and it would lie within one.
     assert!(matches!(
         write_kitti(&street, &parent.join("occupied"), |_, _| {}),
         Err(SynthError::NotEmpty(_))
@@ -391,6 +413,7 @@ fn a_failed_writing_leaves_nothing_behind() {
         write_kitti(&street, &parent.join("occupied/below"), |_, _| {}),
         Err(SynthError::Write { .. })
     ));
+    // Nothing but the file is there.
     assert_eq!(std::fs::read_dir(&parent).unwrap().count(), 1);
     std::fs::remove_dir_all(&parent).unwrap();
 }

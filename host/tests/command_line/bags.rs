@@ -60,6 +60,7 @@ fn picture(root: &Path, side: usize, frame: usize) -> image::GrayImage {
 
 /// Both encodings of a picture: raw, or its PNG file.
 fn message(root: &Path, side: usize, frame: usize, compressed: bool) -> Vec<u8> {
+    // A header with the frame's time, then the message's own fields.
     let mut cdr = Cdr::with_header(frame as u64 * NS);
     if compressed {
         cdr.text("png");
@@ -73,6 +74,7 @@ fn message(root: &Path, side: usize, frame: usize, compressed: bool) -> Vec<u8> 
     cdr.u32(picture.height());
     cdr.u32(picture.width());
     cdr.text("mono8");
+    // Little-endian.
     cdr.0.push(0);
     cdr.u32(picture.width());
     cdr.bytes(picture.as_raw());

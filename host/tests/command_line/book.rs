@@ -81,6 +81,7 @@ fn every_command_in_the_documents_is_one_that_the_program_takes() {
         let text = fs::read_to_string(path).unwrap();
         for line in &shell_lines(&text) {
             for words in commands(line) {
+                // With --help in the end, so that nothing is run.
                 let answer = dynvox(folder.path(), &asking_for_help(&words));
                 parsed += 1;
                 if !answer.status.success() {

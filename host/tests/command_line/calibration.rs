@@ -53,6 +53,7 @@ fn write_images(root: &Path, frames: usize) {
             image::open(&from).expect("a picture").to_luma8()
         });
         let width = left.width();
+        // Both pictures beside each other, as a camera with one stream sends them.
         let both = image::GrayImage::from_fn(2 * width, left.height(), |u, v| {
             if u < width { *left.get_pixel(u, v) } else { *right.get_pixel(u - width, v) }
         });

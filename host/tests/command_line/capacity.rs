@@ -111,6 +111,7 @@ fn one_fewer_of_each_bound_that_a_run_used_in_full_is_refused() {
         let value: usize = line.rsplit(' ').next().unwrap().parse().unwrap();
         fs::write(
             root.join("fewer.toml"),
+            // The bounds of the run that needed them, less one.
             text.replace(&format!("\n{line}\n"), &format!("\n{name} = {}\n", value - 1)),
         )
         .unwrap();

@@ -103,6 +103,7 @@ fn a_budget_is_printed_for_every_language_and_summed_up_for_a_target() {
     let asked = ["budget", "--memory", "48MiB", "--image", "752x480", "--raw", "800x500"];
     let text = String::from_utf8(dynvox(root.path(), &asked).stdout).unwrap();
     for line in [
+        // TOML, Rust and C name one bound each in their own way.
         "raw_width = 800",
         "    raw_width: 800,",
         "  .raw_width = 800,",
@@ -117,12 +118,14 @@ fn a_budget_is_printed_for_every_language_and_summed_up_for_a_target() {
         )
         .unwrap()
     };
+    // With the stack and the code it is what a target needs in all.
     let (solved, summed) = (json(&[]), json(&["--stack"]));
     let number = |value: &serde_json::Value| value.as_u64().unwrap();
     let part = |key: &str| number(&summed[0][key]);
     assert_eq!(part("slab_bytes"), number(&solved["bytes"]));
     assert!(part("slab_bytes") > 46 << 20 && part("slab_bytes") <= 48 << 20, "{summed}");
     assert_eq!(part("sum_bytes"), part("slab_bytes") + part("stack_bytes") + part("code_bytes"));
+    // A worker's stack is larger than 32 KiB.
     assert!(part("stack_bytes") >= 32 << 10 && part("code_bytes") > 0, "{summed}");
 }
 

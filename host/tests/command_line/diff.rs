@@ -33,11 +33,13 @@ fn diff(root: &Path, args: &[&str]) -> (i32, String) {
 #[test]
 fn one_bit_of_one_pixel_is_found_as_input_of_its_frame() {
     let root = prepared();
+    // Threads change nothing.
     run(root.path(), "again", &["--threads", "2"]);
     let (code, output) = diff(root.path(), &["clean", "again"]);
     assert_eq!((code, output.as_str()), (0, "equal in all 4 frames\n"));
     let path = root.path().join("rig/left/002.png");
     let mut image = image::open(&path).unwrap().into_luma8();
+    // The lowest bit of one grey level.
     image.get_pixel_mut(80, 40).0[0] ^= 1;
     image.save(&path).unwrap();
     run(root.path(), "dirty", &[]);
@@ -95,6 +97,7 @@ fn a_setting_is_named_beside_the_stage_it_reaches_first() {
         output.contains("\nfirst divergence: frame 0, static_map\napart in frame 0: "),
         "{output}"
     );
+    // The first frame has no matches, so that the second is the first to differ.
     run(root.path(), "sparse", &["--set", "scene_flow.bucket_matches=1"]);
     let (code, output) = diff(root.path(), &["clean", "sparse"]);
     assert!(code == 1 && output.contains("\nfirst divergence: frame 1, scene_flow\n"), "{output}");
@@ -131,6 +134,7 @@ fn what_is_no_run_folder_or_an_old_or_damaged_one_is_told_with_what_to_do() {
     let text = fs::read_to_string(&csv).unwrap();
     fs::write(&csv, text.replace("stereo_digest", "other")).unwrap();
     trouble("old", "has no column stereo_digest: an older dynvox wrote it");
+    // The last line lacks its end.
     fs::write(&csv, &text[..text.len() - 30]).unwrap();
     trouble("old", "line 5 cannot be read");
 }

@@ -99,6 +99,7 @@ fn keys(prefix: &str, value: &Value, found: &mut BTreeSet<String>) {
                 );
             }
         }
+        // The items of a list have the keys of one item.
         Value::Array(list) if list.first().is_some_and(Value::is_object) => {
             list.iter().for_each(|value| keys(&format!("{prefix}[]"), value, found));
         }
@@ -130,6 +131,7 @@ fn files(folder: &Path, prefix: &str, found: &mut Vec<String>) {
 fn run(root: &Path, frames: u32) {
     let frames = format!("street.frames={frames}");
     let street = ["--set", "street.width=320", "--set", "street.height=96", "--set", &frames];
+    // All options that add files.
     let all = [
         "--profile",
         "tiny",
@@ -221,14 +223,17 @@ fn keys_of_a_run_are_described_and_misspelt_ones_get_near_ones() {
     let config: toml::Table =
         fs::read_to_string(root.path().join("result/config.toml")).unwrap().parse().unwrap();
     let page = document("docs/settings.md");
+    // Every key of the written settings has its row in the documentation.
     for (section, keys) in &config {
         for key in keys.as_table().unwrap().keys() {
             assert!(page.contains(&format!("| `{section}.{key}")), "{section}.{key} has no row");
         }
     }
+    // Settings that bound each other name each other.
     let one = dynvox(root.path(), &["settings", "volume.far_m"]);
     let row = String::from_utf8_lossy(&one.stdout);
     assert!(row.contains("volume.near_m"), "{row}");
+    // A key that is misspelt gets the nearest one.
     let none = dynvox(root.path(), &["settings", "volume.fare_m"]);
     assert!(!none.status.success() && output_text(&none).contains("`volume.far_m`"));
 }
@@ -240,6 +245,7 @@ fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
     let mut found = BTreeMap::<String, String>::new();
     let mut last = None;
     for line in help.lines() {
+        // Options stand at the beginning of a line, with two blanks before their text.
         let text = line.trim_start();
         let option = text
             .split([' ', ','])

@@ -114,6 +114,7 @@ fn signalled(root: &Path, signal: &str, more: &[&str]) -> (Option<i32>, String) 
         .spawn()
         .unwrap();
     let mut text = BufReader::new(run.stderr.take().unwrap()).lines().map(Result::unwrap);
+    // Only then are the handlers set and the first frame is mapped.
     assert!(text.any(|line| line.starts_with("frame 1/2000")), "it is under way");
     let sent = Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
     assert!(sent.success());
@@ -131,11 +132,13 @@ fn a_signal_ends_the_run_after_its_frame() {
         assert!(text.contains(&format!("the run was stopped by {name} after")), "{text}");
         let (result, of) = (root.path().join("result"), summary(&root.path().join("result")));
         let frames = of["frames"].as_u64().unwrap() as usize;
+        // Stopped early, but not before the first frame.
         assert!((1..2000).contains(&frames), "{frames}");
         assert_eq!(
             (&of["incomplete"]["cause"], of["incomplete"]["frames_left"].as_u64()),
             (&"signal".into(), Some(2000 - frames as u64))
         );
+        // A row for each frame, and a header.
         assert_eq!(
             (lines(&result.join("trajectory_tum.txt")), lines(&result.join("frames.csv"))),
             (frames, frames + 1)

@@ -331,6 +331,7 @@ fn a_recording_has_every_frame_of_every_topic() {
 
 #[test]
 fn completions_and_the_manual_know_every_command() {
+    // What a package of a distribution installs.
     let root = TempDir::new().unwrap();
     let text = |args: &[&str]| String::from_utf8(dynvox(root.path(), args).stdout).unwrap();
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
@@ -346,6 +347,7 @@ fn completions_and_the_manual_know_every_command() {
             .all(|page| pages.iter().any(|name| name == page)),
         "{pages:?}"
     );
+    // Options come in groups, in an order that helps to find them.
     let help = text(&["run", "--help"]);
     assert!(
         ["Input:", "Frames:", "Mapping:", "Limits:", "Evaluation:", "Results:"]
@@ -463,6 +465,7 @@ fn a_window_that_cannot_be_is_refused_with_a_sentence() {
 #[test]
 fn what_the_map_shows_is_saved_as_disparities_that_a_run_takes() {
     let root = TempDir::new().unwrap();
+    // Exact depth, so that errors are those of the map.
     let street = [&STREET[..], &["--frames", "6", "--depth", "exact"]].concat();
     run(root.path(), &[&street[..], &["--out", "one", "--save-map-disparity", "seen"]].concat());
     assert_eq!(
@@ -479,6 +482,7 @@ fn what_the_map_shows_is_saved_as_disparities_that_a_run_takes() {
     let input = &summary["lidar"]["static"]["input"];
     let share = |key: &str| input[key].as_f64().unwrap();
     assert!(share("accuracy_alone") > 0.97 && share("completeness") > 0.4, "{input}");
+    // The folder of pictures exists from the first run.
     let refused = dynvox(
         root.path(),
         &[&street[..], &["--out", "two", "--save-map-disparity", "seen"]].concat(),

@@ -6,6 +6,7 @@ use tempfile::TempDir;
 /// Returns the report on one fault from frame 8 on, in 18 frames of a small street.
 fn outcome(fault: &str) -> serde_json::Value {
     let root = TempDir::new().unwrap();
+    // Enough frames before the fault for a map, and after it to recover.
     let of_faults =
         ["evaluate", "faults", "--json", "--at", "8", "--frames", "18", "--fault", fault, "--"];
     let of_run = [
@@ -82,6 +83,7 @@ fn no_pose_of_a_camera_a_frame_late_is_wrong_and_unreported() {
     );
     assert!(run.status.success(), "{}", output_text(&run));
     let table = serde_json::from_slice::<Vec<serde_json::Value>>(&run.stdout).unwrap();
+    // A wrong pose is reported, and not in the map.
     for of in &table {
         assert_eq!(
             (of["unreported_frames"].as_u64(), of["wrong_fused"].as_u64()),
@@ -128,6 +130,7 @@ fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
         "{}",
         output_text(&run)
     );
+    // A fault that is none is a wrong argument, not a failed run.
     let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--faults", "melt@3"]);
     assert!(
         run.status.code() == Some(2) && output_text(&run).contains("there is no fault melt"),

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 /// A street, and a fixture of six of its frames.
 fn pinned() -> TempDir {
     let root = TempDir::new().unwrap();
+    // As small as a profile allows, since fixtures are packed into firmware.
     let size = ["--set", "street.width=320", "--set", "street.height=96"];
     assert!(
         dynvox(root.path(), &[&["synth", "--out", "street", "--frames", "8"], &size[..]].concat())
@@ -135,6 +136,7 @@ fn bounds_and_settings_are_packed_as_rust_beside_the_clip() {
     );
     assert!(packed.status.success(), "{}", output_text(&packed));
     let text = fs::read_to_string(root.path().join("clip.rs")).unwrap();
+    // The bounds and settings as Rust constants, for builds without a file system.
     for line in [
         "image_width: 320,",
         "image_height: 96,",

@@ -114,6 +114,7 @@ fn jobs_done_in_shares_are_merged_in_any_order_to_one_map() {
 fn the_sums_of_one_map_show_its_own_surface() {
     let root = TempDir::new().unwrap();
     let root = root.path();
+    // One recording of the list.
     let first = RECORDINGS.split("[[recording]]\nname = \"second\"").next().unwrap();
     fs::write(root.join("recordings.toml"), first).unwrap();
     done(root, &["fleet", "plan", "recordings.toml", "--out", "jobs"]);
@@ -124,6 +125,7 @@ fn the_sums_of_one_map_show_its_own_surface() {
     let run = root.join("jobs/runs").join(&names(&root.join("jobs/runs"))[0]);
     let summary: serde_json::Value =
         serde_json::from_slice(&fs::read(run.join("summary.json")).unwrap()).unwrap();
+    // The command prints "map.ply: N triangles".
     let triangles: u64 = meshed
         .split(": ")
         .nth(1)
@@ -275,12 +277,14 @@ fn a_plan_knows_where_fixes_and_poses_place_a_recording() {
     let jobs: serde_json::Value =
         serde_json::from_slice(&fs::read(root.join("jobs/jobs.json")).unwrap()).unwrap();
     assert_eq!(
+        // The origin is that of the first fix; the pose is that of the poses' file.
         (&jobs["jobs"][0]["gnss"]["origin"][2], &jobs["jobs"][1]["t_world_camera"][11]),
         (&92.0.into(), &4.0.into()),
         "{jobs}"
     );
     let open: serde_json::Value =
         serde_json::from_str(&done(root, &["fleet", "status", "jobs", "--json"])).unwrap();
+    // Where fixes place a recording, its pose is not known before its run.
     assert!(open[0]["sums"].is_null() && open[1]["sums"].is_string(), "{open}");
 }
 
@@ -301,6 +305,7 @@ fn a_recording_lies_where_its_fixes_or_its_poses_say() {
         at(0).abs() < 0.2 && (at(1) - 2.0).abs() < 0.2 && (at(2) - 50.0).abs() < 0.2,
         "{alignment}"
     );
+    // Fixes that never move: the direction is not known any more.
     fs::write(root.join("fixes.txt"), "0 8 90\n".repeat(14)).unwrap();
     let standing = dynvox(root, &["fleet", "resample", "jobs"]);
     assert!(output_text(&standing).contains("is not of these jobs"), "{}", output_text(&standing));

@@ -31,6 +31,7 @@ impl Clip {
         );
         assert!(written.status.success(), "{}", output_text(&written));
         let sequence = root.path().join("street/sequences/00");
+        // Written once, and dressed as each layout from there.
         let picture = |side: usize, at: usize| {
             image::open(sequence.join(format!("image_{side}/{at:06}.png"))).unwrap().into_luma8()
         };
@@ -112,6 +113,7 @@ fn data_csv(late_ns: u64) -> String {
 /// Names in the layout of a data set, and its calibration.
 fn dress_data_sets(clip: &Clip) {
     let at_root = |name: &'static str| clip.path(name);
+    // Time stamps of the cameras may be off by a millisecond.
     for (name, late_ns) in [("euroc", 0), ("late", 1_000_000)] {
         clip.save(|at, side| at_root(name).join(format!("mav0/cam{side}/data/{at}.png")));
         write(at_root(name).join("mav0/calib.txt"), &clip.calibration(["P0", "P1"]));
@@ -125,6 +127,7 @@ fn dress_data_sets(clip: &Clip) {
         at_root("tracking").join("training/calib/0000.txt"),
         &(clip.calibration(["P0", "P1"]) + &clip.calibration(["P2", "P3"])),
     );
+    // Nanoseconds, as KITTI's raw recordings have them.
     let dates: String =
         (0..FRAMES as u64).map(|at| format!("2011-09-26 13:02:25.{:09}\n", at * STEP_NS)).collect();
     for (name, recording, data) in [
@@ -153,6 +156,7 @@ fn dress_data_sets(clip: &Clip) {
         .projections
         .each_ref()
         .map(|row| row.split(' ').map(|word| word.parse().unwrap()).collect::<Vec<f64>>());
+    // Cityscapes states a baseline where others have a projection.
     let camera = serde_json::json!({
         "extrinsic": { "baseline": -right[3] / right[0] },
         "intrinsic": { "fx": left[0], "fy": left[5], "u0": left[2], "v0": left[6] },
@@ -165,6 +169,7 @@ fn dress_data_sets(clip: &Clip) {
 
 /// Two folders, one folder with prefixes or suffixes, and images that hold both cameras.
 fn dress_folders(clip: &Clip) -> Vec<&'static str> {
+    // Names of the two folders; the numbers begin with 8, so that 10 follows 9.
     let two = ["left/right", "cam0/cam1", "image_0/image_1", "infra1/infra2"];
     let mut names = vec!["left-right", "cam0-cam1", "image_0-image_1", "infra1-infra2"];
     for (name, sides) in names.iter().zip(two.map(|sides| sides.split_once('/').unwrap())) {
@@ -181,6 +186,7 @@ fn dress_folders(clip: &Clip) -> Vec<&'static str> {
     for (at, [left, right]) in clip.pairs.iter().enumerate() {
         let (width, height) = left.dimensions();
         let both = |columns: u32, rows: u32| {
+            // Left or above the left picture, right or below the right one.
             GrayImage::from_fn(columns, rows, |u, v| {
                 if u < width && v < height {
                     *left.get_pixel(u, v)
@@ -211,6 +217,7 @@ fn dress_formats(clip: &Clip) -> Vec<&'static str> {
     }
     for (at, pair) in clip.pairs.iter().enumerate() {
         for (image, side) in pair.iter().zip(["left", "right"]) {
+            // Eight bits in the upper half, as TUM VI has its pictures.
             let wide = |u: u32, v: u32| Luma([u16::from(image.get_pixel(u, v).0[0]) << 8]);
             let wide =
                 ImageBuffer::<Luma<u16>, Vec<u16>>::from_fn(image.width(), image.height(), wide);
@@ -267,6 +274,7 @@ fn names_without_padding_and_missing_images_keep_order_and_pairs() {
         write(clip.path(name).join("calib.txt"), &clip.calibration(["P0", "P1"]));
     }
     assert_eq!(clip.digest("unpadded"), plain, "3, 4, ..., 9, 10, ..., 14");
+    // In one folder one side is missing, in the other both: the same frames are left.
     for at in [5, 9, 12] {
         fs::remove_file(clip.path("missing/right").join(format!("{at}.png"))).unwrap();
         ["left", "right"].iter().for_each(|side| {
@@ -295,6 +303,7 @@ fn jpeg_of_quality_90_keeps_the_trajectory_within_two_percent() {
                 .unwrap();
         }
     }
+    // The camera's position after the last frame.
     let end_m = |name: &str| {
         write(clip.path(name).join("calib.txt"), &clip.calibration(["P0", "P1"]));
         let args = [

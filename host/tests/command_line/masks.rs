@@ -33,6 +33,7 @@ fn without_masks_what_moves_is_found_by_its_motion_and_reconstructed() {
     assert!(objects.iter().all(|object| object["class"] == "moving object"), "{objects:?}");
     assert!(objects.iter().any(|object| object["state"] == "dynamic"), "{objects:?}");
     assert!(!names(&root.path().join("auto/objects")).is_empty());
+    // The street knows what moves.
     let masks = &summary["masks_truth"];
     let found: u64 = masks["ranges"]
         .as_array()
@@ -40,17 +41,20 @@ fn without_masks_what_moves_is_found_by_its_motion_and_reconstructed() {
         .iter()
         .map(|range| range["found"].as_u64().unwrap())
         .sum();
+    // No mask may be where nothing moves.
     assert!(
         found > 0 && masks["mean_iou"].as_f64() > Some(0.6) && masks["false_masks"] == 0,
         "{masks}"
     );
     let tracks = fs::read_to_string(root.path().join("auto/tracks.csv")).unwrap();
     let saved = names(&root.path().join("saved/motion"));
+    // 16 frames.
     assert_eq!(saved.len(), 2 * 16, "a picture and a list a frame: {saved:?}");
     let rows = saved.iter().filter(|name| name.ends_with(".txt")).map(|name| {
         let list = fs::read_to_string(root.path().join("saved/motion").join(name)).unwrap();
         list.lines().filter(|line| line.contains(" moving object 0.9 ")).count()
     });
+    // A row of the table is a mask of a frame.
     assert_eq!(rows.sum::<usize>(), tracks.lines().count() - 1, "each mask is a track's");
     assert_eq!(
         street(root.path(), "none", &["--frames", "4", "--instances", "none"])["objects"]

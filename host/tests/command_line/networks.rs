@@ -76,6 +76,7 @@ fn constant_boxes(size: [u64; 2], value: f32) -> Vec<u8> {
 
 /// A network that counts up to 2^62 before it answers.
 fn endless() -> Vec<u8> {
+    // The loop's body hands on its state and its condition, so that only the count ends it.
     let body = [
         field(1, node("Identity", &["cin"], &["cout"], &[])),
         field(1, node("Identity", &["v"], &["vout"], &[])),
@@ -144,6 +145,7 @@ fn networks_of_large_inputs_and_outputs_end_in_a_sentence() {
 #[test]
 fn settings_that_leave_nothing_to_be_found_are_refused_with_what_is_known() {
     let net = constant_boxes([64, 64], 0.0);
+    // 80 names, all of them misspelt alike.
     let names = |first: &str| format!("names = [{}]", vec![format!("\"{first}\""); 80].join(", "));
     for (settings, sentence) in [
         ("score_min = 5", "score_min = 5 is not within 0 and 1"),
@@ -157,6 +159,7 @@ fn settings_that_leave_nothing_to_be_found_are_refused_with_what_is_known() {
         let text = refusal(&net, settings);
         assert!(text.contains(sentence), "{settings}: {text}");
     }
+    // The limit itself is allowed, although nothing reaches it.
     let root = folder(&net, "keep = [\"car\"]\nscore_min = 1.0");
     let run = dynvox(root.path(), &[&ARGS[..], &["--force"]].concat());
     assert!(run.status.success(), "{}", output_text(&run));
@@ -187,6 +190,7 @@ fn waited(limit: Duration, mut is_so: impl FnMut() -> bool) -> bool {
 fn the_first_ctrl_c_ends_a_network_that_loops_without_an_end() {
     let root = folder(&endless(), "");
     let at = root.path().canonicalize().unwrap();
+    // A signal to end, and one that cannot be caught: the worker ends either way.
     for signal in ["-INT", "-KILL"] {
         let mut run = Command::new(env!("CARGO_BIN_EXE_dynvox"))
             .args(ARGS)
@@ -195,6 +199,7 @@ fn the_first_ctrl_c_ends_a_network_that_loops_without_an_end() {
             .spawn()
             .unwrap();
         assert!(waited(Duration::from_secs(20), || workers(&at) == 1), "no worker");
+        // Well within the endless loop.
         std::thread::sleep(Duration::from_millis(500));
         let sent = Command::new("kill").args([signal, &run.id().to_string()]).status().unwrap();
         assert!(sent.success());

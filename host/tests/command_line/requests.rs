@@ -88,16 +88,19 @@ fn a_snapshot_of_the_command_line_is_resumed_by_its_request() {
     rig(root.path(), 8);
     let args = ["run", "rig", "--profile", "tiny", "--quiet", "--out"];
     commanded(root.path(), &[&args[..], &["whole"]].concat());
+    // The sixth frame is torn: the run ends there with a snapshot.
     fs::rename(path("rig/left/005.png"), path("away.png")).unwrap();
     fs::write(path("rig/left/005.png"), "torn").unwrap();
     let stopped = dynvox(root.path(), &[&args[..], &["cut", "--snapshot-every", "2"]].concat());
     assert_eq!(stopped.status.code(), Some(4), "{}", output_text(&stopped));
+    // Repaired.
     fs::rename(path("away.png"), path("rig/left/005.png")).unwrap();
 
     let mut folder = RunFolder::reopen(&path("cut")).unwrap();
     let (checkpoint, damage) = Checkpoint::read(&folder).unwrap();
     assert!(damage.is_none());
     let request = checkpoint.manifest().request().clone();
+    // Absolute, since a resumed run may be called from another folder.
     assert_eq!(request.input.source, Source::Recording(path("rig")), "from any folder");
     assert_eq!(request.storage.snapshot_every, Some(2));
     folder.check_target(checkpoint.manifest().overwrites()).unwrap();
@@ -120,10 +123,12 @@ fn a_job_of_a_fleet_has_the_bits_of_its_request() {
     let job = &jobs["jobs"][0];
     let request: Request = serde_json::from_value(job["request"].clone()).unwrap();
     let mut expected = street();
+    // What a fleet adds to a recording's own settings.
     expected.settings.volume.allocation_m = 64.0;
     expected.storage.keep_blocks = true;
     assert_eq!(request, expected, "far about surfaces for registration");
 
+    // Three ways to one result: the request, the command, the fleet.
     asked(root.path(), "asked", &request);
     let words = ["run", "--quiet", "--keep-blocks", "--set", "volume.allocation_m=64", "--out"];
     commanded(root.path(), &[&words[..], &["commanded"], &STREET].concat());
@@ -144,6 +149,7 @@ fn a_point_of_a_sweep_has_the_bits_of_its_request() {
     let (key, request) = plan["runs"].as_object().unwrap().iter().next().unwrap();
     let request: Request = serde_json::from_value(request.clone()).unwrap();
     asked(root.path(), "asked", &request);
+    // What a sweep adds, said on the command line.
     let words = ["run", "--scale", "0.8", "--instances", "exact", "--evaluate", "exact", "--out"];
     commanded(root.path(), &[&words[..], &["commanded"], &common].concat());
     assert_same_bits(root.path(), "commanded", "asked");

@@ -113,6 +113,7 @@ fn stopped() -> TempDir {
     let root = TempDir::new().unwrap();
     rig(root.path(), 8);
     fs::write(root.path().join("settings.toml"), "[volume]\nvoxel_size_m = 0.08\n").unwrap();
+    // A run without a stop, to compare with.
     let whole = dynvox(
         root.path(),
         &[
@@ -130,6 +131,7 @@ fn stopped() -> TempDir {
     assert!(whole.status.success(), "{}", output_text(&whole));
     let image = root.path().join("rig/left/005.png");
     fs::rename(&image, root.path().join("005.png")).unwrap();
+    // A picture of another size ends the run at its frame.
     GrayImage::new(50, 50).save(&image).unwrap();
     let args = [
         "run",
@@ -154,6 +156,7 @@ fn stopped() -> TempDir {
     );
     fs::rename(root.path().join("005.png"), &image).unwrap();
     assert_eq!(names(&root.path().join("out")), ["it"]);
+    // Results so far, and what a resumption needs.
     let files = names(&root.path().join("out/it"));
     assert!(
         ["map.blocks", "map.ply", "run.snapshot", "summary.json"]
@@ -176,6 +179,7 @@ fn a_run_that_failed_resumes_when_the_cause_is_repaired() {
     let resumed = dynvox(root.path(), &["run", "--resume", "out/it", "--quiet"]);
     assert!(resumed.status.success(), "{}", output_text(&resumed));
     assert_same(root.path(), "whole", "out/it");
+    // Once resumed to its end, there is nothing more to resume.
     let twice = dynvox(root.path(), &["run", "--resume", "out/it"]);
     assert!(
         output_text(&twice).contains("it has no snapshot: it is complete"),
@@ -220,6 +224,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     let path = |name: &str| root.path().join(name);
     let snapshot = "out/it/run.snapshot";
     let whole = fs::read(path(snapshot)).unwrap();
+    // Else the snapshot before would be taken.
     fs::remove_file(path("out/it/run.snapshot.previous")).unwrap();
     let refused =
         |bytes: &[u8], sentence: &str| assert_refused_with(&root, snapshot, bytes, sentence);
@@ -228,11 +233,14 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
         bytes[at] = byte;
         bytes
     };
+    // The version begins at byte 8.
     refused(b"P5 3 1 255", "is not a snapshot of a run");
     refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 8");
+    // In the head, the manifest and the state, and at the end.
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         refused(&changed(at, !whole[at]), "run.snapshot is damaged");
     }
+    // A byte less, and one more.
     refused(&whole[..whole.len() - 1], "run.snapshot is damaged");
     refused(&[&whole[..], b"1"].concat(), "run.snapshot is damaged");
     let blocks = path("out/it/map.blocks");
@@ -248,9 +256,11 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     for table in ["frames.csv", "tracks.csv", "trajectory_tum.txt"] {
         let known = fs::read(path(&format!("out/it/{table}"))).unwrap();
         if known.is_empty() {
+            // No row yet.
             continue;
         }
         let sentence = format!("{table} is not as the run left it");
+        // Cut in half, and changed in the first byte.
         assert_refused_with(
             &root,
             &format!("out/it/{table}"),
@@ -295,6 +305,7 @@ fn objects_written_before_a_snapshot_are_checked() {
     );
     let objects = root.path().join(".stopped.partial/objects");
     let meshes: Vec<_> =
+        // Meshes of objects that left before the snapshot.
         names(&objects).into_iter().filter(|name| name.ends_with(".ply")).collect();
     let first = objects.join(meshes.first().expect("an object has left"));
     let whole = fs::read(&first).unwrap();
@@ -319,6 +330,7 @@ fn objects_written_before_a_snapshot_are_checked() {
 fn another_run_or_a_changed_data_set_is_refused_by_name() {
     let root = stopped();
     let path = |name: &str| root.path().join(name);
+    // A snapshot has its own copy of the settings.
     fs::remove_file(path("settings.toml")).expect("a snapshot holds the settings themselves");
     let calibration = fs::read_to_string(path("rig/calib.txt"))
         .unwrap()
@@ -335,6 +347,7 @@ fn another_run_or_a_changed_data_set_is_refused_by_name() {
     );
     let [last, away] = ["rig/left/007.png", "away.png"].map(path);
     fs::rename(&last, &away).unwrap();
+    // One frame fewer, on both sides.
     fs::rename(path("rig/right/007.png"), path("away-right.png")).unwrap();
     assert_refused(&root, "the data set's number of frames was 8 and is 7");
     fs::rename(&away, &last).unwrap();

@@ -162,6 +162,7 @@ fn every_comparison_is_a_row_in_the_order_of_frames() {
         &Transform::IDENTITY,
     );
     let rows = errors.comparisons();
+    // The first frame has no motion that an error could be of.
     assert_eq!(
         rows.iter().map(|(id, one)| (*id, one.at, one.error.is_some())).collect::<Vec<_>>(),
         [(1, 0, false), (1, 1, true), (1, 2, true)]

@@ -12,10 +12,12 @@ fn arc(count: usize, step: Transform) -> Vec<Transform> {
 #[test]
 fn a_trajectory_one_percent_too_long_has_one_percent_error() {
     let step = |length: f64| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, length));
+    // Steps of a metre, and of a centimetre more.
     let found = errors(&arc(80, step(1.0)), &arc(80, step(1.01))).unwrap();
     assert!((found.t_err_percent.unwrap() - 1.0).abs() < 1e-9, "{found:?}");
     assert!(found.r_err_deg_per_m.unwrap() < 1e-9 && found.rpe_r_deg < 1e-9);
     assert!((found.rpe_t_m - 0.01).abs() < 1e-12);
+    // A path of less than 100 m is measured over shorter lengths, from every frame on.
     assert_eq!(
         found.per_length.iter().map(|row| (row.0 as usize, row.3)).collect::<Vec<_>>(),
         [(5, 75), (10, 70), (20, 60), (30, 50), (40, 40), (50, 30)]
@@ -140,6 +142,7 @@ fn too_little_to_compare_is_none() {
 
 #[test]
 fn agrees_with_evo() {
+    // The files that evo was given, and its figures.
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
     let [estimate, truth] =
         ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());

@@ -26,6 +26,7 @@ fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
     let path = folder.join(format!("{}.blocks", job.id));
     let (mut store, _) =
         BlockFile::open(&path, LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
+    // 10 x 4 x 16 blocks of 1.6 m.
     for block in 0..10 * 4 * 16 {
         let coord = BlockCoord { x: block % 10 - 5, y: block / 10 % 4 - 2, z: block / 40 - 2 };
         let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
@@ -34,6 +35,7 @@ fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
             let at = std::array::from_fn(|axis| {
                 (f64::from([coord.x, coord.y, coord.z][axis]) * 8.0 + offset[axis]) * 0.2
             });
+            // In shares of the truncation.
             let share = street(t_world_camera.transform_point(at)) / 0.8;
             if share > -1.0 {
                 (sdf[voxel], weight[voxel]) = ((share.min(1.0) * 32_767.0) as i16, 9);
@@ -67,12 +69,14 @@ fn job(nth: usize, given: &Transform) -> Job {
 fn recordings_two_tenths_of_a_metre_and_a_degree_off_are_aligned() {
     let root = tempfile::TempDir::new().unwrap();
     std::fs::create_dir_all(root.path().join("submaps")).unwrap();
+    // Three that see one street, twelve metres apart, and one far away.
     let truth = [
         Transform::IDENTITY,
         Transform::new([0.0, 0.05, 0.0], [0.3, 0.0, 12.0]),
         Transform::new([0.0, -0.08, 0.01], [-0.4, 0.1, 24.0]),
         Transform::from_translation([400.0, 0.0, 5.0]),
     ];
+    // The position is off in the world's axes, the direction about the pose itself.
     let off = |at: usize, turn: [f64; 3], shift: [f64; 3]| {
         let moved = std::array::from_fn(|axis| truth[at].translation_m[axis] + shift[axis]);
         let turned =
@@ -91,6 +95,7 @@ fn recordings_two_tenths_of_a_metre_and_a_degree_off_are_aligned() {
         jobs: given.iter().enumerate().map(|(nth, given)| job(nth, given)).collect(),
     };
     manifest.jobs.iter().zip(&truth).for_each(|(job, truth)| record(job, root.path(), truth));
+    // The uncertainty of given poses bounds how far they may be moved.
     let alignment = Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap();
     alignment.write(root.path()).unwrap();
     let found: Vec<Transform> =
@@ -105,6 +110,7 @@ fn recordings_two_tenths_of_a_metre_and_a_degree_off_are_aligned() {
         );
     }
     assert!((found[3].inverse() * given[3]).distance_m() < 1e-9, "without overlap it stays");
+    // Each registration fits better than before.
     assert!(
         alignment
             .pairs
@@ -112,6 +118,7 @@ fn recordings_two_tenths_of_a_metre_and_a_degree_off_are_aligned() {
             .all(|pair| pair.fit.refused.is_none() && pair.fit.rms_m < pair.fit.rms_before_m),
         "{alignment:?}"
     );
+    // The same each time, to the bit.
     assert_eq!(alignment, Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap());
     let mut others = manifest;
     let moved = Transform::from_translation([0.1, 0.0, 0.0]) * given[1];
@@ -130,9 +137,11 @@ fn a_pose_farther_off_than_it_may_be_is_refused_by_name() {
     };
     record(&manifest.jobs[0], root.path(), &given[0]);
     record(&manifest.jobs[1], root.path(), &Transform::from_translation([0.0, 0.0, 12.0]));
+    // A twentieth of what the pose is off.
     let sure = Uncertainty { position_m: 0.05, rotation_rad: 0.001 };
     let alignment = Alignment::find(&manifest, root.path(), &sure).unwrap();
     let why = alignment.pairs[0].fit.refused.clone().unwrap();
     assert!(why.contains("more than the given poses may be off"), "{why}");
+    // A refused registration moves nothing.
     assert!(alignment.recordings.iter().all(|of| of.moved_m < 1e-6), "{alignment:?}");
 }

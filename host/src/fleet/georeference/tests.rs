@@ -34,13 +34,16 @@ fn observed(
     let frame = |nth: usize| {
         let (sine, cosine) = (f64::from(nth as u32) * 0.03).sin_cos();
         let t_map_camera = Transform::new([0.3 * bend_rad * cosine, bend_rad * sine, 0.0], at_m);
+        // The position grows by a step along the direction.
         let ahead = t_map_camera.rotate([0.0, 0.0, step_m]);
         (0..3).for_each(|axis| at_m[axis] += ahead[axis]);
         let t_world_camera = world() * t_map_camera;
+        // A reflection puts a fix up to 25 m off.
         let reflected = if nth % 8 == 3 { noise.vector(25.0) } else { Vector3::zeros() };
         let at_m = Vector3::from(t_world_camera.transform_point(ANTENNA_M))
             + noise.vector(sigma_m)
             + reflected;
+        // Given angles, off by a constant turn.
         let off = |by: f64| Transform::new([0.0, by, 0.0], [0.0; 3]) * t_world_camera;
         Observation {
             t_map_camera,
@@ -74,6 +77,7 @@ fn a_bent_path_lies_where_its_fixes_say_within_the_stated_error() {
         off_m < 0.01 && turned_rad < 1e-4,
         "reflected fixes alone: {off_m} m, {turned_rad} rad"
     );
+    // Taken for the camera's, positions of the antenna mislead.
     assert!(
         error(&georeference(&frames, [0.0; 3]).unwrap(), [0.0; 3]).0 > 0.5,
         "the antenna counts"
@@ -92,6 +96,7 @@ fn a_straight_or_short_path_is_refused_unless_angles_are_given() {
         let (off_m, turned_rad) = error(&found, [0.0; 3]);
         assert!(off_m < 0.5 && turned_rad < 0.02, "{off_m} m, {turned_rad} rad");
     }
+    // Nine frames, where ten are needed.
     let few = georeference(&observed(0.6, 0.8, 0.4, None)[..9], ANTENNA_M).unwrap_err();
     assert!(few.contains("9 frames with a fix are less than 10"), "{few}");
     let turned = |bend_rad: f64| {

@@ -20,6 +20,7 @@ fn map(folder: &Path) -> Submap {
     for block in 0..216 {
         let coord = BlockCoord { x: block % 6 - 3, y: block / 6 % 6 - 3, z: block / 36 - 3 };
         let (mut sdf, mut weight) = ([0; BLOCK_VOXELS], [0; BLOCK_VOXELS]);
+        // A voxel's distance from the plane, in voxels.
         for at in 0..BLOCK_VOXELS {
             let offset = [at % 8, at / 8 % 8, at / 64];
             let point = std::array::from_fn(|axis| {
@@ -54,6 +55,7 @@ fn all_sums(folder: &Path) -> Vec<(BlockCoord, BlockSums)> {
 fn lattices_that_coincide_keep_every_value() {
     let root = tempfile::TempDir::new().unwrap();
     let mut map = map(root.path());
+    // Whole blocks, in the lattice's own voxel size, which is an f32.
     let shifted = Transform::from_translation([
         1.6 * f64::from(0.1f32) / 0.1,
         0.0,
@@ -66,6 +68,7 @@ fn lattices_that_coincide_keep_every_value() {
         resample(&mut map, 0, &t_world_map, &out).unwrap();
         let all = all_sums(&out);
         assert!(all.len() > 60, "{}", all.len());
+        // Block by block the source's values, shifted by whole blocks.
         for (coord, sums) in &all {
             let source = BlockCoord {
                 x: coord.x - blocks[0],
@@ -81,6 +84,7 @@ fn lattices_that_coincide_keep_every_value() {
                 colour: Some(&mut colour)
             }));
             let average = sums.average();
+            // Voxels without weight have no distance to compare.
             assert!(
                 *average.weight == weight
                     && weight
@@ -102,6 +106,7 @@ fn a_turned_map_shows_the_same_surface() {
     let t_world_map = Transform::new([0.1, -0.4, 0.2], [3.03, -1.21, 0.57]);
     let out = root.path().join("turned");
     resample(&mut map, 0, &t_world_map, &out).unwrap();
+    // Back into the map's lattice, where the plane is known.
     let to_map = LatticeWay::new(&t_world_map, &LATTICE).to_map;
     let (mut seen, mut worst) = (0, 0.0f64);
     for (coord, sums) in all_sums(&out) {

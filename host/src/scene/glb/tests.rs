@@ -24,6 +24,7 @@ fn triangle() -> IndexedMesh {
 
 #[test]
 fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
+    // The object is known at frames 1 and 3 only.
     let pose = |x: f64| Transform::from_translation([x, 0.0, 0.0]);
     let frame = |frame: usize| SceneFrame {
         row: FrameColumns { frame, time_s: 100.0 + 0.1 * frame as f64, ..FrameColumns::default() },
@@ -42,6 +43,7 @@ fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
         ..Scene::default()
     };
     let (json, bytes) = parsed(&scene);
+    // The numbers behind an accessor.
     let floats = |accessor: &Value| -> Vec<f32> {
         let accessor = &json["accessors"][accessor.as_u64().unwrap() as usize];
         let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
@@ -60,6 +62,7 @@ fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
         (&json!("object 7"), &json!([30.0, 0.0, 0.0])),
         "where it was last seen"
     );
+    // From the first frame on, in seconds.
     let times = floats(&animation["samplers"][0]["input"]);
     assert!(
         times.len() == 2 && (times[0] - 0.1).abs() < 1e-6 && (times[1] - 0.3).abs() < 1e-6,
@@ -68,12 +71,14 @@ fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
     assert_eq!(floats(&animation["samplers"][0]["output"]), [10.0, 0.0, 0.0, 30.0, 0.0, 0.0]);
     let map =
         json["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "static map").unwrap();
+    // Quantised vertices: the node restores their place and size.
     assert_eq!(
         (&map["translation"], &map["scale"]),
         (&json!([1.0, 2.0, 3.0]), &json!([4.0, 4.0, 4.0]))
     );
     let root = json["nodes"].as_array().unwrap().last().unwrap();
     assert_eq!(
+        // Half a turn about x: y up as glTF has it.
         (root["children"].as_array().unwrap().len(), &root["rotation"]),
         (3, &json!([1.0, 0.0, 0.0, 0.0])),
         "map, path, object"

@@ -71,6 +71,7 @@ fn failures(seed: u64) -> Vec<String> {
         let call = (bomb.make)(folder.path(), &mut Random::new(seed));
         let Usage { code, cpu_s, rss, text } = measured(folder.path(), call);
         println!("{:>6.2} s {:>5} MiB  {}: {}", cpu_s, rss >> 20, bomb.name, text.trim());
+        // The sentence must name the bound: a crash would give an exit code as well.
         let faults = [
             (code.is_none_or(|code| code == 0), "its exit code is wrong"),
             (!text.contains(bomb.bound), "its sentence lacks the bound"),

@@ -210,6 +210,8 @@ fn sparse(root: &Path, random: &mut Random) -> Call {
 /// A TIFF of one strip with a compression and bits of a sample.
 fn tiff_file([width, height]: [u32; 2], [compression, bits]: [u32; 2]) -> Vec<u8> {
     let mut file = b"II*\0\x08\0\0\0".to_vec();
+    // Width, height, bits, compression, black is 0, the strip's place, samples, rows, and its
+    // bytes.
     let tags: [(u16, u32); 9] = [
         (256, width),
         (257, height),
@@ -224,6 +226,7 @@ fn tiff_file([width, height]: [u32; 2], [compression, bits]: [u32; 2]) -> Vec<u8
     file.extend((tags.len() as u16).to_le_bytes());
     for (tag, value) in tags {
         file.extend(tag.to_le_bytes());
+        // Of type LONG, one value each.
         file.extend([4, 0, 1, 0, 0, 0]);
         file.extend(value.to_le_bytes());
     }

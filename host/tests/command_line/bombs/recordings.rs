@@ -54,6 +54,7 @@ fn image(size: [u32; 2], step: u32, data: &[u8]) -> Vec<u8> {
 fn recording(root: &Path, kind: &str, messages: usize, message: &[u8]) {
     let file = BufWriter::new(File::create(root.join("m.mcap")).unwrap());
     let options =
+        // Compressed, since a bomb is small on disk.
         WriteOptions::new().compression(Some(Compression::Zstd)).chunk_size(Some(1 << 20));
     let mut writer = options.create(file).unwrap();
     let schema = writer.add_schema(kind, "ros2msg", b"").unwrap();
