@@ -10,12 +10,12 @@ use std::{collections::BTreeMap, path::Path};
 /// Most lines of a function, from its `fn` to its closing brace.
 const FUNCTION_LINES: usize = 101;
 /// Most lines of a file.
-const FILE_LINES: usize = 523;
+const FILE_LINES: usize = 520;
 
 /// Parameters from which on a function is wide: `self` is one, a tuple counts as its elements.
 const WIDE: usize = 6;
 /// Most wide functions of the repository, tests included. The figure only ever falls.
-const MAX_WIDE: usize = 29;
+const MAX_WIDE: usize = 20;
 /// Most functions that are not wide and take a tuple apart in their parameter list, which hides
 /// parameters. The figure only ever falls.
 const MAX_TAKING_APART: usize = 30;

@@ -61,46 +61,10 @@ impl<'s> Hypotheses<'s> {
         t_world_camera: &Transform,
     ) -> u32 {
         let mut used = [false; MAX_GROUPS];
-        let observed = |group: &Group| {
-            let half = group
-                .extent
-                .high
-                .iter()
-                .zip(&group.extent.low)
-                .map(|(high, low)| 0.5 * (high - low));
-            let mut halves = [0.0; 3];
-            halves.iter_mut().zip(half).for_each(|(slot, half)| *slot = half);
-            Observed {
-                center: t_world_camera.transform_point(group.extent.center()),
-                motion: t_world_camera.rotate(group.motion_m),
-                half: halves,
-                depth_m: group.extent.center().z,
-                depth_sigma_m: group.depth_sigma_m,
-            }
-        };
         // In the order of the table, which is that of age: older hypotheses choose first.
         for hypothesis in self.table.iter_mut().take(self.len) {
-            let predicted = hypothesis.center() + Vector3::from(hypothesis.motion_m);
-            let mut best: Option<(f64, usize, Observed)> = None;
-            for (index, group) in groups.iter().enumerate() {
-                let found = observed(group);
-                let distance_m = (found.center - predicted).norm();
-                let difference_m = (found.motion - Vector3::from(hypothesis.motion_m)).norm();
-                // Depth is less certain far away: both bounds grow with it.
-                let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
-                let is_alike = difference_m
-                    < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
-                let is_free = used.get(index) == Some(&false);
-                if is_near
-                    && is_alike
-                    && is_free
-                    && best.as_ref().is_none_or(|(least_m, ..)| distance_m < *least_m)
-                {
-                    best = Some((distance_m, index, found));
-                }
-            }
-            match best {
-                Some((_, index, found)) => {
+            match hypothesis.nearest(groups, &used, t_world_camera) {
+                Some((index, found)) => {
                     hypothesis.update(&found, t_world_camera);
                     used.get_mut(index).into_iter().for_each(|used| *used = true);
                 }
@@ -116,7 +80,7 @@ impl<'s> Hypotheses<'s> {
                 continue;
             };
             *slot = Hypothesis::new(config);
-            slot.update(&observed(group), t_world_camera);
+            slot.update(&Observed::new(group, t_world_camera), t_world_camera);
             self.len += 1;
         }
         refused
@@ -288,5 +252,54 @@ mod tests {
             u32::from(config.erase_frames),
             "all frames in which it was searched for, up to the most"
         );
+    }
+}
+
+impl Hypothesis {
+    /// The nearest group that is not used and moves alike, by position.
+    fn nearest(
+        &self,
+        groups: &[Group],
+        used: &[bool; MAX_GROUPS],
+        t_world_camera: &Transform,
+    ) -> Option<(usize, Observed)> {
+        let predicted = self.center() + Vector3::from(self.motion_m);
+        let mut best: Option<(f64, usize, Observed)> = None;
+        for (index, group) in groups.iter().enumerate() {
+            let found = Observed::new(group, t_world_camera);
+            let distance_m = (found.center - predicted).norm();
+            let difference_m = (found.motion - Vector3::from(self.motion_m)).norm();
+            // Depth is less certain far away: both bounds grow with it.
+            let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
+            let is_alike =
+                difference_m < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
+            let is_free = used.get(index) == Some(&false);
+            if is_near
+                && is_alike
+                && is_free
+                && best.as_ref().is_none_or(|(least_m, ..)| distance_m < *least_m)
+            {
+                best = Some((distance_m, index, found));
+            }
+        }
+        best.map(|(_, index, found)| (index, found))
+    }
+}
+
+impl Observed {
+    /// A group of a frame, moved into the world.
+    fn new(group: &Group, t_world_camera: &Transform) -> Self {
+        let extent = &group.extent;
+        let mut half = [0.0; 3];
+        for (half, (high, low)) in half.iter_mut().zip(extent.high.iter().zip(&extent.low)) {
+            *half = 0.5 * (high - low);
+        }
+        Self {
+            center: t_world_camera.transform_point(extent.center()),
+            motion: t_world_camera.rotate(group.motion_m),
+            half,
+            depth_m: extent.center().z,
+            depth_sigma_m: group.depth_sigma_m,
+        }
     }
 }

@@ -1,11 +1,14 @@
 //! The disparity image on a lattice: where a group's mask grows.
 
+mod growth;
+
 use super::extent::Extent;
 use crate::{
     geometry::{GroundPlane, StereoRig, scalar::max_f64},
     image::{DISPARITY_ONE_PX, View},
     masks::PixelBox,
 };
+use growth::Growth;
 
 /// Marks of an object's cells: those it grew to, and those between them.
 const GROWN: u8 = 1;
@@ -128,60 +131,16 @@ impl<'a> Lattice<'a> {
     ) -> Option<PixelBox> {
         let reach = widened(extent);
         let bounds = self.bounds(&reach)?;
-        let can_be_own = |column: usize, row: usize, within: &Extent| {
-            if blocked.get(row * self.columns + column).is_some_and(|blocked| *blocked > 0) {
-                return false;
-            }
-            let point = self.point(column, row).filter(|point| within.contains(&(*point).into()));
-            point.is_some_and(|point| self.is_above_ground(point))
-        };
         let cells = cells.get_mut(..self.columns * self.rows)?;
         cells.fill(0);
+        let growth = Growth { lattice: self, bounds: &bounds, blocked };
         // Of an object that leaves the image, the members' extent may lie outside already.
-        let is_visible = bounds.cells().any(|(column, row)| can_be_own(column, row, extent));
+        let is_visible = bounds.cells().any(|(column, row)| growth.can_be_own(column, row, extent));
         let start = if is_visible { extent } else { &reach };
-        let mut queued = 0;
-        // Seeds: all cells within the extent that can be the object's.
-        for (column, row) in bounds.cells() {
-            if can_be_own(column, row, start) {
-                let (cell, slot) =
-                    (cells.get_mut(row * self.columns + column)?, queue.get_mut(queued)?);
-                (*cell, *slot) = (GROWN, (row * self.columns + column) as u32);
-                queued += 1;
-            }
-        }
-        // Breadth first from all seeds at once; the queue holds each cell at most once.
-        let mut next = 0;
-        while next < queued {
-            let at = *queue.get(next)? as usize;
-            next += 1;
-            let (column, row) = (at % self.columns, at / self.columns);
-            let disparity_px = self.disparity_px(self.pixel(column, row))?;
-            // Neighbours of one surface have similar disparities.
-            let step_px = step_px(disparity_px);
-            let is_next = |column: usize, row: usize| {
-                self.disparity_px(self.pixel(column, row))
-                    .is_some_and(|other_px| libm::fabs(other_px - disparity_px) < step_px)
-            };
-            let around = [
-                (column.wrapping_sub(1), row),
-                (column + 1, row),
-                (column, row.wrapping_sub(1)),
-                (column, row + 1),
-            ];
-            for (column, row) in
-                around.into_iter().filter(|&(column, row)| bounds.contains(column, row))
-            {
-                let cell = cells.get_mut(row * self.columns + column)?;
-                if *cell == 0 && is_next(column, row) && can_be_own(column, row, &reach) {
-                    *cell = GROWN;
-                    *queue.get_mut(queued)? = (row * self.columns + column) as u32;
-                    queued += 1;
-                }
-            }
-        }
+        let seeds = growth.seed(start, cells, queue)?;
+        growth.spread(&reach, cells, queue, seeds)?;
         // Gaps are closed only after growing, so that they do not carry growth further.
-        (queued > 0).then_some(())?;
+        (seeds > 0).then_some(())?;
         self.close(&bounds, cells);
         self.reach_border(&bounds, cells);
         self.pixels(&bounds, cells)

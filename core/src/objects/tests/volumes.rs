@@ -261,22 +261,23 @@ fn plain_crop(
     masked.iter().map(kept).collect()
 }
 
+/// Disparities in runs of similar ones, with pixels without any; the steps grow with the round.
+fn stepped_disparities(random: &mut Random, round: u32) -> Vec<u16> {
+    let mut level = 0;
+    let mut pixel = || {
+        let steps = random.below(12) == 0;
+        level = if steps { 1_000 + random.below(1 + round * 15) } else { level };
+        if random.below(30) == 0 { 0 } else { (level + random.below(200)) as u16 }
+    };
+    (0..WIDTH * HEIGHT).map(|_| pixel()).collect()
+}
+
 #[test]
 fn crops_equal_those_cut_pixel_by_pixel() {
     let mut random = Random::new(5);
     let mut kept = 0;
     for round in 0..200 {
-        let mut level = 0;
-        let disparity: Vec<u16> = (0..WIDTH * HEIGHT)
-            .map(|_| {
-                level = if random.below(12) == 0 {
-                    1_000 + random.below(1 + round * 15)
-                } else {
-                    level
-                };
-                if random.below(30) == 0 { 0 } else { (level + random.below(200)) as u16 }
-            })
-            .collect();
+        let disparity = stepped_disparities(&mut random, round);
         let disparity = View::new(&disparity, WIDTH, HEIGHT).unwrap();
         let mut span = |size: usize| {
             let first = random.below(size as u32 / 2);
