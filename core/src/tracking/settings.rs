@@ -139,14 +139,6 @@ impl TrackingConfig {
                  this: slower than a pedestrian. A dynamic object becomes static only if it is \
                  likely slower than `dynamic_m_s`.",
             ),
-        Row::expert("tracking.state.sigmas", "sigmas", |c| F32(&mut c.state.sigmas))
-            .range(Range::NOT_NEGATIVE)
-            .published("0")
-            .text("Sigmas that are \"certainly\"."),
-        Row::expert("tracking.state.static_sigmas", "sigmas", |c| F32(&mut c.state.static_sigmas))
-            .range(Range::NOT_NEGATIVE)
-            .published("0")
-            .text("Sigmas that are \"likely\"."),
         Row::expert("tracking.state.confirm_frames", "frames", |c| U8(&mut c.state.confirm_frames))
             .range(FRAMES)
             .published("1")
@@ -160,13 +152,6 @@ impl TrackingConfig {
             "Consecutive frames that confirm an uncertain object as static: after 2 the filter has \
              averaged over several frames.",
         ),
-        Row::expert("tracking.state.change_frames", "frames", |c| U8(&mut c.state.change_frames))
-            .range(FRAMES)
-            .published("no such change")
-            .text("Consecutive frames that change a dynamic object to static, or back."),
-        Row::expert("tracking.state.static_frames", "frames", |c| U8(&mut c.state.static_frames))
-            .range(Range::Within(0.0, 255.0))
-            .text("Frames without a motion over which a static object stays static."),
         Row::expert("tracking.state.dynamic_frames", "frames", |c| U8(&mut c.state.dynamic_frames))
             .range(Range::Within(0.0, 255.0))
             .published("1, in its experiments 2")

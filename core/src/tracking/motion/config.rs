@@ -83,21 +83,12 @@ pub struct StateConfig {
     /// m/s; at least `static_m_s`; 1.2, slower than a pedestrian. A dynamic object becomes static
     /// only if it is likely slower than `dynamic_m_s`.
     pub slow_m_s: f32,
-    /// Number of sigmas that count as "certainly"; at least 0. The published code: 0.
-    pub sigmas: f32,
-    /// Number of sigmas that count as "likely"; at least 0. The published code: 0.
-    pub static_sigmas: f32,
     /// Consecutive frames that confirm an uncertain object as dynamic; 1 to 100. The published
     /// code: 1.
     pub confirm_frames: u8,
     /// Frames in a row that must be classified as static to confirm it; 1 to 100; 2: the filter has
     /// averaged over several frames by then. The published code: 1.
     pub confirm_static_frames: u8,
-    /// Consecutive frames that change a dynamic object to static, or the other way round; 1 to 100.
-    /// The published code has no such change.
-    pub change_frames: u8,
-    /// Frames without a motion over which a static object stays static; 0 to 255; 5.
-    pub static_frames: u8,
     /// Frames without a motion over which a dynamic object stays dynamic; 0 to 255; 3: the filter
     /// predicts its motion. The published code: 1, its experiments: 2.
     pub dynamic_frames: u8,
@@ -109,12 +100,8 @@ impl Default for StateConfig {
             dynamic_m_s: 0.6,
             static_m_s: 0.3,
             slow_m_s: 1.2,
-            sigmas: 2.5,
-            static_sigmas: 1.0,
             confirm_frames: 3,
             confirm_static_frames: 2,
-            change_frames: 2,
-            static_frames: 5,
             dynamic_frames: 3,
         }
     }

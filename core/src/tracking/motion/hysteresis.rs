@@ -1,19 +1,19 @@
 //! Uncertain, static, dynamic: the motion state of an object, with hysteresis.
 //!
 //! A frame's motion has a speed, an error of it (one sigma) and a bias the cameras may add. It is
-//! classified *dynamic* when the speed less the bias and `sigmas` times the error is above
-//! `dynamic_m_s`; *static* when that is below `static_m_s` and the speed plus `static_sigmas` times
+//! classified *dynamic* when the speed less the bias and 2.5 times the error is above
+//! `dynamic_m_s`; *static* when that is below `static_m_s` and the speed plus one times
 //! the error in all directions is below `slow_m_s`, for a dynamic object below `dynamic_m_s`;
 //! otherwise neither. So a far car that may be static and is certainly slower than a pedestrian is
 //! static, and one that may be faster stays uncertain; but a dynamic object must be measured to
-//! have stopped. With `sigmas` 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is
+//! have stopped. With an error of 0, `confirm_frames` 1 and `slow_m_s` equal to `static_m_s` this is
 //! the published rule (Section III-D).
 //!
 //! ```text
-//!      confirm_static_frames or confirm_frames agree         change_frames agree
+//!      confirm_static_frames or confirm_frames agree         2 frames agree
 //! uncertain ----------------------> static or dynamic <-------------------> the other
 //!     ^                                    |
-//!     +------------------------------------+  no motion for more than static_frames or
+//!     +------------------------------------+  no motion for more than 5 (static) or
 //!                                             dynamic_frames frames
 //! ```
 //!
@@ -24,6 +24,12 @@
 use super::{MotionEvidence, MotionState, StateConfig};
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
+
+/// Consecutive frames that change a dynamic object to static, or the other way round. The published
+/// code has no such change.
+const CHANGE_FRAMES: u8 = 2;
+/// Frames without a motion over which a static object stays static.
+const STATIC_FRAMES: u8 = 5;
 
 /// The motion state of one track, with its hysteresis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -73,7 +79,7 @@ impl MotionHysteresis {
         let required = match (self.state(), classified) {
             (MotionState::Uncertain, MotionState::Static) => config.confirm_static_frames,
             (MotionState::Uncertain, _) => config.confirm_frames,
-            _ => config.change_frames,
+            _ => CHANGE_FRAMES,
         };
         if classified != MotionState::Uncertain && self.consecutive >= u32::from(required) {
             self.state = classified.code();
@@ -84,7 +90,7 @@ impl MotionHysteresis {
     fn expire(&mut self, config: &StateConfig) {
         self.since_motion = self.since_motion.saturating_add(1);
         let most = match self.state() {
-            MotionState::Static => config.static_frames,
+            MotionState::Static => STATIC_FRAMES,
             MotionState::Dynamic | MotionState::Uncertain => config.dynamic_frames,
         };
         if self.since_motion > u32::from(most) {

@@ -3,6 +3,11 @@
 use super::{CameraMotion, MotionConfig, MotionFilter, MotionState, StateConfig};
 use crate::geometry::StereoRig;
 
+/// Sigmas that count as "certainly"; the published code: 0.
+const SIGMAS: f32 = 2.5;
+/// Sigmas that count as "likely"; the published code: 0.
+const STATIC_SIGMAS: f32 = 1.0;
+
 /// Measurement of an object's speed in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MotionEvidence {
@@ -55,8 +60,8 @@ impl MotionEvidence {
 
     /// The state it is classified as; `Uncertain` when neither, or not a number.
     pub fn classify(&self, config: &StateConfig, state: MotionState) -> MotionState {
-        let least = self.speed_m_s - self.bias_m_s - config.sigmas * self.sigma_m_s;
-        let most = self.speed_m_s + config.static_sigmas * self.spread_m_s;
+        let least = self.speed_m_s - self.bias_m_s - SIGMAS * self.sigma_m_s;
+        let most = self.speed_m_s + STATIC_SIGMAS * self.spread_m_s;
         let slow_m_s =
             if state == MotionState::Dynamic { config.dynamic_m_s } else { config.slow_m_s };
         if least > config.dynamic_m_s {

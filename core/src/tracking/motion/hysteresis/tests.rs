@@ -7,12 +7,8 @@ const PUBLISHED: StateConfig = StateConfig {
     dynamic_m_s: 5.5,
     static_m_s: 0.3,
     slow_m_s: 0.3,
-    sigmas: 0.0,
-    static_sigmas: 0.0,
     confirm_frames: 1,
     confirm_static_frames: 1,
-    change_frames: 2,
-    static_frames: 5,
     dynamic_frames: 1,
 };
 
@@ -116,32 +112,31 @@ fn one_frame_without_a_motion_does_not_undo_a_state_but_two_do() {
 
 #[test]
 fn a_mover_must_be_seen_to_stop_before_it_is_static() {
-    let config = StateConfig {
-        confirm_frames: 1,
-        confirm_static_frames: 1,
-        change_frames: 1,
-        ..StateConfig::default()
-    };
+    let config =
+        StateConfig { confirm_frames: 1, confirm_static_frames: 1, ..StateConfig::default() };
     let far = |speed_m_s| {
         Some(MotionEvidence { speed_m_s, sigma_m_s: 0.5, spread_m_s: 0.5, bias_m_s: 0.0 })
     };
     assert_eq!(states(&config, &[far(0.6)]), [Static]);
     assert_eq!(states(&config, &[far(0.8)]), [Uncertain], "it may be walking");
-    assert_eq!(states(&config, &[seen(1.0), far(0.6), far(0.05)]), [Dynamic, Dynamic, Static]);
+    assert_eq!(
+        states(&config, &[seen(1.0), far(0.6), far(0.6), far(0.05), far(0.05)]),
+        [Dynamic, Dynamic, Dynamic, Dynamic, Static]
+    );
 }
 
 #[test]
 fn a_noisy_motion_proves_nothing() {
-    let config = StateConfig { sigmas: 2.0, static_sigmas: 2.0, slow_m_s: 5.5, ..PUBLISHED };
+    let config = StateConfig { slow_m_s: 5.5, ..PUBLISHED };
     let classified = |speed_m_s, sigma_m_s| {
         MotionEvidence { speed_m_s, sigma_m_s, spread_m_s: sigma_m_s, bias_m_s: 0.0 }
             .classify(&config, Uncertain)
     };
-    assert_eq!([classified(8.0, 1.0), classified(8.0, 1.5)], [Dynamic, Uncertain]);
+    assert_eq!([classified(8.1, 1.0), classified(8.1, 1.5)], [Dynamic, Uncertain]);
     // A far car that seems to do 2 m/s, give or take 1.5, stands as far as one can tell; give
-    // or take 2 nothing can be told.
+    // or take 4 nothing can be told.
     assert_eq!(
-        [classified(2.0, 1.5), classified(2.0, 2.0), classified(2.0, 0.5)],
+        [classified(2.0, 1.5), classified(2.0, 4.0), classified(2.0, 0.5)],
         [Static, Uncertain, Uncertain]
     );
     let biased = |bias_m_s| {
