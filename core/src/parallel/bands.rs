@@ -11,7 +11,7 @@ pub(crate) struct Bands([usize; BANDS + 1]);
 
 impl Bands {
     /// Cuts `items` items.
-    pub(crate) fn of(items: usize) -> Self {
+    pub(crate) fn new(items: usize) -> Self {
         Self([0, items / 4, items / 2, items / 2 + items / 4, items])
     }
 
@@ -80,7 +80,7 @@ mod tests {
     fn bands_cover_every_item_once() {
         for items in 0..40 {
             let mut values: std::vec::Vec<usize> = (0..items * 3 + 5).collect();
-            let bands = Bands::of(items);
+            let bands = Bands::new(items);
             assert_eq!(bands.split(&values, 3).concat(), values[..items * 3]);
             for (part, first) in bands.split_mut(&mut values, 3).iter().zip(bands.first()) {
                 assert!(part.first().is_none_or(|&value| value == first * 3));
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn fewer_values_than_items_leave_the_last_bands_short() {
-        assert_eq!(Bands::of(8).split(&[1, 2, 3, 4, 5], 1).map(<[i32]>::len), [2, 2, 1, 0]);
+        assert_eq!(Bands::new(8).split(&[1, 2, 3, 4, 5], 1).map(<[i32]>::len), [2, 2, 1, 0]);
     }
 
     #[test]

@@ -97,8 +97,8 @@ pub enum CellState {
 }
 
 impl CellState {
-    /// By the bits of a cell.
-    pub(super) fn of(bits: u8) -> Self {
+    /// The state that the bits of a cell say.
+    pub(super) fn from_bits(bits: u8) -> Self {
         match bits {
             bits if bits & OBJECT != 0 => Self::Occupied,
             bits if bits & OCCUPIED != 0 && !is_ghost(bits) => Self::Occupied,

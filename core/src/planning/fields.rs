@@ -83,7 +83,8 @@ impl Planning<'_> {
         self.cut_slice(&limits);
         self.fill_distances();
         let count = |state: CellState| {
-            self.cells.bits.iter().filter(|bits| CellState::of(**bits) == state).count() as u32
+            self.cells.bits.iter().filter(|bits| CellState::from_bits(**bits) == state).count()
+                as u32
         };
         PlanningReport {
             occupied: count(CellState::Occupied),
@@ -138,7 +139,7 @@ impl Planning<'_> {
             // The window is a ring in height as well.
             for (z, obstacle) in column.iter_mut().enumerate() {
                 let bits = cells.bits.get(first + cells.level(z)).copied().unwrap_or_default();
-                *obstacle = u8::from(is_obstacle(config, CellState::of(bits) as u8));
+                *obstacle = u8::from(is_obstacle(config, CellState::from_bits(bits) as u8));
             }
         }
         cell_distance.transform(cell_obstacle, [width, length, height]);
@@ -189,8 +190,11 @@ impl Planning<'_> {
         else {
             return (CellState::Unknown, None);
         };
-        let state =
-            self.cells.bits.get(position).map_or(CellState::Unknown, |bits| CellState::of(*bits));
+        let state = self
+            .cells
+            .bits
+            .get(position)
+            .map_or(CellState::Unknown, |bits| CellState::from_bits(*bits));
         let stamp = self.cells.observed_at.get(position).copied().filter(|stamp| *stamp > 0);
         (state, stamp.map(|stamp| self.cells.age(stamp)))
     }

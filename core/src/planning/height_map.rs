@@ -364,7 +364,7 @@ fn clearance([x, y]: [usize; 2], ground_m: f32, growth: &Growth<'_, '_>) -> f32 
         cells
             .bits
             .get(column + cells.level(z))
-            .is_some_and(|bits| CellState::of(*bits) == CellState::Occupied)
+            .is_some_and(|bits| CellState::from_bits(*bits) == CellState::Occupied)
     };
     above.into_iter().find(|(z, _)| is_occupied(*z)).map_or(0.0, |(_, above_m)| above_m)
 }

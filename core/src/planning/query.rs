@@ -179,7 +179,7 @@ pub(super) fn ray(
 }
 
 fn state_at(grid: &Grid, cells: &Cells<'_>, point_m: [f64; 3]) -> CellState {
-    bits_at(grid, cells, point_m).map_or(CellState::Unknown, CellState::of)
+    bits_at(grid, cells, point_m).map_or(CellState::Unknown, CellState::from_bits)
 }
 
 /// The bits of the cell that holds a point of the world; `None` outside the window.
@@ -336,7 +336,7 @@ impl Leg {
                 .and_then(|cell| cells.position(cells.local(cell)?));
             position
                 .and_then(|at| cells.bits.get(at))
-                .is_none_or(|bits| CellState::of(*bits) == CellState::Unknown)
+                .is_none_or(|bits| CellState::from_bits(*bits) == CellState::Unknown)
         })
     }
 }

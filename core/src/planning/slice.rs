@@ -34,7 +34,9 @@ pub(super) fn reduce(
             let first = cells.column(x, y);
             // Every cell of the robot's height counts: one occupied cell blocks the column.
             let states_above = (from..to).map(|z| {
-                CellState::of(cells.bits.get(first + cells.level(z)).copied().unwrap_or_default())
+                CellState::from_bits(
+                    cells.bits.get(first + cells.level(z)).copied().unwrap_or_default(),
+                )
             });
             let (mut free, mut occupied) = (false, false);
             for state in states_above {

@@ -39,7 +39,7 @@ impl<'s> AlignedImage<'s> {
         executor: &E,
     ) -> Option<View<'_, u8>> {
         let (width, height) = (right.width(), right.height());
-        let bands = Bands::of(height);
+        let bands = Bands::new(height);
         // The buffer is for the capacity's largest image.
         let rows = clipped_mut(self.0, ..width * height);
         each(executor, zip2(bands.first(), bands.split_mut(rows, width)), |(first, rows)| {

@@ -127,7 +127,7 @@ impl Camera<'_> {
         out: &'a mut [T],
         executor: &E,
     ) -> Option<View<'a, T>> {
-        let bands = Bands::of(height);
+        let bands = Bands::new(height);
         let jobs = zip2(bands.split(self.map, width), bands.split_mut(out, width));
         each(executor, jobs, |(map, out)| map::remap(map, &raw.camera.raw, &raw.image, out));
         View::new(out, width, height)

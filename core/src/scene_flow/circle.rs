@@ -78,7 +78,7 @@ impl Corners<'_, '_> {
     ) {
         let len = self.previous_left.len();
         let Some(traced) = traced.get_mut(..len) else { return };
-        let bands = Bands::of(len);
+        let bands = Bands::new(len);
         each(executor, zip2(bands.first(), bands.split_mut(traced, 1)), |(first, traced)| {
             compare(executor.vectors(), TraceBand { corners: self, reach: &reach, first, traced });
         });

@@ -281,7 +281,7 @@ impl<'s> StereoMatcher<'s> {
     /// Takes a disparity error out of the last pair's disparities, whichever way they came.
     pub(crate) fn correct<E: Executor>(&mut self, correction: PixelCorrection, executor: &E) {
         let (width, height) = (self.width, self.height);
-        let bands = Bands::of(height);
+        let bands = Bands::new(height);
         each(
             executor,
             zip2(bands.first(), bands.split_mut(self.disparity, width)),

@@ -45,7 +45,7 @@ impl ObservedDepth<'_> {
     /// Writes the depths with their notes; none where nothing is to be fused.
     pub fn write<E: Executor>(&self, depths: &mut ViewMut<'_, NotedDepth>, executor: &E) {
         let width = depths.width().max(1);
-        let bands = Bands::of(depths.pixels_mut().len() / width);
+        let bands = Bands::new(depths.pixels_mut().len() / width);
         let jobs = zip2(bands.first(), bands.split_mut(depths.pixels_mut(), width));
         each(executor, jobs, |(first, depths)| {
             executor.vectors().run(WriteRows { observed: self, first, width, depths })

@@ -130,7 +130,7 @@ impl Volume<'_> {
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else {
             return (0, false);
         };
-        let census = Census::of(weight, prune_weight);
+        let census = Census::new(weight, prune_weight);
         // A block that leaves is not cleared: the next block in its slot does that.
         if census.remaining == 0 {
             self.free_block(slot);
@@ -177,7 +177,7 @@ const GROUP: usize = 128;
 impl Census {
     /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its
     /// cost.
-    fn of(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {
+    fn new(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {
         let mut census = Self { low_weight: 0, remaining: 0 };
         for group in weight.as_chunks::<GROUP>().0 {
             // Weight 0 becomes 255, which no prune weight exceeds.

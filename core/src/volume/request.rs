@@ -90,7 +90,7 @@ impl<'s> RequestedCache<'s> {
     pub fn bands(&mut self, rows: usize) -> [Band<'_>; BANDS] {
         self.caches.fill(0);
         // Every `PIXEL_STEP`-th row, in four bands.
-        let quarters = Bands::of(rows.div_ceil(PIXEL_STEP));
+        let quarters = Bands::new(rows.div_ceil(PIXEL_STEP));
         let mut caches = self.caches.chunks_mut(CACHE_ENTRIES);
         let list_len = self.lists.len() / BANDS;
         let mut lists = self.lists.chunks_mut(list_len.max(1));
@@ -131,7 +131,7 @@ impl Band<'_> {
     /// Lists a block unless it was met just now.
     #[inline]
     fn meet(&mut self, block: [i32; 3]) {
-        let tag = Tag::of(block);
+        let tag = Tag::from_block(block);
         let entry = self.cache.get_mut(tag.entry());
         debug_assert!(
             entry.is_some() && self.len < self.list.len(),

@@ -105,7 +105,7 @@ impl FlowMatcher<'_> {
     ) {
         let images = images(&self.left, &self.right, [width, height]);
         if config.refine {
-            let bands = Bands::of(closed);
+            let bands = Bands::new(closed);
             let (matches, supported) =
                 (bands.split_mut(self.refined, 1), bands.split_mut(self.supported, 1));
             let jobs = zip3(matches, supported, bands.split_mut(self.score, 1));

@@ -38,7 +38,7 @@ impl StereoMatcher<'_> {
         invalid: Option<&InvalidPair<'_>>,
         executor: &E,
     ) {
-        let (width, bands) = (self.width, Bands::of(self.height));
+        let (width, bands) = (self.width, Bands::new(self.height));
         let [left_du, left_dv, right_du, right_dv] =
             split_planes(self.gradients, width * self.height);
         let [left_invalid, right_invalid] =
@@ -70,13 +70,13 @@ impl StereoMatcher<'_> {
             support::candidates(self.width, CANDIDATE_STEP),
             support::candidates(self.height, CANDIDATE_STEP),
         );
-        let bands = Bands::of(rows);
+        let bands = Bands::new(rows);
         let matching = SupportMatching { config, left, right };
         // Bands run at the same time, each with its own rows of descriptors.
         let jobs = zip3(
             bands.first(),
             bands.split_mut(self.support, columns),
-            Bands::of(BANDS).split_mut(self.rows, ROWS * self.width),
+            Bands::new(BANDS).split_mut(self.rows, ROWS * self.width),
         );
         each(executor, jobs, |(first, grid, scratch)| {
             compare(executor.vectors(), MatchRows { matching, first, grid, scratch })
@@ -139,7 +139,7 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let (width, bands) = (self.width, Bands::of(self.height));
+        let (width, bands) = (self.width, Bands::new(self.height));
         let columns = prior::cells(width, config.grid_size);
         let matching = DenseMatching {
             config,
@@ -157,7 +157,7 @@ impl StereoMatcher<'_> {
             bands.split_mut(disparity, width),
             bands.split_mut(self.other, width),
         );
-        let scratch = Bands::of(BANDS).split_mut(self.rows, ROWS * width);
+        let scratch = Bands::new(BANDS).split_mut(self.rows, ROWS * width);
         let mut jobs = [(); BANDS].map(|()| None);
         for ((job, (first, left, right)), scratch) in jobs.iter_mut().zip(images).zip(scratch) {
             *job = Some(DenseBand { first, left, right, scratch, counts: [0; 2] });
@@ -253,8 +253,8 @@ impl StereoMatcher<'_> {
         let (width, vectors) = (self.width, executor.vectors());
         let image = image_of(self.disparity, width * self.height);
         // Buffers that other steps use as well, cut to what the bands need.
-        let edges = Bands::of(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
-        let bands = zip2(Bands::of(self.height).split_mut(image, width), edges);
+        let edges = Bands::new(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
+        let bands = zip2(Bands::new(self.height).split_mut(image, width), edges);
         let along_rows = each(executor, bands, |(rows, edges)| {
             vectors.run(FillRows { rows, width, filling, edges })
         });
@@ -268,7 +268,7 @@ impl StereoMatcher<'_> {
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
-        let (width, pixels, bands) = (self.width, self.width * self.height, Bands::of(self.height));
+        let (width, pixels, bands) = (self.width, self.width * self.height, Bands::new(self.height));
         let image = image_of(self.disparity, pixels);
         let other = clipped_mut(self.other, ..pixels);
         let smooth = |from: &[i16], along, to: &mut [i16]| {

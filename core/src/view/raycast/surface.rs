@@ -221,7 +221,7 @@ impl<'s> Surface<'s> {
             return;
         };
         // Each block writes its own signs, so bands may run at the same time.
-        let bands = Bands::of(self.len);
+        let bands = Bands::new(self.len);
         each(executor, zip2(bands.split_mut(signs, 1), bands.split(slots, 1)), read);
     }
 

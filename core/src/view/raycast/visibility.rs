@@ -72,7 +72,7 @@ impl<'s> Visibility<'s> {
     /// A strip for each band.
     pub fn strips(&mut self, width: usize) -> [Strip<'_>; BANDS] {
         let (stride, rows) = (Self::stride(width), self.strip_rows);
-        let bands = Bands::of(BANDS);
+        let bands = Bands::new(BANDS);
         let memory = zip2(
             bands.split_mut(self.enters_m, rows * stride),
             bands.split_mut(self.cells, rows * stride),

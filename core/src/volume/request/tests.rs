@@ -10,7 +10,7 @@ use std::{collections::BTreeSet, vec, vec::Vec};
 #[test]
 fn a_tag_is_its_block_again() {
     for block in [[0, 0, 0], [-1, 2, -3], [1_000_000, -1_000_000, 65_536]] {
-        assert_eq!(Tag::of(block).block(), block);
+        assert_eq!(Tag::from_block(block).block(), block);
     }
 }
 
