@@ -243,19 +243,16 @@ pub(super) fn sweep(
         });
     }
     // Cells never observed end the path as an obstacle would, when the caller asks for that.
-    if robot.unknown_ends {
+    let unknown = robot.unknown_ends.then(|| {
         let mut start_m = 0.0;
-        for leg in legs() {
-            if let Some(at_m) = leg
-                .first_unknown(grid, cells, robot, way.free_m - start_m)
-                .map(|at_m| start_m + at_m)
-            {
-                return FreePath { end: PathEnd::Unknown, free_m: at_m };
-            }
+        legs().find_map(|leg| {
+            let found = leg.first_unknown(grid, cells, robot, way.free_m - start_m);
+            let at_m = found.map(|at_m| start_m + at_m);
             start_m += leg.length_m;
-        }
-    }
-    way
+            at_m
+        })
+    });
+    unknown.flatten().map_or(way, |free_m| FreePath { end: PathEnd::Unknown, free_m })
 }
 
 /// A straight part of a path, in the grid's axes, m.

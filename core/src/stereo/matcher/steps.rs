@@ -268,7 +268,8 @@ impl StereoMatcher<'_> {
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
-        let (width, pixels, bands) = (self.width, self.width * self.height, Bands::new(self.height));
+        let (width, pixels, bands) =
+            (self.width, self.width * self.height, Bands::new(self.height));
         let image = image_of(self.disparity, pixels);
         let other = clipped_mut(self.other, ..pixels);
         let smooth = |from: &[i16], along, to: &mut [i16]| {
