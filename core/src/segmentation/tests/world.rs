@@ -231,8 +231,9 @@ impl World {
 }
 
 /// A car in a box, with its mask.
-fn detection((pixels, mask): &(PixelBox, Vec<u8>)) -> Detection<'_> {
-    let &PixelBox { left, top, width, height } = pixels;
+fn detection(masked: &(PixelBox, Vec<u8>)) -> Detection<'_> {
+    let (PixelBox { left, top, width, height }, mask) = masked;
+    let (left, top, width, height) = (*left, *top, *width, *height);
     let (width, height) = (width as u32, height as u32);
     Detection { class: Class::Car, score: 0.8, left, top, width, height, mask }
 }
