@@ -37,7 +37,7 @@ const FIELD: u32 = 21;
 
 impl Tag {
     #[inline]
-    fn of([x, y, z]: [i32; 3]) -> Self {
+    fn from_block([x, y, z]: [i32; 3]) -> Self {
         const MASK: u64 = (1 << FIELD) - 1;
         Self(
             1 << 63
