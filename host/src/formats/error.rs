@@ -22,7 +22,7 @@ pub enum FormatError {
         source: std::io::Error,
     },
     /// It does not hold what its format demands.
-    #[error("{path} cannot be used: {reason}. {action}")]
+    #[error("{path} cannot be used: {reason}{} {action}", stop_after(.reason))]
     Content {
         /// The file.
         path: PathBuf,
@@ -61,6 +61,11 @@ impl From<FormatError> for std::io::Error {
             FormatError::Content { reason, .. } => Self::new(ErrorKind::InvalidData, reason),
         }
     }
+}
+
+/// Full stop of a sentence, unless it ends in a question.
+fn stop_after(sentence: &str) -> &'static str {
+    if sentence.ends_with('?') { "" } else { "." }
 }
 
 /// The text of a file within the bounds of a table.

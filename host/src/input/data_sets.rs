@@ -102,8 +102,21 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, 
     if !path.exists() {
         return Err(InputError::Absent { path: path.to_path_buf() });
     }
-    let layout = options.layout.map_or_else(|| Layout::guess(path), Ok)?;
+    let layout = layout_of(path, options)?;
     (layout.row().open)(path, options)
+}
+
+/// The layout that is asked for, else the one at a path. A folder of pictures is one where their
+/// calibration is given.
+fn layout_of(path: &Path, options: &OpenOptions) -> Result<Layout, InputError> {
+    match options.layout.map_or_else(|| Layout::guess(path), Ok) {
+        Err(InputError::Layout { .. } | InputError::Within { .. })
+            if !options.calibration.is_empty() && folder::holds_pictures(path) =>
+        {
+            Ok(folder::DATA_SET)
+        }
+        found => found,
+    }
 }
 
 /// One sequence at a path, as `inspect` shows it.
@@ -124,7 +137,7 @@ pub fn sequences_at(path: &Path, layout: Layout) -> Result<Vec<String>, InputErr
 
 /// Opens everything at `path`; the options' sequence is not looked at.
 pub fn survey(path: &Path, options: &OpenOptions) -> Result<(Layout, Vec<Found>), InputError> {
-    let layout = options.layout.map_or_else(|| Layout::guess(path), Ok)?;
+    let layout = layout_of(path, options)?;
     let names = sequences_at(path, layout)?;
     let names: Vec<Option<String>> =
         if names.is_empty() { vec![None] } else { names.into_iter().map(Some).collect() };

@@ -93,7 +93,7 @@ fn opencvs_file_without_size_and_lens_maps_as_kalibrs_with_both() {
     let expected = digest(&["rig", "--calibration", "camchain.yaml", "--out", "a"]);
     let found = digest(&["rig", "--calibration", "stereo.yml", "--out", "b"]);
     assert_eq!(found, expected, "size and lens are those of the images");
-    let both = ["both", "--dataset", "folder", "--calibration", "stereo.yml", "--out", "c"];
+    let both = ["both", "--calibration", "stereo.yml", "--out", "c"];
     assert_eq!(digest(&both), expected, "half of a picture is one image");
 
     // The right camera first, in the calibration only.

@@ -71,6 +71,11 @@ fn is_stereo_folder(path: &Path) -> bool {
     side_folders(path).is_some() || (path.join("calib.txt").is_file() && pictures_in(path).is_ok())
 }
 
+/// Returns true if the folder has pictures.
+pub fn holds_pictures(path: &Path) -> bool {
+    pictures_in(path).is_ok_and(|files| !files.is_empty())
+}
+
 /// Describes the layout of the images, as `inspect` prints it.
 pub(super) fn describe(path: &Path) -> String {
     let name =

@@ -266,3 +266,34 @@ fn the_camera_data_of_an_oak_is_in_centimetres() {
     let text = format!(r#"{{"cameraData": [{}, {}]}}"#, camera(1, 2, -11.0), camera(2, 0, 5.5));
     assert!((check::baseline_m(&plain(&text).unwrap().cameras) - 0.11).abs() < 1e-12);
 }
+
+#[test]
+fn a_bags_camera_info_is_checked_as_files_are() {
+    let info = |cx: f64, along: f64| {
+        ros::FORMAT.example[0]
+            .1
+            .replace("[400, 0, 370, 0,", &format!("[400, 0, {cx}, {along},"))
+            .replace("[-0.28, 0.07, 0.0002, 0.00002, 0]", "[0, 0, 0, 0, 0]")
+    };
+    let settled = |right: String, size: (usize, usize)| {
+        let texts = [info(370.0, 0.0), right];
+        let hints = CalibrationHints::default();
+        let path = Path::new("drive.mcap");
+        let files = CalibrationFiles::from_camera_infos(path, &texts, true, hints);
+        files.cameras(None)?;
+        CameraGeometry::Files(Box::new(files)).settled(size, None)
+    };
+    let plain = settled(info(370.0, -44.0), (752, 480)).unwrap();
+    assert!(plain.notes[0].starts_with("rectified, 752 x 480"), "{:?}", plain.notes);
+    let binned = settled(info(370.0, -44.0), (376, 240)).unwrap_err().to_string();
+    assert!(binned.contains("images of 752 x 480 px, but these are 376 x 240 px"), "{binned}");
+    let apart = settled(info(378.0, -44.0), (752, 480)).unwrap();
+    assert!(apart.notes[0].contains("principal points 8.000 px apart"), "{:?}", apart.notes);
+    assert!(matches!(apart.cameras, CameraGeometry::Raw { .. }), "the right images are moved");
+    let negative = settled(info(370.0, 44.0), (752, 480)).unwrap_err().to_string();
+    assert!(negative.contains("to the left of the left one"), "{negative}");
+    let focal =
+        info(370.0, -44.0).replace("[400, 0, 370, -44, 0, 400,", "[420, 0, 370, -44, 0, 420,");
+    let focal = settled(focal, (752, 480)).unwrap_err().to_string();
+    assert!(focal.contains("differ in focal length"), "{focal}");
+}
