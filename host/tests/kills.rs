@@ -124,8 +124,10 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
         [&STREET[..], &["--snapshot-every", "2", "--quiet", "--out", out]].concat()
     };
     assert!(dynvox(root, &args("whole")).status.success());
+    // Kills come at any moment of a whole run.
     let longest = begin.elapsed();
     let of = summary(&root.join("whole"));
+    // Blocks must leave and come back, and objects must leave, or the test would say little.
     assert!(
         of["evict"]["stored"].as_u64() > Some(0) && of["evict"]["loaded"].as_u64() > Some(0),
         "{of}"
@@ -136,10 +138,12 @@ fn runs_killed_at_any_moment_equal_the_run_never_killed() {
     let mut delay = || longest * random.below(1_000) / 1_000;
     while counts.killed < trials || counts.killed_again < trials / 2 {
         if !killed_after(root, &start, delay()) {
+            // It had ended before the kill.
             std::fs::remove_dir_all(root.join("killed")).unwrap();
             continue;
         }
         counts.killed += 1;
+        // Every second resumption is killed as well.
         if counts.killed_again < counts.killed / 2 {
             counts.killed_again +=
                 u32::from(killed_after(root, &["run", "--resume", "killed", "--quiet"], delay()));

@@ -248,6 +248,7 @@ fn a_use_of_the_command_line_is_found_however_it_is_written() {
 /// Returns true if code leads a path through the module of the command line.
 fn uses_the_command_line(code: &str) -> bool {
     let code = parts(code).code;
+    // By path, in a list, by way of the parent, by a name handed on, in a body, and renamed.
     let starts = ["dynvox::", "crate::"].into_iter().flat_map(|root| code.match_indices(root));
     let found: Vec<_> = starts.flat_map(|(at, _)| paths(&code, at).0).collect();
     found.iter().any(|path| path.get(1).is_some_and(|module| module == "cli"))
@@ -268,6 +269,7 @@ fn a_forbidden_import_is_found_however_it_is_written() {
         assert_eq!(
             faults(CORE, &planted),
             ["volume imports mapper (volume/fuse/row.rs)"],
+            // Allowed folders, a comment and a string, tests, and an item of the crate itself.
             "{line}"
         );
     }
@@ -281,6 +283,7 @@ fn what_is_allowed_or_no_import_is_not_a_fault() {
         "// use crate::mapper::Mapper;\n/// [`crate::mapper::Mapper`]\nconst TEXT: &str = \
          \"crate::mapper\";",
         "#[cfg(test)]\nmod tests {\n    use crate::mapper::Mapper;\n    fn f() { if true { } }\n}",
+        // A whole file that only tests have.
         "#[cfg(test)]\nuse crate::mapper::Mapper;\nfn f() {}",
         "use crate::Capacity;",
     ];
@@ -359,6 +362,7 @@ fn a_circle_is_found_through_a_mod_that_hands_names_on() {
             ("lib.rs", "mod masks;"),
             (
                 "masks/mod.rs",
+                // By a name that the parent hands on, and by a path in a body.
                 "mod grid;\nmod ground;\npub use grid::{Cell, Grid};\nuse ground::Ground;",
             ),
             ("masks/grid.rs", "use super::Ground;"),

@@ -58,6 +58,7 @@ fn the_fixtures_give_the_digests_on_file_on_one_two_and_eight_threads() {
                 "bits have changed: fixtures/README.md says what to do when that is meant"
             );
         };
+        // Without threads, and with more than the core has bands.
         verify(&|| fixtures::verify(&fixture, &Serial));
         for threads in [1, 2, 8] {
             verify(&|| fixtures::verify(&fixture, &Threads::new(threads).expect("a pool")));

@@ -104,6 +104,7 @@ fn every_link_of_the_documents_leads_to_a_file_and_a_heading() {
     let pages = pages();
     let (mut dead, mut checked) = (Vec::new(), 0);
     for (name, text) in &pages {
+        // Links to other sites are not followed.
         for link in links(text).iter().filter(|link| !link.contains("://")) {
             checked += 1;
             let (path, anchor) = link.split_once('#').unwrap_or((link, ""));

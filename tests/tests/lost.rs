@@ -157,6 +157,7 @@ fn the_c_interface_reports_the_same() {
 
 #[test]
 fn a_camera_that_sees_another_street_begins_a_segment_apart() {
+    // Two streets have nothing in common by which the camera could be found.
     let reports = map_covered(&street(3), &street(4));
     let began = UNCOVERED as usize + 1;
     assert_eq!(segments(&reports), [vec![0; began], vec![1; FRAMES as usize - began]].concat());
@@ -166,6 +167,7 @@ fn a_camera_that_sees_another_street_begins_a_segment_apart() {
     );
     let pose = |index: usize| reports[index].t_world_camera;
     assert_eq!(pose(began), Transform::IDENTITY, "its first camera is its world");
+    // From its own first camera on, the second segment must be as good as any.
     let last = FRAMES as usize - 1;
     let truth = street(4);
     let true_motion =

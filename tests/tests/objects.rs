@@ -149,6 +149,7 @@ impl Sequence {
             let corner = triangle.vertices[0].position_m.map(f64::from);
             count += u64::from(boxes.iter().any(|(t_object_map, [width, height, length])| {
                 let [x, y, z] = t_object_map.transform_point(corner);
+                // Height is measured downwards from the ground.
                 x.abs() < width / 2.0 - 0.2
                     && z.abs() < length / 2.0 - 0.2
                     && y < -0.3
@@ -176,6 +177,7 @@ fn truth<'f>(
 fn moving_cars_leave_no_trail_in_the_static_map_and_do_without_masks() {
     let sequence = &*SEQUENCE;
     let trail = |dynamic| {
+        // Only at the end: a trail may be there while the car is.
         let mut count = 0;
         sequence.run(dynamic, false, |index, _, mapper| {
             if index + 1 == sequence.frames.len() {

@@ -81,12 +81,14 @@ fn findings(rust: &str) -> Vec<Finding> {
     for (at, (line, prose)) in rust.lines().zip(prose.lines()).enumerate() {
         let (number, trimmed) = (at + 1, line.trim());
         let columns = line.chars().count();
+        // A line with an address cannot be broken.
         if columns > COLUMNS && !line.contains("://") {
             found.push((WIDE, number));
         }
         if columns > 140 && !line.contains("://") {
             found.push((VERY_WIDE, number));
         }
+        // Four slashes are no doc comment.
         if let Some(doc) = trimmed.strip_prefix("///").filter(|doc| !doc.starts_with('/')) {
             if !within_doc && opens_with(doc.trim(), &CLAUSES) {
                 found.push((CLAUSE, number));
@@ -96,6 +98,7 @@ fn findings(rust: &str) -> Vec<Finding> {
             }
             within_doc = true;
         } else {
+            // Attributes stand between a doc comment's parts.
             within_doc &= trimmed.starts_with("#[");
         }
         if trimmed.starts_with("//") && lacks_zero(trimmed) {

@@ -89,6 +89,7 @@ impl BlockStore for Store {
     }
 
     fn load(&mut self, block: LoadedBlock<'_>) -> bool {
+        // By the block, so that a store answers the same when asked again.
         let mut random = self.random(block.key);
         let loads = random.below(2) == 0;
         if loads {
@@ -256,6 +257,7 @@ impl Inputs {
         let view = |pixels| View::new(pixels, width, height).expect("pixels of this size");
         let detections: Vec<_> =
             self.masks.iter().map(|(detection, mask)| Detection { mask, ..*detection }).collect();
+        // Each input is given in a share of the frames: every fourth, every eighth, every second.
         let given = |bit: u32, of: u32| self.given >> bit & (of - 1) == 0;
         let frame = StereoFrame {
             colour: given(0, 4)
@@ -298,6 +300,7 @@ fn assert_restored(
     store: &mut Store,
 ) {
     let restored = Mapper::restore(capacity, config, slab, &mut |piece: &mut [u8]| {
+        // Part by part, as the mapper asks for it.
         let (next, rest) = saved.split_at_checked(piece.len()).ok_or(())?;
         piece.copy_from_slice(next);
         saved = rest;

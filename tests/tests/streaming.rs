@@ -118,6 +118,7 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
     let (clip, config) = (&*STREET, config(&STREET));
     let folder = tempfile::TempDir::new().expect("a folder for the blocks");
     let mut store = file(&folder);
+    // Enough for some blocks, and not for all.
     store.limit(300_000);
     let mut slab = HeapSlab::of(&SMALL);
     let mut mapper = Mapper::new(&SMALL, &config, slab.bytes()).expect("a slab that fits");
@@ -126,6 +127,7 @@ fn a_full_disk_is_told_from_the_first_lost_block_on_and_the_drive_goes_on() {
     let kept = sum(&reports, |report| report.allocate.eviction.stored);
     assert!(kept > 0 && sum(&reports, |report| report.allocate.eviction.lost) > 0);
     assert_eq!(u64::from(kept), store.records());
+    // Each frame in which a block is lost says so.
     for report in &reports {
         let harmed = report.severity() == Severity::MapAffected;
         assert_eq!(harmed, report.allocate.eviction.lost > 0, "frame {}", report.frame);

@@ -45,6 +45,7 @@ fn rules(list: &str) -> Vec<Rule> {
         let (kind, separator) = match columns[0] {
             "word" => (Kind::Word, ' '),
             "name" => (Kind::Name, ' '),
+            // Phrases have blanks of their own.
             "phrase" => (Kind::Phrase, ';'),
             other => panic!("an unknown kind: {other}"),
         };

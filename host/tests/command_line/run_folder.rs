@@ -31,10 +31,12 @@ impl FakeRun {
         let (mut frames, mut poses, mut tracks) =
             (String::from("frame,time_s,step_ms,blocks_used\n"), String::new(), track_header());
         for at in 0..self.frames {
+            // Every second frame, so that numbers of frames and rows differ.
             writeln!(frames, "{},{},{},{}", 2 * at, 0.2 * at as f64, 9 + at % 3, 100 + at).unwrap();
             writeln!(poses, "{}", row(&Transform::from_translation([0.0, 0.0, self.z_m(at)])))
                 .unwrap();
             for id in (1..=self.objects.min(8)).filter(|&id| self.is_seen(id, at)) {
+                // Static and dynamic tracks in turns.
                 let state = ["static", "dynamic"][id % 2];
                 writeln!(
                     tracks,
@@ -70,6 +72,7 @@ impl FakeRun {
     fn write_floor(&self, path: &Path) {
         let mut ply = PlyWriter::begin(path).unwrap();
         let corner = |x: usize, z: usize| {
+            // A plane at the camera's height, 1.6 m below it.
             let at = [SIDE_M * (x as f32 - 0.5 * self.squares as f32), 1.6, SIDE_M * z as f32];
             Vertex {
                 position_m: at,
@@ -91,6 +94,7 @@ impl FakeRun {
     fn write_blocks(&self, folder: &Path) {
         fs::write(folder.join("config.toml"), "[volume]\nvoxel_size_m = 0.1\n").unwrap();
         let mut rows = String::from("x,y,z,last_frame,fate\n");
+        // Blocks of 8 voxels of 0.1 m.
         let blocks = (self.squares as f32 * SIDE_M / 0.8).ceil() as i32;
         for (x, z) in (0..blocks * blocks).map(|at| (at % blocks - blocks / 2 - 1, at / blocks)) {
             writeln!(rows, "{x},2,{z},{},map", 2 * self.frames as i32 * z / blocks.max(1)).unwrap();
@@ -110,6 +114,7 @@ impl FakeRun {
     fn write_object(&self, folder: &Path, id: usize) {
         fs::create_dir_all(folder).unwrap();
         let mut ply = PlyWriter::begin(&folder.join(format!("{id}.ply"))).unwrap();
+        // The corners of a cube by the bits of their number.
         let corner = |bits: usize| {
             let position_m = [0, 1, 2].map(|axis| (bits >> axis & 1) as f32);
             Vertex { position_m, colour: [200, 200, 40], weight: 0 }
@@ -123,6 +128,7 @@ impl FakeRun {
         }
         ply.finish().unwrap();
         let x = (id % 8) as f64 - 3.0;
+        // In rows of eight, side by side.
         let pose =
             |at: usize| Transform::from_translation([x, 0.6, 4.0 + (id / 8) as f64 + self.z_m(at)]);
         let rows = (0..self.frames)
@@ -135,6 +141,7 @@ impl FakeRun {
         fs::create_dir_all(folder).unwrap();
         let every = self.frames.div_ceil(PICTURES);
         let mut numbers: Vec<usize> =
+            // The last frame has a picture, wherever the steps end.
             (0..self.frames).step_by(every).chain([self.frames - 1]).map(|at| 2 * at).collect();
         numbers.dedup();
         let picture = |shade: usize| {

@@ -39,6 +39,7 @@ pub fn assert_same(root: &Path, whole: &str, resumed: &str) {
     let [a, b] = [whole, resumed].map(|name| root.join(name));
     assert_eq!(rows(&a), rows(&b));
     assert_eq!(summary(&a), summary(&b));
+    // These have times, memory and the machine; what else they say was compared above.
     let of_the_machine = ["frames.csv", "summary.json", "report.html"];
     let same_files = |a: &Path, b: &Path| {
         assert_eq!(names(a), names(b));

@@ -43,6 +43,7 @@ fn covered(root: &Path, out: &str, blocks: usize, more: &[&str]) -> Vec<String> 
     let text = CAPACITY.replace("blocks = 3000", &format!("blocks = {blocks}"));
     fs::write(root.join(&bounds), text).unwrap();
     let frames = FRAMES.to_string();
+    // Slow and without shake: the camera is to be lost by the cover alone.
     let settings = [
         "street.width=320",
         "street.height=96",
@@ -52,6 +53,7 @@ fn covered(root: &Path, out: &str, blocks: usize, more: &[&str]) -> Vec<String> 
         "volume.voxel_size_m=0.1",
     ];
     let mut args = vec!["run", "--frames", &frames, "--capacity", &bounds, "--out", out];
+    // Both cameras see black for eleven frames.
     args.extend(["--instances", "none", "--faults", "black@12..23"]);
     args.extend(settings.iter().flat_map(|setting| ["--set", setting]));
     args.extend(more);

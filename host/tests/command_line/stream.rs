@@ -90,6 +90,7 @@ fn a_piped_street_has_the_folders_digests_in_any_arrangement() {
     let root = root.path();
     let folder = summary(root, "folder")["digest"].clone();
     for (out, bytes, how) in [
+        // Left and right in turn, beside each other, and one above the other.
         ("in-turn", in_turn(root), None),
         ("side-by-side", stacked(root, false), Some("--side-by-side")),
         ("top-bottom", stacked(root, true), Some("--top-bottom")),
@@ -103,10 +104,12 @@ fn a_piped_street_has_the_folders_digests_in_any_arrangement() {
             (&folder, &FRAMES.into(), &"stream".into()),
             "{out}"
         );
+        // Nothing was dropped: the writer waits for the mapper.
         assert_eq!((&of["input"]["dropped"], of["incomplete"].is_null()), (&0.into(), true));
     }
     let tum = |out: &str| fs::read_to_string(root.join(out).join("trajectory_tum.txt")).unwrap();
     assert_eq!(tum("in-turn"), tum("folder"));
+    // Of the frames 0 to 5 the second and the fourth.
     let run = piped(
         root,
         &in_turn(root),
@@ -163,6 +166,7 @@ fn memory_does_not_grow_with_the_stream() {
 fn a_stream_that_stops_inside_an_image_is_an_incomplete_run() {
     let root = street();
     let bytes = in_turn(root.path());
+    // The last image ends early, and with it the sixth pair.
     let run = piped(root.path(), &bytes[..bytes.len() - 5_000], "result", &["--quiet"]);
     assert_eq!(run.status.code(), Some(4), "{}", output_text(&run));
     assert!(
@@ -173,6 +177,7 @@ fn a_stream_that_stops_inside_an_image_is_an_incomplete_run() {
     );
     let of = summary(root.path(), "result");
     assert_eq!((&of["frames"], &of["incomplete"]["cause"]), (&5.into(), &"input".into()), "{of}");
+    // How many frames would have come is not known of a stream.
     assert!(
         of["incomplete"]["frames_left"].is_null() && root.path().join("result/map.ply").is_file()
     );
@@ -185,6 +190,7 @@ fn what_a_stream_cannot_do_is_refused_with_a_sentence() {
         let run = piped(root.path(), bytes, "result", more);
         assert_eq!(run.status.code(), Some(1), "{more:?}");
         assert!(output_text(&run).contains(sentence), "{more:?}: {}", output_text(&run));
+        // A refusal leaves no folder.
         assert_eq!(names(root.path()), ["folder", "street"]);
     };
     refused(b"", &[], "standard input ended without an image");
@@ -193,6 +199,7 @@ fn what_a_stream_cannot_do_is_refused_with_a_sentence() {
     refused(b"", &["--evaluate", "lidar"], "--evaluate needs a recording");
     refused(b"", &["--egomotion", "file:poses.txt"], "--egomotion file needs a recording");
     refused(b"", &["--depth", "exact"], "--depth needs a recording");
+    // A stream has no calibration beside it.
     let run = dynvox(root.path(), &["run", "-", "--out", "result"]);
     assert!(output_text(&run).contains("Give one with --calibration"), "{}", output_text(&run));
     let run = dynvox(root.path(), &["run", "street", "--rate", "30", "--out", "result"]);

@@ -97,6 +97,7 @@ fn a_killed_sweep_does_not_repeat_what_was_done() {
     kill_after_results(root.path(), &args, "cut", 1);
     let before = results(&root.path().join("cut"));
     assert!((1..3).contains(&before.len()), "killed in the middle: {before:?}");
+    // When each result was written.
     let kept: Vec<_> = before.iter().map(made).collect();
     let resumed = dynvox(root.path(), &[&args[..], &["cut"]].concat());
     assert!(resumed.status.success(), "{}", output_text(&resumed));
@@ -122,6 +123,7 @@ fn shares_of_a_sweep_are_merged_to_the_tables_of_the_whole() {
         done(&["fleet", "run", machine, "--shard", share]);
         assert_eq!(results(&root.path().join(machine)).len(), 1);
     }
+    // From the folders of the machines, without running anything.
     done(&["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
     let [whole, alone] = ["whole", "alone"]
         .map(|out| fs::read_to_string(root.path().join(out).join("prune-weight.csv")).unwrap());
@@ -150,6 +152,7 @@ fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
         "only its result stays of a run"
     );
     for (machine, share) in [("1", "0/2"), ("2", "1/2")] {
+        // Planned on each machine alike, and then each runs its share.
         let planned = dynvox(root.path(), &[&SWEEP[..], &[machine, "--plan"]].concat());
         assert!(
             planned.stdout.starts_with(b"7 jobs in ") && results(machine).is_empty(),
@@ -171,6 +174,7 @@ fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
             .filter(|job| job["state"] == "done" && job["bytes"].as_u64() > Some(1 << 20));
         assert_eq!(done.count(), results(machine).len(), "{status}");
     }
+    // Runs of a sweep keep results, not maps.
     let merged = dynvox(root.path(), &["fleet", "resample", "1"]);
     assert!(output_text(&merged).contains("which keep no maps"), "{}", output_text(&merged));
     let merged = dynvox(root.path(), &["sweep", "--merge", "1", "2", "--out", "whole", "--quiet"]);
@@ -180,6 +184,7 @@ fn a_killed_sweep_resumes_and_merged_shares_equal_the_whole() {
             .map(|out| fs::read_to_string(root.path().join(out).join(table)).unwrap());
         assert_eq!(whole, cut, "{table}");
         assert!(
+            // Every run has an accuracy, but those whose tracking failed.
             whole.lines().skip(1).all(|line| line
                 .split(',')
                 .nth_back(18)

@@ -52,12 +52,14 @@ fn view_writes_one_file_that_fetches_nothing_and_refuses_what_is_no_run() {
     let root = TempDir::new().unwrap();
     FakeRun { frames: 4, objects: 1, squares: 20, pictures: true }.write(root.path());
     let page = fs::read_to_string(viewer(root.path())).unwrap();
+    // No address, no file beside it, no style sheet from elsewhere.
     assert!(!page.contains("http") && !page.contains("src=\"/") && !page.contains("@import"));
     assert!(
         page.contains("<figcaption class=\"reason\">The map as a picture")
             && page.contains("data:image/jpeg;base64,"),
         "without scripts"
     );
+    // A row that is no number.
     fs::write(root.path().join("frames.csv"), "frame\nx\n").unwrap();
     let damaged = dynvox(root.path(), &["view", ".", "--no-open"]);
     assert!(
@@ -186,6 +188,7 @@ fn the_viewer_draws_scrubs_and_toggles() {
 fn without_a_graphics_card_motion_is_coarse_and_rest_is_whole() {
     let root = TempDir::new().unwrap();
     FakeRun { frames: 4, objects: 0, squares: 190, pictures: false }.write(root.path());
+    // A pointer that is pressed and moved once, as when a map is turned.
     let script = r#"
 const turn = (kind, x) => canvas.dispatchEvent(new PointerEvent(kind, {
   pointerId: 1, clientX: x, clientY: 200, buttons: 1, bubbles: true,
@@ -206,6 +209,7 @@ report({ whole, moving, rest: Number(data.triangles), share, movingShare });
             && triangles("moving") > 100.0,
         "{of}"
     );
+    // Coarse triangles cover what the fine ones do.
     assert!((triangles("share") - triangles("movingShare")).abs() < 0.1, "the same is seen: {of}");
 }
 
@@ -231,6 +235,7 @@ report({ share: shown().share, frame: data.frame, map: layer("map").checked, wid
         of["share"].as_f64().unwrap() > 0.05 && of["frame"] == "6" && of["map"] == true,
         "{of}"
     );
+    // Nothing is wider than the screen.
     assert!(of["wide"].as_i64().unwrap() <= 0, "{of}");
 }
 
@@ -244,11 +249,13 @@ report({
   live: root.classList.contains("live"), frames: root.querySelector(".slider").max,
 });
 "#;
+    // Each page in a browser of its own.
     let of = |run: FakeRun, before: &str| {
         let root = TempDir::new().unwrap();
         run.write(root.path());
         visit(&viewer(root.path()), before, script)
     };
+    // An empty map, many objects, many frames, and no WebGL.
     let empty = of(FakeRun { frames: 3, objects: 0, squares: 0, pictures: false }, "");
     assert!(
         empty["note"] == "The map is empty" && empty["live"] == true && empty["colours"] == 4,

@@ -41,6 +41,7 @@ fn worst(ours: &Lens, theirs: &impl CameraModel) -> f64 {
 
 #[test]
 fn every_model_agrees_with_an_independent_one_to_a_millionth_of_a_pixel() {
+    // One set of parameters for ours and theirs.
     let radial = [-0.28, 0.07, -0.002, 0.0, 0.0, 0.0];
     let bent = lens(LensModel::RadialTangential { radial, tangential: [2e-4, -3e-4] });
     let theirs = RadTanCamera::new(
@@ -114,6 +115,7 @@ fn the_rational_and_the_fisheye_model_give_opencvs_pixels() {
                 (found[0] - expected[0]).hypot(found[1] - expected[1]) < BOUND_PX,
                 "{found:?} {expected:?}"
             );
+            // And back from OpenCV's pixel to the ray.
             let ray = lens(model).unproject(expected).unwrap();
             assert!((ray[0] / ray[2] - x).hypot(ray[1] / ray[2] - y) < 1e-9);
         }

@@ -46,6 +46,7 @@ impl Graph {
                 source.test_modules.iter().map(|name| joined(module, std::slice::from_ref(name)))
             })
             .collect();
+        // Modules of tests, and all within them, may import anything.
         sources.retain(|module, _| !only_tests.iter().any(|tests| module.starts_with(tests)));
         let names = Names::new(&sources);
         let edges = sources

@@ -104,6 +104,7 @@ fn without_tests(code: &str) -> (String, Vec<String>) {
     let (mut kept, mut modules, mut rest) = (String::new(), Vec::new(), code);
     while let Some(at) = rest.find(TEST) {
         kept += &rest[..at];
+        // An item ends with its block, or with a semicolon.
         let item = &rest[at + TEST.len()..];
         let head = item.find(['{', ';']).unwrap_or(item.len());
         if let Some(name) =

@@ -32,6 +32,7 @@ fn in_name(char: char) -> bool {
 fn parameter_list(code: &[char], start: usize) -> Option<ParameterList> {
     let name: String = code[start + 3..].iter().take_while(|&&char| in_name(char)).collect();
     let mut at = start + 3 + name.chars().count();
+    // Generic parameters may contain parentheses.
     if code.get(at) == Some(&'<') {
         at += length_in_brackets(&code[at..])?;
     }
