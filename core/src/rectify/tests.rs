@@ -66,6 +66,24 @@ fn the_general_model_without_sphere_prism_and_tilt_is_the_radial_one() {
 }
 
 #[test]
+fn prism_and_tilt_move_a_point_as_their_formulas_say() {
+    let (u, v, about_y): (f64, f64, f64) = (0.3, -0.2, 0.05);
+    let lens = |prism, tilt| {
+        let (radial, tangential) = ([0.0; 6], [0.0; 2]);
+        let model = LensModel::General { xi: 0.0, radial, tangential, prism, tilt };
+        Lens::new([1.0; 2], [0.0; 2], model).unwrap()
+    };
+    let [x, y] = lens([1e-3, 2e-3, 3e-3, 4e-3], [0.0; 2]).project([u, v, 1.0]).unwrap();
+    let r2 = u * u + v * v;
+    let [along, down] = [r2 * (1e-3 + 2e-3 * r2), r2 * (3e-3 + 4e-3 * r2)];
+    assert!((x - u - along).abs() < 1e-15 && (y - v - down).abs() < 1e-15);
+    // Turned about y alone, the sensor's plane is met nearer or farther by the column.
+    let [x, y] = lens([0.0; 4], [0.0, about_y]).project([u, v, 1.0]).unwrap();
+    let depth = about_y.sin() * u + about_y.cos();
+    assert!((x - u / depth).abs() < 1e-15 && (y - about_y.cos() * v / depth).abs() < 1e-15);
+}
+
+#[test]
 fn a_sphere_seen_from_its_rim_is_the_unified_model() {
     // Mei's model without distortion is the extended unified one with other names.
     let xi = 0.8;

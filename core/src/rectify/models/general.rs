@@ -41,12 +41,10 @@ pub(super) fn distort(
     let at = [x / below, y / below];
     let within = at[0] * at[0] + at[1] * at[1] <= limit * limit;
     let [u, v] = within.then(|| plane.distort(at))?;
-    let [row_x, row_y, row_z] = sensor(tilt);
-    let dot = |row: [f64; 3]| row[0] * u + row[1] * v + row[2];
-    let depth = dot(row_z);
-    (depth > 0.0).then(|| {
-        [row_z[2] * dot(row_x) / depth - row_x[2], row_z[2] * dot(row_y) / depth - row_y[2]]
-    })
+    let [[a, b, c], [d, e, f], [g, h, i]] = sensor(tilt);
+    let depth = g * u + h * v + i;
+    (depth > 0.0)
+        .then(|| [i * (a * u + b * v + c) / depth - c, i * (d * u + e * v + f) / depth - f])
 }
 
 /// The ray that meets the image there.
@@ -57,15 +55,15 @@ pub(super) fn undistort(
     limit: f64,
     [u, v]: [f64; 2],
 ) -> Option<[f64; 3]> {
-    let [row_x, row_y, row_z] = sensor(tilt);
-    let turned = [(u + row_x[2]) / row_z[2], (v + row_y[2]) / row_z[2]];
-    let back = |axis: usize| row_x[axis] * turned[0] + row_y[axis] * turned[1] + row_z[axis];
-    let depth = back(2);
+    let [[a, b, c], [d, e, f], [g, h, i]] = sensor(tilt);
+    let [p, q] = [(u + c) / i, (v + f) / i];
+    let depth = c * p + f * q + i;
     let in_front = depth > 0.0;
     if !in_front {
         return None;
     }
-    let [x, y] = plane.undistort(limit, [back(0) / depth, back(1) / depth])?;
+    let [x, y] =
+        plane.undistort(limit, [(a * p + d * q + g) / depth, (b * p + e * q + h) / depth])?;
     let r2 = x * x + y * y;
     let square = 1.0 + (1.0 - xi * xi) * r2;
     let scale = (xi + libm::sqrt(square)) / (1.0 + r2);

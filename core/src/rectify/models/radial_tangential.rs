@@ -55,6 +55,8 @@ pub(super) struct Plane<'m> {
 
 impl Plane<'_> {
     /// Moves a point as the lens does.
+    // One copy serves two models: a firmware's code is bounded.
+    #[inline(never)]
     pub fn distort(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ([p1, p2], [s1, s2, s3, s4]) = (*self.tangential, *self.prism);
         let r2 = x * x + y * y;
@@ -67,6 +69,7 @@ impl Plane<'_> {
 
     /// Moves a point back: the radial part by itself, then Newton's steps for the whole. `None`
     /// where no point within `limit` of the middle leads there.
+    #[inline(never)]
     pub fn undistort(&self, limit: f64, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
         let k = self.radial;
         let distorted = libm::sqrt(u * u + v * v);

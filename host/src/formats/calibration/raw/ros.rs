@@ -72,10 +72,31 @@ fn read(files: &Files<'_>) -> Result<StereoCalibration, FormatError> {
     })
 }
 
-/// Reads two files of rectified images: the projection matrices say all.
+/// Reads two files of rectified images: the projection matrices say all. Principal points that
+/// differ are a question: recorders rectify with zero disparity at infinity.
 pub fn read_rectified(files: &Files<'_>) -> Result<Cameras, FormatError> {
     let [left, right] = sides(files)?;
-    Ok(Cameras::Rectified(RectifiedCameras { size: Some(size(left)?), ..rig_of(left, right)? }))
+    let cameras = rig_of(left, right)?;
+    if cameras.offset_px != 0.0 {
+        let line = |node: Node<'_>| -> Result<String, FormatError> {
+            let numbers = node.need("projection_matrix")?.array::<12>()?;
+            Ok(numbers.map(|number| number.to_string()).join(" "))
+        };
+        return Err(right.refuse(
+            &format!(
+                "the principal points of the two projection matrices are {:.3} px apart, where \
+                 rectified images have one",
+                cameras.offset_px
+            ),
+            &format!(
+                "Correct the CameraInfo; if the images are rectified so, give --calibration with a \
+                 calib.txt of the two lines `P0: {}` and `P1: {}`, which takes the difference out",
+                line(left)?,
+                line(right)?
+            ),
+        ));
+    }
+    Ok(Cameras::Rectified(RectifiedCameras { size: Some(size(left)?), ..cameras }))
 }
 
 fn size(node: Node<'_>) -> Result<[u32; 2], FormatError> {
