@@ -108,7 +108,7 @@ fn opencvs_file_without_size_and_lens_maps_as_kalibrs_with_both() {
     fs::write(root.join("reversed.yml"), reversed).expect("a file");
     let refused = run(&["rig", "--calibration", "reversed.yml", "--out", "d"]);
     let message = output_text(&refused);
-    assert!(!refused.status.success() && message.contains("--swap calibration"), "{message}");
+    assert!(!refused.status.success() && message.contains("--swap=calibration"), "{message}");
     let swapped = ["rig", "--calibration", "reversed.yml", "--swap=calibration", "--out", "e"];
     assert!(run(&swapped).status.success());
 

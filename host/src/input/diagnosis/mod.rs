@@ -265,7 +265,7 @@ fn check_matches(matches: &[&PatchMatch], width_px: f64) -> Vec<Finding> {
     };
     if share(&|one| one.disparity_px < -1.0) > 0.6 {
         let message = "left and right are exchanged: what is near lies further left in the left \
-                       images. Exchange the two folders or files";
+                       images. Exchange the two folders or files, or give --swap=images";
         findings.push(finding(Fault::Exchanged, true, message.to_owned()));
     }
     findings.extend(check_rows(&RowError::of(matches, width_px), matches.len(), width_px));

@@ -17,7 +17,7 @@ const SHORTEST_M: f64 = 0.01;
 const TRIED_PX: u32 = 4_096;
 
 /// Next action where the second camera stands to the left of the first.
-const EXCHANGE: &str = "The first camera must be the left one: give --swap calibration if only the \
+const EXCHANGE: &str = "The first camera must be the left one: give --swap=calibration if only the \
                         calibration has them in this order, --swap if the images have it, too";
 /// Next action where one camera stands above the other.
 const TURN: &str = "Turn the rig by a quarter, so that its cameras stand side by side, and \
