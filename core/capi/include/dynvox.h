@@ -367,7 +367,8 @@ typedef struct {
   DynvoxSeverity severity;
   // Pose of the left camera in the world, which is that of its segment of the map.
   DynvoxPose t_world_camera;
-  // True if the frame was fused into the map.
+  // True if something of the frame was fused into the map: its pose is known, and it shows
+  // depth.
   bool fused;
   // Number of the map's segment, from 0: another one begins where the camera was lost and is not
   // found again, with that camera as its world. Where one segment lies in another is not known.

@@ -114,7 +114,8 @@ pub struct DynvoxReport {
     pub severity: DynvoxSeverity,
     /// Pose of the left camera in the world, which is that of its segment of the map.
     pub t_world_camera: DynvoxPose,
-    /// True if the frame was fused into the map.
+    /// True if something of the frame was fused into the map: its pose is known, and it shows
+    /// depth.
     pub fused: bool,
     /// Number of the map's segment, from 0: another one begins where the camera was lost and is not
     /// found again, with that camera as its world. Where one segment lies in another is not known.

@@ -174,8 +174,9 @@ pub struct Report {
     pub segmentation: SegmentationReport,
     /// Counts of the objects' volumes.
     pub objects: ObjectsReport,
-    /// True if the frame was fused. A frame whose pose was extrapolated is not, because it would
-    /// smear the map; nor is one between two turns of `mapper.fuse_every`.
+    /// True if something of the frame was fused. A frame whose pose was extrapolated is not, because
+    /// it would smear the map; nor is one without depth, or between two turns of
+    /// `mapper.fuse_every`.
     pub fused: bool,
     /// Blocks made and refused.
     pub allocate: AllocationReport,

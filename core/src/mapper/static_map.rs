@@ -117,6 +117,12 @@ impl<'s> StaticMap<'s> {
         allocation
     }
 
+    /// Returns true if the depth taken last shows a surface: of its first `pixels` values one is
+    /// above 0.
+    pub fn has_depth(&self, pixels: usize) -> bool {
+        self.depth_m.iter().take(pixels).any(|&depth_m| depth_m > 0.0)
+    }
+
     /// Looks at the map from a pose; whether that could be done.
     pub fn cast<E: Executor>(&mut self, view: &Viewpoint, executor: &E) -> bool {
         self.raycaster.cast(&self.volume, view, executor).is_ok()

@@ -33,7 +33,10 @@ struct Outcome {
     ground: Option<GroundPlane>,
     segmentation: SegmentationReport,
     tracking: TrackingReport,
+    /// The pose is good enough to fuse at, and the frame's turn has come.
     fused: bool,
+    /// There was depth to fuse.
+    shows_depth: bool,
     allocation: AllocationReport,
     prune: PruneReport,
 }
@@ -187,9 +190,10 @@ impl Mapper<'_> {
         // (E) The static map without what may move, and objects' maps; not at a pose extrapolated.
         let erase_trails = || static_map.erase_trails(&camera, segmenter);
         let voxels_erased = executor.stage(Stage::Prune, erase_trails);
-        let mut allocation = AllocationReport::default();
+        let (mut allocation, mut shows_depth) = (AllocationReport::default(), false);
         if fused {
             static_map.take_depth(&seen, &mut tracked, executor);
+            shows_depth = static_map.has_depth(frame.left.width() * frame.left.height());
             allocation = static_map.fuse(&seen, &camera, executor, store);
         }
         let shown = seen.of_objects(&rig, &camera.t_world_camera);
@@ -209,6 +213,7 @@ impl Mapper<'_> {
             segmentation,
             tracking,
             fused,
+            shows_depth,
             allocation,
             prune,
         };
@@ -269,6 +274,7 @@ impl Mapper<'_> {
             segmentation,
             tracking,
             fused,
+            shows_depth,
             allocation,
             prune,
         } = outcome;
@@ -295,7 +301,7 @@ impl Mapper<'_> {
             tracking: TrackingReport { matches_excluded: found.matches_excluded, ..tracking },
             segmentation,
             objects: self.objects.report(),
-            fused,
+            fused: fused && shows_depth,
             allocate: allocation,
             prune,
             blocks: self.block_count(),
