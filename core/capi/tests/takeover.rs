@@ -44,7 +44,8 @@ impl Living {
     /// Restores `snapshot` over the mapper; the status, and what became of the handle's place.
     fn restore(
         &mut self,
-        (capacity, config): (&DynvoxCapacity, &DynvoxConfig),
+        capacity: &DynvoxCapacity,
+        config: &DynvoxConfig,
         snapshot: &[u8],
     ) -> (DynvoxStatus, *mut DynvoxMapper) {
         let (len, mut rest, mut restored) = (self.buffer.len, snapshot, UNTOUCHED);
@@ -101,7 +102,7 @@ fn a_restore_that_fails_ends_the_mapper_that_lived_there() {
         let mut living = Living::new();
         let mut bytes = living.snapshot.clone();
         damage(&mut bytes);
-        assert_eq!(living.restore((&capacity, &config), &bytes), (expected, UNTOUCHED), "{story}");
+        assert_eq!(living.restore(&capacity, &config, &bytes), (expected, UNTOUCHED), "{story}");
         // The mapper that lived there is gone in each case.
         living.assert_ended(story);
     }
@@ -111,7 +112,7 @@ fn a_restore_that_fails_ends_the_mapper_that_lived_there() {
         let mut living = Living::new();
         let bytes = living.snapshot.clone();
         assert_eq!(
-            living.restore((bounds, settings), &bytes),
+            living.restore(bounds, settings, &bytes),
             (DynvoxStatus::Snapshot, UNTOUCHED),
             "{story}"
         );
@@ -136,8 +137,8 @@ fn what_is_refused_before_a_byte_is_written_leaves_the_mapper_alone() {
     assert_eq!(create(&huge, &config, len), DynvoxStatus::TooSmall);
     assert_eq!(create(&capacity, &config, len - 1), DynvoxStatus::TooSmall);
     assert_eq!(made, UNTOUCHED);
-    assert_eq!(living.restore((&capacity, &broken), &bytes), (DynvoxStatus::Config, UNTOUCHED));
-    assert_eq!(living.restore((&huge, &config), &bytes), (DynvoxStatus::TooSmall, UNTOUCHED));
+    assert_eq!(living.restore(&capacity, &broken, &bytes), (DynvoxStatus::Config, UNTOUCHED));
+    assert_eq!(living.restore(&huge, &config, &bytes), (DynvoxStatus::TooSmall, UNTOUCHED));
     let unread = unsafe {
         let (capacity, config) = (&raw const capacity, &raw const config);
         dynvox_restore(capacity, config, start, len, None, ptr::null_mut(), &raw mut made)
@@ -203,7 +204,7 @@ fn a_snapshot_restored_where_its_mapper_lives_continues_it() {
     let (mut living, twin) = (Living::new(), Living::new());
     let bytes = living.snapshot.clone();
     assert_eq!(living.step().0, DynvoxStatus::Ok, "a frame that the snapshot does not have");
-    let (status, restored) = living.restore((&capacity(), &config()), &bytes);
+    let (status, restored) = living.restore(&capacity(), &config(), &bytes);
     assert_eq!((status, restored), (DynvoxStatus::Ok, living.mapper));
     assert_eq!(living.step(), twin.step());
 }

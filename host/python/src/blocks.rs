@@ -5,9 +5,9 @@ use dynvox::run::store::BlockFile;
 use dynvox_core::Config;
 use dynvox_core::volume::{BlockStore, EvictedBlock, LoadedBlock};
 use pyo3::prelude::*;
-use std::fs::File;
-use std::io::{Read, Write};
-use std::path::PathBuf;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
 /// Destination of evicted blocks.
@@ -15,8 +15,13 @@ use tempfile::TempPath;
 pub enum BlocksChoice {
     /// To a temporary file, as in `dynvox run`.
     Temporary,
-    /// To a file of the caller's, which stays.
-    File(PathBuf),
+    /// To a file that stays. Only a file that this mapper made is ever replaced.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// True once this mapper made it.
+        ours: bool,
+    },
     /// Nowhere: they are lost, and counted.
     Lost,
 }
@@ -29,7 +34,7 @@ pub enum Blocks {
 
 impl Blocks {
     /// An empty store; with `records`, those of a snapshot.
-    pub fn begin(choice: &BlocksChoice, config: &Config, records: &[u8]) -> PyResult<Self> {
+    pub fn begin(choice: &mut BlocksChoice, config: &Config, records: &[u8]) -> PyResult<Self> {
         let (path, temporary) = match choice {
             BlocksChoice::Lost if records.is_empty() => return Ok(Self::Lost),
             BlocksChoice::Lost => {
@@ -40,24 +45,14 @@ impl Blocks {
             }
             BlocksChoice::Temporary => {
                 let path = tempfile::NamedTempFile::new().map_err(raise)?.into_temp_path();
+                std::fs::write(&path, records).map_err(|error| not_written(&path, &error))?;
                 (path.to_path_buf(), Some(path))
             }
-            BlocksChoice::File(path) => (path.clone(), None),
+            BlocksChoice::File { path, ours } => {
+                write_new(path, ours, records)?;
+                (path.clone(), None)
+            }
         };
-        let shown = path.display();
-        if temporary.is_none() && records.is_empty() && path.exists() {
-            return Err(refuse(format!(
-                "{shown} exists. Name another file for evicted blocks, or remove it"
-            )));
-        }
-        if !records.is_empty() {
-            let written = File::create(&path).and_then(|mut file| file.write_all(records));
-            written.map_err(|error| {
-                refuse(format!(
-                    "{shown} cannot be written: {error}. Name another file for evicted blocks"
-                ))
-            })?;
-        }
         let (file, _) =
             BlockFile::open(&path, config.volume.voxel_size_m, config.volume.truncation_m)
                 .map_err(raise)?;
@@ -82,6 +77,35 @@ impl Blocks {
         }
         Ok(bytes)
     }
+}
+
+/// Makes the file of evicted blocks; what is there is the caller's, unless this mapper made it.
+fn write_new(path: &Path, ours: &mut bool, records: &[u8]) -> PyResult<()> {
+    if std::mem::take(ours) {
+        // Of a link that took its place only the link goes.
+        let removed = std::fs::remove_file(path);
+        let is_absent = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
+        removed.or_else(
+            |error| if is_absent(&error) { Ok(()) } else { Err(not_written(path, &error)) },
+        )?;
+    }
+    let made = OpenOptions::new().write(true).create_new(true).open(path);
+    let mut file = made.map_err(|error| match error.kind() {
+        io::ErrorKind::AlreadyExists => refuse(format!(
+            "{} exists. Name another file for evicted blocks, or remove it",
+            path.display()
+        )),
+        _ => not_written(path, &error),
+    })?;
+    *ours = true;
+    file.write_all(records).map_err(|error| not_written(path, &error))
+}
+
+fn not_written(path: &Path, error: &io::Error) -> PyErr {
+    refuse(format!(
+        "{} cannot be written: {error}. Name another file for evicted blocks",
+        path.display()
+    ))
 }
 
 impl BlockStore for Blocks {

@@ -5,7 +5,9 @@ use super::detection::Detection;
 use super::error::{raise, refuse};
 use super::mapper::Mapper;
 use super::rig::Rig;
+use super::running::Recipe;
 use super::{arrays, options, pose};
+use dynvox::Request;
 use dynvox::formats::Image;
 use dynvox::input::StereoImages;
 use dynvox::observe::from_first;
@@ -16,7 +18,10 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// The frames that a run would map.
+/// The frames that `dynvox run PATH` would map; the synthetic street without a path.
+///
+/// Options are those of `dynvox run`, with underscores. A sequence of frames: `dataset[3]`,
+/// `len(dataset)`, `for frame in dataset` (decoded ahead).
 #[pyclass(frozen, module = "dynvox", subclass)]
 pub struct Dataset {
     plan: Plan,
@@ -47,7 +52,7 @@ impl Dataset {
         threads: Option<usize>,
         options: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let path = path.map(|path| path.str().map(|path| path.to_string())).transpose()?;
+        let path = path.map(|path| options::path("path", &path)).transpose()?;
         if path.as_deref() == Some("-") {
             return Err(refuse(
                 "a stream is read by its own program. Give its pairs to Mapper.step",
@@ -62,16 +67,19 @@ impl Dataset {
         Ok(Self { plan, poses, blocks: options::blocks(stream.as_ref())? })
     }
 
+    /// Name of the data set.
     #[getter]
     fn name(&self) -> &str {
         self.plan.dataset.name()
     }
 
+    /// Width and height of the pictures that are mapped.
     #[getter]
     fn size(&self) -> (usize, usize) {
         self.plan.dataset.size()
     }
 
+    /// The cameras.
     #[getter]
     fn rig(&self) -> Rig {
         Rig::of(
@@ -81,32 +89,37 @@ impl Dataset {
         )
     }
 
+    /// Assumptions, and what was left aside.
     #[getter]
     fn notes(&self) -> Vec<String> {
         self.plan.dataset.notes().to_vec()
     }
 
+    /// Doubts about the images, in sentences.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.plan.warnings.clone()
     }
 
+    /// Time between two frames, s.
     #[getter]
     fn frame_interval_s(&self) -> f32 {
         self.plan.config.tracking.frame_interval_s
     }
 
+    /// Numbers of the frames in the data set.
     #[getter]
     fn numbers(&self) -> Vec<usize> {
         self.plan.frames.listed().to_vec()
     }
 
+    /// Times of the frames, s.
     #[getter]
     fn times_s(&self) -> Vec<f64> {
         self.plan.frames.listed().iter().map(|&number| self.plan.dataset.time_s(number)).collect()
     }
 
-    /// True poses of the frames, the first at the origin; None where they are unknown.
+    /// True poses, frames x 4 x 4, the first at the origin.
     #[getter]
     fn truth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let Some(truth) = self.plan.dataset.truth() else { return Ok(None) };
@@ -120,7 +133,8 @@ impl Dataset {
         Ok(Some(numpy::PyArrayMethods::reshape(&array, [poses.len(), 4, 4])?))
     }
 
-    /// Points of a frame's LiDAR scan in camera axes, m; None where there is no scan.
+    /// Points of a frame's LiDAR scan in the axes of the rectified left camera; None where the
+    /// frame has no scan.
     fn lidar<'py>(
         &self,
         py: Python<'py>,
@@ -135,8 +149,8 @@ impl Dataset {
         arrays::image(py, values, [count, 3]).map(Some)
     }
 
-    /// A mapper with this run's bounds and settings.
-    fn mapper(&self) -> PyResult<Mapper> {
+    /// A mapper with the bounds, settings and threads of this run.
+    fn mapper(&self, py: Python<'_>) -> PyResult<Mapper> {
         let Plan { profile, capacity, config, config_toml, threads, .. } = &self.plan;
         let plan = MapperPlan {
             profile: profile.clone(),
@@ -147,7 +161,14 @@ impl Dataset {
         };
         dynvox::request::check_bounds(self.plan.dataset.size(), (profile, capacity), config)
             .map_err(raise)?;
-        Mapper::of_plan(self.rig(), self.plan.dataset.size(), plan, self.blocks.clone())
+        let recipe = Recipe {
+            rig: self.rig(),
+            request: Request::default(),
+            interval_s: None,
+            plan: Some(plan),
+            blocks: self.blocks.clone(),
+        };
+        Mapper::from_recipe(py, recipe, self.plan.dataset.size())
     }
 
     fn __len__(&self) -> usize {

@@ -7,7 +7,7 @@ use dynvox_core::tracking::{Class, Detection as CoreDetection};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 
-/// An instance in the left image: a box with a mask in it.
+/// An instance in the left image: a mask in a box whose first column and row are `left` and `top`.
 #[pyclass(frozen, module = "dynvox")]
 pub struct Detection {
     class: Class,
@@ -101,11 +101,13 @@ impl Detection {
         Ok(Self { class, class_name: class_name.to_owned(), score, left, top, mask: mask.unbind() })
     }
 
+    /// Name of its class.
     #[getter]
     fn class_name(&self) -> &str {
         &self.class_name
     }
 
+    /// Pixels of the box: not 0 where they belong to the instance.
     #[getter]
     fn mask(&self, py: Python<'_>) -> Py<PyAny> {
         self.mask.clone_ref(py)

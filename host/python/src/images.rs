@@ -1,4 +1,5 @@
-//! Pictures of numpy, borrowed: no pixel is copied on the way into the core.
+//! Pictures of numpy, borrowed: no pixel is copied on the way into the core where the pixels of a
+//! row lie side by side. Other views, such as `[..., ::-1]`, are copied.
 
 use super::error::refuse;
 use dynvox::formats::luma;
@@ -25,14 +26,46 @@ impl<'py, T: Element> Borrowed<'py, T> {
                             copies nothing that has a buffer"
             ))
         })?;
-        let array = array.extract::<PyReadonlyArrayDyn<'py, T>>().map_err(|_| {
-            let found = untyped.dtype();
-            refuse(format!(
-                "{name} has values of {found}, and {wanted} is needed. Scale and \
-                            convert it: array.astype(numpy.{wanted})"
-            ))
-        })?;
-        Ok(Self { array, name })
+        let read = |array: &Bound<'py, PyAny>| {
+            array.extract::<PyReadonlyArrayDyn<'py, T>>().map_err(|_| {
+                let found = untyped.dtype();
+                refuse(format!(
+                    "{name} has values of {found}, and {wanted} is needed. Scale and \
+                     convert it: array.astype(numpy.{wanted})"
+                ))
+            })
+        };
+        let this = Self { array: read(array)?, name };
+        if this.is_dense() {
+            return Ok(this);
+        }
+        let numpy = array.py().import("numpy")?;
+        Ok(Self { array: read(&numpy.call_method1("ascontiguousarray", (array,))?)?, name })
+    }
+
+    /// Borrows a colour picture whose channels are blue, green, red, as red, green, blue: a copy.
+    pub fn reversed(name: &'static str, array: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let this = Self::new(name, array)?;
+        if !this.is_colour() {
+            return Ok(this);
+        }
+        let numpy = array.py().import("numpy")?;
+        Self::new(name, &numpy.call_method1("flip", (array, -1))?)
+    }
+
+    /// Returns true if pixels of a row lie side by side, and rows a whole number of pixels apart;
+    /// what has another number of axes is left to [`Borrowed::view`].
+    fn is_dense(&self) -> bool {
+        let (shape, strides) = (self.array.shape(), self.array.strides());
+        let (&[height, width, ref rest @ ..], &[row, column, ..]) = (shape, strides) else {
+            return true;
+        };
+        let value = size_of::<T>() as isize;
+        let size = rest.iter().product::<usize>() as isize * value;
+        let side_by_side = (width <= 1 || column == size)
+            && strides.get(2).is_none_or(|&channel| channel == value);
+        let rows = height <= 1 || (size > 0 && row >= size * width as isize && row % size == 0);
+        shape.contains(&0) || rest.len() > 1 || (side_by_side && rows)
     }
 
     /// Returns true if there are three values for each pixel.
@@ -66,16 +99,9 @@ impl<'py, T: Element> Borrowed<'py, T> {
         if rest != trailing || height == 0 || width == 0 {
             return Err(wrong_shape());
         }
-        // Pixels of a row lie side by side, rows any whole number of pixels apart.
-        let (size, value) = (size_of::<P>() as isize, size_of::<T>() as isize);
-        let row = strides[0];
-        let dense = (width == 1 || strides[1] == size)
-            && strides.get(2).is_none_or(|&channel| channel == value);
-        if !dense || (height > 1 && (row < size * width as isize || row % size != 0)) {
-            return Err(refuse(format!(
-                "{name} has pixels that do not lie side by side in its rows. Pass \
-                 numpy.ascontiguousarray({name})"
-            )));
+        let (size, row) = (size_of::<P>() as isize, strides[0]);
+        if !self.is_dense() {
+            return Err(wrong_shape());
         }
         let stride = if height > 1 { (row / size) as usize } else { width };
         let len = (height - 1) * stride + width;

@@ -2,7 +2,7 @@
 //! calibrations.
 //!
 //! `python/dynvox/__init__.pyi` describes what users see. Images are borrowed from numpy for the
-//! time of a step ([`images`]); what comes back is new arrays and dictionaries. The interpreter is
+//! time of a step (`images`); what comes back is new arrays and dictionaries. The interpreter is
 //! free for other threads while a mapper works and while a frame is decoded.
 
 mod arrays;
@@ -10,11 +10,14 @@ mod blocks;
 mod dataset;
 mod detection;
 mod error;
+mod examined;
 mod images;
 mod mapper;
 mod options;
+mod pickled;
 mod planning;
 mod pose;
+mod readout;
 mod rig;
 mod running;
 
@@ -29,5 +32,7 @@ fn _dynvox(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<mapper::Mapper>()?;
     module.add_class::<dataset::Dataset>()?;
     module.add_function(wrap_pyfunction!(images::_borrowed, module)?)?;
+    module.add_function(wrap_pyfunction!(rig::_rig, module)?)?;
+    module.add_function(wrap_pyfunction!(examined::diagnose, module)?)?;
     module.add_function(wrap_pyfunction!(rig::read_calibration, module)?)
 }

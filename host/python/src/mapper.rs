@@ -1,54 +1,71 @@
 //! The mapper.
 
-use super::arrays::{self, Raycast, Triangles};
-use super::blocks::BlocksChoice;
+use super::arrays::{self, Raycast};
 use super::detection::BorrowedDetection;
 use super::error::{raise, refuse};
+use super::examined::Examined;
 use super::images::{Borrowed, Picture};
 use super::planning::Plan;
+use super::readout::{map_triangles, object_triangles, report_dictionary, track_dictionary};
 use super::rig::Rig;
 use super::running::{Recipe, Running, State};
 use super::{options, pose};
-use dynvox::Request;
-use dynvox::request::MapperPlan;
-use dynvox::run::store::{self, OneSegment};
-use dynvox::slab::HostSlab;
-use dynvox_core::tracking::TrackReport;
-use dynvox_core::view::{RaycastView, Triangle};
-use dynvox_core::volume::BlockKey;
-use dynvox_core::{Report, StereoFrame};
-use hashbrown::HashSet;
+use dynvox_core::StereoFrame;
+use dynvox_core::view::RaycastView;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 use pythonize::pythonize;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Bytes in which evicted blocks are meshed, a cube of the map at a time.
-const MESH_BYTES: usize = 8 << 20;
-
-/// A stereo mapper in one slab of memory.
+/// A stereo mapper in one slab of memory, which is taken when the pictures' size is known: with
+/// `image`, else at the first pair.
+///
+/// Other threads of Python run while it is made and while it works. One mapper serves one thread at
+/// a time; others wait. It belongs to the process that made it: in a forked child every call is an
+/// `Error`, and the parent's mapper and files stay as they are.
 #[pyclass(frozen, module = "dynvox")]
 pub struct Mapper {
     state: Mutex<State>,
+    /// Process that made it: a forked child has none of its threads, and not its lock.
+    process: u32,
+    /// Colour pictures are blue, green, red.
+    is_bgr: bool,
+}
+
+impl Drop for Mapper {
+    fn drop(&mut self) {
+        // What a child inherits is the parent's: its file of blocks, and threads that do not run
+        // here and would be waited for.
+        if self.process != std::process::id() {
+            let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+            std::mem::forget(state.running.take());
+        }
+    }
 }
 
 impl Mapper {
     /// The mapper of a data set's run.
-    pub fn of_plan(
-        rig: Rig,
-        size: (usize, usize),
-        plan: MapperPlan,
-        blocks: BlocksChoice,
-    ) -> PyResult<Self> {
-        let request = Request::default();
-        let recipe = Recipe { rig, request, interval_s: None, plan: Some(plan), blocks };
-        let mut state = State { recipe, running: None };
-        state.running_for(size)?;
-        Ok(Self { state: Mutex::new(state) })
+    pub fn from_recipe(py: Python<'_>, recipe: Recipe, size: (usize, usize)) -> PyResult<Self> {
+        // The data set was examined as a whole.
+        let examined = Examined::over();
+        let mut state = State { recipe, running: None, examined, is_closed: false };
+        py.detach(|| state.running_for(size).map(drop))?;
+        Ok(Self::holding(state, false))
+    }
+
+    fn holding(state: State, is_bgr: bool) -> Self {
+        Self { state: Mutex::new(state), process: std::process::id(), is_bgr }
     }
 
     fn lock(&self) -> PyResult<MutexGuard<'_, State>> {
+        let Self { process, .. } = *self;
+        if process != std::process::id() {
+            return Err(refuse(format!(
+                "this mapper belongs to process {process}. Make one in this process, or start it \
+                 with multiprocessing's spawn"
+            )));
+        }
         self.state.lock().map_err(|_| {
             refuse(
                 "the mapper failed within a call: please report it as \
@@ -70,15 +87,25 @@ impl Mapper {
 #[pymethods]
 impl Mapper {
     #[new]
-    #[pyo3(signature = (rig, *, image=None, frame_interval_s=None, stream=None, threads=None, **options))]
+    #[pyo3(signature = (
+        rig, *, image=None, frame_interval_s=None, stream=None, threads=None, force=false,
+        channels="rgb", **options
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn new(
+        py: Python<'_>,
         rig: Rig,
         image: Option<(usize, usize)>,
         frame_interval_s: Option<f64>,
         stream: Option<Bound<'_, PyAny>>,
         threads: Option<usize>,
+        force: bool,
+        channels: &str,
         options: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        if !matches!(channels, "rgb" | "bgr") {
+            return Err(refuse(format!("channels is {channels:?}. Give \"rgb\" or \"bgr\"")));
+        }
         let recipe = Recipe {
             request: options::of_mapper(threads, options.as_ref())?,
             blocks: options::blocks(stream.as_ref())?,
@@ -87,16 +114,29 @@ impl Mapper {
             rig,
         };
         let size = image.or(recipe.rig.mapped_size());
-        let mut state = State { recipe, running: None };
+        let examined = Examined::new(force);
+        let mut state = State { recipe, running: None, examined, is_closed: false };
         match size {
-            Some(size) => drop(state.running_for(size)?),
+            Some(size) => py.detach(|| state.running_for(size).map(drop))?,
             // What is wrong with the options is said at once, and not at the first picture.
             None => drop(state.recipe.request.check_mapper().map_err(raise)?),
         }
-        Ok(Self { state: Mutex::new(state) })
+        Ok(Self::holding(state, channels == "bgr"))
     }
 
-    #[pyo3(signature = (left, right, *, colour=None, classes=None, disparity_q8=None, t_world_camera=None, time_ns=None, detections=None))]
+    /// Maps one pair and returns the report, with the fields of `dynvox_core::Report` and
+    /// `severity`.
+    ///
+    /// Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then
+    /// fused in colour, and grey is computed. Nothing is copied whose pixels lie side by side in
+    /// their rows; rows may lie apart, as in a part of a larger array. Other views, as `[...,
+    /// ::-1]`, are copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo
+    /// matching: give them with every frame. A pose must be a rigid motion within the map's bounds.
+    /// `fused` in the report is true only if something was fused.
+    #[pyo3(signature = (
+        left, right, *, colour=None, classes=None, disparity_q8=None, t_world_camera=None,
+        time_ns=None, detections=None
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn step<'py>(
         &self,
@@ -110,8 +150,9 @@ impl Mapper {
         time_ns: Option<u64>,
         detections: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (left, right) = (Borrowed::new("left", &left)?, Borrowed::new("right", &right)?);
-        let colour = colour.map(|array| Borrowed::<u8>::new("colour", &array)).transpose()?;
+        let borrow = if self.is_bgr { Borrowed::<u8>::reversed } else { Borrowed::<u8>::new };
+        let (left, right) = (borrow("left", &left)?, borrow("right", &right)?);
+        let colour = colour.map(|array| borrow("colour", &array)).transpose()?;
         let classes = classes.map(|array| Borrowed::<u8>::new("classes", &array)).transpose()?;
         let disparity_q8 =
             disparity_q8.map(|array| Borrowed::<u16>::new("disparity_q8", &array)).transpose()?;
@@ -138,6 +179,31 @@ impl Mapper {
         report_dictionary(py, &report)
     }
 
+    /// Doubts about the first pairs, in sentences.
+    #[getter]
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        py.detach(|| Ok(self.lock()?.examined.warnings()))
+    }
+
+    /// Frees the memory; every later call is an `Error`. A `with` block calls it at its end.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| {
+            let mut state = self.lock()?;
+            (state.running, state.is_closed) = (None, true);
+            Ok(())
+        })
+    }
+
+    fn __enter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        this
+    }
+
+    #[pyo3(signature = (*_error))]
+    fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, PyTuple>) -> PyResult<()> {
+        self.close(py)
+    }
+
+    /// Ends a sequence: prunes what is still in the window.
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pruned = self.with(py, |running| {
             Ok(running.mapper.with_dependent_mut(|_, mapper| mapper.finish()))
@@ -145,6 +211,7 @@ impl Mapper {
         Ok(pythonize(py, &pruned)?)
     }
 
+    /// Tracks after the last step, oldest first.
     #[getter]
     fn tracks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let tracks: Vec<_> = self.with(py, |running| {
@@ -156,6 +223,8 @@ impl Mapper {
         )
     }
 
+    /// The map seen from a pose, the last one of the camera without one; with the objects where
+    /// they are now. Of the image's columns and rows every so many are looked at.
     #[pyo3(signature = (t_world_camera=None, *, objects=true, every=1))]
     fn raycast<'py>(
         &self,
@@ -189,6 +258,8 @@ impl Mapper {
         shown.dictionary(py, &ids)
     }
 
+    /// The window around the camera for planners, with moving objects where they will be `ahead_s`
+    /// seconds after the last frame; an error of a mapper made without `planning`.
     #[pyo3(signature = (ahead_s=0.0))]
     fn plan<'py>(&self, py: Python<'py>, ahead_s: f32) -> PyResult<Bound<'py, PyDict>> {
         let plan = self.with(py, |running| {
@@ -200,6 +271,9 @@ impl Mapper {
         .dictionary(py)
     }
 
+    /// Triangles of the static map, evicted blocks included, or of one track's object, in the
+    /// world: positions in metres and colours, both triangles x corners x 3. Corners run counter-
+    /// clockwise seen from free space.
     #[pyo3(signature = (object=None))]
     fn triangles<'py>(
         &self,
@@ -213,6 +287,7 @@ impl Mapper {
         triangles.arrays(py)
     }
 
+    /// Pose of the left camera in the last frame, 4 x 4.
     #[getter]
     fn t_world_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let of = self.with(py, |running| {
@@ -221,6 +296,9 @@ impl Mapper {
         pose::matrix(py, &of)
     }
 
+    /// Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels.
+    /// Where the mapper matched the pair itself, odd values were filled in between measured ones,
+    /// which are even. It has size 1 x 1 before the first frame.
     #[getter]
     fn disparity_q8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let (pixels, size) = self.with(py, |running| {
@@ -229,6 +307,7 @@ impl Mapper {
         arrays::image(py, pixels, size)
     }
 
+    /// Digest of the last step; None before the first, and after `restore`.
     #[getter]
     fn digest(&self, py: Python<'_>) -> PyResult<Option<u64>> {
         py.detach(|| {
@@ -241,6 +320,7 @@ impl Mapper {
         })
     }
 
+    /// Wall time of the last step within the core; None before the first.
     #[getter]
     fn step_seconds(&self, py: Python<'_>) -> PyResult<Option<f64>> {
         py.detach(|| {
@@ -253,16 +333,19 @@ impl Mapper {
         })
     }
 
+    /// Bytes of the slab.
     #[getter]
     fn slab_bytes(&self, py: Python<'_>) -> PyResult<usize> {
         self.with(py, |running| Ok(running.plan.capacity.bytes()))
     }
 
+    /// All settings, as the config.toml of a run has them.
     #[getter]
     fn config_toml(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |running| Ok(running.plan.config_toml.clone()))
     }
 
+    /// Every region of the slab.
     fn footprint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let footprint = self.with(py, |running| {
             Ok(running.mapper.with_dependent(|_, mapper| mapper.footprint()))
@@ -278,88 +361,15 @@ impl Mapper {
         PyList::new(py, regions.collect::<PyResult<Vec<_>>>()?)
     }
 
+    /// Everything that later steps depend on, evicted blocks included.
     fn snapshot<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &self.with(py, Running::snapshot)?))
     }
 
+    /// Continues after the step at which the snapshot was taken, bit for bit. The mapper must have
+    /// been made with the same rig, bounds and settings. After an error it is as it was made. A
+    /// file of `stream` that this mapper did not make is never touched.
     fn restore(&self, py: Python<'_>, snapshot: &[u8]) -> PyResult<()> {
         py.detach(|| self.lock()?.restore(snapshot))
     }
-}
-
-/// Triangles of the static map in the camera's segment: of the blocks in memory, and of those that
-/// are only in the store.
-fn map_triangles(running: &mut Running) -> PyResult<Triangles> {
-    let mut triangles = Triangles::default();
-    let (segment, in_memory): (_, HashSet<_>) = running.mapper.with_dependent(|_, mapper| {
-        mapper.triangles(&mut |triangle| triangles.add(triangle));
-        let volume = mapper.static_map();
-        let in_memory = volume.current_blocks().map(|(_, coord)| BlockKey::in_first(coord));
-        (volume.segment(), in_memory.collect())
-    });
-    if let Some(file) = running.blocks.file_mut() {
-        let (config, colour) = (&running.plan.config, running.plan.capacity.colour);
-        let mut slab = HostSlab::map(MESH_BYTES)
-            .ok_or_else(|| refuse("there is no memory for the triangles. Free some"))?;
-        let how = (&config.volume, &config.mesh);
-        store::mesh::triangles(
-            &mut OneSegment::new(file, segment),
-            how,
-            (slab.bytes_mut(), colour),
-            &in_memory,
-            &mut |triangle: Triangle| triangles.add(triangle),
-        )
-        .map_err(|error| raise(anyhow::anyhow!("{error}")))?;
-    }
-    Ok(triangles)
-}
-
-/// Triangles of one object where it is now.
-fn object_triangles(running: &mut Running, id: u32) -> PyResult<Triangles> {
-    let mesh = running.plan.config.mesh;
-    let found = running.mapper.with_dependent(|_, mapper| {
-        let posed = mapper.posed_objects().find(|posed| posed.summary.id == id)?;
-        let mut triangles = Triangles::default();
-        posed.object.volume().triangles(&mesh, &mut |triangle| triangles.add(triangle));
-        Some(triangles.moved(&posed.t_world_object))
-    });
-    found.ok_or_else(|| {
-        refuse(format!(
-            "track {id} has no reconstructed object now. Mapper.tracks lists tracks, \
-                        with blocks where they have one"
-        ))
-    })
-}
-
-/// A report as nested dictionaries, and its severity in a word.
-fn report_dictionary<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyAny>> {
-    let dictionary = pythonize(py, report)?;
-    dictionary.set_item("severity", report.severity().name())?;
-    Ok(dictionary)
-}
-
-fn track_dictionary<'py>(py: Python<'py>, of: &TrackReport) -> PyResult<Bound<'py, PyDict>> {
-    let parts = PyDict::new(py);
-    parts.set_item("id", of.id)?;
-    parts.set_item("class_name", of.class.name())?;
-    parts.set_item("state", of.state.name())?;
-    parts.set_item("score", of.score)?;
-    parts.set_item("detected", of.detected)?;
-    parts.set_item("first_frame", of.first_frame)?;
-    parts.set_item("last_frame", of.last_frame)?;
-    parts.set_item("sightings", of.sightings)?;
-    parts.set_item("box_px", [of.pixels.left, of.pixels.top, of.pixels.width, of.pixels.height])?;
-    parts.set_item("speed_m_s", of.speed_m_s.map(|[speed, _]| speed))?;
-    parts.set_item("speed_sigma_m_s", of.speed_m_s.map(|[_, sigma]| sigma))?;
-    parts.set_item("measured", of.measured)?;
-    parts.set_item("center_world_m", of.center_world_m)?;
-    parts.set_item("motion_world", pose::dictionary(py, &of.motion_world)?)?;
-    parts.set_item(
-        "t_world_object",
-        of.t_world_object.map(|pose| pose::dictionary(py, &pose)).transpose()?,
-    )?;
-    parts.set_item("matches", of.matches)?;
-    parts.set_item("inliers", of.inliers)?;
-    parts.set_item("blocks", of.blocks)?;
-    Ok(parts)
 }

@@ -2,6 +2,7 @@
 
 use super::blocks::{Blocks, BlocksChoice};
 use super::error::{raise, refuse};
+use super::examined::Examined;
 use super::rig::Rig;
 use dynvox::Request;
 use dynvox::request::MapperPlan;
@@ -59,6 +60,10 @@ pub struct Recipe {
 pub struct State {
     pub recipe: Recipe,
     pub running: Option<Running>,
+    /// Examination of the first pairs.
+    pub examined: Examined,
+    /// True after `Mapper.close`.
+    pub is_closed: bool,
 }
 
 /// A snapshot, taken apart.
@@ -84,7 +89,7 @@ impl<'a> Snapshot<'a> {
 
 impl Running {
     /// Maps the slab and makes the mapper in it.
-    fn begin(plan: MapperPlan, size: (usize, usize), blocks: &BlocksChoice) -> PyResult<Self> {
+    fn begin(plan: MapperPlan, size: (usize, usize), blocks: &mut BlocksChoice) -> PyResult<Self> {
         let slab = slab_of(&plan)?;
         let mapper = SlabMapper::try_new(slab, |slab| {
             Mapper::new(&plan.capacity, &plan.config, slab.borrow_mut().bytes_mut())
@@ -103,7 +108,11 @@ impl Running {
     }
 
     /// Restores the mapper to its state when the snapshot was taken.
-    fn restore(plan: MapperPlan, snapshot: &Snapshot<'_>, blocks: &BlocksChoice) -> PyResult<Self> {
+    fn restore(
+        plan: MapperPlan,
+        snapshot: &Snapshot<'_>,
+        blocks: &mut BlocksChoice,
+    ) -> PyResult<Self> {
         let slab = slab_of(&plan)?;
         let mut source = snapshot.core;
         let mapper = SlabMapper::try_new(slab, |slab| {
@@ -175,11 +184,12 @@ fn slab_of(plan: &MapperPlan) -> PyResult<MutBorrow<HostSlab>> {
 impl State {
     /// The mapper, made for pictures of a size unless it is there.
     pub fn running_for(&mut self, size: (usize, usize)) -> PyResult<&mut Running> {
+        self.check_open()?;
         match self.running {
             Some(ref mut running) => Ok(running),
             None => {
                 let running =
-                    Running::begin(self.recipe.plan_for(size)?, size, &self.recipe.blocks)?;
+                    Running::begin(self.recipe.plan_for(size)?, size, &mut self.recipe.blocks)?;
                 Ok(self.running.insert(running))
             }
         }
@@ -187,6 +197,8 @@ impl State {
 
     /// Maps a frame of pictures of a size.
     pub fn step(&mut self, size: (usize, usize), frame: &StereoFrame<'_>) -> PyResult<Report> {
+        self.check_open()?;
+        self.examined.take(&self.recipe.rig, frame)?;
         let is_first = self.running.is_none();
         let stepped = self.running_for(size)?.step(frame);
         // A pair that is refused does not decide on the size.
@@ -198,6 +210,7 @@ impl State {
 
     /// The mapper.
     pub fn running(&mut self) -> PyResult<&mut Running> {
+        self.check_open()?;
         let absent = || {
             refuse(
                 "the mapper has no picture yet, and so no size. Give it one with step, or its size \
@@ -207,9 +220,17 @@ impl State {
         self.running.as_mut().ok_or_else(absent)
     }
 
+    fn check_open(&self) -> PyResult<()> {
+        if self.is_closed {
+            return Err(refuse("the mapper is closed. Make another one"));
+        }
+        Ok(())
+    }
+
     /// Puts a snapshot instead of the mapper. After an error the mapper is gone, and as it was
     /// made.
     pub fn restore(&mut self, bytes: &[u8]) -> PyResult<()> {
+        self.check_open()?;
         let foreign = || {
             refuse(
                 "the bytes are not a snapshot of a mapper of Python. Pass those that \
@@ -220,7 +241,7 @@ impl State {
         let plan = self.recipe.plan_for(snapshot.size)?;
         // Its file of evicted blocks is in the way otherwise, and two slabs are more than one.
         self.running = None;
-        self.running = Some(Running::restore(plan, &snapshot, &self.recipe.blocks)?);
+        self.running = Some(Running::restore(plan, &snapshot, &mut self.recipe.blocks)?);
         Ok(())
     }
 }

@@ -37,7 +37,7 @@ def test_the_sentence_is_that_of_the_command_line(command_line, path, options):
 
 
 def test_options_that_are_none_are_named():
-    with pytest.raises(dynvox.Error, match="there is no option frame. Give one of path, sequence"):
+    with pytest.raises(dynvox.Error, match="there is no option frame. Did you mean frames\\? Give one of path, sequence"):
         dynvox.Dataset(frame=3)
     with pytest.raises(dynvox.Error, match="read frame by frame has no exports.record"):
         dynvox.Dataset(mcap=True)
@@ -88,11 +88,11 @@ def test_the_calibration_of_raw_cameras(data):
 
 def test_the_stubs_name_what_is_there_and_nothing_else():
     stub = ast.parse((Path(dynvox.__file__).parent / "__init__.pyi").read_text())
-    typed_only = {"Pose", "Track", "Region", "Raycast", "Plan", "Frame"}
+    typed_only = {"Pose", "Track", "Region", "Raycast", "Plan", "Finding", "Frame"}
     described = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef | ast.FunctionDef)}
     assert set(described) - typed_only | {"__version__"} == set(dynvox.__all__)
     for name in ("Rig", "Detection", "Mapper", "Dataset"):
-        stubbed = {node.name for node in described[name].body if isinstance(node, ast.FunctionDef)} - {"__new__"}
+        stubbed = {node.name for node in described[name].body if isinstance(node, ast.FunctionDef)} - {"__new__", "__enter__", "__exit__"}
         there = {member for kind in getattr(dynvox, name).__mro__[:-1] for member in vars(kind)}
         there = {member for member in there if not member.startswith("_") or member in ("__len__", "__getitem__", "__iter__")}
         assert stubbed == there, name

@@ -2,7 +2,7 @@
 
 use super::{FrameNumbers, Request, RequestError, Source, frame_interval_s};
 use crate::input::FrameSource;
-use crate::input::diagnosis::{self, Fault, Finding, RefusedInput};
+use crate::input::diagnosis::{self, Finding, RefusedInput};
 
 /// Findings about a recording.
 pub struct Examined {
@@ -35,7 +35,10 @@ fn warnings(
     let stream = dataset.stream().is_some();
     // Of a stream the first frame can be looked at, and a camera may begin in the dark.
     let findings = diagnosis::examine(dataset, if stream { &[0] } else { frames.listed() })?;
-    let refused = |finding: &Finding| finding.refused && !(stream && finding.fault == Fault::Black);
+    let refused = |finding: &Finding| match stream {
+        true => finding.is_refused_live(),
+        false => finding.refused,
+    };
     if findings.iter().any(refused) && !request.frames.force {
         return Err(RefusedInput { findings }.into());
     }

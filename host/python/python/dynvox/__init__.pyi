@@ -1,7 +1,7 @@
 """Stereo dense mapping of streets with moving cars, for numpy.
 
 Axes are KITTI's: x right, y down, z forward; the first left camera is the world. Poses map camera to world. Lengths are metres, disparities
-1/256 px. Every error is an `Error` with the sentence that the command line prints. Pose, Track, Region, Raycast and Frame are dictionaries: import their
+1/256 px. Every error is an `Error` with the sentence that the command line prints. Pose, Track, Region, Raycast, Plan, Finding and Frame are dictionaries: import their
 names under `typing.TYPE_CHECKING` alone.
 """
 
@@ -88,19 +88,39 @@ class Frame(TypedDict, total=False):
     time_ns: int
     detections: list[Detection]
 
+class Finding(TypedDict):
+    """A fault of pictures, as `diagnose` finds it."""
+
+    fault: Literal["not_rectified", "exchanged", "same_image", "baseline", "exposure", "black", "saturated", "focus", "unknown"]
+    message: str
+    """What is wrong, and what to do about it."""
+    refused: bool
+    """Whether a map would be meaningless."""
+
 @final
 class Rig:
-    """Two identical pinhole cameras, rectified. That of a data set or of `read_calibration` can also be of raw cameras: the mapper rectifies then."""
+    """Two identical pinhole cameras, rectified. That of a data set or of `read_calibration` can also be of raw cameras: the mapper rectifies then.
+
+    Rigs of equal numbers are equal, and can be pickled.
+    """
 
     def __new__(cls, focal_px: float, center_u_px: float, center_v_px: float, baseline_m: float) -> Self: ...
     @property
-    def focal_px(self) -> float: ...
+    def focal_px(self) -> float:
+        """Focal length, px."""
+
     @property
-    def center_u_px(self) -> float: ...
+    def center_u_px(self) -> float:
+        """Column of the principal point, px from the centre of the upper left pixel."""
+
     @property
-    def center_v_px(self) -> float: ...
+    def center_v_px(self) -> float:
+        """Row of the principal point, px from the centre of the upper left pixel."""
+
     @property
-    def baseline_m(self) -> float: ...
+    def baseline_m(self) -> float:
+        """Distance between the cameras, m."""
+
     @property
     def size(self) -> tuple[int, int] | None:
         """Width and height of rectified pictures, where known."""
@@ -128,15 +148,31 @@ class Detection:
         cls, mask: NDArray[np.uint8] | NDArray[np.bool_], left: int, top: int, class_name: str = "car", score: float = 1.0
     ) -> Self: ...
     @property
-    def mask(self) -> NDArray[np.uint8]: ...
+    def mask(self) -> NDArray[np.uint8]:
+        """Pixels of the box: not 0 where they belong to the instance."""
+
     @property
-    def left(self) -> int: ...
+    def left(self) -> int:
+        """First column of the box, px."""
+
     @property
-    def top(self) -> int: ...
+    def top(self) -> int:
+        """First row of the box, px."""
+
     @property
-    def class_name(self) -> str: ...
+    def class_name(self) -> str:
+        """Name of its class."""
+
     @property
-    def score(self) -> float: ...
+    def score(self) -> float:
+        """Confidence of the detector, 0 to 1."""
+
+
+def diagnose(rig: Rig, pairs: Iterable[tuple[NDArray[np.uint8], NDArray[np.uint8]] | Frame]) -> list[Finding]:
+    """Examines up to ten pairs without mapping them, as the command line does before a run: (left, right), or dictionaries with left and right.
+
+    Returns what is wrong with them, an empty list when all is well.
+    """
 
 def detections_of(instances: ArrayLike, class_names: Sequence[str], scores: Sequence[float] | None = None) -> list[Detection]:
     """Detections of an image of instances: pixel k shows instance k, of class `class_names[k - 1]`; 0 shows none."""
@@ -164,7 +200,8 @@ class Plan(TypedDict):
 class Mapper:
     """A stereo mapper in one slab of memory, which is taken when the pictures' size is known: with `image`, else at the first pair.
 
-    Other threads of Python run while it works. One mapper serves one thread at a time; others wait.
+    Other threads of Python run while it is made and while it works. One mapper serves one thread at a time; others wait. It belongs to the process that made
+    it: in a forked child every call is an `Error`, and the parent's mapper and files stay as they are.
     """
 
     def __new__(
@@ -186,10 +223,16 @@ class Mapper:
         fuse_every: int | None = None,
         instances: Literal["auto", "motion", "none"] = "auto",
         egomotion: Literal["stereo", "icp"] = "stereo",
+        force: bool = False,
+        channels: Literal["rgb", "bgr"] = "rgb",
     ) -> Self:
         """`image` is (width, height). `frame_interval_s` is the time between two frames without `time_ns`.
 
-        `stream`: evicted blocks go to a temporary file (None, True), to the file of a path, or nowhere (False): then they are lost, and counted. All others are the
+        `stream`: evicted blocks go to a temporary file (None, True), to a new file at a path, or nowhere (False): then they are lost, and counted. A file that this
+        mapper did not make is never overwritten.
+
+        The first ten pairs are examined as the command line examines a recording: exchanged, equal or unrectified pictures are an `Error` and are not mapped,
+        unless `force` is given; what is doubtful is in `warnings`. `channels="bgr"` takes colour pictures as OpenCV has them, at the cost of a copy. All others are the
         options of `dynvox run`: `set={"volume.voxel_size_m": 0.1}` is `--set volume.voxel_size_m=0.1`.
         """
 
@@ -209,16 +252,27 @@ class Mapper:
         that the pose lies in, from 0: another one begins, with that camera as its world, where the camera was lost and is not found again.
 
         Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then fused in colour, and grey is computed.
-        No grey picture, colour, disparity or mask is copied; rows may lie apart, as in a part of a larger array. `t_world_camera` replaces the
-        egomotion and `disparity_q8` the stereo matching: give them with every frame.
+        Nothing is copied whose pixels lie side by side in their rows; rows may lie apart, as in a part of a larger array. Other views, as `[..., ::-1]`, are
+        copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo matching: give them with every frame. A pose must be a rigid motion within
+        the map's bounds. `fused` in the report is true only if something was fused.
         """
+
+    @property
+    def warnings(self) -> list[str]:
+        """Doubts about the first pairs, in sentences."""
+
+    def close(self) -> None:
+        """Frees the memory; every later call is an `Error`. A `with` block calls it at its end."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *error: object) -> None: ...
 
     def finish(self) -> dict[str, Any]:
         """Ends a sequence: prunes what is still in the window."""
 
     @property
     def tracks(self) -> list[Track]:
-        """What is tracked after the last step, oldest first."""
+        """Tracks after the last step, oldest first."""
 
     def raycast(self, t_world_camera: ArrayLike | Pose | None = None, *, objects: bool = True, every: int = 1) -> Raycast:
         """The map's current segment seen from a pose in it, the last one of the camera without one; with the objects where they are now. Of the image's columns and rows every so many
@@ -234,11 +288,11 @@ class Mapper:
 
     @property
     def t_world_camera(self) -> NDArray[np.float64]:
-        """Where the left camera was in the last frame, 4 x 4."""
+        """Pose of the left camera in the last frame, 4 x 4."""
 
     @property
     def disparity_q8(self) -> NDArray[np.uint16]:
-        """Disparity of the last frame in 1/256 px, 0 where there is none: divide by 256 for pixels. Where the mapper matched the pair itself, odd values were
+        """Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Where the mapper matched the pair itself, odd values were
         filled in between measured ones, which are even. It has size 1 x 1 before the first frame."""
 
     @property
@@ -250,7 +304,9 @@ class Mapper:
         """Wall time of the last step within the core; None before the first."""
 
     @property
-    def slab_bytes(self) -> int: ...
+    def slab_bytes(self) -> int:
+        """Bytes of the slab."""
+
     @property
     def config_toml(self) -> str:
         """All settings, as the config.toml of a run has them."""
@@ -263,7 +319,7 @@ class Mapper:
 
     def restore(self, snapshot: bytes) -> None:
         """Continues after the step at which the snapshot was taken, bit for bit. The mapper must have been made with the same rig, bounds and
-        settings. After an error it is as it was made."""
+        settings. After an error it is as it was made. A file of `stream` that this mapper did not make is never touched."""
 
 class Dataset:
     """The frames that `dynvox run PATH` would map; the synthetic street without a path.
@@ -308,29 +364,37 @@ class Dataset:
         fuse_every: int | None = None,
     ) -> Self: ...
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the data set."""
+
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the pictures that are mapped."""
 
     @property
-    def rig(self) -> Rig: ...
+    def rig(self) -> Rig:
+        """The cameras."""
+
     @property
     def notes(self) -> list[str]:
-        """What was assumed or left aside."""
+        """Assumptions, and what was left aside."""
 
     @property
     def warnings(self) -> list[str]:
-        """What is doubtful about the images."""
+        """Doubts about the images, in sentences."""
 
     @property
-    def frame_interval_s(self) -> float: ...
+    def frame_interval_s(self) -> float:
+        """Time between two frames, s."""
+
     @property
     def numbers(self) -> list[int]:
         """Numbers of the frames in the data set."""
 
     @property
-    def times_s(self) -> list[float]: ...
+    def times_s(self) -> list[float]:
+        """Times of the frames, s."""
+
     @property
     def truth(self) -> NDArray[np.float64] | None:
         """True poses, frames x 4 x 4, the first at the origin."""

@@ -8,6 +8,7 @@
 
 mod agreement;
 mod correlation;
+mod live;
 mod order;
 mod patches;
 #[cfg(test)]
@@ -20,6 +21,8 @@ mod tests;
 use crate::formats::Image;
 use crate::input::source::{FrameSource, InputError};
 pub use agreement::{row_difference_px, row_error};
+use dynvox_core::geometry::StereoRig;
+pub use live::LiveExamination;
 use patches::PatchMatch;
 pub use rectified::{PairRectifier, RectifiedSource};
 pub use rows::RowError;
@@ -79,6 +82,25 @@ pub enum Fault {
     Unknown,
 }
 
+impl Fault {
+    /// Name of the fault, for programs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotRectified => "not_rectified",
+            Self::Exchanged => "exchanged",
+            Self::SameImage => "same_image",
+            Self::Baseline => "baseline",
+            Self::Order => "order",
+            Self::Jump => "jump",
+            Self::Exposure => "exposure",
+            Self::Black => "black",
+            Self::Saturated => "saturated",
+            Self::Focus => "focus",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
 /// One fault, in a sentence with the next action.
 #[derive(Clone, Debug)]
 pub struct Finding {
@@ -112,19 +134,7 @@ fn messages(findings: &[Finding]) -> String {
 /// # Errors
 /// A raw source that cannot be rectified.
 pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Finding>, InputError> {
-    let mut findings = Vec::new();
-    let rig = source.rig();
-    if rig.baseline_m > BASELINE_M {
-        findings.push(finding(
-            Fault::Baseline,
-            true,
-            format!(
-                "the cameras are {} m apart. Is the calibration in millimetres? Give the \
-                     baseline in metres",
-                rig.baseline_m
-            ),
-        ));
-    }
+    let mut findings: Vec<Finding> = check_baseline(&source.rig()).into_iter().collect();
     let mut rectified = RectifiedSource::new(source)?;
     let step = indices.len().div_ceil(PAIRS).max(1);
     let mut pairs = Vec::new();
@@ -144,6 +154,18 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
         indices.first().copied().unwrap_or(0),
     ));
     Ok(findings)
+}
+
+/// A baseline that no rig has.
+fn check_baseline(rig: &StereoRig) -> Option<Finding> {
+    (rig.baseline_m > BASELINE_M).then(|| {
+        let message = format!(
+            "the cameras are {} m apart. Is the calibration in millimetres? Give the baseline in \
+             metres",
+            rig.baseline_m
+        );
+        finding(Fault::Baseline, true, message)
+    })
 }
 
 fn finding(fault: Fault, refused: bool, message: String) -> Finding {
