@@ -9,12 +9,15 @@
 //!
 //! The world is the plane through the origin of the fixes: x east, y down, z north.
 
+mod heading;
+
 use super::FleetError;
 use super::manifest::{Given, Job, transform};
 use super::register::Uncertainty;
 use super::submap::Submap;
 use crate::formats::{Fix, LocalPlane, read_gnss};
 use dynvox_core::geometry::Transform;
+use heading::HeadingError;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 
@@ -27,6 +30,8 @@ const TURN_MAX_RAD: f64 = 0.052;
 const ANGLES_SIGMA_RAD: f64 = 0.0175;
 /// Angles may contradict positions by no more, rad.
 const CONTRADICTION_MAX_RAD: f64 = 0.175;
+/// A path that fits its fixes at a scale off by more has other fixes; stereo errs less.
+const SCALE_ERROR_MAX: f64 = 0.08;
 /// Fixes in a row err alike: so many count as one.
 const CORRELATED_FIXES: f64 = 10.0;
 /// Largest standard deviation of a fix from the path, m.
@@ -214,6 +219,26 @@ impl Estimate {
     }
 }
 
+/// Scale at which the path fits its fixes best.
+struct PathScale {
+    factor: f64,
+    /// One standard deviation.
+    sigma: f64,
+}
+
+impl PathScale {
+    fn new(points: &[PointPair], estimate: &Estimate) -> Self {
+        let (from_centre, to_centre) = centres(points, &estimate.weights);
+        let (mut along, mut arm) = (0.0, 0.0);
+        for ((from, to), weight) in points.iter().zip(&estimate.weights) {
+            let turned = estimate.rotation * (from - from_centre);
+            along += weight * turned.dot(&(to - to_centre));
+            arm += weight * turned.norm_squared();
+        }
+        Self { factor: along / arm, sigma: (information_of(estimate.sigma_m) / arm).sqrt() }
+    }
+}
+
 /// Returns the divisor of a fix's squared error.
 fn information_of(sigma_m: f64) -> f64 {
     sigma_m * sigma_m * CORRELATED_FIXES
@@ -263,6 +288,28 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
             "its angles contradict its positions by {:.0} degrees. The camera must look along the \
              vehicle",
             off_rad.to_degrees()
+        ));
+    }
+    // A straight path tells its heading, if not how far the camera leans.
+    let heading = axes
+        .map(|axes| HeadingError::new(&points, &by_positions.weights, by_positions.sigma_m, &axes));
+    if let Some(HeadingError { off_rad, sigma_rad }) = heading
+        && off_rad.abs() > CONTRADICTION_MAX_RAD
+        && sigma_rad < TURN_MAX_RAD
+    {
+        return Err(format!(
+            "its angles contradict the heading of its path by {:.0} degrees. Yaw is 0 to the east \
+             and rises counterclockwise, in rad: it may count from north (compass) or be in \
+             degrees, or latitude and longitude may be exchanged",
+            off_rad.abs().to_degrees()
+        ));
+    }
+    let scale = PathScale::new(&points, &estimate);
+    if (scale.factor - 1.0).abs() > SCALE_ERROR_MAX + 3.0 * scale.sigma {
+        return Err(format!(
+            "its fixes lie along {:.2} x the length of its path. Latitude and longitude may be \
+             exchanged, or the fixes those of another recording",
+            scale.factor
         ));
     }
     let (position_m, rotation_rad) =

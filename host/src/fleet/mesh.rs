@@ -29,8 +29,9 @@ pub fn write_mesh(
     let how = (&volume, &MeshConfig { min_weight });
     // Any profile's slab holds a cube of the map.
     let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
-    let mut ply = PlyWriter::begin_in(out, "the world", axes).map_err(FleetError::io(out))?;
     let (store, colour) = (&mut map.store, map.lattice.colour);
+    let mut ply =
+        PlyWriter::begin_with(out, "the world", axes, colour).map_err(FleetError::io(out))?;
     // No block is left out here: the set is empty.
     let meshed = triangles(store, how, (&mut slab, colour), &HashSet::new(), &mut ply);
     meshed.map_err(|error| FleetError::content(out, format!("cannot be made: {error}")))?;

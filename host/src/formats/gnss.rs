@@ -14,6 +14,10 @@ use std::path::{Path, PathBuf};
 const RADIUS_M: f64 = 6_378_137.0;
 /// First eccentricity of the ellipsoid, squared.
 const ECCENTRICITY_SQUARED: f64 = 0.006_694_379_990_141_316;
+/// Frames of a recording: a week at 30 Hz.
+const FRAMES_MAX: usize = 20_000_000;
+/// Greatest angle, rad: a turn, with the rounding of people's tables.
+const TURN_MAX_RAD: f64 = 6.3;
 /// Folders of KITTI raw with a file a frame, below that of the recording.
 const FOLDERS: [&str; 3] = ["oxts/data", "data", "."];
 
@@ -91,17 +95,35 @@ pub fn read_gnss(path: &Path) -> Result<Vec<Option<Fix>>, FormatError> {
             "Give a file, or a recording of KITTI raw with `oxts/data`",
         ));
     }
-    let first = |file: &PathBuf| {
+    // A frame whose file is missing has no fix.
+    let mut fixes = Vec::new();
+    for (number, file) in &files {
         let text = read_text(file)?;
         let (line, row) = lines_of(&text).next().unwrap_or((1, "-"));
-        row_of(file, line, row)
-    };
-    files.iter().map(first).collect()
+        let fix = row_of(file, line, row)?;
+        if *number >= FRAMES_MAX {
+            return Err(FormatError::content(
+                file,
+                format!("its number is not that of a frame: there are at most {FRAMES_MAX}"),
+                "Name the files by the frames' numbers, from 0",
+            ));
+        }
+        fixes.resize(*number, None);
+        fixes.push(fix);
+    }
+    Ok(fixes)
 }
 
 fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatError> {
     if row == "-" {
         return Ok(None);
+    }
+    if row.starts_with('$') {
+        return Err(FormatError::content(
+            path,
+            format!("line {line} is NMEA"),
+            "Write a line for each frame: latitude and longitude in degrees, altitude in m",
+        ));
     }
     let fix = numbers_of(row).and_then(|numbers| {
         let &[latitude_deg, longitude_deg, altitude_m, ref more @ ..] = &numbers[..] else {
@@ -119,22 +141,31 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
     });
     let action = "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw \
                   (6), KITTI's 30, or - where there was no fix";
+    if let Some(angle) = fix
+        .and_then(|fix| fix.angles_rad)
+        .and_then(|angles_rad| angles_rad.into_iter().find(|angle| angle.abs() > TURN_MAX_RAD))
+    {
+        return Err(FormatError::content(
+            path,
+            format!("line {line} has an angle of {angle}, more than a turn in rad"),
+            "It may be in degrees: write roll, pitch and yaw in rad, yaw 0 to the east",
+        ));
+    }
     fix.map(Some)
         .ok_or_else(|| FormatError::content(path, format!("line {line} is no fix"), action))
 }
 
-/// The text files of a folder whose names are numbers, by name.
-fn text_files(folder: &Path) -> Vec<PathBuf> {
+/// The text files of a folder whose names are numbers, by number.
+fn text_files(folder: &Path) -> Vec<(usize, PathBuf)> {
     let entries =
         std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let is_number = |path: &PathBuf| {
-        path.file_stem()
-            .is_some_and(|stem| stem.to_string_lossy().bytes().all(|byte| byte.is_ascii_digit()))
+    let number = |path: PathBuf| {
+        let number = path.file_stem()?.to_str()?.parse().ok()?;
+        path.extension().is_some_and(|end| end == "txt").then_some((number, path))
     };
-    let mut files: Vec<PathBuf> = entries
-        .filter(|path| path.extension().is_some_and(|end| end == "txt") && is_number(path))
-        .collect();
+    let mut files: Vec<(usize, PathBuf)> = entries.filter_map(number).collect();
     files.sort();
+    files.dedup_by_key(|(number, _)| *number);
     files
 }
 
@@ -187,6 +218,22 @@ mod tests {
             fixes[1].unwrap(),
             Fix { geodetic: [49.0, 8.1, 112.0], angles_rad: Some([0.01, 0.02, -1.5]) }
         );
+        // A gap in the files is a gap in the fixes.
+        std::fs::rename(
+            folder.join("oxts/data/0000000001.txt"),
+            folder.join("oxts/data/0000000003.txt"),
+        )
+        .unwrap();
+        let gap = read_gnss(&folder).unwrap();
+        assert!(gap.len() == 4 && gap[1].is_none() && gap[3] == fixes[1]);
+        for (row, expected) in [
+            ("49 8.4 110 0 0 90.2", "may be in degrees"),
+            ("$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47", "is NMEA"),
+        ] {
+            std::fs::write(&file, row).unwrap();
+            let refused = read_gnss(&file).unwrap_err().to_string();
+            assert!(refused.contains(expected), "{refused}");
+        }
         std::fs::write(&file, "49 8.4\n").unwrap();
         assert!(
             read_gnss(&file)

@@ -94,3 +94,24 @@ fn a_mesh_shares_recent_vertices_and_its_header_counts_are_true() {
     );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the file of faces is gone");
 }
+
+#[test]
+fn a_mesh_without_colours_has_no_properties_of_colour() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("map.ply");
+    let mut ply = PlyWriter::begin_with(&path, "a test", Axes::Camera, false).unwrap();
+    ply.begin_object(7);
+    let corner =
+        |x: f32, y: f32| Vertex { position_m: [x, y, 2.0], colour: [0; 3], weight: 40 + x as u8 };
+    ply.triangle([corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0)]);
+    ply.finish().unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let end = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+    let header = std::str::from_utf8(&bytes[..end]).unwrap();
+    assert!(!header.contains("red") && header.contains("uchar weight"), "{header}");
+    assert_eq!(bytes.len() - end, 3 * 29 + 13);
+    let mut corners = Vec::new();
+    PlyMesh::open(&path).unwrap().triangles(|triangle| corners.extend(triangle)).unwrap();
+    let [_, second, _] = corners[..] else { panic!("{corners:?}") };
+    assert_eq!((second.object, second.vertex), (7, corner(1.0, 0.0)));
+}

@@ -75,7 +75,7 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
         }
         Source::Street => Box::new(StreetFrames::new(request.settings.street())?),
     };
-    let dataset = depth::attach(dataset, &request.depth)?;
+    let dataset = depth::attach(dataset, &request.depth, request.depth_scale.as_ref())?;
     let scale = request.frames.scale;
     Ok(if scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, scale)?) })
 }

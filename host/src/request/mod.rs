@@ -54,7 +54,7 @@ pub(crate) use settings::leaves;
 pub use sizes::{Bytes, ImageSize, WindowSize};
 pub use storage::{Storage, Streaming};
 
-use crate::input::depth::DepthChoice;
+use crate::input::depth::{DepthChoice, DepthScale};
 use serde::{Deserialize, Serialize};
 
 /// Everything that is asked of a run. The default maps the synthetic street.
@@ -90,6 +90,8 @@ pub struct Request {
     pub frames: Frames,
     /// Source of depth.
     pub depth: DepthChoice,
+    /// Unit of the numbers in files of depth; the usual one of their format if absent.
+    pub depth_scale: Option<DepthScale>,
     /// Source of instance masks.
     pub masks: Masks,
     /// Source of the camera's poses.

@@ -9,7 +9,7 @@ use super::{
 use crate::formats::Axes;
 use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
 use crate::input::Topics;
-use crate::input::depth::DepthChoice;
+use crate::input::depth::{DepthChoice, DepthScale};
 use crate::input::faults::Faults;
 use crate::input::masks::MaskChoice;
 use crate::input::stream::WhenLate;
@@ -146,6 +146,12 @@ pub struct Options {
     #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
     #[serde(deserialize_with = "words::parsed")]
     pub depth: Option<DepthChoice>,
+    /// Unit of the numbers in files of depth: m (of disparities px) for each unit, such as 0.001 or
+    /// 1/5000, or a name: m, cm, mm, tum (1/5000), kitti (1/256), sgbm (1/16 px), negative (-1 px)
+    /// [default: PNG mm or 1/256 px, PFM m or px, XML mm]
+    #[arg(long, value_name = "UNIT", allow_hyphen_values = true, help_heading = "Mapping")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub depth_scale: Option<DepthScale>,
     /// Source of instance masks
     #[arg(
         long,
@@ -251,6 +257,7 @@ impl Options {
             input: self.input()?,
             frames: self.frames(),
             depth: self.depth.clone().unwrap_or_default(),
+            depth_scale: self.depth_scale.clone(),
             masks: self.masks(),
             poses: self.poses(),
             bounds: self.bounds()?,

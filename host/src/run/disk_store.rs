@@ -119,7 +119,8 @@ impl MeshOutput {
         folder: &RunFolder,
         (axes, colour): (Axes, bool),
     ) -> Self {
-        let begin = || PlyWriter::begin_in(&folder.file(MAP_FILE), "the first camera", axes);
+        let begin =
+            || PlyWriter::begin_with(&folder.file(MAP_FILE), "the first camera", axes, colour);
         // A disk without a free entry has those of the reserve.
         let mut ply = begin().or_else(|_| {
             folder.release_reserve();

@@ -9,6 +9,7 @@ mod error;
 mod execute;
 mod folder;
 mod map_objects;
+mod mask_effect;
 mod progress;
 mod reader;
 mod record;

@@ -3,6 +3,7 @@
 use super::checkpoint::{self, Checkpoint, ResumeError, RunManifest};
 use super::disk_store::{BLOCKS_FILE, DiskStore};
 use super::error::{RunError, refused, step_reason};
+use super::mask_effect::MaskEffect;
 use super::resident::address_space;
 use super::retired::RetiredVolumes;
 use super::state::RunState;
@@ -42,6 +43,7 @@ pub(super) struct Session<'p, 's> {
     pub state: RunState,
     /// Time before this is in the timers.
     pub since: Instant,
+    masks: MaskEffect,
 }
 
 impl<'p, 's> Session<'p, 's> {
@@ -108,6 +110,7 @@ impl<'p, 's> Session<'p, 's> {
                 .poses
                 .as_ref()
                 .map(|poses| from_first(poses, &(0..poses.len()).collect::<Vec<_>>())),
+            masks: MaskEffect::new(&plan.request.masks.source, plan.request.masks.every.get()),
             state,
             since,
         })
@@ -233,6 +236,9 @@ impl<'p, 's> Session<'p, 's> {
             f64::from(blocks.used) / f64::from(blocks.capacity),
             row.is_extrapolated(),
         );
+        let given = images.masks.instances.len();
+        let warning = self.masks.add(&row, given, &self.plan.request.masks.source);
+        warning.iter().for_each(|warning| progress.warn(warning));
         let evicted = self.store.take_evicted();
         let mut view =
             LiveMap { mapper: &mut self.mapper, threads: &self.threads, first_raycast: None };

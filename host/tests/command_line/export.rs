@@ -175,8 +175,6 @@ fn glb_objects(path: &Path) -> ObjectCells {
             rotation: numbers(&node["rotation"]).try_into().unwrap(),
         };
         let mesh = &json["nodes"][at(&node["children"][0])];
-        // Positions are quantised: the node's scale and translation undo that.
-        let (low_m, size_m) = (numbers(&mesh["translation"]), numbers(&mesh["scale"])[0]);
         let accessor = &json["accessors"]
             [at(&json["meshes"][at(&mesh["mesh"])]["primitives"][0]["attributes"]["POSITION"])];
         let view = &json["bufferViews"][at(&accessor["bufferView"])];
@@ -185,12 +183,10 @@ fn glb_objects(path: &Path) -> ObjectCells {
             .take(at(&accessor["count"]));
         let object = cells.entry(name.split('-').next().unwrap().parse().unwrap()).or_default();
         for vertex in vertices {
-            let steps = |axis: usize| {
-                f64::from(u16::from_le_bytes([vertex[2 * axis], vertex[2 * axis + 1]])) / 65_535.0
+            let metres = |axis: usize| {
+                f64::from(f32::from_le_bytes(vertex[4 * axis..4 * axis + 4].try_into().unwrap()))
             };
-            object.insert(cell(
-                pose.transform_point([0, 1, 2].map(|axis| low_m[axis] + size_m * steps(axis))),
-            ));
+            object.insert(cell(pose.transform_point([0, 1, 2].map(metres))));
         }
     }
     cells

@@ -103,7 +103,7 @@ fn a_straight_or_short_path_is_refused_unless_angles_are_given() {
         georeference(&observed(bend_rad, 0.8, 0.4, Some(1.5)), ANTENNA_M).unwrap_err()
     };
     assert!(turned(0.6).contains("contradict its positions by 8"), "{}", turned(0.6));
-    assert!(turned(0.0).contains("m off its path"), "{}", turned(0.0));
+    assert!(turned(0.0).contains("the heading of its path by 8"), "{}", turned(0.0));
 }
 
 #[test]
@@ -120,4 +120,98 @@ fn a_vehicle_that_heads_north_has_the_axes_of_the_world() {
         (left_up - Vector3::new(0.1f64.cos(), 0.1f64.sin(), 0.0)).norm() < 1e-12,
         "positive with the left side up: {left_up}"
     );
+}
+
+/// A path of 150 m by a seed: its heading, bends and noise.
+struct Drive {
+    noise: Noise,
+    heading_rad: f64,
+    bend_rad: f64,
+}
+
+/// Mistake in the table of fixes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mistake {
+    None,
+    Compass,
+    Degrees,
+    Exchanged,
+    OtherDrive,
+}
+
+impl Drive {
+    fn new(seed: u64) -> Self {
+        let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        (0..20).for_each(|_| {
+            noise.next();
+        });
+        // Not towards the north-east, where the compass agrees with yaw.
+        let heading_rad = 0.785 + 0.5 + 2.1 * (0.5 + 0.5 * noise.next());
+        let bend_rad = 0.3 * noise.next().abs();
+        Self { noise, heading_rad, bend_rad }
+    }
+
+    /// The frames of the path as its table of fixes gives them, with gaps, and the map's pose.
+    fn observed(&mut self, mistake: Mistake) -> (Vec<Observation>, Transform) {
+        let plane = LocalPlane::at([49.0, 8.4, 110.0]);
+        let (mut map_m, mut east_north_m, mut yaw) = ([0.0; 3], [0.0; 2], self.heading_rad);
+        let t_world_map = Transform::from_rotation_matrix(
+            &camera_axes([0.0, 0.0, yaw]).transpose().into(),
+            [0.0; 3],
+        );
+        let mut frames = Vec::new();
+        for nth in 0..150u32 {
+            let turned = yaw - self.heading_rad;
+            // The camera's y points down: a turn to the left is negative about it.
+            let t_map_camera = Transform::new([0.0, -turned, 0.0], map_m);
+            let [east, north] = east_north_m;
+            let noise = self.noise.vector(0.3);
+            let mut geodetic = [
+                49.0 + (north + noise.x) / 111_212.0,
+                8.4 + (east + noise.y) / 73_173.0,
+                110.0 + noise.z,
+            ];
+            let mut angles = [0.0, 0.0, yaw + 0.005 * self.noise.next()];
+            match mistake {
+                Mistake::None => {}
+                Mistake::Compass => angles[2] = std::f64::consts::FRAC_PI_2 - angles[2],
+                Mistake::Degrees => angles[2] = angles[2].to_degrees(),
+                Mistake::Exchanged => geodetic.swap(0, 1),
+                Mistake::OtherDrive => geodetic[1] = 8.4 - 2.5 * (geodetic[1] - 8.4),
+            }
+            let fix = Fix { geodetic, angles_rad: Some(angles) };
+            let origin = if mistake == Mistake::Exchanged {
+                LocalPlane::at([8.4, 49.0, 110.0])
+            } else {
+                plane
+            };
+            if nth % 7 != 3 {
+                frames.push(Observation::of(&t_map_camera, &fix, &origin));
+            }
+            let step = t_map_camera.rotate([0.0, 0.0, 1.0]);
+            (0..3).for_each(|axis| map_m[axis] += step[axis]);
+            east_north_m = [east + yaw.cos(), north + yaw.sin()];
+            yaw += self.bend_rad / 150.0;
+        }
+        (frames, t_world_map)
+    }
+}
+
+#[test]
+fn tables_with_a_mistake_are_refused_and_others_lie_within_their_sigma() {
+    for seed in 0..100 {
+        for mistake in [Mistake::Compass, Mistake::Degrees, Mistake::Exchanged, Mistake::OtherDrive]
+        {
+            let (frames, _) = Drive::new(seed).observed(mistake);
+            let found = georeference(&frames, [0.0; 3]);
+            assert!(found.is_err(), "{mistake:?} of seed {seed}: {found:?}");
+        }
+        let (frames, t_world_map) = Drive::new(seed).observed(Mistake::None);
+        let found =
+            georeference(&frames, [0.0; 3]).unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let stated = found.uncertainty.unwrap();
+        let apart = t_world_map.inverse() * found.t_world_map;
+        assert!(apart.distance_m() < 3.0 * stated.position_m, "{seed}: {apart:?}, {stated:?}");
+        assert!(apart.angle_rad() < 3.0 * stated.rotation_rad, "{seed}: {apart:?}, {stated:?}");
+    }
 }

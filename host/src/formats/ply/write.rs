@@ -27,12 +27,14 @@ const DIGITS: usize = 10;
 /// Bytes of a vertex: position and normal of three floats, three bytes of colour, the weight, the
 /// object's number.
 const VERTEX_BYTES: usize = 32;
+/// Bytes of a vertex's colour.
+const COLOUR_BYTES: usize = 3;
 /// Offset of a vertex's normal, bytes.
 const NORMAL: usize = 12;
-const PROPERTIES: &[u8] =
-    b"property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar \
-    weight\nproperty int object\n";
+const POSITION: &str = "property float x\nproperty float y\nproperty float z\n\
+                        property float nx\nproperty float ny\nproperty float nz\n";
+const COLOUR: &str = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+const REST: &str = "property uchar weight\nproperty int object\n";
 
 /// Counts of a written mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,6 +63,8 @@ pub struct PlyWriter {
     vertices: Records,
     faces: BufWriter<File>,
     axes: Axes,
+    /// Vertices have colours.
+    colour: bool,
     vertex_count_at: u64,
     face_count_at: u64,
     /// Recent vertices, each in the slot of its hash. Untouched slots cost no memory.
@@ -91,6 +95,15 @@ impl PlyWriter {
     /// # Errors
     /// The disk refuses.
     pub fn begin_in(path: &Path, frame: &str, axes: Axes) -> io::Result<Self> {
+        Self::begin_with(path, frame, axes, true)
+    }
+
+    /// Begins a file like [`PlyWriter::begin_in`]; without `colour` its vertices have no colours,
+    /// so that viewers do not show a map of grey images as black.
+    ///
+    /// # Errors
+    /// The disk refuses.
+    pub fn begin_with(path: &Path, frame: &str, axes: Axes, colour: bool) -> io::Result<Self> {
         let mut file = BufWriter::new(owned::create_file(path)?);
         write!(
             file,
@@ -102,16 +115,17 @@ impl PlyWriter {
             "comment object: 0 for the static map, otherwise the number of the object's track"
         )?;
         let vertex_count_at = count_line(&mut file, "element vertex ")?;
-        file.write_all(PROPERTIES)?;
+        write!(file, "{POSITION}{}{REST}", if colour { COLOUR } else { "" })?;
         let face_count_at = count_line(&mut file, "element face ")?;
         file.write_all(b"property list uchar uint vertex_indices\nend_header\n")?;
         let start = file.stream_position()?;
         let file = file.into_inner().map_err(|error| error.into_error())?;
         let faces = owned::create_unnamed(&path.with_extension("faces"))?;
         Ok(Self {
-            vertices: Records::new(file, start, 0, VERTEX_BYTES),
+            vertices: Records::new(file, start, 0, vertex_bytes(colour)),
             faces: BufWriter::with_capacity(FACES, faces),
             axes,
+            colour,
             vertex_count_at,
             face_count_at,
             window: vec![[0; 5]; WINDOW],
@@ -184,10 +198,15 @@ impl PlyWriter {
         for (bytes, value) in record.chunks_exact_mut(4).zip(self.axes.of_camera(*position_m)) {
             bytes.copy_from_slice(&value.to_le_bytes());
         }
-        record[24..27].copy_from_slice(colour);
-        record[27] = *weight;
-        record[28..].copy_from_slice(&self.object.to_le_bytes());
-        self.vertices.push(&record)?;
+        let weight_at = if self.colour {
+            record[24..24 + COLOUR_BYTES].copy_from_slice(colour);
+            24 + COLOUR_BYTES
+        } else {
+            24
+        };
+        record[weight_at] = *weight;
+        record[weight_at + 1..weight_at + 5].copy_from_slice(&self.object.to_le_bytes());
+        self.vertices.push(&record[..vertex_bytes(self.colour)])?;
         Ok(next - 1)
     }
 
@@ -267,6 +286,11 @@ fn add_normal(vertex: &mut [u8], normal: [f32; 3]) {
 fn normalize(vertex: &mut [u8]) {
     let normal = nalgebra::Vector3::from(normal_of(vertex));
     set_normal(vertex, normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_default().into());
+}
+
+/// Bytes of a vertex with or without colour.
+fn vertex_bytes(colour: bool) -> usize {
+    if colour { VERTEX_BYTES } else { VERTEX_BYTES - COLOUR_BYTES }
 }
 
 /// Writes a header line with space for a count and returns the position of the count.

@@ -1,5 +1,7 @@
 //! Choosing a source and laying it over a data set.
 
+use super::compare::{self, Ratios};
+use super::scale::{DepthScale, suggestion};
 use crate::formats::{FormatError, Image, read_opencv_depth, read_pfm, read_png_deep};
 use crate::input::source::{
     AvailableMasks, FrameSource, GivenDepth, InputError, Overlay, OverlaySource, Quantity,
@@ -117,13 +119,16 @@ impl fmt::Display for DepthChoice {
     }
 }
 
-/// Lays the chosen depth over a data set whose images have their full size.
+/// Lays the chosen depth over a data set whose images have their full size; `scale` is the unit of
+/// the files' numbers, where it is not the usual one.
 ///
 /// # Errors
-/// The folder does not exist, has nothing for the first frame, or the data set has no exact depth.
+/// The folder does not exist, has nothing for any frame, has depths of another unit, or the data set
+/// has no exact depth.
 pub fn attach(
     dataset: Box<dyn FrameSource>,
     choice: &DepthChoice,
+    scale: Option<&DepthScale>,
 ) -> Result<Box<dyn FrameSource>, InputError> {
     let (folder, quantity) = match choice {
         DepthChoice::Elas => return Ok(dataset),
@@ -167,9 +172,81 @@ pub fn attach(
     } else {
         format!(" for {there} of {} frames", files.len())
     };
-    let note = format!("{what} from {}{part}", folder.display());
+    let unit = FileUnit { quantity, per_unit: scale.map(DepthScale::per_unit) };
+    let mut note = format!("{what} from {}{part}", folder.display());
+    if let Some(off) = unit_off(dataset.as_ref(), &files, unit)? {
+        // A unit that was named is believed, and the factor is only said.
+        if scale.is_none() {
+            return Err(InputError::depth(folder, off));
+        }
+        note = format!("{note}; {off}");
+    }
     let expected = stems.iter().map(|stem| folder.join(format!("{stem}.png"))).collect();
-    Ok(Box::new(Overlay::new(dataset, Source::Files { files, expected, quantity }, note)))
+    Ok(Box::new(Overlay::new(dataset, Source::Files { files, expected, unit }, note)))
+}
+
+/// Says by which factor the files' depths differ from the run's own matches, if by one.
+fn unit_off(
+    dataset: &dyn FrameSource,
+    files: &[Option<PathBuf>],
+    unit: FileUnit,
+) -> Result<Option<String>, InputError> {
+    let there: Vec<(usize, &PathBuf)> =
+        (0..).zip(files).filter_map(|(at, file)| Some((at, file.as_ref()?))).collect();
+    let step = there.len().div_ceil(compare::FRAMES).max(1);
+    let mut ratios = Ratios::default();
+    for (index, path) in there.iter().step_by(step) {
+        // Frames that cannot be read are refused when their turn comes.
+        let Ok(images) = dataset.frame(*index) else { continue };
+        let Ok(given) = read(path, unit, dataset.size(), &dataset.rig()) else { continue };
+        if let Some(matched) = compare::matched(dataset, &images) {
+            ratios.add(&given.disparity_q8, &matched);
+        }
+    }
+    Ok(ratios.factor().map(|ratio| {
+        let (factor, direction) = if ratio > 1.0 { (ratio, "near") } else { (1.0 / ratio, "far") };
+        // Depth falls as disparity rises.
+        let right = match (unit.quantity, there.first()) {
+            (Quantity::DepthM, Some((_, path))) => unit.of(path) * ratio,
+            (Quantity::DisparityPx, Some((_, path))) => unit.of(path) / ratio,
+            (_, None) => 1.0,
+        };
+        let option = suggestion(right, unit.quantity);
+        format!(
+            "its depths are {factor:.1} x too {direction} compared with the run's own matches. The \
+             unit of its numbers may be another: try --depth-scale {option}"
+        )
+    }))
+}
+
+/// Unit of the numbers in files.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FileUnit {
+    pub quantity: Quantity,
+    /// M or px for each unit; `None` for the usual unit of the file's format.
+    pub per_unit: Option<f64>,
+}
+
+impl FileUnit {
+    /// The usual unit.
+    #[cfg(test)]
+    pub fn usual(quantity: Quantity) -> Self {
+        Self { quantity, per_unit: None }
+    }
+
+    /// M or px for each unit of a file's numbers.
+    fn of(&self, path: &Path) -> f64 {
+        let usual = || match (ending(path), self.quantity) {
+            (Some("pfm"), _) => 1.0,
+            (Some("xml"), _) | (_, Quantity::DepthM) => 1e-3,
+            (_, Quantity::DisparityPx) => 1.0 / 256.0,
+        };
+        self.per_unit.unwrap_or_else(usual)
+    }
+}
+
+fn ending(path: &Path) -> Option<&str> {
+    path.extension().and_then(|ending| ending.to_str())
 }
 
 /// A folder whose name speaks of depth and not of disparity holds depth:
@@ -193,17 +270,23 @@ fn file_of(folders: &[PathBuf], stem: &str) -> Option<PathBuf> {
     files.find(|path| path.is_file())
 }
 
-/// Reads one file. What it holds follows from its format and `quantity`.
+/// Reads one file. What it holds follows from its format and `unit`.
 pub(super) fn read(
     path: &Path,
-    quantity: Quantity,
+    unit: FileUnit,
     size: (usize, usize),
     rig: &StereoRig,
 ) -> Result<GivenDepth, InputError> {
-    let (values, quantity) = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("pfm") => (read_pfm(path, size).map_err(InputError::depth_format)?, quantity),
+    let per_unit = unit.of(path) as f32;
+    let (values, quantity) = match ending(path) {
+        Some("pfm") => {
+            let values = read_pfm(path, size).map_err(InputError::depth_format)?;
+            (values.map(|value| value * per_unit), unit.quantity)
+        }
         Some("xml") => {
-            (read_opencv_depth(path, size).map_err(InputError::depth_format)?, Quantity::DepthM)
+            // Read in m, of mm.
+            let values = read_opencv_depth(path, size).map_err(InputError::depth_format)?;
+            (values.map(|value| value * (per_unit / 1e-3)), Quantity::DepthM)
         }
         _ => {
             let image = read_png_deep(path).map_err(InputError::depth_format)?;
@@ -214,14 +297,49 @@ pub(super) fn read(
                     size,
                 )));
             }
-            let unit = match quantity {
-                Quantity::DisparityPx => 1.0 / 256.0,
-                Quantity::DepthM => 1e-3,
-            };
-            (image.map(|&value| f32::from(value) * unit), quantity)
+            (image.map(|&value| f32::from(value) * per_unit), unit.quantity)
         }
     };
-    Ok(to_disparity(&values, quantity, rig))
+    let given = to_disparity(&values, quantity, rig);
+    match refused_by_most(&given, &values, quantity) {
+        Some(reason) => Err(InputError::depth(path, reason)),
+        None => Ok(given),
+    }
+}
+
+/// Says why most values of a file are none, if they are.
+fn refused_by_most(given: &GivenDepth, values: &Image<f32>, quantity: Quantity) -> Option<String> {
+    let usable = given.disparity_q8.pixels().iter().filter(|value| **value > 0).count();
+    let count = |is: fn(f32) -> bool| values.pixels().iter().filter(|value| is(**value)).count();
+    let (all, finite, negative, positive) = (
+        values.pixels().len(),
+        count(f32::is_finite),
+        count(|value| value < 0.0 && value.is_finite()),
+        count(|value| value > 0.0 && value.is_finite()),
+    );
+    if negative > usable {
+        return Some(format!(
+            "{negative} of {all} values are negative. Disparities of some matchers are right minus \
+             left: if these are, give --depth-scale negative"
+        ));
+    }
+    if given.refused.out_of_range as usize > usable {
+        let bound = match quantity {
+            Quantity::DisparityPx => "are disparities of 256 px and more",
+            Quantity::DepthM => "are depths nearer than a disparity of 256 px",
+        };
+        return Some(format!(
+            "{} of {all} values {bound}: the unit may be another. Give it with --depth-scale",
+            given.refused.out_of_range
+        ));
+    }
+    if usable == 0 && 2 * positive > all {
+        return Some(format!(
+            "{positive} of {all} values are too far to have a disparity: the unit may be another. \
+             Give it with --depth-scale"
+        ));
+    }
+    (finite == 0).then(|| format!("none of its {all} values is a number"))
 }
 
 enum Source {
@@ -229,7 +347,7 @@ enum Source {
         files: Vec<Option<PathBuf>>,
         /// Paths at which a missing file was expected.
         expected: Vec<PathBuf>,
-        quantity: Quantity,
+        unit: FileUnit,
     },
     Exact,
 }
@@ -249,9 +367,9 @@ impl OverlaySource for Source {
                     exact.depth_m.map(|&depth_m| if depth_m.is_finite() { depth_m } else { 0.0 });
                 to_disparity(&depth_m, Quantity::DepthM, &rig)
             }),
-            Self::Files { files, expected, quantity } => {
+            Self::Files { files, expected, unit } => {
                 match (files.get(index).and_then(Option::as_ref), expected.get(index)) {
-                    (Some(path), _) => Some(read(path, *quantity, size, &rig)?),
+                    (Some(path), _) => Some(read(path, *unit, size, &rig)?),
                     (None, Some(path)) => {
                         return Err(InputError::depth(
                             path,

@@ -1,6 +1,6 @@
 //! Files of other programs, each kind of bad input, and what the core makes of given depth.
 
-use super::files::read;
+use super::files::{FileUnit, read};
 use super::*;
 use crate::formats::{Image, read_opencv_depth, read_pfm};
 use crate::input::source::{DepthRefusals, Quantity, to_disparity};
@@ -32,7 +32,8 @@ fn refusal_of<T>(result: Result<T, impl std::fmt::Display>) -> String {
 #[test]
 fn disparities_of_opencv_arrive_bit_for_bit() {
     for name in ["disparity.png", "disparity.pfm"] {
-        let given = read(&fixture(name), Quantity::DisparityPx, SIZE, &RIG).unwrap();
+        let given =
+            read(&fixture(name), FileUnit::usual(Quantity::DisparityPx), SIZE, &RIG).unwrap();
         let put_in = [(2, 1), (3, 2), (4, 3)];
         for v in 0..SIZE.1 {
             for u in 0..SIZE.0 {
@@ -58,7 +59,7 @@ fn disparities_of_opencv_arrive_bit_for_bit() {
 #[test]
 fn depths_of_opencv_become_the_disparities_they_were_made_of() {
     for name in ["depth_mm.png", "depth.xml"] {
-        let given = read(&fixture(name), Quantity::DepthM, SIZE, &RIG).unwrap();
+        let given = read(&fixture(name), FileUnit::usual(Quantity::DepthM), SIZE, &RIG).unwrap();
         for v in 0..SIZE.1 {
             for u in (0..SIZE.0).filter(|&u| (u, v) != (0, 0)) {
                 let found = f64::from(given.disparity_q8.get(u, v).unwrap()) / 256.0;
@@ -119,12 +120,17 @@ fn broken_files_and_other_sizes_are_refused_with_a_sentence() {
     let small = root.path().join("small.png");
     image::GrayImage::new(8, 6).save(&small).unwrap();
     assert!(
-        refusal_of(read(&small, Quantity::DisparityPx, SIZE, &RIG))
+        refusal_of(read(&small, FileUnit::usual(Quantity::DisparityPx), SIZE, &RIG))
             .contains("8 bit, not of one of 16")
     );
     assert!(
-        refusal_of(read(&fixture("disparity.png"), Quantity::DisparityPx, (4, 4), &RIG))
-            .contains("8 x 6 px")
+        refusal_of(read(
+            &fixture("disparity.png"),
+            FileUnit::usual(Quantity::DisparityPx),
+            (4, 4),
+            &RIG
+        ))
+        .contains("8 x 6 px")
     );
 }
 
@@ -167,7 +173,7 @@ fn rig(folder: &str, name: &str, file: &str) -> TempDir {
 
 fn laid_over(root: &TempDir, choice: &str) -> Result<Box<dyn FrameSource>, InputError> {
     let choice = choice.replace("ROOT", &root.path().display().to_string());
-    attach(input::open(root.path(), &OpenOptions::default())?, &choice.parse().unwrap())
+    attach(input::open(root.path(), &OpenOptions::default())?, &choice.parse().unwrap(), None)
 }
 
 #[test]
@@ -208,7 +214,7 @@ fn scaled_images_have_scaled_disparities() {
     let street =
         StreetFrames::new(StreetConfig { width: 160, height: 64, ..StreetConfig::default() })
             .unwrap();
-    let street = attach(Box::new(street), &DepthChoice::Exact).unwrap();
+    let street = attach(Box::new(street), &DepthChoice::Exact, None).unwrap();
     let whole = street.frame(0).unwrap();
     let half = Scaled::new(street, 0.5).unwrap();
     let (depth, exact) = (half.frame(0).unwrap(), half.rig().focal_baseline_px_m());
@@ -225,4 +231,92 @@ fn scaled_images_have_scaled_disparities() {
         })
         .count();
     assert_eq!((wrong, whole.depth.unwrap().refused.count()), (0, 0));
+}
+
+/// Size of the images of two walls.
+const WALLS: (u32, u32) = (200, 96);
+
+/// Disparity of the walls in a row, px: one far above, one near below. [`RIG`] has 45 px m.
+fn wall_px(v: u32) -> u32 {
+    if v < WALLS.1 / 2 { 8 } else { 16 }
+}
+
+/// Two walls of noise, and a folder of PFM files of their depth or disparity times a factor.
+fn walls(
+    factor: f32,
+    kind: &str,
+    scale: Option<&str>,
+) -> (TempDir, Result<Box<dyn FrameSource>, InputError>) {
+    let root = TempDir::new().unwrap();
+    let noise = |u: u32, v: u32| {
+        let hash = (u * 73_856_093 ^ v * 19_349_663).wrapping_mul(0x9e37_79b1);
+        image::Luma([(hash >> 24) as u8])
+    };
+    let file = |side: &str, ending: &str| {
+        fs::create_dir_all(root.path().join(side)).unwrap();
+        root.path().join(side).join(format!("000000.{ending}"))
+    };
+    let (width, height) = WALLS;
+    let left = image::GrayImage::from_fn(width, height, noise);
+    let right = image::GrayImage::from_fn(width, height, |u, v| noise(u + wall_px(v), v));
+    left.save(file("left", "png")).unwrap();
+    right.save(file("right", "png")).unwrap();
+    let calib = "focal_px 90\ncenter_u_px 100\ncenter_v_px 48\nbaseline_m 0.5\n";
+    fs::write(root.path().join("calib.txt"), calib).unwrap();
+    let value = |v: u32| match kind {
+        "depth" => 45.0 / wall_px(v) as f32 * factor,
+        _ => wall_px(v) as f32 * factor,
+    };
+    let mut bytes = format!("Pf\n{width} {height}\n-1\n").into_bytes();
+    for v in (0..height).rev() {
+        bytes.extend((0..width).flat_map(|_| value(v).to_le_bytes()));
+    }
+    fs::write(file("given", "pfm"), bytes).unwrap();
+    let choice = format!("{kind}:{}", root.path().join("given").display()).parse().unwrap();
+    let scale = scale.map(|scale| scale.parse().unwrap());
+    let laid = input::open(root.path(), &OpenOptions::default())
+        .and_then(|dataset| attach(dataset, &choice, scale.as_ref()));
+    (root, laid)
+}
+
+#[test]
+fn depth_in_another_unit_is_named_with_its_factor() {
+    for (kind, factor, expected) in [
+        ("depth", 4.0, "4.0 x too far"),
+        ("depth", 0.25, "4.0 x too near"),
+        ("depth", 100.0, "--depth-scale cm"),
+        ("disparity", 40.0, "256 px and more"),
+        ("disparity", 0.062_5, "--depth-scale 1.600e1"),
+        ("disparity", 0.5, "2.0 x too far"),
+    ] {
+        let (_root, laid) = walls(factor, kind, None);
+        let reason = refusal_of(laid.and_then(|dataset| dataset.frame(0)));
+        assert!(reason.contains(expected), "{kind} times {factor}: {reason}");
+        let (_root, laid) = walls(factor, kind, Some(&format!("1/{factor}")));
+        let frame = laid.unwrap().frame(0).unwrap();
+        let found = frame.depth.unwrap().disparity_q8.get(50, 80);
+        assert_eq!(found, Some(16 * 256), "{kind} times {factor}, scaled back");
+    }
+    for (kind, factor) in [("depth", 1.0), ("disparity", 1.0), ("depth", 1.1)] {
+        assert!(walls(factor, kind, None).1.is_ok(), "{kind} times {factor}");
+    }
+}
+
+#[test]
+fn negative_disparities_are_refused_and_turned_by_their_scale() {
+    let (_root, laid) = walls(-1.0, "disparity", None);
+    let reason = refusal_of(laid.unwrap().frame(0));
+    assert!(
+        reason.contains("are negative") && reason.contains("--depth-scale negative"),
+        "{reason}"
+    );
+    let (_root, laid) = walls(-1.0, "disparity", Some("negative"));
+    assert_eq!(laid.unwrap().frame(0).unwrap().depth.unwrap().refused, DepthRefusals::default());
+}
+
+#[test]
+fn files_without_a_number_are_refused() {
+    let (_root, laid) = walls(f32::INFINITY, "depth", None);
+    let reason = refusal_of(laid.unwrap().frame(0));
+    assert!(reason.contains("none of its"), "{reason}");
 }

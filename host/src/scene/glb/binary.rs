@@ -7,7 +7,6 @@ pub const VERTICES: u32 = 34_962;
 /// A buffer that is used for indices.
 pub const INDICES: u32 = 34_963;
 /// Types of numbers.
-pub const I8: u32 = 5_120;
 pub const U16: u32 = 5_123;
 pub const U32: u32 = 5_125;
 pub const F32: u32 = 5_126;

@@ -1,17 +1,17 @@
 //! A scene as binary glTF 2.0 (GLB): the static map, and each object as a node that moves along its
 //! trajectory.
 //!
-//! Positions have 16 bits and normals 8 (`KHR_mesh_quantization`); a node's scale and translation
-//! turn them into m. glTF's axes are x right, y up, z backward: the root node turns the first
+//! Positions and normals are floats, in m: of `KHR_mesh_quantization`, which halves the bytes, many
+//! readers make maps of thousands of kilometres. glTF's axes are x right, y up, z backward: the root node turns the first
 //! camera's axes into them. Colours are linear, as glTF demands. Time 0 is the first frame's.
 
 mod binary;
-mod quantise;
+mod primitive;
 
 use super::{Scene, SceneObject};
 use binary::{Binary, F32, VERTICES, Values};
 use dynvox_core::geometry::Transform;
-use quantise::primitive;
+use primitive::primitive;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -64,10 +64,9 @@ pub fn write(out: &mut impl Write, scene: &Scene) -> io::Result<()> {
 impl Document {
     /// A node with a mesh, in m; nothing for an empty mesh.
     fn mesh_node(&mut self, name: &str, mesh: &super::IndexedMesh) -> Option<usize> {
-        let (primitive, low_m, size_m) = primitive(&mut self.binary, mesh)?;
+        let primitive = primitive(&mut self.binary, mesh)?;
         self.meshes.push(json!({ "name": name, "primitives": [primitive] }));
-        let scale = [size_m; 3];
-        Some(self.node(json!({ "name": name, "mesh": self.meshes.len() - 1, "translation": low_m, "scale": scale })))
+        Some(self.node(json!({ "name": name, "mesh": self.meshes.len() - 1 })))
     }
 
     /// A node with a line through points; nothing for fewer than two.
@@ -156,8 +155,6 @@ impl Document {
             root["buffers"] = json!([{ "byteLength": binary.bytes.len() }]);
             root["bufferViews"] = std::mem::take(&mut binary.views).into();
             root["accessors"] = std::mem::take(&mut binary.accessors).into();
-            root["extensionsUsed"] = json!(["KHR_mesh_quantization"]);
-            root["extensionsRequired"] = root["extensionsUsed"].clone();
         }
         if !self.channels.is_empty() {
             root["animations"] =

@@ -71,11 +71,17 @@ fn an_object_moves_along_its_trajectory_and_its_mesh_is_to_scale() {
     assert_eq!(floats(&animation["samplers"][0]["output"]), [10.0, 0.0, 0.0, 30.0, 0.0, 0.0]);
     let map =
         json["nodes"].as_array().unwrap().iter().find(|node| node["name"] == "static map").unwrap();
-    // Quantised vertices: the node restores their place and size.
+    // Readers without extensions see metres.
+    assert!(map.get("scale").is_none() && json.get("extensionsRequired").is_none(), "{json}");
+    let attributes = &json["meshes"][map["mesh"].as_u64().unwrap() as usize]["primitives"][0];
+    let position = &attributes["attributes"]["POSITION"];
+    assert_eq!(floats(position), [1.0, 2.0, 3.0, 5.0, 2.0, 3.0, 1.0, 4.0, 3.0]);
+    let accessor = &json["accessors"][position.as_u64().unwrap() as usize];
     assert_eq!(
-        (&map["translation"], &map["scale"]),
-        (&json!([1.0, 2.0, 3.0]), &json!([4.0, 4.0, 4.0]))
+        (&accessor["min"], &accessor["max"], &accessor["componentType"]),
+        (&json!([1.0, 2.0, 3.0]), &json!([5.0, 4.0, 3.0]), &json!(binary::F32))
     );
+    assert!(floats(&attributes["attributes"]["NORMAL"]).chunks(3).all(|n| n == [0.0, 0.0, 1.0]));
     let root = json["nodes"].as_array().unwrap().last().unwrap();
     assert_eq!(
         // Half a turn about x: y up as glTF has it.

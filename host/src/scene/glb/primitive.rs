@@ -1,6 +1,7 @@
-//! A mesh in few bytes: positions of 16 bits, normals of 8, linear colours of 16.
+//! A mesh as glTF reads it without extensions: positions and normals of floats, linear colours of
+//! 16 bits.
 
-use super::binary::{Binary, I8, INDICES, U16, U32, VERTICES, Values};
+use super::binary::{Binary, F32, INDICES, U16, U32, VERTICES, Values};
 use crate::scene::IndexedMesh;
 use serde_json::{Value, json};
 
@@ -9,54 +10,38 @@ const MOST: f32 = 65_535.0;
 /// Colour of vertices without one: light grey.
 const CLAY: [u8; 3] = [205, 205, 200];
 /// Bytes from one vertex's position, normal and colour to the next one's.
-const STRIDES: [usize; 3] = [8, 4, 8];
+const STRIDES: [usize; 3] = [12, 12, 8];
 
-/// Appends a mesh and returns its primitive, and the least corner and the longest side of its box,
-/// m. Nothing for an empty mesh.
-pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<(Value, [f32; 3], f32)> {
+/// Appends a mesh, in m, and returns its primitive; nothing for an empty mesh.
+pub fn primitive(binary: &mut Binary, mesh: &IndexedMesh) -> Option<Value> {
     let [low_m, high_m] = mesh.bounds_m()?;
-    // One scale for all axes, so that normals need no correction.
-    let size_m = (0..3).map(|axis| high_m[axis] - low_m[axis]).fold(1e-3, f32::max);
-    let step = |at: &[f32; 3]| {
-        [0, 1, 2].map(|axis| ((at[axis] - low_m[axis]) / size_m * MOST).round() as u16)
-    };
     let count = mesh.positions_m.len();
-    let (mut positions, mut normals, mut colours) = (Vec::new(), Vec::new(), Vec::new());
-    for at in &mesh.positions_m {
-        // A fourth number pads each position to a multiple of four bytes.
-        positions.extend(step(at).into_iter().chain([0]).flat_map(u16::to_le_bytes));
-    }
-    for normal in mesh.normals() {
-        normals.extend(
-            unit(normal).map(|value| (127.0 * value).round() as i8 as u8).into_iter().chain([0]),
-        );
-    }
+    let floats = |values: &[[f32; 3]]| -> Vec<u8> {
+        values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect()
+    };
+    let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(unit).collect();
+    let mut colours = Vec::new();
     for &colour in &mesh.colours {
         // Points without colour are drawn like clay.
         let shown = if colour == [0; 3] { CLAY } else { colour };
+        // A fourth number pads each colour to a multiple of four bytes.
         colours.extend(shown.map(linear).into_iter().chain([0]).flat_map(u16::to_le_bytes));
     }
-    // Each attribute is a view of its own, with its stride padded to four bytes.
-    let [position, normal, colour] = [&positions, &normals, &colours]
+    // Each attribute is a view of its own.
+    let [position, normal, colour] = [floats(&mesh.positions_m), floats(&normals), colours]
         .into_iter()
         .zip(STRIDES)
-        .map(|(bytes, stride)| binary.view(bytes, Some(VERTICES), Some(stride)))
+        .map(|(bytes, stride)| binary.view(&bytes, Some(VERTICES), Some(stride)))
         .collect::<Vec<_>>()
         .try_into()
         .ok()?;
-    let normalized = json!({ "normalized": true });
-    let range = json!({ "normalized": true, "min": step(&low_m), "max": step(&high_m) });
     let of = |component| Values { component, kind: "VEC3", count };
     let attributes = json!({
-        "POSITION": binary.accessor(position, of(U16), &range),
-        "NORMAL": binary.accessor(normal, of(I8), &normalized),
-        "COLOR_0": binary.accessor(colour, of(U16), &normalized),
+        "POSITION": binary.accessor(position, of(F32), &json!({ "min": low_m, "max": high_m })),
+        "NORMAL": binary.accessor(normal, of(F32), &Value::Null),
+        "COLOR_0": binary.accessor(colour, of(U16), &json!({ "normalized": true })),
     });
-    Some((
-        json!({ "attributes": attributes, "indices": indices(binary, mesh), "material": 0 }),
-        low_m,
-        size_m,
-    ))
+    Some(json!({ "attributes": attributes, "indices": indices(binary, mesh), "material": 0 }))
 }
 
 /// Appends the corners of the triangles, of 16 bits where that is enough.
