@@ -51,7 +51,7 @@ struct ChangeableArgs {
     #[arg(
         long,
         value_name = "N",
-        conflicts_with_all = ["evaluate", "save_instances", "save_map_disparity", "mcap"],
+        conflicts_with_all = ["evaluate", "save_instances", "save_map_disparity", "export", "mcap"],
         help_heading = "Results"
     )]
     snapshot_every: Option<usize>,

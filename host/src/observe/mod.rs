@@ -24,6 +24,7 @@ mod planning_layers;
 mod planning_maps;
 mod recording;
 mod reference;
+mod scene_export;
 pub mod tables;
 mod thumbnail;
 mod tracks;
@@ -54,6 +55,7 @@ pub use planning::{
 pub use planning_layers::PlanningLayers;
 pub use recording::{RECORDING_FILE, RecordingObserver};
 pub use reference::{ErrorPictures, ReferenceObserver, ReferencePlan, ReferenceSection};
+pub use scene_export::SceneExportObserver;
 pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection, state_name};
 pub use trajectory::{
     ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first,
@@ -108,6 +110,8 @@ pub struct ObservedRun<'p> {
     pub instances_folder: Option<PathBuf>,
     /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
     pub map_disparity_folder: Option<PathBuf>,
+    /// Folder that the scene is exported to, if it is.
+    pub scene_folder: Option<PathBuf>,
     /// Reference against which the map is evaluated, and its frames.
     pub reference: Option<ReferencePlan>,
 }
@@ -261,6 +265,7 @@ pub struct Observers {
     map_disparity: MapDisparityObserver,
     planning: PlanningObserver,
     mavlink: MavlinkObserver,
+    scene_export: SceneExportObserver,
 }
 
 /// Findings of all observers.
@@ -339,7 +344,8 @@ impl Observer for Observers {
         self.instances.frame(run, frame)?;
         self.map_disparity.frame(run, frame)?;
         self.mavlink.frame(run, frame)?;
-        self.planning.frame(run, frame)
+        self.planning.frame(run, frame)?;
+        self.scene_export.frame(run, frame)
     }
 
     fn end(
@@ -363,6 +369,7 @@ impl Observer for Observers {
     fn finish(self, run: &ObservedRun<'_>, finished: &Finished) -> Result<Sections, ObserveError> {
         // Those without a section of the summary.
         self.planning.finish(run, finished)?;
+        self.scene_export.finish(run, finished)?;
         self.block_history.finish(run, finished)?;
         Ok(Sections {
             trajectory: self.trajectory.finish(run, finished)?,

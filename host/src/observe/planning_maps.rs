@@ -79,7 +79,8 @@ impl MapMode {
     }
 
     /// Encodes columns, row by row from the farthest, as the mode's picture.
-    pub fn encode(self, states: &[CellState], (width, height): (u32, u32)) -> Vec<u8> {
+    pub fn encode(self, states: &[CellState], size: (u32, u32)) -> Vec<u8> {
+        let (width, height) = size;
         let pgm = |[free, occupied, unknown]: [u8; 3]| {
             let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
             bytes.extend(states.iter().map(|state| match state {

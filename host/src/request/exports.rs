@@ -1,5 +1,6 @@
 //! Results for other programs.
 
+use super::SceneExport;
 use crate::formats::Axes;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt::{Display, Formatter};
@@ -24,6 +25,8 @@ pub struct Exports {
     pub map_disparity: Option<PathBuf>,
     /// Address that obstacle messages are sent to after every frame.
     pub mavlink: Option<UdpAddress>,
+    /// Scene for programs of photogrammetry.
+    pub scene: Option<SceneExport>,
 }
 
 /// Address of a receiver of datagrams: `udp:127.0.0.1:14550`.

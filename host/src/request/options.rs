@@ -3,8 +3,8 @@
 use super::poses::Egomotion;
 use super::{
     Bounds, Bytes, Evaluation, Exports, Frames, ImageSize, Input, Limits, MapObjects, Masks,
-    Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneScale,
-    Settings, Source, Storage, UdpAddress, WindowSize, words,
+    Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneExport,
+    SceneScale, Settings, Source, Storage, UdpAddress, WindowSize, words,
 };
 use crate::formats::Axes;
 use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
@@ -210,6 +210,11 @@ pub struct Options {
     /// the images, disparity in 1/256 px, 0 none
     #[arg(long, value_name = "DIR", help_heading = "Evaluation")]
     pub save_map_disparity: Option<PathBuf>,
+    /// Export the run for COLMAP or nerfstudio to a new folder: images, masks of what moves, camera,
+    /// poses, points of the map
+    #[arg(long, value_names = ["FORMAT", "DIR"], num_args = 2, help_heading = "Results")]
+    #[serde(deserialize_with = "words::settings")]
+    pub export: Vec<String>,
     /// End at the first frame that affects the map: an extrapolated pose, anything refused or lost
     #[arg(long, help_heading = "Limits")]
     pub strict: bool,
@@ -280,6 +285,7 @@ impl Options {
                 instances: self.save_instances.clone(),
                 map_disparity: self.save_map_disparity.clone(),
                 mavlink: self.mavlink,
+                scene: SceneExport::from_words(&self.export).map_err(RequestError::Invalid)?,
             },
             limits: Limits { strict: self.strict, ..Limits::default() },
         };

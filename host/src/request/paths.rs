@@ -14,8 +14,9 @@ impl Request {
         for path in self.inputs_mut() {
             *path = std::path::absolute(&*path)?;
         }
-        let Exports { instances, map_disparity, .. } = &mut self.exports;
-        for path in instances.iter_mut().chain(map_disparity) {
+        let Exports { instances, map_disparity, scene, .. } = &mut self.exports;
+        let scene = scene.iter_mut().map(|scene| &mut scene.folder);
+        for path in instances.iter_mut().chain(map_disparity).chain(scene) {
             *path = std::path::absolute(&*path)?;
         }
         Ok(self)
@@ -28,7 +29,8 @@ impl Request {
 
     /// Every path that is written besides the run folder.
     pub fn saved_folders(&self) -> impl Iterator<Item = &PathBuf> {
-        self.exports.instances.iter().chain(&self.exports.map_disparity)
+        let scene = self.exports.scene.iter().map(|scene| &scene.folder);
+        self.exports.instances.iter().chain(&self.exports.map_disparity).chain(scene)
     }
 
     /// Every path that is read.

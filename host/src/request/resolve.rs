@@ -139,6 +139,7 @@ impl Request {
             ("a recording as MCAP", exports.record),
             ("saved instances", exports.instances.is_some()),
             ("saved disparities of the map", exports.map_disparity.is_some()),
+            ("an exported scene", exports.scene.is_some()),
         ];
         if let Some((what, _)) = whole.iter().find(|(_, asked)| snapshots && *asked) {
             return Err(RequestError::Invalid(format!(

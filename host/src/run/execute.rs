@@ -39,11 +39,14 @@ pub fn run(
     let exports = &plan.request.exports;
     let instances = Saved::begin(exports.instances.as_deref(), "--save-instances")?;
     let map_disparity = Saved::begin(exports.map_disparity.as_deref(), "--save-map-disparity")?;
+    let scene =
+        Saved::begin(exports.scene.as_ref().map(|scene| scene.folder.as_path()), "--export")?;
     let observed = ObservedRun {
         plan: &plan,
         folder: folder.path().to_path_buf(),
         instances_folder: instances.path(),
         map_disparity_folder: map_disparity.path(),
+        scene_folder: scene.path(),
         reference: ReferencePlan::of_run(&plan),
     };
     let Mapped { mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
@@ -64,8 +67,12 @@ pub fn run(
     let sections = std::mem::take(&mut state.observers).finish(&observed, &finished)?;
     add_unwritten(&mut incomplete, &sections);
     if incomplete.is_none() {
-        let options = ["the folder of --save-instances", "the folder of --save-map-disparity"];
-        for (saved, option) in [instances, map_disparity].into_iter().zip(options) {
+        let options = [
+            "the folder of --save-instances",
+            "the folder of --save-map-disparity",
+            "the folder of --export",
+        ];
+        for (saved, option) in [instances, map_disparity, scene].into_iter().zip(options) {
             if let Err(error) = saved.commit() {
                 Incomplete::add_missing(&mut incomplete, option, &error.to_string());
             }

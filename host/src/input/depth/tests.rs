@@ -249,7 +249,8 @@ fn walls(
 ) -> (TempDir, Result<Box<dyn FrameSource>, InputError>) {
     let root = TempDir::new().unwrap();
     let noise = |u: u32, v: u32| {
-        let hash = (u * 73_856_093 ^ v * 19_349_663).wrapping_mul(0x9e37_79b1);
+        let hash = u.wrapping_mul(73_856_093) ^ v.wrapping_mul(19_349_663);
+        let hash = hash.wrapping_mul(0x9e37_79b1);
         image::Luma([(hash >> 24) as u8])
     };
     let file = |side: &str, ending: &str| {
