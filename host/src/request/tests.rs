@@ -12,6 +12,7 @@ fn unlike_the_default() -> Request {
         "topics": "/left,/right", "top_bottom": true, "calibration": ["left.yaml", "right.yaml"],
         "faults": "freeze:right@20..,noise=0.1@5,seed=3", "start": 3, "frames": 40, "stride": 2,
         "scale": [0.3, "room"], "skip_bad_frames": true, "force": true, "depth": "disparity:depth",
+        "depth_scale": "sgbm", "export": ["colmap", "scene"],
         "instances": "onnx:a.onnx,b.onnx", "instances_every": 3, "egomotion": "file:poses.txt",
         "memory": "48MiB", "planning": "200x100x20", "planning_3d": true,
         "set": { "volume.voxel_size_m": 0.1, "street.seed": 7, "volume.observation_weight": "depth" },
@@ -67,6 +68,7 @@ fn paths_are_absolute() {
         (networks, NonZeroUsize::new(3).unwrap())
     );
     assert_eq!(request.exports.map_disparity, Some(here.join("shown")));
+    assert_eq!(request.exports.scene.unwrap().folder, here.join("scene"));
 }
 
 #[test]

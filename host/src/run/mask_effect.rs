@@ -31,7 +31,7 @@ impl MaskEffect {
         if self.frames_left == 0 {
             return None;
         }
-        let report = &row.report.instances.detections;
+        let report = &row.report.tracking.detections;
         if report.accepted + report.tracked_only > 0 {
             self.frames_left = 0;
             return None;
@@ -64,7 +64,7 @@ mod tests {
 
     fn row(accepted: u32) -> FrameRow {
         let mut row = FrameRow::default();
-        row.report.instances.detections.accepted = accepted;
+        row.report.tracking.detections.accepted = accepted;
         row.mask_refusals.unknown_class = 2;
         row
     }

@@ -13,7 +13,7 @@ mod tests;
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer, instances::stem};
 use crate::request::SceneFormat;
 use dynvox_core::Mapper;
-use dynvox_core::geometry::Transform;
+use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::image::View;
 use dynvox_core::tracking::MotionState;
 use image::{GrayImage, RgbImage};
@@ -55,7 +55,7 @@ impl Observer for SceneExportObserver {
         else {
             return Ok(());
         };
-        if frame.row.is_extrapolated() || frame.row.report.segment > 0 {
+        if frame.row.is_extrapolated() || frame.row.report.segment > MapSegment::FIRST {
             return Ok(());
         }
         let mapper = frame.view.mapper();
