@@ -226,8 +226,7 @@ fn costs_are_free_only_where_every_cell_was_seen_free() {
 }
 
 fn parsed(bytes: &[u8]) -> MavMessage {
-    let mut reader = mavlink::peek_reader::PeekReader::new(bytes);
-    mavlink::read_v2_msg::<MavMessage, _>(&mut reader).unwrap().1
+    mavlink::MavlinkReader::new(bytes).read_any_message::<MavMessage>().unwrap().1
 }
 
 /// A window with free directions, obstacles and unknown ones.

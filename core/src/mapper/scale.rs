@@ -5,7 +5,7 @@
 
 use super::Config;
 use crate::geometry::StereoRig;
-use libm::{floorf, sqrtf};
+use libm::{floor, round, sqrt};
 
 /// Voxel sizes that a map may have, m, in steps of about two.
 const VOXELS_M: [f32; 10] = [0.001, 0.002, 0.004, 0.01, 0.02, 0.04, 0.1, 0.2, 0.4, 1.0];
@@ -17,11 +17,13 @@ const STREET_REACH_M: f32 = 0.3125;
 /// Rigs whose reach is within these shares of KITTI's keep the defaults.
 const STREET_SHARES: (f32, f32) = (0.5, 2.5);
 /// Noise of a disparity that decides how far a map reaches, px, one sigma.
-const DISPARITY_SIGMA_PX: f32 = 0.25;
+const DISPARITY_SIGMA_PX: f64 = 0.25;
 /// Depth of a map is a multiple of so many voxels, so that it is a short number.
-const DEPTH_STEP_VOXELS: f32 = 10.0;
+const DEPTH_STEP_VOXELS: f64 = 10.0;
+/// Truncation, voxels.
+const TRUNCATION_VOXELS: f64 = 15.0;
 /// Farthest depth that follows from a rig, m: the planner's window takes no more.
-const FAR_MAX_M: f32 = 500.0;
+const FAR_MAX_M: f64 = 500.0;
 /// Smallest extent of an object, m: a person's arms.
 const EXTENT_MIN_M: f32 = 1.0;
 /// Number of settings that follow from a rig.
@@ -68,15 +70,14 @@ impl Scale {
 
     /// A scale by its voxel size, m, with the depth that a rig has at it.
     pub fn with_voxels(voxel_size_m: f32, rig: &StereoRig) -> Self {
-        let defaults = Config::for_rig(*rig).volume;
-        let truncation_m = defaults.truncation_m * (voxel_size_m / STREET_VOXEL_M);
-        let reach_m_px = rig.focal_px as f32 * rig.baseline_m as f32;
+        let voxel_m = decimal(voxel_size_m);
+        let reach_m_px = rig.focal_px * rig.baseline_m;
         // Noise grows with the square of the depth: z² sigma / (f b).
-        let depth_m = sqrtf(truncation_m * reach_m_px / DISPARITY_SIGMA_PX);
-        let step_m = DEPTH_STEP_VOXELS * voxel_size_m;
-        let steps = floorf(depth_m / step_m);
-        let far_m = if steps >= 1.0 { steps * step_m } else { step_m };
-        Self { voxel_size_m, far_m: Some(if far_m < FAR_MAX_M { far_m } else { FAR_MAX_M }) }
+        let depth_m = sqrt(TRUNCATION_VOXELS * voxel_m * reach_m_px / DISPARITY_SIGMA_PX);
+        let steps = floor(depth_m / (DEPTH_STEP_VOXELS * voxel_m));
+        let far_m = if steps >= 1.0 { steps } else { 1.0 } * DEPTH_STEP_VOXELS * voxel_m;
+        let far_m = if far_m < FAR_MAX_M { far_m } else { FAR_MAX_M };
+        Self { voxel_size_m, far_m: Some(far_m as f32) }
     }
 
     /// Distance between lattice points of the map, m.
@@ -92,33 +93,28 @@ impl Scale {
     /// The settings that follow, by their keys. At [`Scale::STREET`] they are the defaults to the
     /// bit.
     pub fn settings(&self) -> [(&'static str, f32); SCALED_SETTINGS] {
-        let street = Config::for_rig(StereoRig {
-            focal_px: 1.0,
-            center_u_px: 0.0,
-            center_v_px: 0.0,
-            baseline_m: 1.0,
-        });
-        // Exactly 1 at the street's voxel size.
-        let lengths = self.voxel_size_m / STREET_VOXEL_M;
-        let depths = self.far_m() / street.volume.far_m;
-        let (volume, objects, planning) = (&street.volume, &street.objects, &street.planning);
-        let extent_m = objects.extent_m * lengths;
+        // Numbers of voxels, and shares of the depth: in double precision, so that a decimal
+        // voxel size gives decimal lengths.
+        let voxel_m = decimal(self.voxel_size_m);
+        let voxels = |count: f64| (count * voxel_m) as f32;
+        let far_m = self.far_m();
+        let extent_m = voxels(60.0);
         [
             ("volume.voxel_size_m", self.voxel_size_m),
-            ("volume.truncation_m", volume.truncation_m * lengths),
-            ("volume.near_m", volume.near_m * lengths),
-            ("volume.far_m", volume.far_m * depths),
-            ("volume.behind_m", volume.behind_m * lengths),
-            ("volume.allocation_m", volume.allocation_m * lengths),
-            ("objects.voxel_size_m", objects.voxel_size_m * lengths),
-            ("objects.truncation_m", objects.truncation_m * lengths),
-            ("objects.far_m", objects.far_m * depths),
+            ("volume.truncation_m", voxels(TRUNCATION_VOXELS)),
+            ("volume.near_m", voxels(10.0)),
+            ("volume.far_m", far_m),
+            ("volume.behind_m", voxels(6.0)),
+            ("volume.allocation_m", voxels(4.0)),
+            ("objects.voxel_size_m", self.voxel_size_m),
+            ("objects.truncation_m", voxels(6.0)),
+            ("objects.far_m", far_m),
             ("objects.extent_m", if extent_m > EXTENT_MIN_M { extent_m } else { EXTENT_MIN_M }),
-            ("segmentation.far_m", street.segmentation.far_m * depths),
-            ("raycast.near_m", street.raycast.near_m * lengths),
-            ("raycast.far_m", street.raycast.far_m * depths),
-            ("planning.near_m", planning.near_m * lengths),
-            ("planning.far_m", planning.far_m * depths),
+            ("segmentation.far_m", 2.25 * far_m),
+            ("raycast.near_m", voxels(6.0)),
+            ("raycast.far_m", 1.5 * far_m),
+            ("planning.near_m", voxels(10.0)),
+            ("planning.far_m", far_m),
         ]
     }
 
@@ -130,6 +126,11 @@ impl Scale {
             }
         }
     }
+}
+
+/// The decimal number that a length of single precision stands for, to a millionth of a metre.
+fn decimal(length_m: f32) -> f64 {
+    round(f64::from(length_m) * 1e6) / 1e6
 }
 
 /// The largest voxel size of the steps that is not above a length, m.
@@ -198,9 +199,9 @@ mod tests {
         let scale = Scale::for_rig(&rig, 848);
         let mut config = Config::for_rig(rig);
         scale.apply(&mut config);
-        let noise_m = scale.far_m() * scale.far_m() * DISPARITY_SIGMA_PX / (425.0 * 0.05);
-        assert!(
-            noise_m <= config.volume.truncation_m && noise_m > 0.5 * config.volume.truncation_m
-        );
+        let far_m = f64::from(scale.far_m());
+        let noise_m = far_m * far_m * DISPARITY_SIGMA_PX / (425.0 * 0.05);
+        let truncation_m = f64::from(config.volume.truncation_m);
+        assert!(noise_m <= truncation_m && noise_m > 0.5 * truncation_m);
     }
 }

@@ -398,7 +398,7 @@ mod tests {
             "rig.disparity_correction.offset_px=0.125",
             "egomotion.confidence=0.99",
             "volume.when_full=refuse",
-            "tracking.overlap=box",
+            "tracking.tracks.overlap=box",
         ];
         let given = sets(&other).unwrap();
         let table: Table = given.to_toml(false).unwrap().parse().unwrap();

@@ -99,7 +99,7 @@ fn a_choice_takes_each_of_its_names_and_no_other() {
     };
     for (key, names) in [
         ("mapper.egomotion", &["stereo", "icp"][..]),
-        ("tracking.overlap", &["mask", "box"]),
+        ("tracking.tracks.overlap", &["mask", "box"]),
         ("stereo.gap_ends", &["surface", "farther"]),
         ("volume.distance", &["ray", "normal"]),
         ("volume.observation_weight", &["one", "depth", "band"]),
