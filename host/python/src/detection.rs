@@ -12,10 +12,13 @@ use pyo3::prelude::*;
 pub struct Detection {
     class: Class,
     class_name: String,
+    /// Confidence of the detector, 0 to 1.
     #[pyo3(get)]
     score: f32,
+    /// First column of the box, px.
     #[pyo3(get)]
     left: i32,
+    /// First row of the box, px.
     #[pyo3(get)]
     top: i32,
     mask: Py<PyAny>,

@@ -125,7 +125,8 @@ impl Mapper {
     }
 
     /// Maps one pair and returns the report, with the fields of `dynvox_core::Report` and
-    /// `severity`.
+    /// `severity`. `segment` numbers the segment of the map that the pose lies in, from 0: another
+    /// one begins, with that camera as its world, where the camera was lost and is not found again.
     ///
     /// Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then
     /// fused in colour, and grey is computed. Nothing is copied whose pixels lie side by side in
@@ -223,8 +224,9 @@ impl Mapper {
         )
     }
 
-    /// The map seen from a pose, the last one of the camera without one; with the objects where
-    /// they are now. Of the image's columns and rows every so many are looked at.
+    /// The map's current segment seen from a pose in it, the last one of the camera without one;
+    /// with the objects where they are now. Of the image's columns and rows every so many are
+    /// looked at.
     #[pyo3(signature = (t_world_camera=None, *, objects=true, every=1))]
     fn raycast<'py>(
         &self,
@@ -271,9 +273,9 @@ impl Mapper {
         .dictionary(py)
     }
 
-    /// Triangles of the static map, evicted blocks included, or of one track's object, in the
-    /// world: positions in metres and colours, both triangles x corners x 3. Corners run counter-
-    /// clockwise seen from free space.
+    /// Triangles of the static map in the camera's segment, evicted blocks included, or of one
+    /// track's object, in the world: positions in metres and colours, both triangles x corners x 3.
+    /// Corners run counter-clockwise seen from free space.
     #[pyo3(signature = (object=None))]
     fn triangles<'py>(
         &self,

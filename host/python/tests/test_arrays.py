@@ -124,7 +124,7 @@ def test_instances_become_detections():
     ]
     mapper = dynvox.Mapper(dynvox.Rig(200, 160, 48, 0.5), memory="16MiB", instances="none")
     image = np.zeros((96, 320), np.uint8)
-    assert mapper.step(image, image, detections=found)["instances"]["detections"]["given"] == 2
+    assert mapper.step(image, image, detections=found)["tracking"]["detections"]["given"] == 2
     with pytest.raises(dynvox.Error, match="2 class names"):
         dynvox.detections_of(instances, ["car", "van"])
     with pytest.raises(dynvox.Error, match='no class "teapot"'):
