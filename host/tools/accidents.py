@@ -14,7 +14,8 @@ full disk, a closed descriptor, a second run), and then checks:
 - nothing panicked, and every failure has a sentence.
 
 One line is printed for each finding, and at the end the number of trials of each kind. The exit code
-is 1 if there was a finding. Kinds that need rights this user does not have (a tmpfs) are counted as
+is 1 if there was a finding. `--names 500` checks names instead: that none commands the terminal, and
+that each is quoted in printed commands. Kinds that need rights this user does not have (a tmpfs) are counted as
 left out.
 """
 
@@ -89,7 +90,7 @@ class Trial:
             else:
                 now = digest_of(path) if path.exists() else "missing"
             if now != before:
-                self.find(f"{path.relative_to(self.root)} of the user's has changed")
+                self.find(f"{path.name} of the user's has changed")
 
     def find(self, what):
         self.findings.append(what)
@@ -413,6 +414,54 @@ def other_outputs(trial):
         trial.find(f"no sentence: {err.strip()[-200:]}")
 
 
+PIECES = [
+    "\x1b]0;owned\x07", "\x1b[2J", "\x9b31m", "\u202e", "\u2066", "\u200f", "\u2028", "\r", "\n",
+    "\t", "\x7f", "\x01", ";touch PWNED;", "$(touch PWNED)", "`touch PWNED`", "'", '"', "\\", " ",
+    "*", "~", "-", "#", "&", "|", ">", "a", "street", "é", "北",
+]
+
+
+def is_raw(text):
+    """True if a text has a character that commands a terminal or turns its letters about."""
+    marks = [(0x200B, 0x200F), (0x2028, 0x202E), (0x2060, 0x206F)]
+    return any(
+        char != "\n" and (ord(char) < 32 or 127 <= ord(char) < 160)
+        or any(first <= ord(char) <= last for first, last in marks)
+        for char in text
+    )
+
+
+def check_name(program, seed):
+    """Findings of a random name in the messages and printed commands of the program."""
+    rng, findings = random.Random(seed), []
+    name = "".join(rng.choice(PIECES) for _ in range(rng.randrange(1, 7))).replace("/", "")
+    given = f"./{name}" if name.startswith("-") else name
+    with tempfile.TemporaryDirectory() as root:
+        commands = [
+            ["inspect", given], ["run", given], ["run", "--resume", given], ["view", given],
+            ["diff", given, given], ["budget", "--capacity", given], ["fleet", "run", given],
+            ["sweep", "--merge", given, "--out", "swept"], ["calibration", given], [given],
+        ]
+        for command in [*commands, None]:
+            if command is None:
+                # A folder of that name with the results of a run: commands are printed for it.
+                pathlib.Path(root, given).mkdir()
+                pathlib.Path(root, given, "summary.json").write_text("{}")
+                command = ["inspect", given]
+            run = subprocess.run([program, *command], cwd=root, capture_output=True)
+            text = (run.stdout + run.stderr).decode(errors="replace")
+            if is_raw(text) or "\n" in name.strip() and name in text:
+                findings.append(f"name {name!r}: raw in the output of {command[0]}")
+        line = next((one for one in text.splitlines() if "trajectory: " in one), "")
+        script = "dynvox() { printf '%s\\0' \"$@\"; }; " + line.partition("trajectory: ")[2]
+        words = subprocess.run(["bash", "-c", script], cwd=root, capture_output=True).stdout
+        if words.decode().split("\0")[2:3] != [given]:
+            findings.append(f"name {name!r}: not quoted in {line!r}")
+        if pathlib.Path(root, "PWNED").exists():
+            findings.append(f"name {name!r}: a command within it was run")
+    return findings
+
+
 KINDS = [
     link_as_partial, folder_as_partial, link_as_target, foreign_target, foreign_file_in_results,
     hard_linked_results, input_in_output, signalled, signalled, killed, file_size_limit,
@@ -426,22 +475,13 @@ def trial_of(program, recording, seed, expected, seconds, keep):
     trial.expected, trial.seconds = expected, seconds
     trial.watch(trial.user)
     trial.watch(recording)
-    trial.watched = {path: before for path, before in trial.watched.items()}
     kind = KINDS[seed % len(KINDS)]
     left_out = None
     try:
         left_out = kind(trial)
     except subprocess.TimeoutExpired:
         trial.find(f"no end within {PATIENCE_S} s")
-    trial.root_of_recording = recording
-    for path, before in trial.watched.items():
-        now = (
-            "link to " + os.readlink(path) if path.is_symlink()
-            else state_of(path) if path.is_dir()
-            else digest_of(path) if path.exists() else "missing"
-        )
-        if now != before:
-            trial.find(f"{path.name} of the user's has changed")
+    trial.check_user()
     if not trial.findings:
         shutil.rmtree(root, ignore_errors=True)
     return kind.__name__, left_out, seed, trial.findings, root
@@ -454,7 +494,14 @@ def main():
     parser.add_argument("--seed", type=int, default=0, help="seed of the first trial")
     parser.add_argument("--jobs", type=int, default=2, help="trials at once")
     parser.add_argument("--keep", default=None, help="folder for the trials; those with findings stay")
+    parser.add_argument("--names", type=int, default=0, help="check so many random names instead")
     given = parser.parse_args()
+    if given.names:
+        with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+            seeds = range(given.seed, given.seed + given.names)
+            found = sum(pool.map(lambda seed: check_name(given.program, seed), seeds), [])
+        print(*found, f"{given.names} names, {len(found)} findings", sep="\n")
+        sys.exit(bool(found))
     with tempfile.TemporaryDirectory(prefix="accidents-") as shared:
         recording = pathlib.Path(shared, "recording")
         made = [given.program, "synth", "--out", recording, "--frames", "4", *STREET]

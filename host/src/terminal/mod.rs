@@ -52,7 +52,8 @@ pub fn print(text: Arguments<'_>) {
 /// Prints a line to standard error, in one write, so that lines of threads do not mix. A failure
 /// leaves nothing to do: there is no other way to tell of it.
 pub fn print_error(line: Arguments<'_>) {
-    let line = shown(line) + "\n";
+    // No message of ours has a tab: it is of a name, which the parser may have changed.
+    let line = shown(line).replace('\t', "\\t") + "\n";
     let _ = stderr().lock().write_all(line.as_bytes());
 }
 

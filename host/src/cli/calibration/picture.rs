@@ -3,6 +3,7 @@
 use crate::formats::Image;
 use crate::input::FrameSource;
 use crate::input::diagnosis::RectifiedSource;
+use crate::owned;
 use anyhow::Context;
 use image::{Rgb, RgbImage};
 use std::io::Cursor;
@@ -54,8 +55,7 @@ pub fn write(picture: &RgbImage, path: Option<&Path>) -> anyhow::Result<PathBuf>
         None => (0..NAMES).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(NAMES)),
     };
     let hint = || format!("{} cannot be written. Give a new file with --picture", path.display());
-    let mut file = std::fs::File::create_new(&path).with_context(hint)?;
-    std::io::Write::write_all(&mut file, bytes.get_ref()).with_context(hint)?;
+    owned::write(&path, bytes.get_ref()).with_context(hint)?;
     Ok(path)
 }
 
