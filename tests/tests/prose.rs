@@ -17,7 +17,7 @@ const COLUMNS: usize = 100;
 const NAME_CHARS: usize = 70;
 /// Fewest comment lines in a thousand lines of code, over all folders. The figure only ever rises;
 /// none of them may repeat the code.
-const MIN_COMMENTS: usize = 19;
+const MIN_COMMENTS: usize = 28;
 /// This test, which names what it forbids.
 const EXEMPT: &str = "tests/tests/prose.rs";
 
@@ -39,7 +39,7 @@ const PHRASES: [&str; 5] = [
 const BOUNDS: [(&str, usize); 7] = [
     ("doc opens with a clause", 0),
     ("doc leans on a neighbour", 0),
-    ("line over 100 columns", 220),
+    ("line over 100 columns", 216),
     ("line over 140 columns", 0),
     ("test name over 70 characters", 0),
     ("number without its zero", 0),

@@ -247,6 +247,7 @@ mod tests {
     #[test]
     fn settings_out_of_range_are_named_and_their_bounds_are_taken() {
         for (key, change, good, bad) in CASES {
+            // One setting is changed, and the others are in range.
             let problems = |value: f64| {
                 let (mut problems, mut config) = (Problems::new(), EgomotionConfig::default());
                 change(&mut config, value);

@@ -208,6 +208,7 @@ impl<'s> Estimator<'s> {
         motion: &Transform,
         within_px: f32,
     ) -> [u32; 2] {
+        // The inliers of the estimate before are of other points.
         self.inlier_len = 0;
         self.points.fill(matches, rig);
         [self.points.score(motion, rig, within_px, 0), self.points.len() as u32]
@@ -318,10 +319,12 @@ impl<'s> Estimator<'s> {
 /// most inliers so far.
 fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) -> u32 {
     let share = f64::from(inliers) / points as f64;
+    // Three matches are drawn, and all of them must be inliers.
     let clean = share * share * share;
     if clean >= 1.0 {
         return 1;
     }
+    // So few inliers that the logarithm would be 0.
     if clean < 1e-9 {
         return u32::from(config.samples);
     }

@@ -104,6 +104,7 @@ impl NormalEquations {
     pub(super) fn add_row(&mut self, row: [f64; N], residual: f64, weight: f64) {
         for i in 0..N {
             self.vector[i] += weight * row[i] * residual;
+            // The lower triangle alone: the matrix is symmetric.
             for j in 0..=i {
                 self.matrix[i][j] += weight * row[i] * row[j];
             }
@@ -116,10 +117,13 @@ impl NormalEquations {
     /// a share of what rows that all point that way would give, from the trace of the translation's
     /// covariance. 0 if the rows do not determine a motion.
     pub(super) fn min_eigen_share(&self) -> f64 {
+        // A column of the inverse: the equations solved for a unit vector.
         let variance = |axis: usize| {
             let unit = core::array::from_fn(|at| if at == axis { 1.0 } else { 0.0 });
             self.solve_for(unit).and_then(|solution| solution.get(axis).copied())
         };
+        // The sum of the variances is at least the largest one, so that the bound is on the safe
+        // side.
         match (variance(3), variance(4), variance(5)) {
             (Some(x), Some(y), Some(z)) if self.weight > 0.0 => 1.0 / ((x + y + z) * self.weight),
             _ => 0.0,

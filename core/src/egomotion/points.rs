@@ -221,6 +221,7 @@ impl SinglePrecision {
 
     #[inline(always)]
     fn error(&self, [x, y, z]: [f32; 3], left: [f32; 2], right: [f32; 2]) -> f32 {
+        // A row of the rotation times the point.
         let row = |r: [f32; 3], t: f32| r[0] * x + r[1] * y + r[2] * z + t;
         let [rx, ry, rz] = self.rotation;
         let [tx, ty, tz] = self.translation;
@@ -231,6 +232,7 @@ impl SinglePrecision {
         let [a, b, c, d] =
             [u - left[0], v - left[1], u - self.focal_baseline * inverse - right[0], v - right[1]];
         let error = a * a + b * b + c * c + d * d;
+        // Computed for all and chosen last: a branch would keep vectors out.
         if depth > DEPTH_MIN_M as f32 { error } else { f32::INFINITY }
     }
 }
@@ -238,6 +240,7 @@ impl SinglePrecision {
 /// The point a match shows, in the previous left camera, and its current observations.
 fn triangulate(m: &Match, rig: &StereoRig) -> Option<Point> {
     let (left, right) = (rig.centered(m.current_left), rig.centered(m.current_right));
+    // The current positions are not checked by the triangulation below.
     if !left.iter().chain(&right).all(|x| x.is_finite()) {
         return None;
     }

@@ -200,6 +200,8 @@ mod tests {
     fn rows_are_corrected_where_there_is_a_disparity() {
         let correction =
             DisparityCorrection { offset_px: -0.5, ..DisparityCorrection::default() }.for_rig(&RIG);
+        // None, a pixel, less than the shift, just as much, the largest, and a flag without
+        // disparity.
         let mut row = [0, 256, 100, 128, 65_535, 1];
         correction.correct_row(0, &mut row);
         assert_eq!(row, [0, 128, 0, 0, 65_407, 0]);

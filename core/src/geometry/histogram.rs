@@ -51,6 +51,7 @@ mod tests {
             (histogram.total(), histogram.median())
         };
         assert_eq!(of(&[]), (0, None));
+        // A value beyond the bins is not counted.
         assert_eq!(of(&[BINS]), (0, None));
         assert_eq!(of(&[BINS - 1]), (1, Some(BINS - 1)));
         assert_eq!(of(&[9, 0, 300]), (3, Some(9)));

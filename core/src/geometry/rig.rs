@@ -203,6 +203,7 @@ mod tests {
                 "{found:?} {point:?}"
             );
         }
+        // A focal length to the right of the principal point the ray has 45 degrees.
         let [x, y, z] = RIG.ray(609.6 + 721.5, 172.9);
         assert!((x - 1.0).abs() < 1e-12 && y == 0.0 && z == 1.0);
     }
@@ -213,6 +214,7 @@ mod tests {
             assert_eq!(RIG.project([1.0, 1.0, z]), None);
         }
         let seen = |u_right_px: f64| StereoObservation { u_left_px: 5.0, v_px: 1.0, u_right_px };
+        // No disparity, a negative one, one too small, and none at all.
         for u_right_px in [5.0, 9.0, 4.95, f64::NAN, f64::NEG_INFINITY] {
             assert_eq!(RIG.triangulate(&seen(u_right_px)), None, "{u_right_px}");
         }

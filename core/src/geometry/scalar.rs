@@ -54,10 +54,12 @@ mod tests {
 
     #[test]
     fn what_loops_round_down_is_what_a_cast_does() {
+        // Every eighth on both sides of 0.
         for eighth in -4_000..4_000 {
             let value = eighth as f32 * 0.125;
             assert_eq!(floored_i32(value), floor_i32(value), "{value}");
         }
+        // The ends of the range for which the fast way holds, and the smallest steps.
         for value in
             [-0.0, 0.999_999_94, 65_534.996, 65_535.0, -4_194_303.5, 4_194_303.5, 1.0e-30, -1.0e-30]
         {

@@ -71,6 +71,7 @@ impl Transform {
     pub fn new(rotation_rad: impl Into<[f64; 3]>, translation_m: impl Into<[f64; 3]>) -> Self {
         let [a, b, c] = rotation_rad.into();
         let angle = libm::sqrt(a * a + b * b + c * c);
+        // sin(a / 2) / a has the limit 1 / 2 at 0, where it would divide 0 by 0.
         let (real, scale) = if angle > SMALL_ANGLE_RAD {
             (libm::cos(0.5 * angle), libm::sin(0.5 * angle) / angle)
         } else {
@@ -172,6 +173,7 @@ impl Transform {
     /// ```
     pub fn rotation_matrix(&self) -> [[f64; 3]; 3] {
         let [i, j, k, w] = self.rotation;
+        // In nalgebra's order of operations, for its bits.
         let (ww, ii, jj, kk) = (w * w, i * i, j * j, k * k);
         let (ij, wk, wj) = (i * j * 2.0, w * k * 2.0, w * j * 2.0);
         let (ik, jk, wi) = (i * k * 2.0, j * k * 2.0, w * i * 2.0);

@@ -71,6 +71,7 @@ mod tests {
 
     #[test]
     fn bits_of_a_row_come_from_left_to_right_and_outside_is_invalid() {
+        // Two words a row of 70 pixels.
         let words = [1 << 3 | 1 << 63, 1, 0, 0];
         let invalid = InvalidPixels::new(&words, 70, 2).unwrap();
         assert_eq!(invalid.in_row(0).collect::<std::vec::Vec<_>>(), [3, 63, 64]);

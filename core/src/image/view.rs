@@ -65,6 +65,7 @@ impl<'a, T> View<'a, T> {
     /// assert_eq!((part.row(0), part.row(1)), (&[5, 6][..], &[9, 10][..]));
     /// ```
     pub fn part(&self, left: usize, top: usize, width: usize, height: usize) -> Option<Self> {
+        // Checked, since sizes come from callers and may overflow.
         let within =
             left.checked_add(width)? <= self.width && top.checked_add(height)? <= self.height;
         let first = top.checked_mul(self.stride)?.checked_add(left)?;

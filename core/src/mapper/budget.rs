@@ -376,6 +376,7 @@ impl<'o> Question<'o> {
     /// With as many blocks as fit, and as can be counted.
     fn filled(&self, capacity: Capacity) -> Capacity {
         let fits = |blocks: usize| self.with_blocks(&capacity, blocks).bytes() <= self.bytes;
+        // Halved until the two meet: bytes grow with blocks.
         let (mut fitting, mut too_many) = (0, self.too_many_blocks(&capacity));
         while fitting + 1 < too_many {
             let middle = fitting + (too_many - fitting) / 2;

@@ -57,10 +57,12 @@ mod tests {
     #[test]
     fn stamps_of_the_assumed_rate_give_the_bits_of_none() {
         let mut clock = Clock::new(0.1);
+        // Nanoseconds since 1970, as recordings have them: f32 seconds would not resolve frames.
         let start = 1_403_636_579_763_555_584;
         assert_eq!(clock.advance(Some(start), 0.1), 0.1, "nothing is known before the first frame");
         assert_eq!(clock.advance(Some(start + 100_000_000), 0.1).to_bits(), 0.1f32.to_bits());
         assert_eq!(clock.advance(Some(start + 133_000_000), 0.1), 0.033);
+        // Equal stamps are refused, later ones and none are taken.
         assert!(
             !clock.may_follow(Some(start + 133_000_000))
                 && clock.may_follow(Some(start + 133_000_001))

@@ -161,6 +161,7 @@ impl StageDigests {
     pub fn whole(&self, frame: u32) -> u64 {
         let mut digest = Digest::default();
         digest.u64(u64::from(frame));
+        // Left out, so that recordings in other formats with equal results have equal digests.
         let outcomes = self.in_order().into_iter().filter(|(of, _)| *of != Digested::Input);
         outcomes.for_each(|(_, outcome)| digest.u64(outcome));
         for object in self.objects.iter() {

@@ -171,6 +171,7 @@ impl<'s> Mapper<'s> {
         let voxel_m = f64::from(volume.config().voxel_size_m);
         for (slot, coord) in volume.current_blocks() {
             crossings(volume, slot, coord, self.config.planning.min_weight, |crossing| {
+                // The object's map is in its own frame.
                 let point = posed.t_world_object.transform_point(crossing.point_m(voxel_m));
                 fit.add(grid.of_world(point).map(|c| c * grid.cell_m()));
             });

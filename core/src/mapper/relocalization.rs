@@ -58,6 +58,7 @@ impl Localization<'_> {
             return false;
         }
         let found = static_map.relocalize(seen, self.camera.t_world_camera(), executor);
+        // Found: the old segment goes on. Not found: another begins.
         match &found {
             Some(t_world_camera) => self.camera.relocalize(t_world_camera),
             None => self.camera.begin_segment(),

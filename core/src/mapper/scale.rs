@@ -148,6 +148,7 @@ mod tests {
 
     #[test]
     fn cars_keep_the_defaults_to_the_bit() {
+        // KITTI, its fixture at a quarter of the size, and Cityscapes.
         for (focal_px, baseline_m, width) in
             [(718.856, 0.5372, 1226), (185.0, 0.54, 320), (2262.5, 0.209, 2048)]
         {
@@ -202,6 +203,7 @@ mod tests {
         let far_m = f64::from(scale.far_m());
         let noise_m = far_m * far_m * DISPARITY_SIGMA_PX / (425.0 * 0.05);
         let truncation_m = f64::from(config.volume.truncation_m);
+        // At most the truncation, and not far below it: the map reaches as far as it can.
         assert!(noise_m <= truncation_m && noise_m > 0.5 * truncation_m);
     }
 }

@@ -136,6 +136,7 @@ impl<'s> Mapper<'s> {
     pub fn save<E>(&mut self, sink: &mut impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
         let mut writer = Writer::new(sink);
         let (mut magic, mut version) = (MAGIC, VERSION);
+        // Fingerprints of bounds and settings, before anything that depends on them.
         let mut prints = [fingerprint(&self.capacity), fingerprint(&self.config)];
         writer.bytes(&mut magic);
         writer.u32(&mut version);

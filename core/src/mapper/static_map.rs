@@ -136,6 +136,7 @@ impl<'s> StaticMap<'s> {
         executor: &E,
     ) -> Result<RaycastReport, RaycastError> {
         let current = self.volume.segment();
+        // For this look only: the next frame belongs to the camera's own segment.
         self.volume.enter_segment(segment);
         let report = self.raycaster.cast(&self.volume, view, executor);
         self.volume.enter_segment(current);

@@ -255,6 +255,7 @@ impl Mapper<'_> {
         let Self { config, localization, stereo, scene_flow, .. } = self;
         let self_calibration = &mut localization.self_calibration;
         let correction = self_calibration.pixel_correction(&config.rig);
+        // Matches must know when the rows of the right image move between two frames.
         let rows_before = self_calibration.row_shift(&config.rig);
         self_calibration.update_rows(&config.rig, scene_flow.bucketed().map(Match::row_difference));
         localization.rows_moved = self_calibration.row_shift(&config.rig) != rows_before;

@@ -105,6 +105,7 @@ impl PixelBox {
     pub(crate) fn scaled(&self, permille: u32) -> Self {
         let of = |side: i32| (i64::from(side) * i64::from(permille) / 1000) as i32;
         let (width, height) = (of(self.width), of(self.height));
+        // Down, so that the odd pixel lies to the right and below also where the box shrinks.
         let half = |excess: i32| excess.div_euclid(2);
         Self {
             left: self.left - half(width - self.width),

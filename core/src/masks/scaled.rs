@@ -36,6 +36,7 @@ impl<'m, 's> ScaledMask<'m, 's> {
         let set = |column: i32, row: i32| {
             self.store.contains(&self.mask, from.left + column, from.top + row)
         };
+        // Bilinear: a pixel is set where all of its sources are.
         rows.iter().all(|&row| columns.iter().all(|&column| set(column, row)))
     }
 

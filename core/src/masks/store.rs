@@ -87,6 +87,7 @@ impl<'s> MaskStore<'s> {
 
     /// Space for a mask in a box within the image, all its bits 0; `None` when the store is full.
     pub(crate) fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
+        // Whole words a row, from the word that holds the box's first column on.
         let mut mask = MaskHandle { pixels, start: self.used as u32, stride: 0 };
         mask.stride = ((pixels.left + pixels.width - mask.origin() + WORD - 1) / WORD) as u32;
         let end =
@@ -107,6 +108,7 @@ impl<'s> MaskStore<'s> {
     /// Copies a mask from another store; the box alone is kept where this one is full. Whether it
     /// was kept whole.
     pub(crate) fn copy(&mut self, mask: MaskHandle, from: &MaskStore<'_>) -> (MaskHandle, bool) {
+        // A stride of 0 is a full box, which has no bits.
         if mask.stride == 0 {
             return (mask, true);
         }

@@ -74,6 +74,7 @@ impl<'a> Pyramid<'a> {
 fn halve_given(limits_px: [f32; 2], disparity_q8: View<'_, u16>, level: &mut [f32], width: usize) {
     let px = |value: u16| {
         let px = f32::from(value) / f32::from(DISPARITY_ONE_PX);
+        // Disparities outside the limits count as none.
         if px >= limits_px[0] && px <= limits_px[1] { px } else { 0.0 }
     };
     for (v, row) in level.chunks_exact_mut(width.max(1)).enumerate() {
