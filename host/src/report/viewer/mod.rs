@@ -11,7 +11,8 @@ mod planes;
 mod tiles;
 mod values;
 
-use crate::formats::FormatError;
+use crate::formats::bounds::MAX_DECODE_BYTES;
+use crate::formats::{FormatError, read_bytes_within};
 use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
@@ -94,7 +95,9 @@ fn pictures(folder: &Path, scene: &Scene) -> Vec<(String, String)> {
 }
 
 fn picture(folder: &Path, name: &str) -> Option<String> {
-    std::fs::read(folder.join(PICTURES_FOLDER).join(name)).ok().map(|bytes| STANDARD.encode(bytes))
+    let path = folder.join(PICTURES_FOLDER).join(name);
+    let bytes = read_bytes_within(&path, "a picture", MAX_DECODE_BYTES).ok()?;
+    Some(STANDARD.encode(bytes))
 }
 
 /// Builds the page's panels, with the pictures that show without the script.

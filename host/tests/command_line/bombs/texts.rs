@@ -51,6 +51,8 @@ pub const KINDS: &[Bomb] = &[
     Bomb { name: "COCO of many numbers", bound: "COCO's annotations", make: wide_coco },
     Bomb { name: "masks of large sides", bound: "at most 8,192 px a side", make: masks },
     Bomb { name: "labels on one line", bound: "at most 1 MiB of a line", make: labels },
+    Bomb { name: "sparse YOLO labels", bound: "at most 64 MiB of a table", make: yolo },
+    Bomb { name: "sparse LiDAR scan", bound: "at most 32 MiB of a LiDAR scan", make: scan },
     Bomb { name: "PFM of large sides", bound: "px", make: pfm_sides },
     Bomb { name: "sparse PFM", bound: "at most 41 KiB", make: sparse_pfm },
     Bomb {
@@ -211,6 +213,38 @@ fn labels(root: &Path, random: &mut Random) -> Call {
     let line = "1,".repeat(600_000 + random.below(1_000_000) as usize);
     fs::write(root.join("det.txt"), line).unwrap();
     with(root, "--instances", "boxes:det.txt")
+}
+
+fn yolo(root: &Path, random: &mut Random) -> Call {
+    fs::create_dir(root.join("labels")).unwrap();
+    for stem in ["000", "001"] {
+        fs::write(root.join("labels").join(format!("{stem}.txt")), "2 0.5 0.5 0.1 0.1\n").unwrap();
+    }
+    widened(&root.join("labels/000.txt"), random);
+    with(root, "--instances", "yolo:labels")
+}
+
+/// The rig in KITTI's layout, with a scan of the first frame.
+fn scan(root: &Path, random: &mut Random) -> Call {
+    rig(root, 2);
+    let sequence = root.join("kitti/sequences/00");
+    fs::create_dir_all(sequence.join("velodyne")).unwrap();
+    for (side, to) in [("left", "image_0"), ("right", "image_1")] {
+        fs::create_dir(sequence.join(to)).unwrap();
+        for frame in 0..2 {
+            let from = root.join("rig").join(side).join(format!("{frame:03}.png"));
+            fs::rename(from, sequence.join(to).join(format!("{frame:06}.png"))).unwrap();
+        }
+    }
+    fs::write(
+        sequence.join("calib.txt"),
+        "P0: 90 0 79.5 0 0 90 31.5 0 0 0 1 0\nP1: 90 0 79.5 -45 0 90 31.5 0 0 0 1 0\n\
+         Tr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n",
+    )
+    .unwrap();
+    fs::write(sequence.join("times.txt"), "0\n0.1\n").unwrap();
+    widened(&sequence.join("velodyne/000000.bin"), random);
+    Call::new(&["run", "kitti", "--quiet", "--profile", "tiny", "--evaluate", "lidar"])
 }
 
 fn depth(root: &Path, name: &str, file: &[u8]) -> Call {

@@ -5,6 +5,7 @@ use super::*;
 use crate::input::masks::boxes::{BoxMasks, FrameDisparity};
 use crate::input::{self, OpenOptions};
 use dynvox_core::masks::PixelBox;
+use dynvox_core::random::Random;
 use tempfile::TempDir;
 
 /// An output of zeros.
@@ -267,6 +268,28 @@ fn refusal(root: &TempDir, name: &str) -> String {
         .err()
         .map(|error| error.to_string())
         .unwrap_or_default()
+}
+
+#[test]
+fn settings_of_any_bytes_are_taken_or_refused() {
+    let valid = b"names = [\"road\", \"car\"]\nkeep = [\"car\"]\nscore_min = 0.5\nwidth = 640\n\
+        mean = [0.0, 1.0, 2.0]\nscale = [1.0, 1.0, 1.0]\ntiles = 2\nchannels = \"bgr\"\n";
+    let root = folder(&largest_channel(3), "");
+    let (mut random, mut taken) = (Random::new(5), 0);
+    for _ in 0..500 {
+        let mut bytes = valid.to_vec();
+        for _ in 0..=random.below(3) {
+            let at = random.below(bytes.len() as u32) as usize;
+            bytes[at] = b"0-.e9nai]\"\n\xff"[random.below(12) as usize];
+        }
+        std::fs::write(root.path().join("net.toml"), bytes).unwrap();
+        if let Ok((_, settings)) = Settings::beside(&root.path().join("net.onnx")) {
+            taken += 1;
+            assert!((0.0..=1.0).contains(&settings.score_min));
+            let _ = settings.classes(Some(2));
+        }
+    }
+    assert!((20..480).contains(&taken), "{taken}");
 }
 
 #[test]
