@@ -9,6 +9,8 @@ mod fixtures;
 mod fleet;
 mod inspect;
 mod manual;
+#[cfg(test)]
+mod messages;
 mod rectified;
 mod run;
 mod settings;

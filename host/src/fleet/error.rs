@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
     /// The system refuses.
-    #[error("{path}: {source}. Check the disk and the permissions")]
+    #[error("{path} cannot be read or written: {source}. Check the disk and the permissions")]
     Io {
         /// The file or folder.
         path: PathBuf,

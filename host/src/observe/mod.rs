@@ -80,7 +80,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum ObserveError {
     /// A file of the run folder.
-    #[error("{path} cannot be written: {source}")]
+    #[error("{path} cannot be written: {source}. Check the disk and the permissions")]
     Write {
         /// The file.
         path: PathBuf,
@@ -88,7 +88,7 @@ pub enum ObserveError {
         source: std::io::Error,
     },
     /// A file that an earlier part of the run wrote.
-    #[error("{path} is not as the run left it: {reason}")]
+    #[error("{path} is not as the run left it: {reason}. Start the run again with --overwrite")]
     Changed {
         /// The file.
         path: PathBuf,

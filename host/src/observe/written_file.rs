@@ -52,9 +52,7 @@ impl WrittenFile {
         // The length first: a checksum takes reading the whole file.
         let as_long = file.metadata().map_err(failed)?.len() == self.bytes;
         if !as_long || checksum_of(&file, self.bytes).map_err(failed)? != Some(self.checksum) {
-            return Err(changed(
-                "it is truncated or changed. Start the run again with --overwrite",
-            ));
+            return Err(changed("it is truncated or changed"));
         }
         Ok(())
     }

@@ -42,10 +42,10 @@ pub enum SynthError {
     #[error("{0}")]
     Config(String),
     /// The target folder holds something already.
-    #[error("{0} exists and is not empty; name another folder or remove it")]
+    #[error("{0} exists and is not empty. Name another folder, or remove it")]
     NotEmpty(std::path::PathBuf),
     /// A file could not be written.
-    #[error("cannot write {path}: {source}")]
+    #[error("{path} cannot be written: {source}. Check the disk and the permissions")]
     Write {
         /// Path of the file.
         path: std::path::PathBuf,

@@ -62,7 +62,7 @@ pub enum TrajectoryError {
     },
     /// Fewer than two pairs.
     #[error(
-        "{pairs} of the poses have the same time, and two are needed. Times must agree to \
+        "too few poses are of the same time: {pairs}, where two are needed. Times must agree to \
          {SAME_TIME_S} s; check that both use the same clock"
     )]
     Few {
