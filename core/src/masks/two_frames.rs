@@ -52,6 +52,7 @@ mod tests {
         assert_eq!((*values.current(), *values.previous()), ("a", "b"));
         values.advance();
         assert_eq!((*values.current(), *values.previous()), ("b", "a"));
+        // What was current two frames ago is overwritten.
         *values.current_mut() = "c";
         values.advance();
         let (current, previous) = values.split_mut();

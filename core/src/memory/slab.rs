@@ -212,6 +212,7 @@ impl<'s> Carver<'s> {
         &mut self,
         name: &'static str,
         bytes: usize,
+        // The size of a value with pointers differs by target; the stated bytes hold it on all.
         value: T,
     ) -> Option<&'s mut T> {
         let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
@@ -323,6 +324,7 @@ mod tests {
         assert_eq!(carver.alloc::<u8>("a", 64).len(), 64);
         assert_eq!(carver.alloc::<u8>("b", 200).len(), 0);
         assert_eq!(carver.alloc::<u8>("c", 1_000).len(), 0);
+        // A failed carver gives out nothing more: no caller may go on with half of its regions.
         assert_eq!(carver.alloc::<u8>("d", 1).len(), 0, "although it would fit");
         assert_eq!(carver.check(), Err(SlabError::TooSmall { missing: 256 - 128 }));
         assert_eq!(carver.footprint().bytes(), 64);
@@ -333,6 +335,7 @@ mod tests {
         let mut slab = std::boxed::Box::new(Slab([0u8; 512]));
         let mut carver = Carver::new(&mut slab.0, 512).unwrap();
         carver.alloc::<u8>("a", 1);
+        // A second region of the same name follows: both are one, of three cache lines.
         carver.alloc::<u8>("a", 65);
         for _ in 0..2 {
             carver.group("both", |carver| {
@@ -368,6 +371,7 @@ mod tests {
     #[test]
     fn skips_to_the_first_aligned_byte() {
         let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
+        // A slab that begins at any byte has its first aligned one up to 63 bytes further.
         for offset in 1..=64 {
             let needed = 128;
             let mut carver = Carver::new(&mut slab[offset..], needed).unwrap();

@@ -316,6 +316,7 @@ impl<'s> Crops<'s> {
     }
 
     fn picture(&self, crop: &Crop) -> Option<(&[u16], Picture<'_>)> {
+        // Disparities, grey and colour lie at one position of their rings.
         let span = crop.start as usize..(crop.start + crop.len) as usize;
         let (width, height) = (crop.pixels.width as usize, crop.pixels.height as usize);
         let colour = match crop.coloured {
@@ -365,6 +366,7 @@ impl<'s> Crops<'s> {
     /// Digest of a crop's pixels.
     fn digest(&self, crop: &Crop) -> u64 {
         let mut digest = Digest::default();
+        // A crop whose pixels cannot be found has the digest of none.
         if let Some((disparity_q8, picture)) = self.picture(crop) {
             digest.u16s(disparity_q8);
             picture.grey.rows().for_each(|row| digest.bytes(row));

@@ -224,6 +224,7 @@ impl<'s> Objects<'s> {
     /// Retires the objects whose track was forgotten.
     fn retire_orphans(&mut self, tracker: &Tracker<'_>, sink: &mut impl ObjectSink) {
         for object in &mut self.volumes.objects {
+            // Lists are short: a search each is no cost.
             let is_tracked = |summary: &ObjectSummary| {
                 tracker.tracks_with_instances().any(|(track, _)| track.id == summary.id)
             };

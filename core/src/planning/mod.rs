@@ -335,6 +335,7 @@ impl<'s> Planning<'s> {
     /// Digest of the window, the ground and the distance fields, as they stand after the last
     /// update: the same on every machine.
     pub fn digest(&self) -> u64 {
+        // The origin first: the same cells elsewhere are another window.
         let mut digest = Digest::default();
         self.cells.origin.iter().for_each(|c| digest.u64(*c as u64));
         self.cells.observed_at.iter().for_each(|stamp| digest.u64(u64::from(*stamp)));

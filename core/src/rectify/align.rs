@@ -116,8 +116,10 @@ impl core::error::Error for RectifyProblem {}
 /// # Errors
 /// [`RectifyProblem::NotARotation`] when it is too far from one.
 pub(super) fn rotation(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, RectifyProblem> {
+    // How far the matrix times its transpose is from the identity.
     let excess = matrix * matrix.transpose() - Matrix3::identity();
     let near = excess.iter().all(|entry| libm::fabs(*entry) <= ROTATION_TOLERANCE);
+    // A mirror image has a determinant of -1.
     let upright = matrix.determinant() > 0.0;
     if near && upright {
         Ok(matrix - excess * matrix * 0.5)
@@ -240,11 +242,13 @@ mod tests {
         let r_right_left = turned(0.03, -0.1, 0.05);
         let raw = rig(r_right_left, Vector3::new(-0.5, 0.03, -0.02));
         let aligned = raw.align().unwrap();
+        // Points near and far, on both sides.
         for point in [Vector3::new(0.3, -0.4, 2.0), Vector3::new(-3.0, 1.0, 9.0)] {
             let left = aligned.r_rectified_left * point;
             let right = aligned.r_rectified_right * (r_right_left * point + raw.t_right_left_m);
             assert!((left - right - Vector3::new(aligned.baseline_m, 0.0, 0.0)).norm() < 1e-12);
         }
+        // The length of the way between the cameras, in all three axes.
         assert!((aligned.baseline_m - (0.25f64 + 0.0009 + 0.0004).sqrt()).abs() < 1e-12);
     }
 
@@ -263,6 +267,7 @@ mod tests {
         let straight = Vector3::new(-0.5, 0.0, 0.0);
         let refused = |r, t| rig(r, t).align().unwrap_err();
         let identity = Matrix3::identity();
+        // Zeros, not a number, and a mirror image.
         assert_eq!(refused(Matrix3::zeros(), straight), RectifyProblem::NotARotation);
         assert_eq!(refused(identity * f64::NAN, straight), RectifyProblem::NotARotation);
         assert_eq!(refused(-identity, straight), RectifyProblem::NotARotation);

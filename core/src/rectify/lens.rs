@@ -103,6 +103,7 @@ impl Lens {
     /// middle at the same scale.
     pub(crate) fn middle_focal_px(&self) -> f64 {
         const STEP: f64 = 1e-4;
+        // Distortion may move the middle.
         let middle = self.project([0.0, 0.0, 1.0]).unwrap_or(self.center_px);
         let along = |ray: [f64; 3], axis: fn([f64; 2]) -> f64, otherwise: f64| {
             self.project(ray).map_or(otherwise, |pixel| (axis(pixel) - axis(middle)) / STEP)

@@ -69,6 +69,7 @@ mod tests {
 
     #[test]
     fn finds_the_end_of_growth_and_inverts_up_to_it() {
+        // Grows up to 1, and falls from there.
         let cubic = |x: f64| x - x * x * x / 3.0;
         let end = growing_until(2.0, |x| x, cubic);
         assert!((end - 1.0).abs() < 0.01, "the derivative is 0 at 1, not at {end}");

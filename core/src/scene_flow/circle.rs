@@ -128,6 +128,7 @@ impl Corners<'_, '_> {
         let mut found = 0;
         for (first, partners) in traced.iter().enumerate().take(self.previous_left.len()) {
             if let Some(closed) = self.closed(first, *partners) {
+                // Counted also where there is no space, so that the report tells what was dropped.
                 found += 1;
                 if let Some(slot) = slots.next() {
                     *slot = closed;

@@ -288,6 +288,7 @@ impl<'s> FlowMatcher<'s> {
         right: View<'_, u8>,
         executor: &E,
     ) -> FlowReport {
+        // Every pixel counts, and the rows are where they were.
         let pair = MaskedPair { left, right, invalid: None, right_moved: false };
         self.push_within(config, &pair, executor)
     }

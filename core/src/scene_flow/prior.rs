@@ -151,9 +151,11 @@ fn united(a: [i16; 4], b: [i16; 4]) -> [i16; 4] {
 }
 
 fn widened(side: [i16; 4], widest: [i16; 4]) -> [i16; 4] {
+    // Nothing was learned of this side.
     if side == EMPTY {
         return widest;
     }
+    // What was learned, with slack, and never beyond the widest.
     [
         widest[0].max(side[0] - SLACK_PX),
         widest[1].min(side[1] + SLACK_PX),

@@ -306,10 +306,12 @@ impl Work for RefineSupported<'_> {
     #[inline(always)]
     fn run(self) {
         let all = self.matches.iter_mut().zip(self.supported).zip(self.score);
+        // Without support a match is not worth refining.
         for ((m, supported), score) in all.filter(|((_, supported), _)| **supported == 1) {
             *score = 0.0;
             match refine(m, self.images) {
                 Some(better) => (*m, *score) = better,
+                // A match that cannot be refined counts as unsupported.
                 None => *supported = 0,
             }
         }

@@ -74,6 +74,7 @@ impl MotionSegmenter<'_> {
     pub(super) fn block_static(&mut self, lattice: &Lattice<'_>, given: &Owned<'_>) {
         self.blocked.fill(0);
         let marked = free_matches(given, self.is_candidate);
+        // Those that stand first, so that one that moves frees the cell for its object.
         for moves in [false, true] {
             let at = |m: &Match| [m.current_left[0], m.current_left[1], m.current_disparity_px()];
             marked
@@ -144,8 +145,10 @@ pub(super) fn free_matches<'m>(
 
 /// Keeps every second candidate; how many those are.
 fn thin(candidates: &mut [Candidate]) -> usize {
+    // Rounded up: of an odd number the last one stays.
     let len = candidates.len().div_ceil(2);
     for index in 0..len {
+        // Written in front of where it is read, so that nothing is lost.
         let kept = candidates.get(2 * index).copied();
         if let Some((slot, kept)) = candidates.get_mut(index).zip(kept) {
             *slot = kept.at(index);

@@ -21,6 +21,7 @@ impl Extent {
     }
 
     pub fn union(&self, other: &Self) -> Self {
+        // The least box that holds both.
         let mut joined = *self;
         for (low, theirs) in joined.low.iter_mut().zip(other.low) {
             *low = if theirs < *low { theirs } else { *low };

@@ -116,10 +116,12 @@ pub(super) fn join(candidates: &mut [Candidate], focal_px: f64) {
 fn root(earlier: &[Candidate], rest: &[Candidate], mut at: u32) -> u32 {
     loop {
         let index = at as usize;
+        // The candidates are in two halves here, numbered through.
         let parent = earlier
             .get(index)
             .or_else(|| rest.get(index.checked_sub(earlier.len())?))
             .map_or(at, |candidate| candidate.parent);
+        // A group's first member is its own parent.
         if parent >= at {
             return at;
         }

@@ -122,6 +122,7 @@ impl<'s> Hypotheses<'s> {
         if shown {
             hypothesis.end_unmasked();
         } else {
+            // So many frames can be erased at most.
             hypothesis.unmasked = (hypothesis.unmasked + 1).min(u32::from(config.erase_frames));
         }
     }
@@ -132,6 +133,7 @@ impl<'s> Hypotheses<'s> {
         for hypothesis in
             self.table.iter_mut().take(self.len).filter(|hypothesis| hypothesis.trail_frames > 0)
         {
+            // Taken, so that a trail is told once.
             let frames = core::mem::take(&mut hypothesis.trail_frames);
             visit(&Trail::new(
                 &hypothesis.extent(t_world_camera),

@@ -112,6 +112,7 @@ impl MotionSegmenter<'_> {
     fn seed_small_groups(&mut self, len: usize) {
         for first in 0..len {
             let Some(candidates) = self.candidates.get(..len) else { return };
+            // Each group once: by its first member.
             if candidates.get(first).is_none_or(|candidate| !candidate.is_first(first)) {
                 continue;
             }

@@ -57,6 +57,7 @@ impl Trail {
             for ((low, high), motion_m) in
                 before.low_m.iter_mut().zip(&mut before.high_m).zip(self.motion_m)
             {
+                // The motion is per frame, and assumed to have been the same.
                 let moved_m = f64::from(frame) * motion_m;
                 (*low, *high) = (*low - moved_m, *high - moved_m);
             }

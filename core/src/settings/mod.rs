@@ -107,6 +107,7 @@ impl<C> Setting<C> {
     ) -> Self {
         Self {
             rule: Rule { key, value, range: Range::Any, relation: None },
+            // Texts are added by the methods below.
             unit,
             text: "",
             published: "",
@@ -186,9 +187,11 @@ pub const fn rules<C, const N: usize>(settings: &[Setting<C>]) -> [Rule<C>; N] {
 
 /// Notes the rules that a configuration breaks, in the order of the rows.
 pub fn check<C: Clone>(rules: &[Rule<C>], config: &C, problems: &mut Problems) {
+    // A row borrows its value mutably, also to read it.
     let mut copy = config.clone();
     for Rule { key, value, range, relation } in rules {
         let number = value(&mut copy).number();
+        // A setting that is no number has no range.
         if !number.is_none_or(|number| range.contains(number)) {
             note(problems, Problem { key, rule: BrokenRule::Range(*range) });
         } else if let Some(relation) = relation.filter(|relation| !(relation.holds)(config)) {

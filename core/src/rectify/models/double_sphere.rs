@@ -23,6 +23,7 @@ pub(super) fn distort(xi: f64, alpha: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 
 /// The ray that meets the image there.
 pub(super) fn undistort(xi: f64, alpha: f64, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
     let r2 = u * u + v * v;
+    // Below 0 the image has no ray there: the model ends at a circle.
     let inside = 1.0 - (2.0 * alpha - 1.0) * r2;
     if inside.is_nan() || inside < 0.0 {
         return None;

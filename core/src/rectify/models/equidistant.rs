@@ -30,11 +30,13 @@ pub(super) fn limit(k: &[f64; 4]) -> f64 {
 /// Projects a ray into the image, in units of the focal length.
 pub(super) fn distort(k: &[f64; 4], limit: f64, [x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
     let aside = libm::sqrt(x * x + y * y);
+    // On the axis the direction in the image is not determined, and the point is its middle.
     if aside < 1e-300 {
         return (z > 0.0).then_some([0.0, 0.0]);
     }
     let angle = libm::atan2(aside, z);
     let within = angle <= limit;
+    // Radius of the image by the angle, and along the ray's direction from the axis.
     within.then(|| {
         let scale = polynomial(k, angle)[0] / aside;
         [x * scale, y * scale]

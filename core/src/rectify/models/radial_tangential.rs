@@ -108,6 +108,7 @@ impl Plane<'_> {
         let [error_x, error_y] = [at_x - sought[0], at_y - sought[1]];
         let r2 = x * x + y * y;
         let [g, slope] = factor(self.radial, r2);
+        // The derivatives of x and y by each other, and by themselves.
         let mixed = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let (along_x, along_y) = (s1 + 2.0 * s2 * r2, s3 + 2.0 * s4 * r2);
         let xx = g + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x + 2.0 * x * along_x;
@@ -115,6 +116,7 @@ impl Plane<'_> {
         let yx = mixed + 2.0 * x * along_y;
         let yy = g + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x + 2.0 * y * along_y;
         let determinant = xx * yy - xy * yx;
+        // Cramer's rule.
         [(yy * error_x - xy * error_y) / determinant, (xx * error_y - yx * error_x) / determinant]
     }
 }

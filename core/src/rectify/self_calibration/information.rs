@@ -185,11 +185,13 @@ impl<const P: usize> Information<P> {
     #[inline(never)]
     pub(super) fn estimate(&self, prior: &Prior<P>) -> Option<([f64; P], f64)> {
         let weight = |i: usize| 1.0 / (prior.sigma[i] * prior.sigma[i]);
+        // The prior adds its own information on the diagonal.
         let matrix: [[f64; P]; P] = core::array::from_fn(|i| {
             core::array::from_fn(|j| self.matrix[i][j] + if i == j { weight(i) } else { 0.0 })
         });
         let parameters =
             solve(&matrix, core::array::from_fn(|i| self.vector[i] + weight(i) * prior.mean[i]))?;
+        // A column of the inverse: its first entry is the first parameter's variance.
         let variance = solve(&matrix, core::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))?;
         Some((parameters, libm::sqrt(variance[0])))
     }

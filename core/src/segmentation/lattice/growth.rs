@@ -28,6 +28,7 @@ impl Growth<'_, '_> {
         let mut queued = 0;
         for (column, row) in self.bounds.cells() {
             if self.can_be_own(column, row, within) {
+                // A full queue ends the growth: the mask would be torn.
                 let (cell, slot) = (cells.get_mut(row * columns + column)?, queue.get_mut(queued)?);
                 (*cell, *slot) = (GROWN, (row * columns + column) as u32);
                 queued += 1;
