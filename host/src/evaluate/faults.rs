@@ -138,8 +138,10 @@ mod tests {
             (100.1, Severity::MapAffected),
         ]);
         assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 2);
+        // Each segment has a world of its own, and the first pose in it is its zero.
         frames[1..].iter_mut().for_each(|frame| frame.segment = 1);
         assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 0);
+        // Back where the segment began, and so 100 m off.
         frames[2].t_world_camera = Transform::IDENTITY;
         assert_eq!(FaultOutcome::from_frames(&frames, 1).wrong_fused, 1);
     }

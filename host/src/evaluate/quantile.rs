@@ -22,6 +22,7 @@ pub fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
 /// The bin that the value at `share` lies in, of a histogram; `None` when it is empty.
 pub fn quantile_bin(counts: &[u64], share: f64) -> Option<usize> {
     let all: u64 = counts.iter().sum();
+    // The rank of a value in all of them, from 0 on.
     let rank = rank(usize::try_from(all).unwrap_or(usize::MAX), share) as u64;
     let mut below = 0;
     counts.iter().position(|count| {
@@ -33,10 +34,12 @@ pub fn quantile_bin(counts: &[u64], share: f64) -> Option<usize> {
 /// Five numbers for a box plot: whiskers end at the last value within one and a half times the
 /// box's height (Tukey).
 pub fn five_numbers(values: &[f64]) -> Option<[f64; 5]> {
+    // Frames without a figure have no place in a box plot.
     let sorted = ascending(values.iter().copied().filter(|value| value.is_finite()));
     let [low, middle, high] =
         [quantile(&sorted, 0.25)?, quantile(&sorted, 0.5)?, quantile(&sorted, 0.75)?];
     let reach = 1.5 * (high - low);
+    // Values, not limits: a whisker ends where a frame lies.
     let first = sorted.iter().copied().find(|value| *value >= low - reach)?;
     let last = sorted.iter().rev().copied().find(|value| *value <= high + reach)?;
     Some([first, low, middle, high, last])

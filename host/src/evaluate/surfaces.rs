@@ -185,6 +185,7 @@ impl<'p> PointGrid<'p> {
     /// Distance to the nearest point, m; infinite beyond the reach.
     fn distance_m(&self, from: &Point3<f64>) -> f64 {
         let [x, y, z] = cell(from, self.reach_m);
+        // A point within reach lies in one of the 27 cells around.
         let around = (0..27).map(|n| [x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
         let near = around
             .filter_map(|cell| self.cells.get(&cell))

@@ -90,6 +90,7 @@ impl Swept {
     /// The file is no mesh of this program.
     pub fn triangles(&self, ply: &Path) -> io::Result<u64> {
         let inside = |corner: &PlyVertex| {
+            // Meshes of objects may lie where cars drove.
             corner.object == 0
                 && self.contains(&Point3::from(corner.vertex.position_m.map(f64::from)))
         };

@@ -198,6 +198,7 @@ impl Sampled {
         points.iter().for_each(|point| {
             (0..3).for_each(|axis| centre_m[axis] += point.at_m[axis] / points.len() as f64)
         });
+        // How far rotations move the points at most.
         let radius_m =
             points.iter().map(|point| distance_m(&point.at_m, &centre_m)).fold(0.0, f64::max);
         Ok(Self { points, centre_m, radius_m })
@@ -255,6 +256,7 @@ fn register_all(
 /// A registration: where maps overlap, it says how they lie; how their centres lie follows as far
 /// as the maps have no drift from there.
 fn edge([a, b]: [usize; 2], of: &Registration, sampled: &[Sampled]) -> Edge {
+    // In the other map's frame, where its own centre is.
     let in_a_m = of.t_b_a.inverse().transform_point(of.centre_m);
     let way_m = distance_m(&of.centre_m, &sampled[b].centre_m)
         .hypot(distance_m(&in_a_m, &sampled[a].centre_m));

@@ -63,6 +63,7 @@ impl Visibility {
 
     fn from_box(object: &PixelBox, size: (usize, usize)) -> Self {
         let (right, bottom) = (object.left + object.width, object.top + object.height);
+        // A box that touches the border shows an object in part.
         if object.left <= 0 || object.top <= 0 || right >= size.0 as i32 || bottom >= size.1 as i32
         {
             Self::Cut

@@ -47,6 +47,7 @@ impl DepthErrors {
 
     /// The figures; `None` without a point.
     pub fn figures(&self) -> Option<DepthErrorFigures> {
+        // The middle of the bin in which the median lies.
         let median =
             |counts: &[u64], bin_m: f64| Some(bin_m * (quantile_bin(counts, 0.5)? as f64 + 0.5));
         Some(DepthErrorFigures {

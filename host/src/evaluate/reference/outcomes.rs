@@ -27,9 +27,11 @@ impl PointOutcomes {
         let words = frame.samples.len().div_ceil(WORD);
         let (mut shown, mut right) = (vec![0; words], vec![0; words]);
         for (at, (sample, &px)) in frame.samples.iter().zip(shown_px).enumerate() {
+            // Objects are elsewhere by the time the map is looked at.
             let is_shown = sample.region == Region::Static && px > 0.0;
             let is_right = is_shown
                 && !Rule::KITTI.is_error(enlarged * px, enlarged * sample.point.disparity_px);
+            // A bit a point: outcomes of all frames of a sweep are kept.
             shown[at / WORD] |= u64::from(is_shown) << (at % WORD);
             right[at / WORD] |= u64::from(is_right) << (at % WORD);
         }

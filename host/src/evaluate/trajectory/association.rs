@@ -10,6 +10,7 @@ pub(super) const SAME_TIME_S: f64 = 0.01;
 pub(super) fn associated(first_s: &[f64], second_s: &[f64]) -> Vec<(usize, usize)> {
     let swapped = first_s.len() > second_s.len();
     let (short_s, long_s) = if swapped { (second_s, first_s) } else { (first_s, second_s) };
+    // Half an interval of the sparser one: further off another pose would be nearer.
     let half_s = [short_s, long_s].map(half_interval_s).into_iter().fold(0.0, f64::max);
     let within_s = if half_s > 0.0 { SAME_TIME_S.min(half_s) } else { SAME_TIME_S };
     let mut pairs: Vec<(usize, usize)> = Vec::new();
@@ -17,6 +18,7 @@ pub(super) fn associated(first_s: &[f64], second_s: &[f64]) -> Vec<(usize, usize
         let apart = |other: usize| long_s.get(other).map_or(f64::INFINITY, |s| (s - time_s).abs());
         let after = long_s.partition_point(|&s| s < time_s);
         let before = after.saturating_sub(1);
+        // Of two equally near ones the earlier.
         let nearest = if apart(after) < apart(before) { after } else { before };
         if apart(nearest) > within_s {
             continue;
@@ -30,6 +32,7 @@ pub(super) fn associated(first_s: &[f64], second_s: &[f64]) -> Vec<(usize, usize
             None => pairs.push((at, nearest)),
         }
     }
+    // Back in the order of the arguments.
     if swapped {
         pairs.iter_mut().for_each(|pair| *pair = (pair.1, pair.0));
     }

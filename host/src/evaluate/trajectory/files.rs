@@ -80,6 +80,7 @@ pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError>
     if !table.is_file() {
         return Ok(None);
     }
+    // The table of another program, or cut short.
     let unreadable = |error: csv::Error| TrajectoryError::Frames {
         path: table.clone(),
         reason: error.to_string(),
@@ -97,6 +98,7 @@ pub fn frames_of_run(path: &Path) -> Result<Option<Vec<usize>>, TrajectoryError>
 /// There is no row for a frame.
 pub fn truth_of_frames(truth: Trajectory, frames: &[usize]) -> Result<Trajectory, TrajectoryError> {
     let by_row = truth.numbers.is_none();
+    // Times match by themselves, and equal counts row by row.
     if truth.times_s.is_some() || (by_row && truth.poses.len() == frames.len()) {
         return Ok(truth);
     }

@@ -111,6 +111,7 @@ pub fn errors(truth: &[Transform], estimate: &[Transform]) -> Option<TrajectoryE
 fn without_boresight(segments: &[Segment], steps: &[Segment]) -> Option<WithoutBoresight> {
     let turn = boresight(segments)?;
     let turned = |segment: &Segment| Segment {
+        // The motion in axes turned by the boresight, and back.
         estimated: turn * segment.estimated * turn.inverse(),
         ..*segment
     };
