@@ -49,7 +49,7 @@ impl Observer for GalleryObserver {
         for entry in folder.read_dir().map_err(failed)? {
             let entry = entry.map_err(failed)?;
             if !known.iter().any(|name| entry.file_name() == name.as_str()) {
-                owned::remove_file(&entry.path()).map_err(failed)?;
+                owned::remove_own(&entry.path()).map_err(failed)?;
             }
         }
         // An empty folder would show a gallery without pictures.

@@ -116,7 +116,7 @@ impl Observer for ObjectsObserver {
                 files(&one.name).iter().any(|file| entry.file_name() == file.as_str())
             };
             if !self.retired.iter().any(known) {
-                owned::remove_file(&entry.path()).map_err(failed)?;
+                owned::remove_own(&entry.path()).map_err(failed)?;
             }
         }
         // Where none is left there is no folder either.

@@ -154,16 +154,35 @@ pub fn remove_file(path: &Path) -> io::Result<()> {
     location.folder.remove_file(&location.below)
 }
 
-/// Removes a folder that dynvox made below one with a marker, if it is empty.
+/// Removes a file if dynvox made it; a foreign one stays.
 ///
 /// # Errors
-/// It is not there, not empty, dynvox did not make it, or the disk refuses.
+/// The disk refuses.
+pub fn remove_own(path: &Path) -> io::Result<()> {
+    match remove_file(path) {
+        Err(error) if matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::NotFound) => {
+            Ok(())
+        }
+        removed => removed,
+    }
+}
+
+/// Removes a folder that dynvox made below one with a marker, if it is empty. Otherwise it stays.
+///
+/// # Errors
+/// The disk refuses.
 pub fn remove_folder(path: &Path) -> io::Result<()> {
     let location = Location::of(path)?;
-    if location.is_free(path)? {
-        return Err(ErrorKind::NotFound.into());
+    match location.is_own() {
+        Ok(true) => {}
+        Ok(false) => return Ok(()),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(error),
     }
-    location.folder.remove_dir(&location.below)
+    match location.folder.remove_dir(&location.below) {
+        Err(error) if error.kind() == ErrorKind::DirectoryNotEmpty => Ok(()),
+        removed => removed,
+    }
 }
 
 /// Renames a file within a folder with a marker. A file of dynvox's own at `to` is replaced.

@@ -28,8 +28,8 @@ mod tests;
 pub use draft::DraftFolder;
 pub use error::NotOwned;
 pub use file::{
-    create_file, create_folder, create_unnamed, remove_file, remove_folder, rename_file,
-    replace_whole, write, write_whole,
+    create_file, create_folder, create_unnamed, remove_file, remove_folder, remove_own,
+    rename_file, replace_whole, write, write_whole,
 };
 pub use folder::OwnedFolder;
 pub use marker::MARKER_FILE;

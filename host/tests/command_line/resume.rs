@@ -67,7 +67,10 @@ fn a_run_killed_three_times_equals_the_uninterrupted_run() {
     // What a kill in the middle of writing leaves.
     let partial = root.path().join(".stopped.partial");
     fs::create_dir_all(partial.join("objects")).unwrap();
-    for torn in [".run.snapshot.partial", "objects/77.ply", "objects/77.faces", "map.faces"] {
+    let ledger = fs::OpenOptions::new().append(true).open(partial.join(".dynvox"));
+    let mut ledger = ledger.unwrap();
+    for torn in [".run.snapshot.partial", "objects/77.ply", ".map.faces.partial"] {
+        std::io::Write::write_all(&mut ledger, format!("{torn}\n").as_bytes()).unwrap();
         fs::write(partial.join(torn), "torn").unwrap();
     }
     // Blocks that left after the last snapshot, and a torn one.
