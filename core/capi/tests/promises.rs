@@ -112,7 +112,7 @@ fn sentences(header: &str) -> Vec<String> {
     let mut found = Vec::new();
     for paragraph in paragraphs {
         let mut rest = paragraph.trim();
-        while let Some(end) = rest.match_indices(". ").map(|(at, _)| at + 1).next() {
+        while let Some(end) = rest.find(". ").map(|at| at + 1) {
             found.push(rest[..end].to_owned());
             rest = rest[end..].trim_start();
         }
@@ -327,7 +327,7 @@ extern "C" fn store_and_call(context: *mut c_void, _: *const DynvoxBlock) -> boo
     calls.1 += 1;
     assert_eq!(unsafe { dynvox_pose(calls.0, &raw mut pose) }, DynvoxStatus::Busy);
     assert_eq!(unsafe { dynvox_destroy(calls.0) }, DynvoxStatus::Busy);
-    calls.1 % 2 == 0
+    calls.1.is_multiple_of(2)
 }
 
 #[test]
