@@ -55,9 +55,21 @@ fn large(random: &mut Random) -> [u32; 2] {
     [4_096 - random.below(99), 4_096 - random.below(99)]
 }
 
-/// A folder of two pairs of a picture that is decoded.
-fn run(root: &Path, name: &str, bytes: &[u8], random: &mut Random) -> Call {
-    Call { args: RUN.map(str::to_owned).to_vec(), ..pairs(root, name, bytes, random) }
+/// A folder of two pairs of a picture that is decoded: its calibration is of its size, and the
+/// mapper's images are small.
+fn run(root: &Path, name: &str, bytes: &[u8], [width, height]: [u32; 2]) -> Call {
+    pairs(root, name, bytes, &mut Random::new(0));
+    let center = [width, height].map(|side| f64::from(side - 1) / 2.0);
+    let calib = format!(
+        "focal_px {width}\ncenter_u_px {}\ncenter_v_px {}\nbaseline_m 0.5\n",
+        center[0], center[1]
+    );
+    fs::write(root.join("calib.txt"), calib).unwrap();
+    let mut call = Call::new(&RUN);
+    if width > 1_000 {
+        call.args.extend(["--scale".to_owned(), "0.1".to_owned()]);
+    }
+    call
 }
 
 /// A folder of two pairs of a picture, inspected or run.
@@ -112,34 +124,32 @@ fn png_interlaced(root: &Path, random: &mut Random) -> Call {
 
 fn png_memory(root: &Path, random: &mut Random) -> Call {
     let rows = packed(1 << 20);
-    run(root, "png", &png(large(random), [16, 6, 0, 0, 0], &[(b"IDAT", rows)]), random)
+    let size = large(random);
+    run(root, "png", &png(size, [16, 6, 0, 0, 0], &[(b"IDAT", rows)]), size)
 }
 
 /// A black picture of the size of [`CALIB`]'s, after 400 MB of text and profile.
-fn png_text(root: &Path, random: &mut Random) -> Call {
+fn png_text(root: &Path, _: &mut Random) -> Call {
     let long = packed(200 << 20);
     let chunks = [
         (b"zTXt", [b"a\0\0".as_slice(), &long].concat()),
         (b"iCCP", [b"a\0\0".as_slice(), &long].concat()),
         (b"IDAT", packed(161 * 64)),
     ];
-    run(root, "png", &png([160, 64], [8, 0, 0, 0, 0], &chunks), random)
+    run(root, "png", &png([160, 64], [8, 0, 0, 0, 0], &chunks), [160, 64])
 }
 
 /// A black picture of a few rows, with two hundred megabytes packed behind them.
 fn png_behind(root: &Path, random: &mut Random) -> Call {
     let kind = [8, 0, 0, 0, random.below(2) as u8];
     let rows = packed(200 << 20);
-    run(root, "png", &png([160, 64], kind, &[(b"IDAT", rows)]), random)
+    run(root, "png", &png([160, 64], kind, &[(b"IDAT", rows)]), [160, 64])
 }
 
 fn png_short(root: &Path, random: &mut Random) -> Call {
     let rows = packed(1 << 16);
-    let mut call =
-        run(root, "png", &png(large(random), [8, 0, 0, 0, 0], &[(b"IDAT", rows)]), random);
-    // The slab of so large images has nothing to do with their decoding.
-    call.args.extend(["--scale".to_owned(), "0.1".to_owned()]);
-    call
+    let size = large(random);
+    run(root, "png", &png(size, [8, 0, 0, 0, 0], &[(b"IDAT", rows)]), size)
 }
 
 /// The header of a JPEG with a frame of a kind.
@@ -159,13 +169,13 @@ fn jpeg_sides(root: &Path, random: &mut Random) -> Call {
 }
 
 fn jpeg_memory(root: &Path, random: &mut Random) -> Call {
-    let file = [jpeg(0xC2, large(random)), SCAN.to_vec()].concat();
-    run(root, "jpg", &file, random)
+    let size = large(random);
+    run(root, "jpg", &[jpeg(0xC2, size), SCAN.to_vec()].concat(), size)
 }
 
 fn jpeg_scans(root: &Path, random: &mut Random) -> Call {
     let scans = SCAN.repeat(above(101, random) as usize);
-    run(root, "jpg", &[jpeg(0xC2, [640, 480]), scans].concat(), random)
+    run(root, "jpg", &[jpeg(0xC2, [640, 480]), scans].concat(), [640, 480])
 }
 
 fn pnm(root: &Path, random: &mut Random, kind: &str) -> Call {
@@ -179,7 +189,7 @@ fn pam_memory(root: &Path, random: &mut Random) -> Call {
     let file = format!(
         "P7\nWIDTH {width}\nHEIGHT {height}\nDEPTH 4\nMAXVAL 65535\nTUPLTYPE RGB_ALPHA\nENDHDR\n"
     );
-    run(root, "pnm", file.as_bytes(), random)
+    run(root, "pnm", file.as_bytes(), [width, height])
 }
 
 fn pam(root: &Path, random: &mut Random) -> Call {
