@@ -190,13 +190,13 @@ impl<'s> MaskStore<'s> {
             return (0..WORD).map(inside).fold(0, |bits, bit| bits | bit);
         }
         let row = self.row(mask, v);
-        // Beyond the row there are no pixels of the mask.
         let from = u - mask.origin();
         let (word, shift) = (from.div_euclid(WORD), from.rem_euclid(WORD) as u32);
+        // Beyond the row there are no pixels of the mask.
         let at = |word: i32| {
-            // A shift by 64 bits is none in Rust.
             usize::try_from(word).ok().and_then(|word| row.get(word)).copied().unwrap_or(0)
         };
+        // A shift by 64 bits is none in Rust.
         if shift == 0 { at(word) } else { at(word) >> shift | at(word + 1) << (64 - shift) }
     }
 

@@ -212,9 +212,9 @@ impl<'s> Carver<'s> {
         &mut self,
         name: &'static str,
         bytes: usize,
-        // The size of a value with pointers differs by target; the stated bytes hold it on all.
         value: T,
     ) -> Option<&'s mut T> {
+        // The size of a value with pointers differs by target; the stated bytes hold it on all.
         let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
         self.require_fit(made.is_ok());
         made.ok().map(Box::leak)

@@ -274,6 +274,7 @@ fn pair(
     of: &Registration,
     before: &[([usize; 2], AlignedPair)],
 ) -> AlignedPair {
+    // The error before the first registration, not before the last one.
     let first = before.iter().find(|(nodes, _)| *nodes == [a, b]);
     let rms_before_m = first.map_or(of.fit.rms_before_m, |(_, pair)| pair.fit.rms_before_m);
     AlignedPair {

@@ -50,6 +50,7 @@ impl BlockSums {
     /// Adds an observation of a voxel.
     pub fn observe(&mut self, voxel: usize, sdf: i16, weight: u8, colour: [u8; 3]) {
         let of = u32::from(weight);
+        // The sum of weight times distance; the average divides it again.
         self.distance[voxel] =
             self.distance[voxel].wrapping_add(i32::from(sdf) * i32::from(weight));
         self.weight[voxel] = self.weight[voxel].wrapping_add(of);
@@ -106,6 +107,7 @@ impl BlockSums {
     /// compress.
     pub(super) fn write(&self, bytes: &mut Vec<u8>) {
         let weights = self.weight.iter().copied();
+        // The buffer is used again for each block.
         bytes.clear();
         planes(bytes, self.distance.iter().map(|value| value.cast_unsigned()));
         planes(bytes, weights);
@@ -163,6 +165,7 @@ mod tests {
     fn sums(seed: u32) -> BlockSums {
         let mut sums = BlockSums::zero(true);
         for voxel in 0..BLOCK_VOXELS {
+            // Spread over all bits, so that no two voxels are alike.
             let mixed = (voxel as u32 ^ seed).wrapping_mul(2_654_435_761);
             sums.observe(
                 voxel,
@@ -193,6 +196,7 @@ mod tests {
             order.iter().for_each(|&map| sum.add(&maps[map]));
             sum
         };
+        // Maps added in another order, and by way of two sums.
         let (mut left, right) = (added(&[6, 1, 3]), added(&[0, 5, 2, 4]));
         left.add(&right);
         assert_eq!(left, added(&[0, 1, 2, 3, 4, 5, 6]));

@@ -171,6 +171,7 @@ mod tests {
                 let at = std::array::from_fn(|axis| {
                     i32::from([coord.x, coord.y, coord.z][axis]) * 8 + offset[axis] as i32
                 });
+                // Distances are clamped at five voxels, as a map has them.
                 let units = (distance(at) / 5.0).clamp(-1.0, 1.0) * 32_767.0;
                 sums.observe(voxel, units as i16, weight, [0; 3]);
             }
@@ -225,6 +226,7 @@ mod tests {
     fn a_box_that_came_is_shown_and_one_seen_too_rarely_is_not() {
         let root = tempfile::TempDir::new().unwrap();
         drop(crate::owned::OwnedFolder::create(root.path()).unwrap());
+        // The box comes in the second epoch, and is seen six times there.
         write(root.path(), 0, false, 20);
         write(root.path(), 1, true, 6);
         let (blocks, changes) = resolved(root.path());

@@ -122,6 +122,7 @@ fn camera_axes([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
         Matrix3::from(Transform::new(axis.map(|side| side * angle), [0.0; 3]).rotation_matrix())
             .transpose()
     };
+    // Yaw about up, pitch about left, roll about ahead, in this order.
     let enu_vehicle =
         about([0.0, 0.0, 1.0], yaw) * about([0.0, 1.0, 0.0], pitch) * about([1.0, 0.0, 0.0], roll);
     let world_enu = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);

@@ -162,6 +162,7 @@ impl Manifest {
     /// # Errors
     /// The disk refuses.
     pub fn write(&self, folder: &Path) -> Result<(), FleetError> {
+        // Held while the file is written.
         let _owned = OwnedFolder::open_or_create(folder)
             .map_err(|error| FleetError::io(folder)(error.into()))?;
         let path = folder.join(MANIFEST_FILE);
@@ -217,7 +218,9 @@ impl Job {
     /// Returns the state of the job, read from its folders.
     pub fn state(&self, folder: &Path) -> JobState {
         let run = self.run_folder(folder);
+        // A run that was killed has a partial folder.
         let started = run.exists() || run.with_file_name(format!(".{}.partial", self.id)).exists();
+        // What the job is for must be there, and not only its run.
         let is_done = match &self.given {
             Given::Figures(file) => folder.join(file).is_file(),
             Given::TWorldCamera(_) | Given::Gnss { .. } => self.submap(folder).is_dir(),
@@ -249,6 +252,7 @@ pub(super) fn rows_of(transform: &Transform) -> [f64; 12] {
 pub(super) fn transform(rows: &[f64; 12]) -> Option<Transform> {
     let row = |at: usize| [rows[4 * at], rows[4 * at + 1], rows[4 * at + 2]];
     let matrix = [row(0), row(1), row(2)];
+    // Rows of length 1, at right angles.
     let is_rotation = (0..3).all(|a| {
         (0..3).all(|b| {
             let dot: f64 = (0..3).map(|axis| matrix[a][axis] * matrix[b][axis]).sum();
@@ -321,6 +325,7 @@ mod tests {
     #[test]
     fn jobs_of_a_format_with_arguments_are_refused_with_the_next_action() {
         let root = tempfile::TempDir::new().unwrap();
+        // As the version before wrote it.
         let job = r#"{"name": "monday", "id": "07", "arguments": ["rig"], "figures": "a.json", "epoch": 0, "bytes": 7}"#;
         let text = format!(r#"{{"program": "{}", "jobs": [{job}]}}"#, program());
         std::fs::write(root.path().join(MANIFEST_FILE), text).unwrap();

@@ -65,6 +65,7 @@ impl TileCursor {
     /// Opens a tile of the lattice of those before it.
     pub(super) fn open(path: &Path, lattice: &mut Option<Lattice>) -> Result<Self, FleetError> {
         let mut reader = TileReader::open(path)?;
+        // The first tile states the lattice of all.
         let (found, expected) = (reader.lattice(), *lattice.get_or_insert(reader.lattice()));
         if found != expected {
             return Err(FleetError::OtherLattice { path: path.to_path_buf(), found, expected });
@@ -91,6 +92,7 @@ pub(super) fn least(heads: &[TileCursor]) -> Option<BlockCoord> {
 fn next(heads: &mut [TileCursor]) -> Result<Option<(BlockCoord, BlockSums)>, FleetError> {
     let Some(coord) = least(heads) else { return Ok(None) };
     let mut sum: Option<BlockSums> = None;
+    // Each map has its blocks in ascending order.
     for head in heads {
         if let Some(block) = head.take(coord)? {
             match &mut sum {

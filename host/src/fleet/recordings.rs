@@ -79,6 +79,7 @@ impl Recordings {
     pub fn read(path: &Path) -> Result<Self, FleetError> {
         let text = read_text_within(path, &SETTINGS_TEXT)?;
         toml::from_str(&text).map_err(|error| {
+            // TOML's messages have several lines with a picture of the place.
             let why = error.message().replace('\n', " ");
             FleetError::content(
                 path,

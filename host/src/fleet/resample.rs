@@ -195,6 +195,7 @@ impl<'s> SourceMap<'s> {
     }
 
     fn block(&mut self, coord: BlockCoord) -> Option<&Source> {
+        // The oldest of the cached ones goes: neighbours are asked for in turn.
         if !self.blocks.contains_key(&coord) {
             if self.order.len() >= CACHED_BLOCKS
                 && let Some(oldest) = self.order.pop_front()
@@ -216,6 +217,7 @@ impl<'s> SourceMap<'s> {
             .colour
             .as_ref()
             .map_or([0; 3], |planes| [planes[0][at], planes[1][at], planes[2][at]]);
+        // Weight 0 was never seen.
         (block.weight[at] > 0).then_some((block.sdf[at], block.weight[at], colour))
     }
 
@@ -223,6 +225,7 @@ impl<'s> SourceMap<'s> {
     fn sums_at(&mut self, coord: BlockCoord, way: &LatticeWay, colour: bool) -> BlockSums {
         let mut sums = BlockSums::zero(colour);
         for voxel in 0..BLOCK_VOXELS {
+            // Each lattice point of the world, looked up in the map.
             let point = lattice_point(coord, voxel).map(f64::from);
             if let Some((sdf, weight, colour)) = self.interpolated(way.to_map.apply(point)) {
                 sums.observe(voxel, sdf, weight, colour);

@@ -123,11 +123,13 @@ fn resolve_block(
     coord: BlockCoord,
     mut blocks: Vec<(u32, BlockSums)>,
 ) -> (ResolvedBlock, Vec<BlockChange>) {
+    // One epoch alone has nothing to contradict.
     let changes = if blocks.len() > 1 { decide(coord, &mut blocks) } else { Vec::new() };
     let mut blocks = blocks.into_iter().map(|(_, sums)| sums);
     let mut sum = blocks.next().unwrap_or_else(|| BlockSums::zero(false));
     blocks.for_each(|other| sum.add(&other));
     let average = sum.average();
+    // Nearer than the truncation: a surface passes here or close by.
     let is_near = |(sdf, weight): (&i16, &u8)| *weight > 0 && f64::from(*sdf) < 0.999 * TRUNCATION;
     let has_surface = average.sdf.iter().zip(&*average.weight).any(is_near);
     (ResolvedBlock { coord, average, has_surface }, changes)
@@ -189,6 +191,7 @@ fn decide(coord: BlockCoord, blocks: &mut [(u32, BlockSums)]) -> Vec<BlockChange
 
 fn statement(sums: &BlockSums, voxel: usize) -> Statement {
     let weight = sums.weight[voxel];
+    // Never seen, or more often than its sums can tell.
     if weight == 0 || weight > MAX_WEIGHT {
         return Statement::Nothing;
     }

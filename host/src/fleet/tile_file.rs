@@ -104,6 +104,7 @@ fn head(lattice: &Lattice, count: u32) -> [u8; HEAD] {
     head[12..16].copy_from_slice(&lattice.truncation_m.to_le_bytes());
     head[16..20].copy_from_slice(&u32::from(lattice.colour).to_le_bytes());
     head[20..HEAD_CHECKED].copy_from_slice(&count.to_le_bytes());
+    // The head has a sum of its own, so that the count can be trusted before blocks are read.
     let sum = crc32fast::hash(&head[..HEAD_CHECKED]);
     head[HEAD_CHECKED..].copy_from_slice(&sum.to_le_bytes());
     head

@@ -68,6 +68,7 @@ impl Observer for BlockHistoryObserver {
         run: &ObservedRun<'_>,
         end: &mut EndContext<'_, '_>,
     ) -> Result<(), ObserveError> {
+        // First what the last pruning took.
         let pruned = self.take_absent(end.view.mapper().static_map());
         let kept = std::mem::take(&mut self.sightings).into_iter().flatten();
         let rows = pruned.into_iter().map(|(coord, last)| (coord, last, BlockFate::Pruned));
@@ -88,6 +89,7 @@ impl BlockHistoryObserver {
             if self.sightings.len() <= slot.index() {
                 self.sightings.resize(slot.index() + 1, None);
             }
+            // Another block in the slot: the one before was pruned or evicted.
             let before = self.sightings[slot.index()].replace((coord, frame));
             left.extend(before.filter(|(known, _)| *known != coord));
         }
@@ -99,6 +101,7 @@ impl BlockHistoryObserver {
         let mut live = volume.pool().live().map(|slot| slot.index()).peekable();
         let mut left = Vec::new();
         for (slot, sighting) in self.sightings.iter_mut().enumerate() {
+            // Both lists ascend.
             while live.next_if(|&at| at < slot).is_some() {}
             if live.peek() != Some(&slot) {
                 left.extend(sighting.take());

@@ -100,6 +100,7 @@ impl BoundUses {
     /// The sparse pass may have a quarter of the features.
     fn add_flow(&mut self, flow: &FlowReport) {
         for image in [&flow.left, &flow.right] {
+            // What would have been enough for both passes.
             let needed = image.dense.max(4 * image.sparse) + image.dropped;
             self.features.add(needed as usize, image.dropped);
         }

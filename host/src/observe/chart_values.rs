@@ -70,6 +70,7 @@ impl ChartValues {
         let mut thinned = Vec::with_capacity(MAX_POINTS);
         let mut points = std::mem::take(&mut self.points).into_iter();
         while let Some(mut first) = points.next() {
+            // Of an odd number the last one stays alone.
             if let Some(second) = points.next() {
                 first.merge(&second);
             }
@@ -97,6 +98,7 @@ impl ChartValues {
             debug_assert!(false, "{column} is no charted column of frames.csv");
             return Vec::new();
         };
+        // NaN is what a chart leaves out.
         let value = |point: &Point| point.values.get(at).copied().unwrap_or(f32::NAN);
         self.points.iter().map(|point| f64::from(value(point))).collect()
     }

@@ -137,6 +137,7 @@ impl FrameRow {
     /// refused. Objects of a frame without masks go into the static map.
     pub fn severity(&self) -> Severity {
         let masks = &self.mask_refusals;
+        // Objects without masks are in the map now.
         let of_sources = if masks.missing + masks.beyond > 0 {
             Severity::MapAffected
         } else if masks.unnamed + masks.unknown_class + masks.empty + self.depth_refused > 0 {

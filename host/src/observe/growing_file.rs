@@ -179,6 +179,7 @@ mod tests {
     #[test]
     fn what_a_disk_refuses_is_written_later() {
         let folder = tempfile::TempDir::new().unwrap();
+        // A folder that is not there stands for a disk that refuses.
         let missing = folder.path().join("below");
         let mut file = GrowingFile::new("rows.csv");
         file.append(b"a\n");
@@ -186,6 +187,7 @@ mod tests {
         std::fs::create_dir(&missing).unwrap();
         file.append(b"b\n");
         file.sync(&missing).unwrap();
+        // Nothing is lost, and nothing is there twice.
         assert_eq!(std::fs::read(missing.join("rows.csv")).unwrap(), b"a\nb\n");
     }
 }

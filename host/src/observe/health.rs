@@ -58,6 +58,7 @@ impl Observer for HealthObserver {
         finished: &Finished,
     ) -> Result<HealthSection, ObserveError> {
         let store = &finished.store;
+        // A block that is lost at the end is missing from the map.
         let end = if u64::from(store.end.lost) + store.unreadable > 0 {
             Severity::MapAffected
         } else {

@@ -99,6 +99,7 @@ mod tests {
     fn depths_become_the_disparities_of_the_rig() {
         let rig =
             StereoRig { focal_px: 500.0, center_u_px: 1.0, center_v_px: 1.0, baseline_m: 0.5 };
+        // None, usual ones, beyond both ends of 16 bits, and exactly one pixel.
         let depth_m = [0.0, 10.0, 100.0, 1e-3, 1e9, 250.0];
         let none = DisparityCorrection::default();
         let image = disparities(&rig, &none, View::new(&depth_m, 3, 2).unwrap()).unwrap();

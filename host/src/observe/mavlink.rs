@@ -77,10 +77,12 @@ impl Observer for MavlinkObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let Some(address) = run.plan.request.exports.mavlink else { return Ok(()) };
+        // As it is now: the vehicle plans ahead itself.
         frame.view.plan(0.0);
         let mapper = frame.view.mapper();
         let planning = mapper.planning();
         let report = &frame.row.report;
+        // A pose that is extrapolated is none to place obstacles by.
         let is_placed = report.pose != PoseOrigin::Extrapolated;
         let vehicle = Vehicle::new(&report.t_world_camera, is_placed);
         let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
@@ -88,6 +90,7 @@ impl Observer for MavlinkObserver {
         let sender = Sender {
             system: SYSTEM,
             component: COMPONENT,
+            // Eight bits, which wrap around.
             sequence: (self.sent + self.failed) as u8,
         };
         let message = obstacle_distance(&around, frame.row.time_ns() / 1_000, sender);

@@ -224,6 +224,7 @@ impl ObjectsObserver {
     fn write_all(&mut self, run: &ObservedRun<'_>, retired: &[RetiredVolume]) {
         for one in retired {
             let name = self.name_of(one);
+            // Half of an object's files would look like a whole object.
             if let Err(error) = self.write(run, one, &name) {
                 files(&name).iter().for_each(|file| {
                     drop(owned::remove_file(&run.folder.join(OBJECTS_FOLDER).join(file)))
