@@ -16,7 +16,7 @@ use dynvox::input::masks::{MaskChoice, attach};
 use dynvox::input::stream::netpbm::NetpbmPairs;
 use dynvox::input::{OpenOptions, Stacking, StopRequest, open};
 use dynvox::run::store::BlockFile;
-use dynvox_core::volume::BlockCoord;
+use dynvox_core::volume::{BlockCoord, BlockKey};
 
 /// Pairs read of a stream at most.
 const FRAMES: usize = 4;
@@ -183,7 +183,7 @@ pub fn store(bytes: &[u8]) -> bool {
             file.holds(key);
         }
     }
-    file.holds(BlockCoord { x: 0, y: 0, z: 0 });
+    file.holds(BlockKey::in_first(BlockCoord { x: 0, y: 0, z: 0 }));
     opened.records > 0
 }
 
