@@ -156,7 +156,7 @@ fn raw_lenses_beyond_the_capacity_leave_the_mapper_alone() {
         focal_px: [200.0; 2],
         center_px: [159.5, 119.5],
         model: DYNVOX_LENS_RADIAL_TANGENTIAL,
-        parameters: [0.0; 8],
+        parameters: [0.0; 15],
     };
     let rig = DynvoxRawRig {
         left: camera,
