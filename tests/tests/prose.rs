@@ -17,7 +17,7 @@ const COLUMNS: usize = 100;
 const NAME_CHARS: usize = 70;
 /// Fewest comment lines in a thousand lines of code, over all folders. The figure only ever rises;
 /// none of them may repeat the code.
-const MIN_COMMENTS: usize = 28;
+const MIN_COMMENTS: usize = 29;
 /// This test, which names what it forbids.
 const EXEMPT: &str = "tests/tests/prose.rs";
 

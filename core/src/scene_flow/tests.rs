@@ -180,21 +180,21 @@ fn refinement_finds_a_fraction_of_a_pixel_under_gain_and_offset() {
     let render = |du: f64, dv: f64, gain: f64, offset: f64| -> Vec<u8> {
         (0..64 * 64)
             .map(|i| {
-                // Four pictures of one texture: shifted by parts of a pixel, brighter, and darker.
                 (gain * texture(f64::from(i % 64) - du, f64::from(i / 64) - dv) + offset).round()
                     as u8
             })
             .collect()
     };
+    // Four pictures of one texture: shifted by parts of a pixel, brighter, and darker.
     let images = [
         render(0.0, 0.0, 1.0, 0.0),
         render(-6.3, 0.0, 1.15, 9.0),
-        // Up to two pixels off in each image.
         render(2.45, -1.7, 1.0, 0.0),
         render(-3.8, -1.62, 1.15, -7.0),
     ];
     let [previous_left, previous_right, current_left, current_right] =
         [&images[0], &images[1], &images[2], &images[3]].map(|data| Pixels { data, width: 64 });
+    // Up to two pixels off in each image.
     let coarse = Match {
         previous_left: [30.0, 31.0],
         previous_right: [24.0, 31.0],
@@ -256,19 +256,19 @@ fn what_comes_nearer_stays_the_same_point() {
     );
 }
 
-// Matches a row below, with one disparity before and after.
 #[test]
 fn bins_search_where_their_matches_or_their_neighbours_went() {
     let mut slab = slab();
     let mut prior = Prior::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
     let config = SceneFlowConfig::default();
+    // Matches a row below, with one disparity before and after.
     let at = |u: f32, disparity: f32, flow: f32| Match {
-        // Two in one bin, and one in a bin far to the right.
         previous_left: [u, 75.0],
         previous_right: [u - disparity, 75.0],
         current_left: [u + flow, 76.0],
         current_right: [u + flow - disparity, 76.0],
     };
+    // Two in one bin, and one in a bin far to the right.
     let matches = [at(75.0, 20.0, -30.0), at(80.0, 24.0, -28.0), at(325.0, 6.0, 50.0)];
     prior.learn(matches.into_iter(), WIDTH, HEIGHT, &config);
     let near = prior.reach([60, 60]).unwrap();
@@ -279,8 +279,8 @@ fn bins_search_where_their_matches_or_their_neighbours_went() {
     );
     assert_eq!(near.to_current_right, [-40, -18, -9, 11]);
     assert_eq!(prior.reach([10, 110]), Some(near), "a bin beside it learns the same");
-    let between = prior.reach([210, 60]).unwrap();
     // The greatest of both: what lies between may belong to either.
+    let between = prior.reach([210, 60]).unwrap();
     assert_eq!(
         between.to_previous_right,
         [-34, -1, -2, 2],

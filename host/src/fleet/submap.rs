@@ -241,8 +241,8 @@ mod tests {
     #[test]
     fn a_kept_map_has_the_newest_values_and_a_changed_one_is_refused() {
         let root = tempfile::TempDir::new().unwrap();
-        // One block twice: its newer values count.
         let (mut store, _) = BlockFile::open(&root.path().join("run.blocks"), 0.1, 0.5).unwrap();
+        // One block twice: its newer values count.
         for (x, weight) in [(3, 1), (-2, 5), (3, 9)] {
             let (sdf, weight) = ([-7; BLOCK_VOXELS], [weight; BLOCK_VOXELS]);
             assert!(store.store(EvictedBlock {
@@ -261,8 +261,8 @@ mod tests {
             segment: MapSegment::FIRST,
             t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]),
         };
-        // Two blocks, although three were stored.
         let camera = Camera { rig, size: (100, 40), poses: vec![pose] };
+        // Two blocks, although three were stored.
         assert_eq!(keep(&mut store, &lattice, &camera, &out).unwrap(), 2);
         assert!(matches!(
             keep(&mut store, &lattice, &camera, &out),
@@ -274,8 +274,8 @@ mod tests {
         let source = Source::load(&mut map.store, BlockCoord { x: 3, y: 0, z: 0 }, false).unwrap();
         assert_eq!((source.sdf[5], source.weight[5]), (-7, 9));
         let path = out.join(BLOCKS_FILE);
-        // A byte of the head, one of a block, and the last one.
         let whole = std::fs::read(&path).unwrap();
+        // A byte of the head, one of a block, and the last one.
         for at in [20, whole.len() / 2, whole.len() - 1] {
             let mut bytes = whole.clone();
             bytes[at] ^= 1;

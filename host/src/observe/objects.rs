@@ -282,6 +282,7 @@ impl ObjectsObserver {
 
     /// Drops the thumbnail of the object fused least often when there are too many.
     fn limit_thumbnails(&mut self) {
+        // The newest one has its thumbnail already, so that it may be the one to go.
         let mut shown: Vec<_> =
             self.retired.iter_mut().filter(|one| !one.thumbnail_jpeg.is_empty()).collect();
         if shown.len() > THUMBNAILS

@@ -94,6 +94,7 @@ fn picture(
     pixel: impl Fn(usize, usize) -> [u8; 3],
 ) -> RgbImage {
     let (step, columns, rows) = thinned(widest_px, width, height);
+    // One of `step` pixels: pictures for looking at need no average.
     RgbImage::from_fn(columns, rows, |u, v| Rgb(pixel(u as usize * step, v as usize * step)))
 }
 
@@ -214,6 +215,7 @@ pub fn input(grey: &View<'_, u8>, colour: Option<&View<'_, [u8; 3]>>) -> RgbImag
 
 /// Disparity as colours from blue (far) to red (near).
 pub fn disparity(disparity_q8: &View<'_, u16>) -> RgbImage {
+    // Disparities are a share of the width: near is the same in any size of images.
     let near_px = NEAR_SHARE * disparity_q8.width() as f32;
     picture(SMALL_PX, disparity_q8.width(), disparity_q8.height(), |u, v| {
         match disparity_q8.get(u, v) {
@@ -314,7 +316,9 @@ impl<T: Fn(usize, usize) -> Option<[u8; 3]>> Painting<'_, T> {
 
 /// The *turbo* colour map (Mikhailov, 2019) by its polynomial approximation; `share` from 0 to 1.
 fn turbo(share: f32) -> [u8; 3] {
+    // Beyond the ends the polynomial leaves the colours.
     let x = share.clamp(0.0, 1.0);
+    // Horner's rule, from the highest power.
     let polynomial = |terms: [f32; 6]| terms.iter().rev().fold(0.0, |sum, term| sum * x + term);
     [
         polynomial([0.135_721_4, 4.615_392_6, -42.660_32, 132.131_08, -152.942_4, 59.286_38]),
@@ -330,6 +334,7 @@ mod tests {
 
     #[test]
     fn a_grey_picture_shows_the_same_with_and_without_planes_of_colour() {
+        // All grey levels, in no order that compresses well.
         let grey = RgbImage::from_fn(75, 41, |u, v| Rgb([(u * u + 3 * v * v + u * v) as u8; 3]));
         let [one_plane, three_planes] = [
             jpeg(&grey),

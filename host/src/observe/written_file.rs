@@ -25,8 +25,10 @@ impl WrittenFile {
     pub fn synced(folder: &Path, name: String) -> Result<Self, ObserveError> {
         let path = folder.join(&name);
         let known = File::open(&path).and_then(|file| {
+            // On the disk before its checksum is noted: a snapshot relies on it.
             file.sync_all()?;
             let bytes = file.metadata()?.len();
+            // A file that shrinks meanwhile has no checksum of that length.
             Ok((bytes, checksum_of(&file, bytes)?.ok_or(ErrorKind::UnexpectedEof)?))
         });
         let (bytes, checksum) = known.map_err(|source| ObserveError::Write { path, source })?;

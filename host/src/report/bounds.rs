@@ -33,6 +33,7 @@ struct BoundSummary {
 pub fn summary(run: &RunRecord) -> CapacitySummary {
     let section = &run.sections.bounds;
     let rows = section.uses.rows(&run.plan.capacity);
+    // What the capacity has, and what the run would have used.
     let bounds = rows.iter().map(|&(name, bound, of)| {
         (name, BoundSummary { bound, needed: of.needed, refused: of.refused })
     });

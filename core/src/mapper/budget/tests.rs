@@ -144,10 +144,10 @@ fn the_profiles_are_valid_and_what_cannot_be_is_named() {
     );
     assert_eq!(
         solve(MIB, (640, 480), &BudgetOptions { voxel_size_m: Some(f32::NAN), ..plain }),
-        // A budget without limit still gives a capacity within its own limits.
         Err(BudgetError::VoxelSize)
     );
     assert!(matches!(solve(0, (640, 480), &plain), Err(BudgetError::TooSmall { .. })));
+    // A budget without limit still gives a capacity within its own limits.
     assert!(
         solve(usize::MAX, (640, 480), &plain).is_ok_and(|capacity| capacity.validate().is_ok())
     );

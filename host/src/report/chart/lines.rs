@@ -91,6 +91,7 @@ fn x(frames: &[usize], at: usize) -> f64 {
 
 fn frame_labels(frames: &[usize]) -> Markup {
     let last = frames.len().saturating_sub(1);
+    // About six labels, at round numbers of frames.
     let step = nice_step(last.max(1) as f64 / 6.0).max(1.0) as usize;
     html! {
         @for (at, frame) in frames.iter().enumerate().step_by(step) {

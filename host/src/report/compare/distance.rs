@@ -33,6 +33,7 @@ pub struct Distance {
 impl Distance {
     /// Between two outcomes.
     pub fn between(a: &Outcome, b: &Outcome) -> Self {
+        // Where one has no pose nothing can be compared, and 0 is said.
         let moved = a.pose.zip(b.pose).map(|(a, b)| a.inverse() * b);
         Self {
             position_m: moved.map_or(0.0, |moved| moved.distance_m()),

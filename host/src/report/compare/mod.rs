@@ -118,13 +118,16 @@ impl Comparison {
     /// Returns the run, 0 or 1, that is a prefix of the other, if one is.
     pub fn prefix(&self) -> Option<usize> {
         let [a, b] = self.frames;
+        // All of its frames are shared, the other has more, and both begin together.
         let begins = |short: [usize; 3], long: [usize; 3]| {
             short[2] == self.shared
                 && long[2] > self.shared
                 && short[0] == long[0]
                 && short[1] < long[1]
         };
+        // Neither may be: then they only overlap.
         let which = if begins(a, b) { Some(0) } else { begins(b, a).then_some(1) };
+        // Runs that diverge are no prefix of each other.
         which.filter(|_| self.divergence.is_none())
     }
 }
@@ -168,6 +171,7 @@ impl RunDigests {
     }
 
     fn frames(&self) -> [usize; 3] {
+        // A run without frames has neither a first nor a last one.
         let ends = self
             .rows
             .keys()
@@ -380,6 +384,7 @@ mod tests {
     #[test]
     fn settings_that_differ_are_named() {
         let (a, mut b) = (run(0..1, |_, _| {}), run(0..1, |_, _| {}));
+        // A value that differs, and a key that one of them has.
         b.settings = BTreeMap::from([
             ("volume.far_m".to_owned(), "30".to_owned()),
             ("volume.near_m".to_owned(), "1".to_owned()),

@@ -36,6 +36,7 @@ pub fn write_reference(out: &mut impl Write, frames: &[EvaluatedFrame]) -> io::R
     let rules = ACCEPTANCE_RULES.iter().enumerate();
     let regions =
         |frame: &EvaluatedFrame| Region::ALL.into_iter().zip(frame.regions).collect::<Vec<_>>();
+    // A row for each frame, region and rule.
     let counts = frames.iter().flat_map(|frame| {
         regions(frame).into_iter().map(move |(region, counts)| (frame, region, counts))
     });

@@ -24,6 +24,7 @@ pub fn write_surface_errors(out: &mut impl Write, errors: &SurfaceErrors) -> io:
     write_rows(
         out,
         errors.cells().map(|cell| {
+            // Centimetres suffice for cells of 20 cm.
             let [x_m, y_m, z_m] = cell.center_m.map(|metres| rounded(metres, 2));
             SurfaceErrorColumns {
                 x_m,

@@ -20,6 +20,7 @@ pub fn section(run: &RunRecord) -> Markup {
         "blocks",
         0.0,
     );
+    // Beside the slab: what the host needs for images, tables and pictures.
     let resident = lines(
         &frames,
         &[
