@@ -1,6 +1,5 @@
-//! Settings, manifests, and what runs left: tables, meshes, snapshots.
+//! Settings, manifests, and what runs left: tables and meshes.
 
-use super::super::binary::rig;
 use super::texts::widened;
 use super::{Bomb, Call, above};
 use dynvox_core::random::Random;
@@ -27,16 +26,6 @@ pub const KINDS: &[Bomb] = &[
     Bomb { name: "run folder with a sparse table", bound: "frames.csv", make: table },
     Bomb { name: "PLY header without an end", bound: "header", make: ply_header },
     Bomb { name: "PLY of many vertices", bound: "its header says", make: ply_counts },
-    Bomb {
-        name: "sparse snapshot",
-        bound: "at most 8,192 MiB of a snapshot",
-        make: snapshot,
-    },
-    Bomb {
-        name: "snapshot with a long part",
-        bound: "at most 64 MiB of a snapshot",
-        make: part,
-    },
 ];
 
 fn sparse(root: &Path, random: &mut Random, option: &str) -> Call {
@@ -105,28 +94,4 @@ fn ply_counts(root: &Path, random: &mut Random) -> Call {
              property list uchar int vertex_indices\nend_header\n"
         ),
     )
-}
-
-/// An interrupted run's folder, whose snapshot a header begins.
-fn resumed(root: &Path, header: &[u8]) -> Call {
-    rig(root, 2);
-    fs::create_dir(root.join("out")).unwrap();
-    fs::write(root.join("out/run.snapshot"), header).unwrap();
-    Call::new(&["run", "--resume", "out", "--quiet"])
-}
-
-fn snapshot(root: &Path, random: &mut Random) -> Call {
-    let call = resumed(root, b"DVXSNAP\0");
-    widened(&root.join("out/run.snapshot"), random);
-    call
-}
-
-fn part(root: &Path, random: &mut Random) -> Call {
-    let mut header = b"DVXSNAP\0".to_vec();
-    header.extend(8u32.to_le_bytes());
-    header.extend(((65 << 20) + u64::from(random.next_u32() % (1 << 30))).to_le_bytes());
-    let call = resumed(root, &header);
-    let file = fs::File::options().append(true).open(root.join("out/run.snapshot")).unwrap();
-    file.set_len(7 << 30).unwrap();
-    call
 }

@@ -47,7 +47,7 @@ pub const KINDS: &[Bomb] = &[
     Bomb { name: "poses on many lines", bound: "the 500,000 that are read", make: poses },
     Bomb { name: "times on one line", bound: "at most 1 MiB of a line", make: times },
     Bomb { name: "sparse COCO", bound: "at most 16 MiB of COCO's JSON", make: sparse_coco },
-    Bomb { name: "COCO of deep nesting", bound: "recursion limit", make: deep_coco },
+    Bomb { name: "COCO of deep nesting", bound: "COCO's annotations", make: deep_coco },
     Bomb { name: "COCO of many numbers", bound: "COCO's annotations", make: wide_coco },
     Bomb { name: "masks of large sides", bound: "at most 8,192 px a side", make: masks },
     Bomb { name: "labels on one line", bound: "at most 1 MiB of a line", make: labels },
@@ -79,13 +79,15 @@ pub fn widened(path: &Path, random: &mut Random) {
 }
 
 fn attributes(root: &Path, random: &mut Random) -> Call {
-    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!("\na{at}=''")).collect();
+    let many: String = (0..60_000 + random.below(20_000))
+        .map(|at| format!("{}a{at}=''", if at % 10 == 0 { "\n" } else { " " }))
+        .collect();
     let text = format!("<?xml version='1.0'?><opencv_storage><M1{many}/></opencv_storage>");
     calibration(root, "c.xml", &text)
 }
 
 fn elements(root: &Path, random: &mut Random) -> Call {
-    let many = "<a/>\n".repeat(above(10_001, random) as usize);
+    let many = "<a/><a/><a/><a/><a/>\n".repeat(above(2_001, random) as usize);
     let text = format!("<?xml version='1.0'?><opencv_storage>{many}</opencv_storage>");
     calibration(root, "c.xml", &text)
 }
@@ -272,7 +274,9 @@ fn depth_png(root: &Path, random: &mut Random) -> Call {
 }
 
 fn depth_xml(root: &Path, random: &mut Random) -> Call {
-    let many: String = (0..60_000 + random.below(20_000)).map(|at| format!("\na{at}=''")).collect();
+    let many: String = (0..60_000 + random.below(20_000))
+        .map(|at| format!("{}a{at}=''", if at % 10 == 0 { "\n" } else { " " }))
+        .collect();
     let text =
         format!("<?xml version='1.0'?><opencv_storage><depth-frame{many}/></opencv_storage>");
     fs::write(root.join("calib.txt"), CALIB).unwrap();
