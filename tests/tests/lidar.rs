@@ -107,11 +107,10 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
         let input =
             |u: usize, v: usize| f32::from(exact_q8[v * 640 + u]) / f32::from(DISPARITY_ONE_PX);
         let evaluate = |scanned: &ProjectedScan, map: &View<'_, f32>| -> EvaluatedFrame {
-            PendingFrame::new(index as usize, frame.t_world_camera, scanned, input, |_, _| {
-                Region::Static
-            })
-            .compare(map, bf, 1.0)
-            .0
+            let view = (&frame.t_world_camera).into();
+            PendingFrame::new(index as usize, view, scanned, input, |_, _| Region::Static)
+                .compare(map, bf, 1.0)
+                .0
         };
         by_scan.push(evaluate(&scans[0], &map));
         by_pixel.push(evaluate(&scans[1], &map));

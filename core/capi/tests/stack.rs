@@ -85,7 +85,7 @@ fn measured() -> Vec<(&'static str, usize)> {
     let start = bytes.as_ptr().align_offset(dynvox_alignment());
     let buffer = bytes[start..].as_mut_ptr();
     let left: Vec<u8> = (0..width * height)
-        .map(|at| ((at % width / 3 * 40_503 ^ at / width / 3 * 30_011) >> 4) as u8)
+        .map(|at| (((at % width / 3 * 40_503) ^ (at / width / 3 * 30_011)) >> 4) as u8)
         .collect();
     let mut right = left.clone();
     right.rotate_left(20);

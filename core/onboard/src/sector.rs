@@ -114,7 +114,7 @@ pub fn sectors(planning: &Planning<'_>, vehicle: &Vehicle, band: &Band) -> Secto
     {
         *direction = if one.occupied.is_finite() && one.occupied <= one.unknown {
             let center = one.cell.map(|c| f64::from(c) + 0.5);
-            *point = Some(vehicle.from_world(planning.grid().to_world(center)).map(|c| c as f32));
+            *point = Some(vehicle.in_body(planning.grid().to_world(center)).map(|c| c as f32));
             Direction::Obstacle { distance_m: one.occupied as f32 }
         } else if one.unknown.is_finite() {
             Direction::Unknown

@@ -62,8 +62,8 @@ impl Vehicle {
         self.t_world_body.translation_m
     }
 
-    /// A point of the world in the vehicle's axes, m.
-    pub(crate) fn from_world(&self, point_m: [f64; 3]) -> [f64; 3] {
+    /// Turns a point of the world into the vehicle's axes, m.
+    pub(crate) fn in_body(&self, point_m: [f64; 3]) -> [f64; 3] {
         self.t_world_body.inverse().transform_point(point_m)
     }
 
@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn a_camera_that_looks_ahead_gives_its_own_axes_turned() {
         let vehicle = Vehicle::new(&Transform::IDENTITY, true);
-        let [ahead, right, down] = vehicle.from_world([2.0, 3.0, 5.0]);
+        let [ahead, right, down] = vehicle.in_body([2.0, 3.0, 5.0]);
         assert!((ahead - 5.0).abs() < 1e-12 && (right - 2.0).abs() < 1e-12);
         assert!((down - 3.0).abs() < 1e-12);
     }

@@ -1,5 +1,5 @@
 //! Directions, costs and messages against brute force over many windows.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
 
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;

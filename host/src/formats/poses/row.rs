@@ -30,8 +30,7 @@ pub(super) enum Key {
 /// It is not a pose. The reason completes a sentence that begins with the line's number.
 pub(super) fn parse(row: &str) -> Result<(Key, Transform), String> {
     let numbers = numbers_of(row).ok_or_else(|| {
-        let wrong =
-            words_of(row).find(|word| word.parse::<f64>().is_ok_and(f64::is_finite) == false);
+        let wrong = words_of(row).find(|word| !word.parse::<f64>().is_ok_and(f64::is_finite));
         format!("is not a pose: {} is not a number", wrong.as_deref().unwrap_or("it"))
     })?;
     let has_commas = row.contains([',', ';']);

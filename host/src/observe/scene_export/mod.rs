@@ -10,7 +10,9 @@ mod scene;
 #[cfg(test)]
 mod tests;
 
+use super::planning_maps::png;
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer, instances::stem};
+use crate::owned;
 use crate::request::SceneFormat;
 use dynvox_core::Mapper;
 use dynvox_core::geometry::{MapSegment, Transform};
@@ -20,7 +22,6 @@ use image::{GrayImage, RgbImage};
 use scene::{ExportedScene, points_of};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// Folder of the images.
@@ -66,21 +67,19 @@ impl Observer for SceneExportObserver {
         let Some(left) = rectified.or_else(|| frame.images.left.view()) else { return Ok(()) };
         self.size = (left.width(), left.height());
         let image = file(folder, IMAGES, &name)?;
-        match colour {
-            Some(colour) => rgb(self.size, colour.pixels()).map(|picture| picture.save(&image)),
-            None => grey(self.size, pixels_of(left)).map(|picture| picture.save(&image)),
-        }
-        .unwrap_or(Ok(()))
-        .map_err(failed(&image))?;
+        let picture = match colour {
+            Some(colour) => rgb(self.size, colour.pixels()).map(png),
+            None => grey(self.size, pixels_of(left)).map(png),
+        };
+        write_file(&image, &picture.unwrap_or_default())?;
         // COLMAP appends the ending to the image's name.
         let mask_name = match export.format {
             SceneFormat::Colmap => format!("{name}.png"),
             SceneFormat::Nerfstudio => name.clone(),
         };
         let mask = file(folder, MASKS, &mask_name)?;
-        grey(self.size, mask_of(mapper, self.size))
-            .map_or(Ok(()), |picture| picture.save(&mask))
-            .map_err(failed(&mask))?;
+        let picture = grey(self.size, mask_of(mapper, self.size)).map(png);
+        write_file(&mask, &picture.unwrap_or_default())?;
         self.frames.push((name, frame.row.report.t_world_camera));
         Ok(())
     }
@@ -110,13 +109,14 @@ impl Observer for SceneExportObserver {
 fn file(folder: &Path, inner: &str, name: &str) -> Result<PathBuf, ObserveError> {
     let path = folder.join(inner).join(name);
     let parent = path.parent().unwrap_or(folder);
-    std::fs::create_dir_all(parent)
+    owned::create_folder(parent)
         .map_err(|source| ObserveError::Write { path: parent.to_path_buf(), source })?;
     Ok(path)
 }
 
-fn failed(path: &Path) -> impl FnOnce(image::ImageError) -> ObserveError + '_ {
-    |error| ObserveError::Write { path: path.to_path_buf(), source: io::Error::other(error) }
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ObserveError> {
+    owned::write(path, bytes)
+        .map_err(|source| ObserveError::Write { path: path.to_path_buf(), source })
 }
 
 fn grey(size: (usize, usize), pixels: Vec<u8>) -> Option<GrayImage> {

@@ -2,6 +2,7 @@
 
 use super::scene::ExportedScene;
 use super::{IMAGES, MASKS};
+use crate::owned;
 use serde_json::json;
 use std::fmt::Write;
 use std::io;
@@ -35,7 +36,7 @@ pub fn write(folder: &Path, scene: &ExportedScene) -> io::Result<()> {
         "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0,
         "ply_file_path": POINTS, "frames": frames,
     });
-    std::fs::write(folder.join("transforms.json"), serde_json::to_vec_pretty(&transforms)?)?;
+    owned::write(&folder.join("transforms.json"), &serde_json::to_vec_pretty(&transforms)?)?;
     let mut points = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
          property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
@@ -46,5 +47,5 @@ pub fn write(folder: &Path, scene: &ExportedScene) -> io::Result<()> {
         // Writing to a string cannot fail.
         let _ = writeln!(points, "{x} {y} {z} {red} {green} {blue}");
     }
-    std::fs::write(folder.join(POINTS), points)
+    owned::write(&folder.join(POINTS), points.as_bytes())
 }

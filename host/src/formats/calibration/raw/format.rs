@@ -25,6 +25,7 @@ pub struct CalibrationFormat {
 
 /// Two cameras as a file has them, before anything is checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "one is made for each calibration that is read")]
 pub enum Cameras {
     /// Images come rectified.
     Rectified(RectifiedCameras),
