@@ -68,6 +68,13 @@ pub(crate) fn store<T: Copy, const N: usize>(row: &mut [T], start: usize, entrie
     }
 }
 
+/// Moves the items behind `at` up by one; the last stays where it is.
+pub(crate) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
+    let Some(behind) = items.get_mut(at..) else { return };
+    let Some(mut carried) = behind.last().copied() else { return };
+    behind.iter_mut().rev().for_each(|slot| core::mem::swap(slot, &mut carried));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,11 +117,4 @@ mod tests {
     fn so_does_one_to_be_written() {
         clipped_mut(&mut [1, 2, 3], ..4);
     }
-}
-
-/// Moves the items behind `at` up by one; the last stays where it is.
-pub(crate) fn remove_at<T: Copy>(items: &mut [T], at: usize) {
-    let Some(behind) = items.get_mut(at..) else { return };
-    let Some(mut carried) = behind.last().copied() else { return };
-    behind.iter_mut().rev().for_each(|slot| core::mem::swap(slot, &mut carried));
 }

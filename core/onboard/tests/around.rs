@@ -1,5 +1,11 @@
 //! Directions, costs and messages against brute force over many windows.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing)]
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::disallowed_methods
+)]
 
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;

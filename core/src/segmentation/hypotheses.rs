@@ -158,6 +158,55 @@ impl<'s> Hypotheses<'s> {
     }
 }
 
+impl Hypothesis {
+    /// The nearest group that is not used and moves alike, by position.
+    fn nearest(
+        &self,
+        groups: &[Group],
+        used: &[bool; MAX_GROUPS],
+        t_world_camera: &Transform,
+    ) -> Option<(usize, Observed)> {
+        let predicted = self.center() + Vector3::from(self.motion_m);
+        let mut best: Option<(f64, usize, Observed)> = None;
+        for (index, group) in groups.iter().enumerate() {
+            let found = Observed::new(group, t_world_camera);
+            let distance_m = (found.center - predicted).norm();
+            let difference_m = (found.motion - Vector3::from(self.motion_m)).norm();
+            // Depth is less certain far away: both bounds grow with it.
+            let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
+            let is_alike =
+                difference_m < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
+            let is_free = used.get(index) == Some(&false);
+            if is_near
+                && is_alike
+                && is_free
+                && best.as_ref().is_none_or(|(least_m, ..)| distance_m < *least_m)
+            {
+                best = Some((distance_m, index, found));
+            }
+        }
+        best.map(|(_, index, found)| (index, found))
+    }
+}
+
+impl Observed {
+    /// A group of a frame, moved into the world.
+    fn new(group: &Group, t_world_camera: &Transform) -> Self {
+        let extent = &group.extent;
+        let mut half = [0.0; 3];
+        for (half, (high, low)) in half.iter_mut().zip(extent.high.iter().zip(&extent.low)) {
+            *half = 0.5 * (high - low);
+        }
+        Self {
+            center: t_world_camera.transform_point(extent.center()),
+            motion: t_world_camera.rotate(group.motion_m),
+            half,
+            depth_m: extent.center().z,
+            depth_sigma_m: group.depth_sigma_m,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::extent::Extent;
@@ -254,54 +303,5 @@ mod tests {
             u32::from(config.erase_frames),
             "all frames in which it was searched for, up to the most"
         );
-    }
-}
-
-impl Hypothesis {
-    /// The nearest group that is not used and moves alike, by position.
-    fn nearest(
-        &self,
-        groups: &[Group],
-        used: &[bool; MAX_GROUPS],
-        t_world_camera: &Transform,
-    ) -> Option<(usize, Observed)> {
-        let predicted = self.center() + Vector3::from(self.motion_m);
-        let mut best: Option<(f64, usize, Observed)> = None;
-        for (index, group) in groups.iter().enumerate() {
-            let found = Observed::new(group, t_world_camera);
-            let distance_m = (found.center - predicted).norm();
-            let difference_m = (found.motion - Vector3::from(self.motion_m)).norm();
-            // Depth is less certain far away: both bounds grow with it.
-            let is_near = distance_m < DISTANCE_M + DISTANCE_PER_DEPTH * found.depth_m;
-            let is_alike =
-                difference_m < MOTION_M + MOTION_PER_DEPTH * found.depth_m + found.depth_sigma_m;
-            let is_free = used.get(index) == Some(&false);
-            if is_near
-                && is_alike
-                && is_free
-                && best.as_ref().is_none_or(|(least_m, ..)| distance_m < *least_m)
-            {
-                best = Some((distance_m, index, found));
-            }
-        }
-        best.map(|(_, index, found)| (index, found))
-    }
-}
-
-impl Observed {
-    /// A group of a frame, moved into the world.
-    fn new(group: &Group, t_world_camera: &Transform) -> Self {
-        let extent = &group.extent;
-        let mut half = [0.0; 3];
-        for (half, (high, low)) in half.iter_mut().zip(extent.high.iter().zip(&extent.low)) {
-            *half = 0.5 * (high - low);
-        }
-        Self {
-            center: t_world_camera.transform_point(extent.center()),
-            motion: t_world_camera.rotate(group.motion_m),
-            half,
-            depth_m: extent.center().z,
-            depth_sigma_m: group.depth_sigma_m,
-        }
     }
 }

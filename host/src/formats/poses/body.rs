@@ -76,7 +76,7 @@ mod tests {
         assert_eq!(camera.translation_m, [0.98, 0.01, 0.0]);
         assert!(
             (camera.inverse()
-                * Transform::new([0.0, 0.0, 1.570_796_326_794_896_6], [0.98, 0.01, 0.0]))
+                * Transform::new([0.0, 0.0, std::f64::consts::FRAC_PI_2], [0.98, 0.01, 0.0]))
             .angle_rad()
                 < 1e-7
         );

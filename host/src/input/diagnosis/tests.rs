@@ -1,6 +1,7 @@
 //! A clean pair gives no finding; each planted fault is named.
 
 use super::*;
+use crate::formats::calibration::{CalibrationHints, LengthUnit};
 use crate::formats::read_picture;
 use crate::input::{OpenOptions, open};
 use std::path::PathBuf;
@@ -180,7 +181,9 @@ fn a_good_rig_has_one_verdict_for_any_number_of_pictures() {
     let head = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n";
     let (lenses, poses) = (entries("intrinsics.yml"), entries("extrinsics.yml"));
     std::fs::write(&file, format!("{head}{lenses}\n{poses}")).unwrap();
-    let options = OpenOptions { calibration: vec![file], ..OpenOptions::default() };
+    // Translations are in squares of the board.
+    let hints = CalibrationHints { unit: Some(LengthUnit(0.025)), ..Default::default() };
+    let options = OpenOptions { calibration: vec![file], hints, ..OpenOptions::default() };
     let source = open(&folder, &options).unwrap();
     for count in [1, 2, 3, 5, 8, source.len()] {
         let findings = examine(source.as_ref(), &(0..count).collect::<Vec<_>>()).unwrap();

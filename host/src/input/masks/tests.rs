@@ -211,6 +211,8 @@ fn scaled_images_have_scaled_masks() {
     let root = rig();
     let folder = root.path().join("instances");
     fs::create_dir(&folder).unwrap();
+    let calibration = "focal_px 100\ncenter_u_px 40\ncenter_v_px 36\nbaseline_m 0.5\n";
+    fs::write(root.path().join("calib.txt"), calibration).unwrap();
     let square = |u: u32, v: u32| (8..24).contains(&u) && (12..20).contains(&v);
     let picture = ImageBuffer::from_fn(80, 72, |u, v| Luma([u8::from(square(u, v))]));
     for side in ["left", "right"] {

@@ -206,7 +206,7 @@ fn images_of_another_scale_are_refused() {
 
 #[test]
 fn kitti_has_two_pairs_and_images_of_either_size() {
-    let grey = KITTI.replace("\n", "\n").to_owned();
+    let grey = KITTI.to_owned();
     let colour = grey.replace("_00", "_02").replace("_01", "_03").replace("458.6", "459.6");
     let text = format!("{grey}{colour}");
     let (_folder, paths) = written(&[("calib_cam_to_cam.txt", &text)]);
