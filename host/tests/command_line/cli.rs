@@ -120,7 +120,8 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
         fs::create_dir_all(root.path().join("rig").join(side)).unwrap();
         GrayImage::new(640, 192).save(root.path().join("rig").join(side).join("0.png")).unwrap();
     }
-    fs::write(root.path().join("rig/calib.txt"), CALIB).unwrap();
+    let calib = "focal_px 300\ncenter_u_px 320\ncenter_v_px 96\nbaseline_m 0.5\n";
+    fs::write(root.path().join("rig/calib.txt"), calib).unwrap();
     let run =
         dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--force"]);
     assert!(

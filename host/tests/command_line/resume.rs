@@ -238,7 +238,7 @@ fn damaged_snapshots_and_stores_are_refused_by_name() {
     };
     // The version begins at byte 8.
     refused(b"P5 3 1 255", "is not a snapshot of a run");
-    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 8");
+    refused(&changed(8, 0), "is a snapshot of version 0; this dynvox takes version 9");
     // In the head, the manifest and the state, and at the end.
     for at in [15, 20, 30, 5_000, whole.len() / 2, whole.len() - 1] {
         refused(&changed(at, !whole[at]), "run.snapshot is damaged");

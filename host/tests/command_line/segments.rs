@@ -84,7 +84,7 @@ fn files_show_each_segment_above_the_one_before() {
     let root = TempDir::new().unwrap();
     let root = root.path();
     let run = self::run(root, &covered(root, "pool", 3_000, &[]));
-    let text = output_text(&run);
+    let text = String::from_utf8_lossy(&run.stdout);
     assert!(run.status.success() && text.contains("segments of the map   2: the camera"), "{text}");
     let folder = root.join("pool");
     let summary: serde_json::Value =

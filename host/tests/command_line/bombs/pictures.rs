@@ -11,8 +11,9 @@ use std::path::Path;
 
 const SIDES: &str = "at most 8,192 px a side are read";
 const MEMORY: &str = "at most 96 MiB are taken for a picture";
-/// Arguments that decode pictures; an inspection may stop before.
-const RUN: [&str; 5] = ["run", ".", "--quiet", "--memory", "48MiB"];
+/// Arguments that decode pictures; an inspection may stop before. No folder of results is made: the
+/// pictures are refused first.
+const RUN: [&str; 7] = ["run", ".", "--quiet", "--memory", "48MiB", "--out", "../result-of-a-bomb"];
 const LENGTH: &str = "at most 96 MiB of a picture are read";
 
 pub const KINDS: &[Bomb] = &[
