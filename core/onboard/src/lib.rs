@@ -21,7 +21,7 @@
 //! // A camera that looks at a wall 10 m ahead.
 //! let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
 //! let capacity = Capacity {
-//!     planning_width: 80, planning_length: 80, planning_height: 20, ..Capacity::TINY
+//!     planning_width: 120, planning_length: 120, planning_height: 20, ..Capacity::TINY
 //! };
 //! let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
 //! let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
@@ -39,7 +39,7 @@
 //! mapper.update_planning_maps(0.0);
 //!
 //! let vehicle = Vehicle::new(&report.t_world_camera, report.pose != PoseOrigin::Extrapolated);
-//! let band = Band { near_m: 3.0, far_m: 12.0, up_m: 0.2, down_m: 0.2, stale_frames: 30 };
+//! let band = Band { near_m: 3.0, far_m: 11.0, up_m: 0.2, down_m: 0.2, stale_frames: 30 };
 //! let around = sectors(mapper.planning(), &vehicle, &band);
 //! match around.directions()[0] {
 //!     Direction::Obstacle { distance_m } => assert!((distance_m - 10.0).abs() < 0.4),

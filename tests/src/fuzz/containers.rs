@@ -31,7 +31,7 @@ fn recording(compression: Option<Compression>) -> Vec<u8> {
     });
     let info = |shift: f64| {
         message(|bytes| {
-            bytes.extend([32u32, 48, 1, 0, 0].iter().flat_map(|word| word.to_le_bytes()));
+            bytes.extend([32u32, 48, 1, 0, 0, 0].iter().flat_map(|word| word.to_le_bytes()));
             let camera = [40.0, 0.0, 24.0, 0.0, 40.0, 16.0, 0.0, 0.0, 1.0];
             let turn = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
             let projection = [40.0, 0.0, 24.0, shift, 0.0, 40.0, 16.0, 0.0, 0.0, 0.0, 1.0, 0.0];

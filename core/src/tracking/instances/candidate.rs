@@ -7,8 +7,27 @@ use heapless::Vec;
 /// Largest side of a box, px.
 const MAX_SIDE: u32 = 1 << 15;
 
-/// Count of the reason why a detection is not used.
-pub(super) type DropReason = fn(&mut DetectionCount) -> &mut u32;
+/// Reason why a detection that can be used is not.
+// No function that borrows the count: a call through a pointer would defy the proofs of firmware.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum DropReason {
+    OverCapacity,
+    MaskStoreFull,
+    BadMask,
+    Covered,
+}
+
+impl DropReason {
+    /// The count of detections dropped for it.
+    fn counted(self, count: &mut DetectionCount) -> &mut u32 {
+        match self {
+            Self::OverCapacity => &mut count.over_capacity,
+            Self::MaskStoreFull => &mut count.mask_store_full,
+            Self::BadMask => &mut count.bad_mask,
+            Self::Covered => &mut count.covered,
+        }
+    }
+}
 
 /// A detection that can be used: what its order depends on, and its position in the caller's list.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +54,7 @@ impl Candidate {
 
     /// Counts it as dropped for `reason`, or as too small if it is.
     pub fn drop(&self, count: &mut DetectionCount, reason: DropReason) {
-        *(if self.tracked_only { &mut count.too_small } else { reason(count) }) += 1;
+        *(if self.tracked_only { &mut count.too_small } else { reason.counted(count) }) += 1;
     }
 }
 
@@ -56,7 +75,7 @@ pub(super) fn select_best(
         let full = best.len() >= most;
         // The digest is expensive: it is computed only for what may stay.
         if full && best.last().is_none_or(|worst| worst.rank() < candidate.rank()) {
-            candidate.drop(count, |count| &mut count.over_capacity);
+            candidate.drop(count, DropReason::OverCapacity);
             continue;
         }
         let mut digest = Digest::default();
@@ -70,7 +89,7 @@ pub(super) fn select_best(
         if full {
             let is_better = at < best.len();
             let worst = if is_better { best.pop() } else { None };
-            worst.unwrap_or(candidate).drop(count, |count| &mut count.over_capacity);
+            worst.unwrap_or(candidate).drop(count, DropReason::OverCapacity);
             if !is_better {
                 continue;
             }

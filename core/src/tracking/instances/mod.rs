@@ -105,7 +105,7 @@ impl<'s> Instances<'s> {
         pixels: PixelBox,
         store: &mut MaskStore<'_>,
     ) -> Result<MaskHandle, DropReason> {
-        let mask = store.alloc(pixels).ok_or::<DropReason>(|count| &mut count.mask_store_full)?;
+        let mask = store.alloc(pixels).ok_or(DropReason::MaskStoreFull)?;
         copy_mask(detection, whole, &mask, store);
         let was_empty = store.area(&mask) == 0;
         self.all().iter().for_each(|above| store.subtract(&mask, &above.mask));
@@ -113,7 +113,7 @@ impl<'s> Instances<'s> {
             return Ok(mask);
         }
         store.free_last(mask);
-        Err(if was_empty { |count| &mut count.bad_mask } else { |count| &mut count.covered })
+        Err(if was_empty { DropReason::BadMask } else { DropReason::Covered })
     }
 
     /// Adds an instance, with its mask in an image of that width. Returns true if the table had an
