@@ -120,10 +120,9 @@ fn images_too_large_for_the_profile_are_refused_with_what_would_fit() {
         fs::create_dir_all(root.path().join("rig").join(side)).unwrap();
         GrayImage::new(640, 192).save(root.path().join("rig").join(side).join("0.png")).unwrap();
     }
-    let calib = "focal_px 300\ncenter_u_px 320\ncenter_v_px 96\nbaseline_m 0.5\n";
+    let calib = CALIB.replace("79.5", "320").replace("31.5", "96");
     fs::write(root.path().join("rig/calib.txt"), calib).unwrap();
-    let run =
-        dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--out", "result", "--force"]);
+    let run = dynvox(root.path(), &["run", "rig", "--profile", "tiny", "--force"]);
     assert!(
         output_text(&run).contains("do not fit profile tiny")
             && output_text(&run).contains("--profile small, or shrink the images with --scale 0.5")
