@@ -23,8 +23,11 @@ const REACH_PX: usize = 255;
 const REACH_MOST: f64 = 0.4;
 /// Pixels at half size by which the way back from a match may miss its patch.
 const BACK_PX: i32 = 1;
-/// Reach of the search above and below, px.
+/// Reach of the search above and below, px: first the near one, then the wide one where that finds
+/// fewer matches than a pair should have.
 const REACH_ROWS_PX: usize = 10;
+const WIDE_ROWS_PX: usize = 40;
+const FEW_MATCHES: usize = 24;
 /// Least similarity of a match.
 const SIMILAR: f64 = 0.9;
 /// Margin by which a match must be better than the second best position.
@@ -126,10 +129,19 @@ pub fn matches(left: &Image<u8>, right: &Image<u8>, step_px: usize) -> Vec<Patch
         small: [&small_left, &small_right],
         searched: [&small_left, &small_right].map(SearchedImage::new),
     };
-    let centers = (step_px..left.height())
-        .step_by(step_px)
-        .flat_map(|v| (step_px..left.width()).step_by(step_px).map(move |u| (u, v)));
-    centers.filter_map(|(u, v)| search.find([u, v])).collect()
+    let within = |rows_px: usize| -> Vec<PatchMatch> {
+        let centers = (step_px..left.height())
+            .step_by(step_px)
+            .flat_map(|v| (step_px..left.width()).step_by(step_px).map(move |u| (u, v)));
+        centers.filter_map(|(u, v)| search.find([u, v], rows_px)).collect()
+    };
+    let near = within(REACH_ROWS_PX);
+    if near.len() >= FEW_MATCHES {
+        return near;
+    }
+    // By chance a wide search finds some more; rows that are far apart, many.
+    let wide = within(WIDE_ROWS_PX);
+    if wide.len() > 2 * near.len() { wide } else { near }
 }
 
 /// A pair at both sizes.
@@ -140,17 +152,17 @@ struct Search<'i> {
 }
 
 impl Search<'_> {
-    fn find(&self, [u, v]: [usize; 2]) -> Option<PatchMatch> {
+    fn find(&self, [u, v]: [usize; 2], rows_px: usize) -> Option<PatchMatch> {
         let ([small_left, small_right], [left, right]) = (self.small, &self.searched);
         let (small_u, small_v) = (u / 2, v / 2);
         if small_u < 5 || small_v < 5 || !has_corners(small_left, small_u as i32, small_v as i32) {
             return None;
         }
-        let there = clear_best(right, small_left, [small_u, small_v])?;
+        let there = clear_best(right, small_left, [small_u, small_v], rows_px)?;
         // A match that is not found again from the other side is a repeated pattern, or hidden.
         let moved = |at: usize, by: i32| usize::try_from(at as i32 + by).ok();
         let back_from = [moved(small_u, there.du)?, moved(small_v, there.dv)?];
-        let back = clear_best(left, small_right, back_from)?;
+        let back = clear_best(left, small_right, back_from, rows_px)?;
         if (there.du + back.du).abs() > BACK_PX || (there.dv + back.dv).abs() > BACK_PX {
             return None;
         }
@@ -164,10 +176,15 @@ impl Search<'_> {
 
 /// The best place of a patch; `None` where it is not much better than all others, or at the end of
 /// the search.
-fn clear_best(searched: &SearchedImage<'_>, image: &Image<u8>, at: [usize; 2]) -> Option<Score> {
+fn clear_best(
+    searched: &SearchedImage<'_>,
+    image: &Image<u8>,
+    at: [usize; 2],
+    rows_px: usize,
+) -> Option<Score> {
     let width = image.width() as f64;
     let columns = (REACH * width).max((REACH_PX / 2) as f64).min(REACH_MOST * width) as usize;
-    let reach = [columns, REACH_ROWS_PX / 2];
+    let reach = [columns, rows_px / 2];
     let scores = searched.scores(image, at, reach);
     let &best = scores.iter().max_by(|a, b| a.similarity.total_cmp(&b.similarity))?;
     let apart = |other: &&Score| (other.du - best.du).abs() > 2 || (other.dv - best.dv).abs() > 2;

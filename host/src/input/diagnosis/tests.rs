@@ -62,6 +62,8 @@ fn a_clean_pair_gives_no_finding_and_each_fault_is_named() {
     assert_eq!(faults(|u, v| ([u + 12.0, v], 1.0)), []);
     assert_eq!(faults(|u, v| ([u - 12.0, v], 1.0)), [Fault::Exchanged]);
     assert_eq!(faults(|u, v| ([u + 12.0, v - 3.0], 1.0)), [Fault::NotRectified]);
+    // Beyond the near search for rows.
+    assert_eq!(faults(|u, v| ([u + 12.0, v - 14.0], 1.0)), [Fault::NotRectified]);
     let roll = 0.6f64.to_radians();
     assert_eq!(faults(|u, v| ([u + 12.0, v + roll * (u - 240.0)], 1.0)), [Fault::NotRectified]);
     assert_eq!(faults(|u, v| ([u + 12.0, v], 0.6)), [Fault::Exposure]);
