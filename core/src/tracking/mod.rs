@@ -5,10 +5,10 @@
 //!
 //! | part | what it holds | settings |
 //! |---|---|---|
-//! | [`instances`] | the detections of a frame that were accepted | `tracking.instances.*` |
-//! | [`matches`] | the instance of each match of the scene flow | `tracking.matches.*` |
-//! | [`motion`] | motion and motion state of one object | `tracking.{motion, state}.*` |
-//! | [`tracks`] | the objects over time, by instances, matches and motion | `tracking.tracks.*` |
+//! | `instances` | the detections of a frame that were accepted | `tracking.instances.*` |
+//! | `matches` | the instance of each match of the scene flow | `tracking.matches.*` |
+//! | `motion` | motion and motion state of one object | `tracking.{motion, state}.*` |
+//! | `tracks` | the objects over time, by instances, matches and motion | `tracking.tracks.*` |
 //!
 //! A frame passes through these values, each made from the one before:
 //!
