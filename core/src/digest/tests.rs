@@ -20,7 +20,7 @@ fn planes() -> [[u8; 512]; 5] {
     [[0; 512], [255; 512], [3; 512], counted, noise]
 }
 
-/// No two of them are the same; returns how many there are.
+/// Asserts that no two digests are equal, and returns their number.
 fn all_different(mut digests: Vec<u64>) -> usize {
     let count = digests.len();
     digests.sort_unstable();

@@ -24,11 +24,11 @@ pub(crate) type Layer<T> = [T; LAYER_VOXELS];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct BlockCoord {
-    /// Along x.
+    /// Coordinate along x, blocks.
     pub x: i16,
-    /// Along y.
+    /// Coordinate along y, blocks.
     pub y: i16,
-    /// Along z.
+    /// Coordinate along z, blocks.
     pub z: i16,
 }
 

@@ -19,7 +19,7 @@ pub enum BlocksChoice {
     File {
         /// The file.
         path: PathBuf,
-        /// True once this mapper made it.
+        /// True once this mapper made the block file.
         ours: bool,
     },
     /// Nowhere: they are lost, and counted.

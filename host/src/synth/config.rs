@@ -216,7 +216,7 @@ pub enum SpeedProfile {
         /// Speed, m/s.
         speed_m_s: f64,
     },
-    /// Stands until a frame, then gathers speed.
+    /// A car that stands until a frame, then gathers speed.
     Starting {
         /// First frame at which the brakes are off.
         frame: u32,
