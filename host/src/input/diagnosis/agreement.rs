@@ -2,7 +2,7 @@
 
 use super::rectified::PairRectifier;
 use super::rows::RowError;
-use super::{FEWEST_MATCHES, PAIRS, RectifiedSource, patches};
+use super::{FEWEST_MATCHES, each_pair, patches};
 use crate::formats::Image;
 use crate::formats::calibration::{LARGEST_PX, StereoCalibration};
 use crate::input::source::{FrameSource, InputError};
@@ -34,16 +34,11 @@ pub fn row_error(
     source: &dyn FrameSource,
     indices: &[usize],
 ) -> Result<Option<RowError>, InputError> {
-    let mut rectified = RectifiedSource::new(source)?;
-    let step = indices.len().div_ceil(PAIRS).max(1);
-    let step_px = patches::step_px(indices.len().min(PAIRS));
     let (mut matches, mut width_px) = (Vec::new(), 0.0);
-    for &index in indices.iter().step_by(step) {
-        if let Ok(Some([left, right])) = rectified.pair(index) {
-            width_px = left.width() as f64;
-            matches.extend(patches::matches(&left, &right, step_px));
-        }
-    }
+    each_pair(source, indices, |left, right, of| {
+        width_px = left.width() as f64;
+        matches.extend(patches::matches(left, right, patches::step_px(of)));
+    })?;
     let matches: Vec<_> = matches.iter().collect();
     Ok((matches.len() >= FEWEST_MATCHES).then(|| RowError::of(&matches, width_px)))
 }

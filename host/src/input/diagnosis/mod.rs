@@ -135,17 +135,9 @@ fn messages(findings: &[Finding]) -> String {
 /// A raw source that cannot be rectified.
 pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Finding>, InputError> {
     let mut findings: Vec<Finding> = check_baseline(&source.rig()).into_iter().collect();
-    let mut rectified = RectifiedSource::new(source)?;
-    let step = indices.len().div_ceil(PAIRS).max(1);
     let mut pairs = Vec::new();
-    for &index in indices.iter().step_by(step) {
-        if let Ok(Some([left, right])) = rectified.pair(index) {
-            pairs.push([left, right]);
-        }
-    }
-    let count = pairs.len();
-    let pairs = pairs.iter().map(|[left, right]| Pair::new(left, right, count));
-    findings.extend(diagnose(&pairs.collect::<Vec<_>>()));
+    each_pair(source, indices, |left, right, of| pairs.push(Pair::new(left, right, of)))?;
+    findings.extend(diagnose(&pairs));
     let thumbnails = order::window(indices)
         .iter()
         .map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
@@ -154,6 +146,24 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
         indices.first().copied().unwrap_or(0),
     ));
     Ok(findings)
+}
+
+/// Visits at most [`PAIRS`] of a source's pairs, spread over `indices`, as the mapper will see them,
+/// with their number. One that cannot be read is left out. Memory: one pair at a time.
+fn each_pair(
+    source: &dyn FrameSource,
+    indices: &[usize],
+    mut visit: impl FnMut(&Image<u8>, &Image<u8>, usize),
+) -> Result<(), InputError> {
+    let mut rectified = RectifiedSource::new(source)?;
+    let chosen = indices.iter().step_by(indices.len().div_ceil(PAIRS).max(1));
+    let of = chosen.len();
+    for &index in chosen {
+        if let Ok(Some([left, right])) = rectified.pair(index) {
+            visit(&left, &right, of);
+        }
+    }
+    Ok(())
 }
 
 /// A baseline that no rig has.
