@@ -25,23 +25,28 @@ impl DepthCensus {
     /// Counts the disparities of a frame, 1/256 px, 0 none.
     pub fn new(disparity_q8: View<'_, u16>, config: &Config) -> Self {
         let (rig, volume) = (&config.rig, &config.volume);
+        // Depth is worked out once for each disparity that there is, not for each pixel.
+        let mut counts = vec![0u32; 1 << u16::BITS];
+        for &disparity_q8 in disparity_q8.rows().flatten() {
+            if let Some(count) = counts.get_mut(usize::from(disparity_q8)) {
+                *count += 1;
+            }
+        }
         let (mut found, mut sum_q8) = (Self::default(), 0u64);
+        found.pixels = counts.iter().sum();
         // A pixel at depth z covers a square of side z / f; a voxel's face has two triangles.
         let faces_per_m = 1.0 / (rig.focal_px * f64::from(volume.voxel_size_m));
-        for &disparity_q8 in disparity_q8.rows().flatten() {
-            found.pixels += 1;
-            if disparity_q8 == 0 {
-                continue;
-            }
-            sum_q8 += u64::from(disparity_q8);
-            let depth_m = rig.focal_px * rig.baseline_m * 256.0 / f64::from(disparity_q8);
+        let known = counts.into_iter().enumerate().skip(1).filter(|(_, count)| *count > 0);
+        for (disparity_q8, count) in known {
+            sum_q8 += disparity_q8 as u64 * u64::from(count);
+            let depth_m = rig.focal_px * rig.baseline_m * 256.0 / disparity_q8 as f64;
             if depth_m < f64::from(volume.near_m) {
-                found.nearer += 1;
+                found.nearer += count;
             } else if depth_m > f64::from(volume.far_m) {
-                found.farther += 1;
+                found.farther += count;
             } else {
-                found.mapped += 1;
-                found.triangles += 2.0 * (depth_m * faces_per_m).powi(2);
+                found.mapped += count;
+                found.triangles += f64::from(count) * 2.0 * (depth_m * faces_per_m).powi(2);
             }
         }
         let known = found.known();
