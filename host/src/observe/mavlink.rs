@@ -1,6 +1,7 @@
 //! Obstacle messages for an autopilot, sent after every frame.
 
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
+use crate::request::searched_from_m;
 use dynvox_core::{Config, PoseOrigin};
 use dynvox_onboard::mavlink::{Sender, obstacle_distance};
 use dynvox_onboard::{Band, Vehicle, sectors};
@@ -40,10 +41,8 @@ fn band(config: &Config, size_cells: [usize; 3], cell_m: f64) -> Band {
     let [width, length, _] = size_cells;
     // The vehicle stands in the middle, but for a cell.
     let half_m = (width.min(length) as f64 / 2.0 - 1.0) * cell_m;
-    let rig = &config.rig;
-    let searched_m = rig.focal_px * rig.baseline_m / f64::from(config.stereo.disparity_max);
     Band {
-        near_m: searched_m.max(f64::from(config.planning.near_m)) as f32,
+        near_m: searched_from_m(config).max(f64::from(config.planning.near_m)) as f32,
         far_m: (half_m as f32).min(config.planning.far_m),
         up_m: HALF_HEIGHT_M,
         down_m: HALF_HEIGHT_M,

@@ -95,7 +95,6 @@ pub struct TrajectoryObserver {
     path: ThinnedPath,
     /// Number and pose of each frame, where true poses are known.
     compared: Vec<(usize, Transform)>,
-    extrapolated_frames: usize,
     extrapolated_because: BTreeMap<String, usize>,
     segments: u32,
     /// Segment of the last frame.
@@ -112,7 +111,6 @@ impl Default for TrajectoryObserver {
             tum: GrowingFile::new(TIMED_TRAJECTORY_FILE),
             path: ThinnedPath::default(),
             compared: Vec::new(),
-            extrapolated_frames: 0,
             extrapolated_because: BTreeMap::new(),
             segments: 1,
             segment: MapSegment::FIRST,
@@ -146,7 +144,6 @@ impl Observer for TrajectoryObserver {
             self.compared.push((row.frame, pose));
         }
         if row.is_extrapolated() {
-            self.extrapolated_frames += 1;
             *self.extrapolated_because.entry(row.motion().replace('_', " ")).or_default() += 1;
         }
         self.segments = self.segments.max(u32::from(row.report.segment.get()) + 1);
@@ -175,7 +172,7 @@ impl Observer for TrajectoryObserver {
             path: self.path,
             errors: truth.as_ref().and_then(|truth| errors(truth, &poses)),
             truth,
-            extrapolated_frames: self.extrapolated_frames,
+            extrapolated_frames: because.iter().map(|(_, frames)| frames).sum(),
             extrapolated_because: because,
             segments: self.segments,
             failures: self.first_lost.map(|(first, status)| TrackingFailures {

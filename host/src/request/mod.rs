@@ -49,7 +49,7 @@ pub use masks::Masks;
 pub use options::Options;
 pub use plan::Plan;
 pub use poses::Poses;
-pub use scale::{ScaleWord, SceneScale, sentence as scale_sentence};
+pub use scale::{ScaleWord, SceneScale, searched_from_m, sentence as scale_sentence};
 pub use scene_export::{SceneExport, SceneFormat};
 pub use settings::Settings;
 pub(crate) use settings::leaves;

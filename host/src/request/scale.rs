@@ -71,12 +71,15 @@ impl FromStr for ScaleWord {
     }
 }
 
+/// Depth from which on the matcher searches, m: what is nearer has a larger disparity.
+pub fn searched_from_m(config: &Config) -> f64 {
+    config.rig.focal_px * config.rig.baseline_m / f64::from(config.stereo.disparity_max)
+}
+
 /// The depths and the voxels of a map, as a sentence that begins with the baseline.
 pub fn sentence(config: &Config) -> String {
     let (rig, volume) = (&config.rig, &config.volume);
-    // Nearer than this the matcher does not search.
-    let searched_m = rig.focal_px * rig.baseline_m / f64::from(config.stereo.disparity_max);
-    let near_m = f64::from(volume.near_m).max(searched_m);
+    let near_m = f64::from(volume.near_m).max(searched_from_m(config));
     format!(
         "{} baseline: maps {} to {} in voxels of {}",
         length(rig.baseline_m),
