@@ -5,48 +5,15 @@
     reason = "each call keeps the header's promises; the stack is written below every live frame"
 )]
 
-use dynvox_capi::*;
-use std::{ffi::c_void, hint::black_box, ptr, thread};
+#[path = "../../../tests/tests/stack/painting.rs"]
+mod painting;
 
-/// Bytes below a frame that are painted, and the first that are not: the painter's own.
-const PAINTED: usize = 512 * 1024;
-const MARGIN: usize = 1024;
-const PAINT: u8 = 0xA5;
+use dynvox_capi::*;
+use painting::painted;
+use std::{ffi::c_void, ptr, thread};
+
 /// The header's bound for making, restoring, stepping and saving.
 const BOUND: usize = 32 * 1024;
-
-#[inline(never)]
-fn stack_pointer() -> *mut u8 {
-    let mut here = 0u8;
-    black_box(&raw mut here)
-}
-
-#[inline(never)]
-fn paint() {
-    let top = stack_pointer();
-    for below in MARGIN..PAINTED {
-        unsafe { top.wrapping_sub(below).write_volatile(PAINT) };
-    }
-}
-
-#[inline(never)]
-fn used() -> usize {
-    let top = stack_pointer();
-    let deepest = PAINTED - MARGIN;
-    let kept = (MARGIN..deepest)
-        .rev()
-        .take_while(|&below| unsafe { top.wrapping_sub(below).read_volatile() } == PAINT)
-        .count();
-    deepest - kept
-}
-
-/// Returns the status of a call and the stack it took.
-#[inline(never)]
-fn painted(call: impl FnOnce() -> DynvoxStatus) -> (DynvoxStatus, usize) {
-    paint();
-    let status = call();
-    (status, used())
-}
 
 extern "C" fn write(context: *mut c_void, bytes: *const u8, len: usize) -> bool {
     unsafe {

@@ -2,16 +2,6 @@
 
 use super::*;
 
-/// A car 10 m ahead that does 8 m/s to the camera's 5.
-fn ahead(frame: u32) -> [Transform; 2] {
-    let t = f64::from(frame) * 0.1;
-    [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
-}
-
-fn parked(frame: u32) -> [Transform; 2] {
-    [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 14.0)]
-}
-
 /// Shows a car in the frames `shown` selects and calls `inspect` after each.
 fn run(
     frames: u32,

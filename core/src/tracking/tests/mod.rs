@@ -17,7 +17,7 @@ pub(crate) use crate::{
     scene_flow::Match,
 };
 pub(crate) use nalgebra::{Point3, Vector3};
-pub(crate) use scene::{Board, Scene, Shot, project, shift};
+pub(crate) use scene::{Board, Scene, Shot, ahead, parked, project, shift};
 
 use crate::{memory::SLAB_ALIGN, state::Hasher};
 use std::vec;

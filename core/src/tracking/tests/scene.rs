@@ -55,6 +55,17 @@ pub(crate) fn shift(x: f64, y: f64, z: f64) -> Transform {
     Transform::new(Vector3::zeros(), Vector3::new(x, y, z))
 }
 
+/// Camera and car in a frame: 10 m ahead, it does 8 m/s to the camera's 5.
+pub(crate) fn ahead(frame: u32) -> [Transform; 2] {
+    let t = f64::from(frame) * 0.1;
+    [shift(0.0, 0.0, 5.0 * t), shift(1.0, 0.3, 10.0 + 8.0 * t)]
+}
+
+/// Camera and car in a frame: it is parked, and the camera drives towards it.
+pub(crate) fn parked(frame: u32) -> [Transform; 2] {
+    [shift(0.0, 0.0, 0.3 * f64::from(frame)), shift(1.0, 0.3, 14.0)]
+}
+
 /// Projects a point into the left and the right image.
 pub(crate) fn project(p: &Point3<f64>) -> [[f32; 2]; 2] {
     let per_m = RIG.focal_px / p.z;
