@@ -165,7 +165,7 @@ impl<'s> Mapper<'s> {
     /// stack.
     ///
     /// # Errors
-    /// Those of [`Mapper::new`].
+    /// Returns the errors of [`Mapper::new`].
     #[inline(never)]
     pub fn new_into(
         slot: &mut Option<Self>,
@@ -199,7 +199,7 @@ impl<'s> Mapper<'s> {
     /// something in it until a mapper is made there.
     ///
     /// # Errors
-    /// Those of [`Mapper::new`].
+    /// Returns the errors of [`Mapper::new`].
     ///
     /// ```
     /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};

@@ -208,7 +208,7 @@ impl<'s> Mapper<'s> {
     /// stack.
     ///
     /// # Errors
-    /// Those of [`Mapper::restore`].
+    /// Returns the errors of [`Mapper::restore`].
     pub fn restore_into<E>(
         slot: &mut Option<Self>,
         capacity: &Capacity,

@@ -298,9 +298,9 @@ impl Mapper {
         pose::matrix(py, &of)
     }
 
-    /// Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels.
-    /// Where the mapper matched the pair itself, odd values were filled in between measured ones,
-    /// which are even. It has size 1 x 1 before the first frame.
+    /// Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd
+    /// values of a pair that the mapper matched itself were filled in between measured ones, which
+    /// are even. It has size 1 x 1 before the first frame.
     #[getter]
     fn disparity_q8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u16>>> {
         let (pixels, size) = self.with(py, |running| {

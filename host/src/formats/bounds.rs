@@ -160,7 +160,7 @@ pub fn check_sides(width: usize, height: usize) -> Result<(), String> {
 /// their bound.
 ///
 /// # Errors
-/// What it would take and the bound, as the rest of a sentence.
+/// Names the need and the bound, as the rest of a sentence.
 pub fn check_decoding(width: usize, height: usize, bytes: u64) -> Result<(), String> {
     check_sides(width, height)?;
     if bytes <= MAX_DECODE_BYTES {

@@ -6,7 +6,7 @@ use roxmltree::{Document, Error, ParsingOptions};
 /// Parses XML without a document type, which could name other files or entities.
 ///
 /// # Errors
-/// What is wrong, as the rest of a sentence.
+/// Names the fault, as the rest of a sentence.
 pub fn xml(text: &str) -> Result<Document<'_>, String> {
     let attributes = most_attributes(text);
     if attributes > MAX_XML_ATTRIBUTES {

@@ -65,7 +65,7 @@ fn shown(text: Arguments<'_>) -> String {
 /// Flushes standard output, and returns the failure if not all was printed.
 ///
 /// # Errors
-/// What stopped the printing.
+/// Names the reason why the printing stopped.
 pub fn finish() -> anyhow::Result<()> {
     let flushed = stdout().lock().flush();
     let failure = FAILURE

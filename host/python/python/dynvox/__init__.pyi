@@ -292,7 +292,7 @@ class Mapper:
 
     @property
     def disparity_q8(self) -> NDArray[np.uint16]:
-        """Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Where the mapper matched the pair itself, odd values were
+        """Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd values of a pair that the mapper matched itself were
         filled in between measured ones, which are even. It has size 1 x 1 before the first frame."""
 
     @property

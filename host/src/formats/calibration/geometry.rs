@@ -63,7 +63,7 @@ impl CameraGeometry {
     /// cameras are settled.
     ///
     /// # Errors
-    /// What is wrong with which file, and what to do.
+    /// Names the file, the fault and the next action.
     pub fn read(paths: &[PathBuf], hints: CalibrationHints) -> Result<Self, FormatError> {
         let files = CalibrationFiles::read(paths, hints)?;
         match files.cameras(None) {

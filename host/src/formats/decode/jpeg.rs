@@ -16,7 +16,7 @@ const COEFFICIENT_BYTES: u64 = 2;
 /// coefficients of a progressive one are kept until its last scan.
 ///
 /// # Errors
-/// What it would take and the bound, as the rest of a sentence.
+/// Names the need and the bound, as the rest of a sentence.
 pub fn check(file: &[u8], decoder: &impl ImageDecoder) -> Result<(), String> {
     let (width, height) = decoder.dimensions();
     let samples = decoder.total_bytes();

@@ -33,7 +33,7 @@ const TIFF_JPEG: u16 = 7;
 /// The pixels of a picture, whose format its first bytes tell.
 ///
 /// # Errors
-/// What is wrong, as the rest of a sentence.
+/// Names the fault, as the rest of a sentence.
 pub fn decode(mut reader: impl BufRead + Seek) -> Result<DynamicImage, String> {
     match format(&mut reader)? {
         ImageFormat::Png => png::decode(reader),
@@ -57,7 +57,7 @@ pub fn decode(mut reader: impl BufRead + Seek) -> Result<DynamicImage, String> {
 /// The pixels of a picture that must be a PNG.
 ///
 /// # Errors
-/// What is wrong, as the rest of a sentence.
+/// Names the fault, as the rest of a sentence.
 pub fn decode_png(mut reader: impl BufRead + Seek) -> Result<DynamicImage, String> {
     check_length(&mut reader)?;
     png::decode(reader)
@@ -66,7 +66,7 @@ pub fn decode_png(mut reader: impl BufRead + Seek) -> Result<DynamicImage, Strin
 /// Width and height of a picture, px; its pixels are not decoded.
 ///
 /// # Errors
-/// What is wrong, as the rest of a sentence.
+/// Names the fault, as the rest of a sentence.
 pub fn size(mut reader: impl BufRead + Seek) -> Result<(usize, usize), String> {
     let (width, height) = match format(&mut reader)? {
         ImageFormat::Png => png::size(reader)?,

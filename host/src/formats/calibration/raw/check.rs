@@ -27,7 +27,7 @@ const TURN: &str = "Turn the rig by a quarter, so that its cameras stand side by
 /// The cameras, if a pair can be mapped by them.
 ///
 /// # Errors
-/// What is wrong, and what to do.
+/// Names the fault and the next action.
 pub fn checked(
     cameras: Cameras,
     path: &Path,

@@ -85,7 +85,7 @@ impl CalibrationFiles {
     /// The cameras, checked. `image_size` is the images' where it is known.
     ///
     /// # Errors
-    /// What is wrong with which file, and what to do.
+    /// Names the file, the fault and the next action.
     pub fn cameras(&self, image_size: Option<[u32; 2]>) -> Result<CalibrationRead, FormatError> {
         self.attempt(image_size).0
     }
