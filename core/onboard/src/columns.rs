@@ -11,6 +11,9 @@ pub enum ColumnState {
     Free { age: u32 },
     /// A cell is occupied: the first one from below.
     Occupied { z: i32 },
+    /// Every cell was seen, and one is too close to a surface behind it to be called free: depth
+    /// errs by that much.
+    InDoubt,
     /// A cell was never seen, or too long ago.
     Unknown,
 }
@@ -44,7 +47,7 @@ pub fn state(
     stale_frames: u32,
 ) -> ColumnState {
     let mut oldest = 0;
-    let mut is_known = true;
+    let (mut is_seen, mut is_free) = (true, true);
     for z in levels.from..levels.to {
         match planning.cell([x, y, z]) {
             // What stands there, however long ago it was seen, is in the way.
@@ -52,8 +55,13 @@ pub fn state(
             (CellState::Free, Some(age)) if age <= stale_frames => {
                 oldest = if age > oldest { age } else { oldest };
             }
-            _ => is_known = false,
+            (_, Some(age)) if age <= stale_frames => is_free = false,
+            _ => is_seen = false,
         }
     }
-    if is_known { ColumnState::Free { age: oldest } } else { ColumnState::Unknown }
+    match (is_seen, is_free) {
+        (true, true) => ColumnState::Free { age: oldest },
+        (true, false) => ColumnState::InDoubt,
+        (false, _) => ColumnState::Unknown,
+    }
 }

@@ -46,7 +46,7 @@ pub fn costs(
         *cost = match seen {
             Some(ColumnState::Free { .. }) => COST_FREE,
             Some(ColumnState::Occupied { .. }) => COST_LETHAL,
-            Some(ColumnState::Unknown) | None => COST_UNKNOWN,
+            Some(ColumnState::InDoubt | ColumnState::Unknown) | None => COST_UNKNOWN,
         };
     }
     Some(Costmap {

@@ -29,14 +29,16 @@ pub struct Band {
 /// State of one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Direction {
-    /// Unseen, seen too long ago, or seen from a pose that is a guess, before any obstacle.
+    /// Unseen, seen too long ago, or seen from a pose that is a guess, before any obstacle; or not
+    /// free for sure, with no obstacle behind it.
     #[default]
     Unknown,
     /// Free as far as was asked.
     Free,
-    /// An obstacle, with everything before it free.
+    /// An obstacle, with everything before it seen.
     Obstacle {
-        /// Distance of the nearest edge that its cell may have, m.
+        /// Distance up to which all is free, m: to the nearest edge that the obstacle's cell may
+        /// have, or that of a cell before it in which depth's error could have put it.
         distance_m: f32,
     },
 }
@@ -55,6 +57,7 @@ pub struct Sectors {
 #[derive(Clone, Copy)]
 struct Nearest {
     occupied: f64,
+    in_doubt: f64,
     unknown: f64,
     cell: [i32; 3],
 }
@@ -92,7 +95,8 @@ pub fn sectors(planning: &Planning<'_>, vehicle: &Vehicle, band: &Band) -> Secto
     };
     let Some(here) = vehicle.on_grid(planning) else { return found };
     let levels = Levels::new(&here, band);
-    let none = Nearest { occupied: f64::INFINITY, unknown: f64::INFINITY, cell: [0; 3] };
+    let far = f64::INFINITY;
+    let none = Nearest { occupied: far, in_doubt: far, unknown: far, cell: [0; 3] };
     let mut nearest = [none; SECTORS];
     each_column(&here, band, |column, [x, y]| {
         match state(planning, [x, y], levels, band.stale_frames) {
@@ -102,21 +106,24 @@ pub fn sectors(planning: &Planning<'_>, vehicle: &Vehicle, band: &Band) -> Secto
                     (one.occupied, one.cell) = (column.distance_m, [x, y, z]);
                 }
             }),
-            ColumnState::Unknown => column.visit(&mut nearest, |one| {
-                if column.distance_m < one.unknown {
-                    one.unknown = column.distance_m;
-                }
-            }),
+            ColumnState::InDoubt => {
+                column.visit(&mut nearest, |one| lower(&mut one.in_doubt, column.distance_m))
+            }
+            ColumnState::Unknown => {
+                column.visit(&mut nearest, |one| lower(&mut one.unknown, column.distance_m))
+            }
         }
     });
     for ((direction, point), one) in
-        found.directions.iter_mut().zip(&mut found.points_m).zip(&nearest)
+        found.directions.iter_mut().zip(&mut found.points_m).zip(&mut nearest)
     {
         *direction = if one.occupied.is_finite() && one.occupied <= one.unknown {
             let center = one.cell.map(|c| f64::from(c) + 0.5);
             *point = Some(vehicle.in_body(planning.grid().to_world(center)).map(|c| c as f32));
+            // Cells in doubt lie before every far surface: the vehicle keeps clear of them as well.
+            lower(&mut one.occupied, one.in_doubt);
             Direction::Obstacle { distance_m: one.occupied as f32 }
-        } else if one.unknown.is_finite() {
+        } else if one.unknown.is_finite() || one.in_doubt.is_finite() {
             Direction::Unknown
         } else {
             Direction::Free
@@ -141,6 +148,13 @@ pub fn sectors(planning: &Planning<'_>, vehicle: &Vehicle, band: &Band) -> Secto
         }
     });
     found
+}
+
+/// Lowers a distance to another one that is less.
+fn lower(least_m: &mut f64, distance_m: f64) {
+    if distance_m < *least_m {
+        *least_m = distance_m;
+    }
 }
 
 /// The nearest obstacles as points in the vehicle's axes (x ahead, y right, z down, m), one for

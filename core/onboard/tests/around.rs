@@ -100,7 +100,7 @@ fn by_definition(
     let from = (center[2] - f64::from(band.down_m) / cell_m).floor() as i32;
     let to = ((center[2] + f64::from(band.up_m) / cell_m).ceil() as i32).max(from + 1);
     let radius_m = cell_m / 2f64.sqrt();
-    let (mut occupied, mut unknown) = (f64::INFINITY, f64::INFINITY);
+    let [mut occupied, mut in_doubt, mut unknown] = [f64::INFINITY; 3];
     let reach = (f64::from(band.far_m) / cell_m) as i32 + 3;
     for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
         let (x, y) = (center[0].floor() as i32 + dx, center[1].floor() as i32 + dy);
@@ -125,15 +125,15 @@ fn by_definition(
         let edge_m = (distance_m - radius_m).max(0.0);
         if cells.iter().any(|(state, _)| *state == CellState::Occupied) {
             occupied = occupied.min(edge_m);
-        } else if !cells.iter().all(|(state, age)| {
-            *state == CellState::Free && age.is_some_and(|age| age <= band.stale_frames)
-        }) {
+        } else if cells.iter().any(|(_, age)| age.is_none_or(|age| age > band.stale_frames)) {
             unknown = unknown.min(edge_m);
+        } else if cells.iter().any(|(state, _)| *state != CellState::Free) {
+            in_doubt = in_doubt.min(edge_m);
         }
     }
     if occupied.is_finite() && occupied <= unknown {
-        Direction::Obstacle { distance_m: occupied as f32 }
-    } else if unknown.is_finite() {
+        Direction::Obstacle { distance_m: occupied.min(in_doubt) as f32 }
+    } else if unknown.min(in_doubt).is_finite() {
         Direction::Unknown
     } else {
         Direction::Free
