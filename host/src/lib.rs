@@ -12,6 +12,7 @@ pub mod cli;
 pub mod evaluate;
 pub mod fixtures;
 pub mod fleet;
+pub mod flight;
 pub mod formats;
 pub mod input;
 pub mod observe;

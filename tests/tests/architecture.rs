@@ -179,6 +179,7 @@ const HOST: Layers = &[
     ("terminal", &[]),
     ("formats", &["owned"]),
     ("synth", &["formats", "owned"]),
+    ("flight", &["synth"]),
     ("input", &["formats", "owned", "slab", "synth", "terminal"]),
     ("scene", &["formats"]),
     ("evaluate", &["formats", "input"]),
@@ -198,8 +199,8 @@ const HOST: Layers = &[
     (
         "cli",
         &[
-            "evaluate", "fixtures", "fleet", "formats", "input", "observe", "owned", "report",
-            "request", "run", "scene", "sentence", "slab", "sweep", "synth", "terminal",
+            "evaluate", "fixtures", "fleet", "flight", "formats", "input", "observe", "owned",
+            "report", "request", "run", "scene", "sentence", "slab", "sweep", "synth", "terminal",
         ],
     ),
 ];

@@ -40,7 +40,9 @@
 //! mapper.update_planning_maps(0.0);
 //!
 //! let vehicle = Vehicle::new(&report.t_world_camera, report.pose != PoseOrigin::Extrapolated);
-//! let band = Band { near_m: 3.0, far_m: 11.0, up_m: 0.2, down_m: 0.2, stale_frames: 30 };
+//! let band = Band {
+//!     body_m: 0.3, near_m: 3.0, far_m: 11.0, up_m: 0.2, down_m: 0.2, stale_frames: 30,
+//! };
 //! let around = sectors(mapper.planning(), &vehicle, &band);
 //! match around.directions()[0] {
 //!     // Half a pixel of disparity is half a metre there: so far from the wall all is free.

@@ -69,7 +69,9 @@ impl Message {
 /// #     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
 /// # let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
 /// # let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
-/// # let band = Band { near_m: 1.0, far_m: 10.0, up_m: 0.5, down_m: 0.5, stale_frames: 10 };
+/// # let band = Band {
+/// #     body_m: 0.5, near_m: 1.0, far_m: 10.0, up_m: 0.5, down_m: 0.5, stale_frames: 10,
+/// # };
 /// # let around = sectors(mapper.planning(), &Vehicle::new(&Transform::IDENTITY, true), &band);
 /// let sender = Sender { system: 1, component: 196, sequence: 0 };
 /// let message = obstacle_distance(&around, 1_000_000, sender);
@@ -89,7 +91,7 @@ pub fn obstacle_distance(sectors: &Sectors, time_us: u64, sender: Sender) -> Mes
         };
         payload.put(&cm.to_le_bytes());
     }
-    payload.put(&centimetres(band.near_m).to_le_bytes());
+    payload.put(&centimetres(band.body_m).to_le_bytes());
     payload.put(&far_cm.to_le_bytes());
     payload.put(&[SENSOR_UNKNOWN, SECTOR_DEG as u8]);
     payload.put(&(SECTOR_DEG as f32).to_le_bytes());
@@ -109,7 +111,7 @@ pub fn obstacle_distance_3d(
     let mut payload = Payload::default();
     payload.put(&time_ms.to_le_bytes());
     point_m.iter().for_each(|c| payload.put(&c.to_le_bytes()));
-    payload.put(&sectors.band().near_m.to_le_bytes());
+    payload.put(&sectors.band().body_m.to_le_bytes());
     payload.put(&sectors.band().far_m.to_le_bytes());
     // Obstacles have no numbers of their own.
     payload.put(&u16::MAX.to_le_bytes());

@@ -14,7 +14,10 @@ const REACH_MAX_CELLS: i32 = 1024;
 /// Space around the vehicle that counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
-    /// Distance within which everything is the vehicle itself, or nearer than the camera sees, m.
+    /// Radius of the vehicle, m: what is nearer is the vehicle itself.
+    pub body_m: f32,
+    /// Distance from which on the camera sees, m: nearer columns that were never seen count for
+    /// nothing. What the map holds there is in the way all the same.
     pub near_m: f32,
     /// Distance up to which a direction is looked along, m; at most 655 m in messages.
     pub far_m: f32,
@@ -106,6 +109,7 @@ pub fn sectors(planning: &Planning<'_>, vehicle: &Vehicle, band: &Band) -> Secto
                     (one.occupied, one.cell) = (column.distance_m, [x, y, z]);
                 }
             }),
+            ColumnState::InDoubt | ColumnState::Unknown if !column.is_seen => {}
             ColumnState::InDoubt => {
                 column.visit(&mut nearest, |one| lower(&mut one.in_doubt, column.distance_m))
             }
@@ -167,6 +171,8 @@ pub fn points(sectors: &Sectors) -> impl Iterator<Item = [f32; 3]> + '_ {
 struct SeenColumn {
     /// Distance of the circle around the column, m.
     distance_m: f64,
+    /// The camera sees so near.
+    is_seen: bool,
     /// Angle of its centre from straight ahead, clockwise, in sectors.
     angle: f64,
     /// Half the angle that the circle covers, in sectors.
@@ -209,7 +215,7 @@ fn each_column(here: &OnGrid, band: &Band, mut with: impl FnMut(&SeenColumn, [i3
             let dy = (f64::from(y) + 0.5 - cy) * cell_m;
             let center_m = libm::hypot(dx, dy);
             let distance_m = center_m - radius_m;
-            if center_m + radius_m < f64::from(band.near_m) || distance_m > f64::from(band.far_m) {
+            if center_m + radius_m < f64::from(band.body_m) || distance_m > f64::from(band.far_m) {
                 continue;
             }
             // Clockwise from the heading: to the right is positive.
@@ -223,6 +229,7 @@ fn each_column(here: &OnGrid, band: &Band, mut with: impl FnMut(&SeenColumn, [i3
             let to_sectors = 180.0 / core::f64::consts::PI / SECTOR_DEG;
             let column = SeenColumn {
                 distance_m: if distance_m > 0.0 { distance_m } else { 0.0 },
+                is_seen: center_m + radius_m >= f64::from(band.near_m),
                 angle: angle * to_sectors,
                 half: half * to_sectors,
             };

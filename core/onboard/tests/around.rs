@@ -77,6 +77,7 @@ fn each_window(count: usize, mut check: impl FnMut(&Planning<'_>, &Transform, &m
 
 fn any_band(random: &mut Random) -> Band {
     Band {
+        body_m: random.below(4) as f32 * 0.25,
         near_m: 0.5 + random.below(4) as f32 * 0.5,
         far_m: 3.0 + random.below(8) as f32,
         up_m: random.below(3) as f32 * 0.3,
@@ -107,7 +108,7 @@ fn by_definition(
         let [right, forth] = [f64::from(x) + 0.5 - center[0], f64::from(y) + 0.5 - center[1]]
             .map(|cells| cells * cell_m);
         let distance_m = right.hypot(forth);
-        if distance_m + radius_m < f64::from(band.near_m)
+        if distance_m + radius_m < f64::from(band.body_m)
             || distance_m - radius_m > f64::from(band.far_m)
         {
             continue;
@@ -125,6 +126,8 @@ fn by_definition(
         let edge_m = (distance_m - radius_m).max(0.0);
         if cells.iter().any(|(state, _)| *state == CellState::Occupied) {
             occupied = occupied.min(edge_m);
+        } else if distance_m + radius_m < f64::from(band.near_m) {
+            // Nearer than the camera sees.
         } else if cells.iter().any(|(_, age)| age.is_none_or(|age| age > band.stale_frames)) {
             unknown = unknown.min(edge_m);
         } else if cells.iter().any(|(state, _)| *state != CellState::Free) {
@@ -174,7 +177,14 @@ fn a_thousand_windows_give_what_the_definition_says() {
 fn a_pose_that_is_a_guess_and_old_looks_leave_nothing_free() {
     let mut seen_free = 0;
     each_window(60, |planning, pose, _| {
-        let band = Band { near_m: 1.0, far_m: 6.0, up_m: 0.0, down_m: 0.0, stale_frames: 1_000 };
+        let band = Band {
+            body_m: 1.0,
+            near_m: 1.0,
+            far_m: 6.0,
+            up_m: 0.0,
+            down_m: 0.0,
+            stale_frames: 1_000,
+        };
         let lost = sectors(planning, &Vehicle::new(pose, false), &band);
         assert_eq!(lost.unknown(), SECTORS);
         let known = sectors(planning, &Vehicle::new(pose, true), &band);
@@ -239,7 +249,8 @@ fn parsed(bytes: &[u8]) -> MavMessage {
 fn mixed(mut with: impl FnMut(&Sectors)) {
     let mut found = 0;
     each_window(80, |planning, pose, _| {
-        let band = Band { near_m: 1.0, far_m: 5.0, up_m: 0.0, down_m: 0.0, stale_frames: 90 };
+        let band =
+            Band { body_m: 1.0, near_m: 1.0, far_m: 5.0, up_m: 0.0, down_m: 0.0, stale_frames: 90 };
         let around = sectors(planning, &Vehicle::new(pose, true), &band);
         found += 1;
         with(&around);

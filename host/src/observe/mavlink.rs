@@ -12,6 +12,8 @@ use std::net::{SocketAddr, UdpSocket};
 const COMPONENT: u8 = 196;
 /// Number of the vehicle.
 const SYSTEM: u8 = 1;
+/// Radius of the vehicle, m.
+const BODY_M: f32 = 0.3;
 /// Height above and below the vehicle that must be free, m.
 const HALF_HEIGHT_M: f32 = 0.5;
 /// Time after which a look at a free cell is too old, s.
@@ -42,6 +44,7 @@ fn band(config: &Config, size_cells: [usize; 3], cell_m: f64) -> Band {
     // The vehicle stands in the middle, but for a cell.
     let half_m = (width.min(length) as f64 / 2.0 - 1.0) * cell_m;
     Band {
+        body_m: BODY_M,
         near_m: searched_from_m(config).max(f64::from(config.planning.near_m)) as f32,
         far_m: (half_m as f32).min(config.planning.far_m),
         up_m: HALF_HEIGHT_M,

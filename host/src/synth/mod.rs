@@ -29,6 +29,7 @@ mod car;
 mod car_paint;
 mod config;
 mod facade;
+mod flown;
 mod frame;
 mod furniture;
 mod layout;
@@ -60,6 +61,7 @@ mod writer;
 
 pub use camera::CAMERA_HEIGHT_M;
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
+pub use flown::{FlownView, StreetPose};
 pub use frame::{ObjectTruth, SynthFrame};
 pub use lens::{RigError, StreetLens};
 pub use path::SEGMENT_M;

@@ -15,7 +15,7 @@ use super::layout;
 use super::light::Light;
 use super::mesh::Mesh;
 use super::paint::Painter;
-use super::path::{Centerline, SEGMENT_M};
+use super::path::{Centerline, RoadSpan, SEGMENT_M};
 use super::random::Rng;
 use super::raster::Pinhole;
 use super::raw::{self, CameraView};
@@ -172,8 +172,19 @@ impl Street {
 
     /// Frame `index` with all its truth.
     pub fn frame(&self, index: u32) -> SynthFrame {
-        // The scene is built once and rendered twice.
         let around = self.surroundings(index);
+        let t_world_camera = self.to_world(&around.t_street_camera, index);
+        self.frame_of(index, &around, t_world_camera)
+    }
+
+    /// Frame `index` in its surroundings.
+    pub(super) fn frame_of(
+        &self,
+        index: u32,
+        around: &Surroundings,
+        t_world_camera: Transform,
+    ) -> SynthFrame {
+        // The scene is built once and rendered twice.
         let ideal = camera::pinhole(&self.config);
         let (left, right) = rayon::join(
             || self.view(&around.scene, index, 0),
@@ -181,10 +192,8 @@ impl Street {
         );
         // What an ideal rig sees holds depth and masks as well; through a lens they are rendered
         // for themselves.
-        let truth = match &self.views {
-            None => None,
-            Some(_) => Some(self.render(&around.scene, ideal, 0, &Sensor::new(0, 0, 0, 0.0))),
-        };
+        let noiseless = Sensor::new(0, 0, 0, 0.0);
+        let truth = self.views.as_ref().map(|_| self.render(&around.scene, ideal, 0, &noiseless));
         let Picture { rgb: left_rgb, depth_m, instances } = left;
         let (depth_m, instances) =
             truth.map_or((depth_m, instances), |truth| (truth.depth_m, truth.instances));
@@ -205,7 +214,7 @@ impl Street {
             right_rgb,
             depth_m,
             instances,
-            t_world_camera: self.to_world(&around.t_street_camera, index),
+            t_world_camera,
             objects,
         }
     }
@@ -255,24 +264,42 @@ impl Street {
     /// Builds the scene of a frame.
     pub(super) fn surroundings(&self, index: u32) -> Surroundings {
         let time_s = self.time_s(index);
-        let along = camera::along_m(&self.config, time_s);
+        let along_m = camera::along_m(&self.config, time_s);
+        self.surroundings_of(time_s, along_m, |span| {
+            camera::t_street_camera(&self.config, span, time_s)
+        })
+    }
+
+    /// Builds the scene around a camera that `pose_camera` poses, `along_m` along the street.
+    pub(super) fn surroundings_of(
+        &self,
+        time_s: f64,
+        along_m: f64,
+        pose_camera: impl FnOnce(&RoadSpan<'_>) -> Transform,
+    ) -> Surroundings {
         // Ahead and behind as far as the camera or a shadow can reach.
-        let reach = (along - REACH_M.0, along + REACH_M.1);
+        let reach = (along_m - REACH_M.0, along_m + REACH_M.1);
         let (first, last) =
             (libm::floor(reach.0 / SEGMENT_M) as i64, libm::floor(reach.1 / SEGMENT_M) as i64);
         let span = self.centerline.span(first, last);
-        let t_street_camera = camera::t_street_camera(&self.config, &span, time_s);
+        let t_street_camera = pose_camera(&span);
         let segments: Vec<Arc<Segment>> =
             (first..=last).map(|number| self.segment(number)).collect();
         let (from_m, to_m) = reach;
         let road = Road { config: &self.config, span: &span, time_s, from_m, to_m };
         let cars = present(&segments, &road);
-        let anchor = span.point(libm::floor(along / SEGMENT_M) * SEGMENT_M);
+        let anchor = span.point(libm::floor(along_m / SEGMENT_M) * SEGMENT_M);
         let posed_cars: Vec<_> =
             cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
         let view = StreetView { t_street_camera: &t_street_camera, anchor, sun: self.sun };
         let scene = Scene::new(&self.bodies, &segments, &posed_cars, view);
         Surroundings { scene, t_street_camera, cars }
+    }
+
+    /// The frame that stands on the road, as [`RoadSpan::t_street_local`] has it.
+    pub(super) fn t_street_local(&self, along_m: f64, lateral_m: f64, yaw_rad: f64) -> Transform {
+        let at = libm::floor(along_m / SEGMENT_M) as i64;
+        self.centerline.span(at, at).t_street_local(along_m, lateral_m, yaw_rad)
     }
 
     /// A segment, from the few that are cached or made anew: either way the same.

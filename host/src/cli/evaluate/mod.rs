@@ -1,6 +1,7 @@
 //! `dynvox evaluate`: figures from files, without a run.
 
 mod faults;
+mod flight;
 mod masks;
 mod stereo;
 mod trajectory;
@@ -21,6 +22,8 @@ enum Subject {
     Masks(masks::MasksArgs),
     /// Map with one fault after the other and say what is reported of each
     Faults(faults::FaultsArgs),
+    /// Fly through the synthetic street on what the map tells an autopilot, and count collisions
+    Flight(flight::FlightArgs),
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -29,5 +32,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         Subject::Stereo(args) => stereo::run(args),
         Subject::Masks(args) => masks::run(args),
         Subject::Faults(args) => faults::run(args),
+        Subject::Flight(args) => flight::run(args),
     }
 }

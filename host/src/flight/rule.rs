@@ -1,0 +1,105 @@
+//! Collision prevention on an autopilot: the speed that obstacle distances allow.
+//!
+//! The rule is the one that PX4's guide to collision prevention states: in each direction a vehicle
+//! may be as fast as lets it stop `keep_m` before the obstacle, after a delay, with a bounded jerk
+//! and deceleration; a direction without data stops it.
+
+use dynvox_onboard::{Direction, SECTOR_DEG, SECTORS};
+
+/// Limits of the vehicle that the rule counts on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Distance kept to obstacles, m (`CP_DIST`).
+    pub keep_m: f64,
+    /// Age of a distance when it takes effect, and the reaction to it, s (`CP_DELAY`).
+    pub delay_s: f64,
+    /// Deceleration counted on, m/s² (`MPC_ACC_HOR`).
+    pub deceleration_m_s2: f64,
+    /// Jerk counted on, m/s³ (`MPC_JERK_AUTO`).
+    pub jerk_m_s3: f64,
+}
+
+/// Sectors to each side of the course that must have data.
+const COURSE_SECTORS: i32 = 1;
+
+impl Limits {
+    /// Fastest speed from which a vehicle stops `keep_m` before an obstacle, m/s.
+    ///
+    /// It travels `v delay` before it brakes, `v a / (2 j)` while the deceleration builds up, and
+    /// `v² / (2 a)` while it brakes.
+    pub fn speed_m_s(&self, distance_m: f64) -> f64 {
+        let way_m = distance_m - self.keep_m;
+        if way_m <= 0.0 {
+            return 0.0;
+        }
+        let a = self.deceleration_m_s2;
+        let lag_s = self.delay_s + a / (2.0 * self.jerk_m_s3);
+        // v² / (2 a) + v lag = way.
+        a * ((lag_s * lag_s + 2.0 * way_m / a).sqrt() - lag_s)
+    }
+
+    /// Fastest speed on a course `course_deg` clockwise from straight ahead, at most `wanted_m_s`.
+    pub fn allowed_m_s(
+        &self,
+        directions: &[Direction; SECTORS],
+        course_deg: f64,
+        wanted_m_s: f64,
+    ) -> f64 {
+        let ahead = (course_deg / SECTOR_DEG).round() as i32;
+        let known = (ahead - COURSE_SECTORS..=ahead + COURSE_SECTORS).all(|sector| {
+            directions[sector.rem_euclid(SECTORS as i32) as usize] != Direction::Unknown
+        });
+        if !known {
+            return 0.0;
+        }
+        directions.iter().enumerate().fold(wanted_m_s, |speed, (sector, direction)| {
+            let Direction::Obstacle { distance_m } = direction else { return speed };
+            let towards = (sector as f64 * SECTOR_DEG - course_deg).to_radians().cos();
+            // Sideways and behind nothing comes nearer.
+            if towards <= 1e-3 {
+                return speed;
+            }
+            speed.min(self.speed_m_s(f64::from(*distance_m)) / towards)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits =
+        Limits { keep_m: 2.0, delay_s: 0.4, deceleration_m_s2: 3.0, jerk_m_s3: 10.0 };
+
+    #[test]
+    fn a_vehicle_at_the_allowed_speed_stops_where_it_should() {
+        for distance_m in [2.5, 4.0, 8.0, 30.0] {
+            let mut speed = LIMITS.speed_m_s(distance_m);
+            // The delay passes, then the deceleration grows with the jerk.
+            let (mut way, mut braking, step) = (speed * LIMITS.delay_s, 0.0f64, 1e-4);
+            while speed > 0.0 {
+                braking = (braking + LIMITS.jerk_m_s3 * step).min(LIMITS.deceleration_m_s2);
+                way += speed * step;
+                speed -= braking * step;
+            }
+            // Slow vehicles stop before the deceleration is built up, which the formula leaves out.
+            let left = distance_m - LIMITS.keep_m - way;
+            assert!((-0.05..0.35).contains(&left), "{distance_m}: {left}");
+        }
+        assert_eq!(LIMITS.speed_m_s(2.0), 0.0);
+    }
+
+    #[test]
+    fn unknown_stops_and_what_stands_aside_does_not() {
+        let mut directions = [Direction::Free; SECTORS];
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 4.0);
+        directions[18] = Direction::Obstacle { distance_m: 0.5 };
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 4.0);
+        directions[12] = Direction::Obstacle { distance_m: 3.0 };
+        let limited = LIMITS.allowed_m_s(&directions, 0.0, 4.0);
+        assert!((limited - 2.0 * LIMITS.speed_m_s(3.0)).abs() < 1e-9);
+        directions[71] = Direction::Unknown;
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 0.0);
+        assert!(LIMITS.allowed_m_s(&directions, -30.0, 4.0) > 0.0, "another course");
+    }
+}

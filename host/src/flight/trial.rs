@@ -1,0 +1,257 @@
+//! One flight: pictures are rendered from where the vehicle is, the mapper sees them, and the
+//! autopilot's rule lets the vehicle go as fast as the directions allow.
+
+use super::rule::Limits;
+use super::vehicle::Multirotor;
+use crate::synth::{
+    FlownView, MovingTraffic, Street, StreetConfig, StreetPose, SynthError, SynthFrame, Traffic,
+};
+use dynvox_core::geometry::Transform;
+use dynvox_core::image::View;
+use dynvox_core::memory::SLAB_ALIGN;
+use dynvox_core::random::Random;
+use dynvox_core::{Capacity, Config, Mapper, PoseOrigin, Serial, StereoFrame};
+use dynvox_onboard::{Band, Direction, SECTORS, Vehicle, sectors};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+/// Width and height of the images, px.
+const IMAGE: [u32; 2] = [320, 96];
+/// Pictures a second.
+const RATE_HZ: f64 = 10.0;
+/// Steps of the vehicle between two pictures.
+const SUBSTEPS: u32 = 5;
+/// Height of the vehicle above the road, m.
+const HEIGHT_M: f64 = 1.6;
+/// Radius of the vehicle, m.
+const RADIUS_M: f64 = 0.3;
+/// Strength of gusts, m/s², 1 sigma.
+const GUSTS_M_S2: f64 = 0.3;
+/// Standing longer than this while the way is clear is a needless stop, s.
+const NEEDLESS_S: f64 = 1.0;
+/// Frames before the vehicle is let go: the mapper sees where it stands.
+const READY_FRAMES: u32 = 5;
+/// Limits that the autopilot counts on; the delay is that of a picture and a message.
+const LIMITS: Limits =
+    Limits { keep_m: 1.5, delay_s: 0.4, deceleration_m_s2: 2.5, jerk_m_s3: 15.0 };
+/// Farthest surface that is looked for, m.
+const REACH_M: f64 = 5.0;
+/// Room on both sides of a course that is clear, m.
+const CLEAR_M: f64 = 1.2;
+/// Below this speed the vehicle stands, m/s.
+const STANDS_M_S: f64 = 0.3;
+
+/// Conditions of a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// Chooses street, start, course, gusts and black pictures.
+    pub seed: u64,
+    /// Speed that the vehicle would like to fly at, m/s.
+    pub speed_m_s: f64,
+    /// Share of pictures that come black.
+    pub black: f64,
+    /// Flying time, s.
+    pub seconds: f64,
+}
+
+/// Outcome of a flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Flight {
+    /// The vehicle flew into something.
+    pub collided: bool,
+    /// A car drove into the vehicle while it stood.
+    pub run_over: bool,
+    /// Stops of more than a second with a clear way ahead.
+    pub needless_stops: u32,
+    /// Distance flown, m.
+    pub flown_m: f64,
+    /// Least distance to a surface, less the vehicle's radius, m.
+    pub clearance_m: f64,
+    /// Pictures whose pose was extrapolated.
+    pub extrapolated: u32,
+    /// True if the vehicle stood before an obstacle in the end.
+    pub stopped: bool,
+}
+
+/// A route drawn from a seed.
+struct Route {
+    street: Street,
+    along_m: f64,
+    lateral_m: f64,
+    yaw_rad: f64,
+    random: Random,
+}
+
+impl Route {
+    /// Draws a street with or without traffic, a start on it and a direction.
+    fn draw(seed: u64) -> Result<Self, SynthError> {
+        let mut random = Random::new(seed ^ 0xF117);
+        let mut between = |low: f64, high: f64| {
+            low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
+        };
+        let (along_m, lateral_m) = (between(30.0, 300.0), between(-1.0, 1.0));
+        // Half of the flights keep to the street, half leave it for what stands beside it.
+        let yaw_rad = if seed.is_multiple_of(2) { between(-0.1, 0.1) } else { between(-1.2, 1.2) };
+        let traffic = if (seed / 2).is_multiple_of(2) {
+            Traffic::None
+        } else {
+            Traffic::Moving(MovingTraffic { cars: Vec::new(), ..MovingTraffic::default() })
+        };
+        let [width, height] = IMAGE;
+        let config =
+            StreetConfig { seed, width, height, rate_hz: RATE_HZ, traffic, ..Default::default() };
+        Ok(Self { street: Street::new(config)?, along_m, lateral_m, yaw_rad, random })
+    }
+
+    /// Pose of the camera where the vehicle is, at a time.
+    fn pose(&self, vehicle: &Multirotor, time_s: f64) -> StreetPose {
+        let StreetPose { t_street_camera, .. } =
+            self.street.pose_above_road(self.along_m, self.lateral_m, HEIGHT_M, self.yaw_rad);
+        let [right, ahead] = vehicle.position_m;
+        // A gimbal holds the camera level, but for a little.
+        let turn = Vector3::new(
+            0.004 * libm::sin(9.0 * time_s),
+            0.006 * libm::sin(4.0 * time_s + 1.0),
+            0.004 * libm::sin(7.0 * time_s + 2.0),
+        );
+        let moved = Transform::new(turn, Vector3::new(right, 0.0, ahead));
+        StreetPose {
+            along_m: self.along_m + ahead * libm::cos(self.yaw_rad),
+            t_street_camera: (t_street_camera * moved).normalized(),
+        }
+    }
+
+    fn chance(&mut self, share: f64) -> bool {
+        f64::from(self.random.next_u32()) / 4_294_967_296.0 < share
+    }
+}
+
+/// Bounds of a small mapper with a vehicle's window: 12 m to each side, 4 m high.
+const CAPACITY: Capacity =
+    Capacity { planning_width: 120, planning_length: 120, planning_height: 20, ..Capacity::TINY };
+
+/// Space that the vehicle looks at: as far as it needs to stop, and a second more.
+fn band(speed_m_s: f64) -> Band {
+    let stop_m = LIMITS.keep_m
+        + speed_m_s * LIMITS.delay_s
+        + speed_m_s * speed_m_s / (2.0 * LIMITS.deceleration_m_s2);
+    Band {
+        body_m: RADIUS_M as f32,
+        near_m: 2.0,
+        far_m: (stop_m + speed_m_s).min(11.0) as f32,
+        up_m: RADIUS_M as f32,
+        down_m: RADIUS_M as f32,
+        stale_frames: (3.0 * RATE_HZ) as u32,
+    }
+}
+
+/// The mapper aboard, with what it told last.
+struct Aboard<'s> {
+    mapper: Mapper<'s>,
+    band: Band,
+    directions: [Direction; SECTORS],
+}
+
+impl Aboard<'_> {
+    /// Maps a frame and looks around; returns true if the pose is no guess.
+    ///
+    /// # Errors
+    /// The pictures have another size than the street's.
+    fn map(&mut self, index: u32, pictures: &SynthFrame, is_black: bool) -> anyhow::Result<bool> {
+        let [width, height] = IMAGE.map(|side| side as usize);
+        let black = vec![0; width * height];
+        let grey = |image| View::new(if is_black { &black } else { image }, width, height);
+        let (Some(left), Some(right)) = (grey(&pictures.left_grey), grey(&pictures.right_grey))
+        else {
+            anyhow::bail!("the street gives no pair of {width} x {height} px");
+        };
+        let time_ns = Some((f64::from(index) / RATE_HZ * 1e9) as u64);
+        let frame = StereoFrame { time_ns, ..StereoFrame::pair(left, right) };
+        let report = self.mapper.step(&frame, &Serial)?;
+        self.mapper.update_planning_maps(0.0);
+        let is_placed = report.pose != PoseOrigin::Extrapolated;
+        let body = Vehicle::new(&report.t_world_camera, is_placed);
+        self.directions = *sectors(self.mapper.planning(), &body, &self.band).directions();
+        Ok(is_placed)
+    }
+}
+
+/// Flies once.
+///
+/// # Errors
+/// A street that cannot be made, or a mapper that cannot be.
+pub fn fly(conditions: &Conditions) -> anyhow::Result<Flight> {
+    let mut route = Route::draw(conditions.seed)?;
+    let mut slab = vec![0; CAPACITY.bytes() + SLAB_ALIGN];
+    let mapper = Mapper::new(&CAPACITY, &Config::for_rig(route.street.rig()), &mut slab)?;
+    let directions = [Direction::Unknown; SECTORS];
+    let mut aboard = Aboard { mapper, band: band(conditions.speed_m_s), directions };
+    let mut vehicle = Multirotor::hovering(GUSTS_M_S2, conditions.seed);
+    let mut flight = Flight { clearance_m: f64::INFINITY, ..Flight::default() };
+    let mut stood_s = 0.0;
+    for index in 0..(conditions.seconds * RATE_HZ) as u32 {
+        let pose = route.pose(&vehicle, f64::from(index) / RATE_HZ);
+        let is_black = index > READY_FRAMES && route.chance(conditions.black);
+        let view = route.street.seen_from(index, &pose);
+        // The vehicle goes by what was told of the frame before: a message takes its time.
+        let is_ready = index >= READY_FRAMES;
+        let wanted = if is_ready { conditions.speed_m_s } else { 0.0 };
+        let allowed = LIMITS.allowed_m_s(&aboard.directions, 0.0, wanted);
+        flight.extrapolated += u32::from(!aboard.map(index, &view.frame(), is_black)?);
+        flight.advance(&mut vehicle, &view, allowed);
+        if flight.clearance_m < 0.0 {
+            flight.run_over = vehicle.speed_m_s() < STANDS_M_S;
+            flight.collided = !flight.run_over;
+            break;
+        }
+        // A vehicle that stands before nothing is stopped needlessly.
+        let stands = is_ready && vehicle.speed_m_s() < STANDS_M_S;
+        let is_needless = stands && is_clear(&view, f64::from(aboard.band.far_m));
+        stood_s = if is_needless { stood_s + 1.0 / RATE_HZ } else { 0.0 };
+        flight.needless_stops += u32::from((stood_s - NEEDLESS_S).abs() < 0.5 / RATE_HZ);
+        flight.stopped = stands && !is_needless;
+    }
+    Ok(flight)
+}
+
+impl Flight {
+    /// Flies until the next picture, and notes how near anything came.
+    fn advance(&mut self, vehicle: &mut Multirotor, view: &FlownView<'_>, speed_m_s: f64) {
+        let from = vehicle.position_m;
+        for _ in 0..SUBSTEPS {
+            vehicle.fly([0.0, speed_m_s], 1.0 / (RATE_HZ * f64::from(SUBSTEPS)));
+            let [right, ahead] = [0, 1].map(|axis| vehicle.position_m[axis] - from[axis]);
+            let clearance_m = view.clearance_m([right, 0.0, ahead], REACH_M) - RADIUS_M;
+            self.clearance_m = self.clearance_m.min(clearance_m);
+        }
+        self.flown_m += (vehicle.position_m[0] - from[0]).hypot(vehicle.position_m[1] - from[1]);
+    }
+}
+
+/// Returns true if nothing stands beside or on the course, out to `far_m`.
+fn is_clear(view: &FlownView<'_>, far_m: f64) -> bool {
+    (1..=(far_m / 0.25) as u32)
+        .all(|step| view.clearance_m([0.0, 0.0, f64::from(step) * 0.25], REACH_M) > CLEAR_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vehicle_flies_down_the_street_and_touches_nothing() {
+        let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 0.0, seconds: 2.5 };
+        let flight = fly(&conditions).unwrap();
+        assert!(!flight.collided && !flight.run_over && flight.clearance_m > 0.3, "{flight:?}");
+        // Let go after half a second, at 4 m/s.
+        assert!((2.0..8.5).contains(&flight.flown_m), "{flight:?}");
+        assert_eq!(fly(&conditions).unwrap(), flight, "one seed, one flight");
+    }
+
+    #[test]
+    fn a_vehicle_whose_pictures_are_black_does_not_fly_on() {
+        let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 1.0, seconds: 2.5 };
+        let flight = fly(&conditions).unwrap();
+        assert!(flight.flown_m < 1.0 && flight.extrapolated > 15, "{flight:?}");
+    }
+}
