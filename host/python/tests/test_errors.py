@@ -69,7 +69,7 @@ def test_every_option_of_a_run_has_a_name_in_python(binary):
     with pytest.raises(dynvox.Error) as error:
         dynvox.Dataset(nonsense=1)
     named = set(str(error.value).split("Give one of ")[1].replace("_", "-").split(", ")) - {"path"}
-    text = subprocess.run([binary, "run", "--help"], capture_output=True, text=True, check=True).stdout
+    text = subprocess.run([binary, "run", "--help-all"], capture_output=True, text=True, check=True).stdout
     options = set(re.findall(r"^ {2,8}(?:-\w, )?--([a-z0-9-]+)", text, re.MULTILINE))
     assert options and options - of_the_command_line == named
 

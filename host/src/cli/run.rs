@@ -7,7 +7,7 @@ mod resume;
 pub use finish::{IncompleteRun, record, write};
 
 use crate::owned::check_overlap;
-use crate::request::{Options, Request};
+use crate::request::{Options, Plan, Request};
 use crate::run::{RunFolder, check_outputs};
 use crate::terminal::quoted;
 use finish::{finish, print_header};
@@ -82,6 +82,15 @@ pub fn request_of(arguments: &[String]) -> anyhow::Result<Request> {
 }
 
 impl RunArgs {
+    /// The arguments that map the synthetic street to `out`, over an earlier run there.
+    pub fn of_demo(out: &Path, frames: Option<usize>) -> Self {
+        Self {
+            options: Options { frames, ..Options::default() },
+            target: TargetArgs { out: Some(out.to_path_buf()), overwrite: true },
+            ..Self::default()
+        }
+    }
+
     /// Request of these arguments.
     fn request(&self) -> Result<Request, crate::request::RequestError> {
         Ok(self.changeable.over(self.options.request()?))
@@ -103,6 +112,20 @@ impl ChangeableArgs {
     }
 }
 
+/// Folder of a run without `--out`: below the current one, or beside the recording where the
+/// current one lies within it.
+fn default_target(plan: &Plan) -> PathBuf {
+    let (name, inputs) = (plan.dataset.name(), plan.request.inputs());
+    let below = RunFolder::next_name(Path::new(DEFAULT_PARENT), name);
+    // The parent of `recording/..` is not known before links and dots are resolved.
+    let real = inputs.iter().filter_map(|input| input.canonicalize().ok());
+    let beside = real
+        .filter_map(|input| Some(input.parent()?.join(DEFAULT_PARENT)))
+        .map(|parent| RunFolder::next_name(&parent, name));
+    let mut targets = std::iter::once(below.clone()).chain(beside);
+    targets.find(|target| check_overlap(target, &inputs).is_ok()).unwrap_or(below)
+}
+
 pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     let stop = super::signals::stop_request()?;
     if let Some(target) = &args.resume {
@@ -110,10 +133,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     }
     let mut plan = args.request()?.resolve_with(&stop)?;
     plan.progress = !args.silent();
-    let target =
-        args.target.out.clone().unwrap_or_else(|| {
-            RunFolder::next_name(Path::new(DEFAULT_PARENT), plan.dataset.name())
-        });
+    let target = args.target.out.clone().unwrap_or_else(|| default_target(&plan));
     check_outputs(&plan, &target)?;
     check_overlap(&target, args.options.config.as_slice())?;
     let folder = RunFolder::begin(&target, args.target.overwrite)?;

@@ -6,7 +6,7 @@ use crate::run::replace_whole;
 use crate::scene::{MAX_TRIANGLES, Scene};
 use anyhow::{Context, bail};
 use maud::html;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name of the file in the run folder.
 const VIEWER_FILE: &str = "viewer.html";
@@ -43,10 +43,15 @@ pub fn run(args: &ViewArgs) -> anyhow::Result<()> {
     let out = args.out.clone().unwrap_or_else(|| folder.join(VIEWER_FILE));
     replace_whole(&out, |file| std::io::Write::write_all(file, page.as_bytes()))?;
     outln!("{}", out.display());
-    if !args.no_open {
-        open::that_detached(&out).with_context(|| {
-            format!("no browser can be started: open {} yourself, or give --no-open", out.display())
-        })?;
-    }
-    Ok(())
+    if args.no_open { Ok(()) } else { show(&out) }
+}
+
+/// Opens a page in the browser.
+///
+/// # Errors
+/// No browser can be started.
+pub fn show(page: &Path) -> anyhow::Result<()> {
+    open::that_detached(page).with_context(|| {
+        format!("no browser can be started: open {} in one yourself", page.display())
+    })
 }

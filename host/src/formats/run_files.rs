@@ -18,3 +18,5 @@ pub const TRAJECTORY_FILE: &str = "trajectory_kitti.txt";
 pub const TRUE_TRAJECTORY_FILE: &str = "trajectory_truth_kitti.txt";
 /// The path with times, as TUM has it.
 pub const TIMED_TRAJECTORY_FILE: &str = "trajectory_tum.txt";
+/// Name of the page that shows a run.
+pub const REPORT_FILE: &str = "report.html";

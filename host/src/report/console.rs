@@ -6,10 +6,17 @@ use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
-use crate::formats::SEGMENT_GAP_M;
+use crate::formats::{MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_TRAJECTORY_FILE};
 use crate::observe::{MavlinkSection, Sections};
 use crate::run::RunRecord;
 use std::path::Path;
+
+/// Files of a run to open first, and where.
+const FIRST_FILES: [(&str, &str); 3] = [
+    (REPORT_FILE, "in a browser: the map to turn, pictures, figures"),
+    (MAP_FILE, "in MeshLab, CloudCompare or Blender: the map"),
+    (TIMED_TRAJECTORY_FILE, "in evo or a text editor: the camera's path"),
+];
 
 /// The figures of a run whose folder is `folder`, line by line.
 pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
@@ -52,7 +59,13 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     ));
     lines.push(("digest", format!("{:016x}", run.digest())));
     lines.push(("results", folder.display().to_string()));
-    lines.push(("report", folder.join("report.html").display().to_string()));
+    // Where to look first. A run that ended early may lack some.
+    let is_first = [true, false, false];
+    let there = FIRST_FILES.iter().filter(|(name, _)| folder.join(name).is_file());
+    lines.extend(there.zip(is_first).map(|((name, why), is_first)| {
+        let label = if is_first { "open" } else { "" };
+        (label, format!("{}  {why}", folder.join(name).display()))
+    }));
     lines.iter().map(|(name, value)| format!("{name:<22}{value}\n")).collect()
 }
 

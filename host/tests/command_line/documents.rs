@@ -240,7 +240,9 @@ fn keys_of_a_run_are_described_and_misspelt_ones_get_near_ones() {
 
 /// Options of a command with the text behind them.
 fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
-    let line: Vec<&str> = command.split(' ').chain(["--help"]).collect();
+    // The page of `run` is long enough to be split.
+    let help = if command == "run" { "--help-all" } else { "--help" };
+    let line: Vec<&str> = command.split(' ').chain([help]).collect();
     let help = String::from_utf8(dynvox(root, &line).stdout).unwrap();
     let mut found = BTreeMap::<String, String>::new();
     let mut last = None;

@@ -17,6 +17,7 @@ mod egomotion;
 mod endings;
 mod export;
 mod faults;
+mod first_steps;
 mod fixtures;
 mod fleet;
 mod layouts;

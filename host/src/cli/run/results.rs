@@ -1,7 +1,7 @@
 //! The files of a run folder that are written at the end, after the map and the objects. A file
 //! that the disk refuses is missing, and the others are written.
 
-use crate::formats::{SETTINGS_FILE, SUMMARY_FILE, TRUE_TRAJECTORY_FILE, kitti_line};
+use crate::formats::{REPORT_FILE, SETTINGS_FILE, SUMMARY_FILE, TRUE_TRAJECTORY_FILE, kitti_line};
 use crate::report::{self, Summary};
 use crate::run::{FolderError, Incomplete, RunFolder, RunRecord};
 use crate::scene::{MAX_TRIANGLES, Scene, glb};
@@ -38,8 +38,8 @@ pub fn write(folder: &RunFolder, run: &mut RunRecord) -> std::result::Result<Sum
         .and_then(|scene| report::viewer::fragment(folder.path(), run.plan.dataset.name(), &scene));
     let viewer =
         viewer.unwrap_or_else(|error| html! { p { b { "The report has no viewer: " (error) } } });
-    if let Err(error) = folder.write("report.html", |out| report::html::write(out, run, &viewer)) {
-        Incomplete::add_missing(&mut run.incomplete, "report.html", &error.to_string());
+    if let Err(error) = folder.write(REPORT_FILE, |out| report::html::write(out, run, &viewer)) {
+        Incomplete::add_missing(&mut run.incomplete, REPORT_FILE, &error.to_string());
     }
     folder.release_last_reserve();
     let summary = Summary::new(run);
