@@ -2,7 +2,7 @@
 
 use clap::{Arg, ArgAction, Command};
 
-/// What the program can do, in twenty lines. Tests compare its names with the sub-commands.
+/// Overview of the commands, in twenty lines. Tests compare its names with the sub-commands.
 pub const OVERVIEW: &str = "\
 Dense stereo mapping of streets with moving cars: the same bits on every machine.
 
