@@ -11,6 +11,7 @@
 //! | scans of a progressive JPEG | [`MAX_JPEG_SCANS`] |
 //! | chunk or record of an MCAP file, packed or not | [`MAX_BAG_RECORD_BYTES`] |
 //! | index of an MCAP file | [`MAX_BAG_INDEX_BYTES`] |
+//! | indexes of all files of a recording; files | [`MAX_BAG_INDEXES_BYTES`], [`MAX_BAG_FILES`] |
 //! | unpacked chunks for each byte of an MCAP file | [`MAX_BAG_RATIO`] |
 //! | images of a topic; image topics | [`MAX_BAG_IMAGES`], [`MAX_BAG_TOPICS`] |
 //! | text: bytes, lines, bytes of a line | [`CALIBRATION_TEXT`], [`SETTINGS_TEXT`] |
@@ -43,6 +44,10 @@ pub const MAX_JPEG_SCANS: usize = 100;
 pub const MAX_BAG_RECORD_BYTES: usize = 48 * MIB as usize;
 /// Length of the index of an MCAP file, bytes.
 pub const MAX_BAG_INDEX_BYTES: u64 = 24 * MIB;
+/// Length of the indexes of all files of a recording, bytes.
+pub const MAX_BAG_INDEXES_BYTES: u64 = 96 * MIB;
+/// Files of a recording.
+pub const MAX_BAG_FILES: usize = 1_000;
 /// Bytes of all unpacked chunks for each byte of an MCAP file.
 pub const MAX_BAG_RATIO: u64 = 250;
 /// Images of a topic: nine hours at 30 a second.

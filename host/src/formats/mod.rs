@@ -38,8 +38,8 @@ pub use image::{Image, luma};
 pub use opencv_xml::read_opencv_depth;
 pub use pfm::read_pfm;
 pub use picture::{
-    Decoded, ENDINGS as PICTURE_ENDINGS, Picture, SAMPLE_BITS, decode_picture, picture_size,
-    read_picture, significant_bits,
+    Decoded, ENDINGS as PICTURE_ENDINGS, Picture, RANGE_PICTURES, SAMPLE_BITS, SampleRange,
+    declared_maximum, decode_picture, picture_size, read_picture, significant_bits,
 };
 pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};

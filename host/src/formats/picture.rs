@@ -91,6 +91,54 @@ pub fn significant_bits(largest: u16) -> u32 {
     SAMPLE_BITS.into_iter().find(|&bits| u32::from(largest) < 1 << bits).unwrap_or(16)
 }
 
+/// Pictures by whose largest value a recording's significant bits are told.
+pub const RANGE_PICTURES: usize = 8;
+
+/// Largest values of some pictures of a recording, by which the bits of 16-bit samples are told.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SampleRange {
+    largest: Option<u16>,
+    pictures: usize,
+    declared: Option<u16>,
+}
+
+impl SampleRange {
+    /// Takes the largest sample that a file says it can have ([`declared_maximum`]).
+    pub fn from_declared(maximum: u16) -> Self {
+        Self { declared: Some(maximum), ..Self::default() }
+    }
+
+    /// Adds a picture.
+    pub fn add(&mut self, picture: &Picture) {
+        self.largest = self.largest.max(picture.largest_sample());
+        self.pictures += 1;
+    }
+
+    /// Returns true if a picture had samples of 16 bit.
+    pub fn is_deep(&self) -> bool {
+        self.largest.is_some() || self.declared.is_some()
+    }
+
+    /// Significant bits of 16-bit pictures; `None` of others.
+    pub fn bits(&self) -> Option<u32> {
+        self.declared.or(self.largest).map(significant_bits)
+    }
+
+    /// Returns a note for the user; `None` for pictures of 8 bit.
+    pub fn note(&self) -> Option<String> {
+        let bits = self.bits()?;
+        let by = match (self.declared, self.largest) {
+            (Some(maximum), _) => format!("the maximum {maximum} that the first one says"),
+            (None, largest) => {
+                format!("the largest value {} of {} images", largest?, self.pictures)
+            }
+        };
+        Some(format!(
+            "16-bit images: {bits} bits are taken as significant, by {by}; --bits says otherwise"
+        ))
+    }
+}
+
 /// Reads a picture. An alpha channel is dropped.
 ///
 /// # Errors
@@ -114,6 +162,11 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Picture, String> {
 /// The file cannot be read, has no header of a picture, or its sides are beyond the bound.
 pub fn picture_size(path: &Path) -> Result<(usize, usize), FormatError> {
     decode::size(open(path)?).map_err(|reason| FormatError::content(path, reason, FETCH_ANEW))
+}
+
+/// Largest sample that a PGM or PPM of 16 bit says it can have, if that is less than all.
+pub fn declared_maximum(path: &Path) -> Option<u16> {
+    decode::declared_maximum(open(path).ok()?)
 }
 
 fn open(path: &Path) -> Result<BufReader<File>, FormatError> {

@@ -64,16 +64,7 @@ impl Layout {
         if !path.exists() {
             return Err(InputError::Absent { path: path.to_path_buf() });
         }
-        if bags::file_at(path).is_some() {
-            return Ok(bags::DATA_SET);
-        }
-        if let Some(action) = bags::conversion(path) {
-            return Err(InputError::bag(
-                path,
-                format!("it is a recording of ROS in another format than MCAP. {action}"),
-            ));
-        }
-        if path.is_file() {
+        if path.is_file() && !(bags::DATA_SET.row().matches)(path) {
             return Err(InputError::File { path: path.to_path_buf() });
         }
         Self::of(path).ok_or_else(|| {

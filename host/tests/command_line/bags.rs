@@ -182,8 +182,8 @@ fn a_recorded_street_has_the_folders_digests_and_broken_ones_a_sentence() {
     let before = names(root);
     for (path, more, sentence) in [
         ("cut.mcap", &[][..], "Repair it with `mcap recover cut.mcap -o repaired.mcap`"),
-        ("old.db3", &[], "`mcap convert old.db3 old.mcap`"),
-        ("old.bag", &[], "`mcap convert old.bag old.mcap`"),
+        ("old.db3", &[], "`rosbags-convert --src old.db3 --dst old-mcap --dst-storage mcap`"),
+        ("old.bag", &[], "`rosbags-convert --src old.bag --dst old-mcap --dst-storage mcap`"),
         (
             "raw.mcap",
             &["--topics", "/a,/b"],

@@ -92,15 +92,24 @@ pub fn mesh(bytes: &[u8]) -> bool {
 
 pub fn plans() -> Vec<Vec<u8>> {
     let small: &[u8] = b"\0[[recording]]\nname = \"a\"\narguments = [\"a\"]\n";
-    vec![small.to_vec(), [b"\0", RECORDINGS_EXAMPLE.as_bytes()].concat()]
+    let files: &[u8] =
+        b"\x02rosbag2_bagfile_information:\n  version: 5\n  compression_mode: ''\n  \
+                         relative_file_paths:\n    - a_0.mcap\n";
+    vec![small.to_vec(), [b"\0", RECORDINGS_EXAMPLE.as_bytes()].concat(), files.to_vec()]
 }
 
-/// A list of recordings or of jobs, by the first byte.
+/// A list of recordings, of jobs or of a recording's files, by the first byte.
 pub fn plan(bytes: &[u8]) -> bool {
     let Some((kind, content)) = bytes.split_first() else { return false };
     let folder = Folder::new();
-    if kind % 2 == 0 {
-        return Recordings::read(&folder.file("list.toml", content)).is_ok();
+    match kind % 3 {
+        0 => return Recordings::read(&folder.file("list.toml", content)).is_ok(),
+        2 => {
+            folder.file("a_0.mcap", &recording(None));
+            folder.file("metadata.yaml", content);
+            return open(folder.path(), &OpenOptions::default()).is_ok();
+        }
+        _ => {}
     }
     folder.file(MANIFEST_FILE, content);
     Manifest::read(folder.path()).is_ok()

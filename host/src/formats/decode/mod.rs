@@ -16,7 +16,7 @@ mod tests;
 use super::bounds::{MAX_DECODE_BYTES, MAX_SIDE_PX, check_bytes, check_decoding, check_sides};
 use ::image::codecs::bmp::BmpDecoder;
 use ::image::codecs::jpeg::JpegDecoder;
-use ::image::codecs::pnm::PnmDecoder;
+use ::image::codecs::pnm::{PnmDecoder, PnmHeader};
 use ::image::codecs::tiff::TiffDecoder;
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, Limits, guess_format};
 use std::fmt::Display;
@@ -49,7 +49,7 @@ pub fn decode(mut reader: impl BufRead + Seek) -> Result<DynamicImage, String> {
             check(&decoder, 2 * bytes)?;
             drawn(decoder, bytes + TIFF_RESERVE)
         }
-        ImageFormat::Pnm => simple(PnmDecoder::new(reader).map_err(plain)?),
+        ImageFormat::Pnm => netpbm(reader),
         _ => simple(BmpDecoder::new(reader).map_err(plain)?),
     }
 }
@@ -78,6 +78,39 @@ pub fn size(mut reader: impl BufRead + Seek) -> Result<(usize, usize), String> {
     let (width, height) = (width as usize, height as usize);
     check_sides(width, height)?;
     Ok((width, height))
+}
+
+/// Largest sample that a PGM or PPM of 16 bit says it can have; `None` where it says all of them,
+/// as programs write that know of no smaller one, and of other pictures.
+pub fn declared_maximum(mut reader: impl BufRead + Seek) -> Option<u16> {
+    if format(&mut reader).ok()? != ImageFormat::Pnm {
+        return None;
+    }
+    maximum_of(PnmDecoder::new(reader).ok()?.header())
+}
+
+fn maximum_of(header: &PnmHeader) -> Option<u16> {
+    let maximum = u16::try_from(header.maximal_sample()).ok()?;
+    (u16::from(u8::MAX) < maximum && maximum < u16::MAX).then_some(maximum)
+}
+
+/// Decodes a PGM or PPM. Its decoder stretches samples to 16 bit; they are given as they stand in
+/// the file, so that the same bits are significant as in other formats.
+fn netpbm(reader: impl BufRead) -> Result<DynamicImage, String> {
+    let decoder = PnmDecoder::new(reader).map_err(plain)?;
+    let maximum = maximum_of(decoder.header());
+    let mut image = simple(decoder)?;
+    let Some(maximum) = maximum.map(u32::from) else { return Ok(image) };
+    let all = u32::from(u16::MAX);
+    let stored = |sample: &mut u16| {
+        *sample = ((u32::from(*sample) * maximum + all / 2) / all) as u16;
+    };
+    match &mut image {
+        DynamicImage::ImageLuma16(pixels) => pixels.iter_mut().for_each(stored),
+        DynamicImage::ImageRgb16(pixels) => pixels.iter_mut().for_each(stored),
+        _ => {}
+    }
+    Ok(image)
 }
 
 /// Tells the format of a file that is not too long. The reader stands at its beginning again.

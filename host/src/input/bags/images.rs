@@ -1,18 +1,20 @@
 //! Image messages as pictures.
 
-use super::cdr::{RawImage, compressed_image};
+use super::container::Topic;
+use super::messages::{RawImage, compressed_image};
 use crate::formats::bounds::{check_decoding, check_sides};
 use crate::formats::{Image, Picture, decode_picture};
 
-/// The picture in an image message.
+/// The picture in an image message of a topic.
 ///
 /// # Errors
 /// What is wrong, as the rest of a sentence.
-pub fn picture(message: &[u8], compressed: bool) -> Result<Picture, String> {
-    if compressed {
-        return decode_picture(compressed_image(message).ok_or("the message is truncated")?);
+pub fn picture(message: &[u8], topic: &Topic) -> Result<Picture, String> {
+    if topic.kind.ends_with("CompressedImage") {
+        let file = compressed_image(message, topic.encoding).ok_or("the message is truncated")?;
+        return decode_picture(file);
     }
-    let image = RawImage::read(message).ok_or("the message is truncated")?;
+    let image = RawImage::read(message, topic.encoding).ok_or("the message is truncated")?;
     let (width, height) = (image.width, image.height);
     check_sides(width, height)?;
     let (channels, deep) = match image.encoding {

@@ -1,6 +1,7 @@
 //! Which topics are the two cameras.
 
-use super::file::{BagFile, Topic};
+use super::container::Topic;
+use super::recording::Recording;
 use crate::formats::bounds::MAX_BAG_TOPICS;
 use crate::input::data_set::Topics;
 use crate::input::source::InputError;
@@ -16,22 +17,19 @@ const SIDES: [[&str; 2]; 7] = [
     ["Left", "Right"],
 ];
 
-fn is_image(topic: &Topic) -> bool {
-    matches!(topic.kind.as_str(), "sensor_msgs/Image" | "sensor_msgs/CompressedImage")
-}
-
 /// The topics of the left and the right camera: as given, else the only two image topics whose
 /// names differ in the side alone. Rectified ones are preferred, then those that are not
 /// compressed.
 ///
 /// # Errors
 /// A topic is not there, or there is no such pair.
-pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], InputError> {
-    let images: Vec<Topic> = file.topics().into_iter().filter(is_image).collect();
+pub fn choose(recording: &Recording, given: Option<&Topics>) -> Result<[String; 2], InputError> {
+    let images: Vec<Topic> =
+        recording.topics().iter().filter(|topic| topic.is_image()).cloned().collect();
     if images.len() > MAX_BAG_TOPICS {
         let (found, most) = (images.len(), MAX_BAG_TOPICS);
         return Err(InputError::bag(
-            file.path(),
+            recording.path(),
             format!(
                 "it has {found} topics with images; at most {most} are read. Keep those of the two \
                  cameras: `mcap filter`"
@@ -43,7 +41,7 @@ pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], Inp
         return match sides.iter().find(|side| images.iter().all(|topic| topic.name != **side)) {
             None => Ok(sides.clone()),
             Some(side) => Err(InputError::bag(
-                file.path(),
+                recording.path(),
                 format!("it has no images at {side}. Its image topics are {names}"),
             )),
         };
@@ -69,21 +67,21 @@ pub fn choose(file: &BagFile, given: Option<&Topics>) -> Result<[String; 2], Inp
     let best = pairs.iter().min_by_key(|pair| rank(pair));
     best.map(|pair| pair.map(|topic| topic.name.clone())).ok_or_else(|| {
         let found = if names.is_empty() {
-            "it has no image topics in CDR".to_owned()
+            "it has no image topics of ROS".to_owned()
         } else {
             format!("its image topics are {names}")
         };
         InputError::bag(
-            file.path(),
+            recording.path(),
             format!("the two cameras cannot be told: {found}. Name them with --topics LEFT,RIGHT"),
         )
     })
 }
 
 /// The topic of a camera's calibration: `camera_info` beside its images.
-pub fn info_of(file: &BagFile, image_topic: &str) -> Option<String> {
-    let infos: Vec<Topic> =
-        file.topics().into_iter().filter(|topic| topic.kind == "sensor_msgs/CameraInfo").collect();
+pub fn info_of(recording: &Recording, image_topic: &str) -> Option<String> {
+    let infos: Vec<&Topic> =
+        recording.topics().iter().filter(|topic| topic.kind == "sensor_msgs/CameraInfo").collect();
     // From the images' own name space upwards.
     let mut space = image_topic;
     while let Some((parent, _)) = space.rsplit_once('/') {

@@ -9,7 +9,8 @@ use crate::formats::calibration::{
     CameraGeometry, FittedGeometry, RectifiedSize, SettledCameras, StereoCalibration, Swap,
 };
 use crate::formats::{
-    Decoded, TimeTable, Trajectory, picture_size, read_picture, significant_bits,
+    Decoded, RANGE_PICTURES, SampleRange, TimeTable, Trajectory, declared_maximum, picture_size,
+    read_picture,
 };
 use crate::input::diagnosis;
 use crate::input::source::{
@@ -18,8 +19,8 @@ use crate::input::source::{
 };
 use std::path::{Path, PathBuf};
 
-/// Pictures whose largest value tells how many bits of 16 are significant.
-const RANGE_PICTURES: usize = 8;
+/// Pairs tried for one whose size can be read.
+const FIRST_PAIRS: usize = 16;
 /// Pairs by whose rows lenses are told apart.
 const ROW_PAIRS: usize = 3;
 const NS_PER_S: f64 = 1e9;
@@ -96,10 +97,7 @@ impl Sequence {
     pub(super) fn from_parts(parts: Parts) -> Result<Self, InputError> {
         let mut notes = parts.notes;
         let (pairs, stacking, left, positions) = paired(parts.images, &mut notes)?;
-        let first = &pairs
-            .first()
-            .ok_or_else(|| InputError::Empty { path: PathBuf::from(&parts.name) })?[0];
-        let size = picture_size(first).map_err(InputError::image)?;
+        let size = first_size(&pairs, &parts.name)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
         let exchanged = parts.cameras.hints().swap.is_some_and(Swap::images);
         let reading = PairReading { stacking, exchanged, bits: parts.bits };
@@ -111,7 +109,7 @@ impl Sequence {
         notes.extend(raw_note(&cameras, &geometry));
         let bits = match parts.bits {
             Some(bits) => Some(bits),
-            None => detected_bits(&pairs, &mut notes)?,
+            None => detected_bits(&pairs, &mut notes),
         };
         let number = |&at: &usize| {
             if parts.numbered { frame_number(&left.files[at]).unwrap_or(at) } else { at }
@@ -246,30 +244,34 @@ fn paired(images: ImageFiles, notes: &mut Vec<String>) -> Result<Paired, InputEr
     Ok((pairs, None, left, positions))
 }
 
-/// Detects the number of significant bits of 16-bit images from pictures spread over the sequence;
-/// `None` if the first is of 8 bit. A picture that cannot be read is passed over: it is refused
+/// Width and height of the first left picture whose header can be read: one that cannot is refused
 /// when its turn comes.
-fn detected_bits(
-    pairs: &[[PathBuf; 2]],
-    notes: &mut Vec<String>,
-) -> Result<Option<u32>, InputError> {
-    let step = pairs.len().div_ceil(RANGE_PICTURES).max(1);
-    let mut largest = None;
-    for (at, [path, _]) in pairs.iter().step_by(step).enumerate() {
-        let sample = read_picture(path).ok().and_then(|picture| picture.largest_sample());
-        if at == 0 && sample.is_none() {
-            return Ok(None);
+fn first_size(pairs: &[[PathBuf; 2]], name: &str) -> Result<(usize, usize), InputError> {
+    let mut sizes = pairs.iter().map(|[left, _]| picture_size(left).map_err(InputError::image));
+    let first = sizes.next().ok_or_else(|| InputError::Empty { path: PathBuf::from(name) })?;
+    first.or_else(|error| sizes.take(FIRST_PAIRS).find_map(Result::ok).ok_or(error))
+}
+
+/// Detects the number of significant bits of 16-bit images: as the first says in its header, else
+/// from pictures spread over the sequence; `None` of 8-bit ones. A picture that cannot be read is
+/// passed over: it is refused when its turn comes.
+fn detected_bits(pairs: &[[PathBuf; 2]], notes: &mut Vec<String>) -> Option<u32> {
+    let mut range = SampleRange::default();
+    let declared = pairs.first().and_then(|[left, _]| declared_maximum(left));
+    if let Some(maximum) = declared {
+        range = SampleRange::from_declared(maximum);
+    } else {
+        let step = pairs.len().div_ceil(RANGE_PICTURES).max(1);
+        for [path, _] in pairs.iter().step_by(step) {
+            let Ok(picture) = read_picture(path) else { continue };
+            range.add(&picture);
+            if !range.is_deep() {
+                return None;
+            }
         }
-        largest = largest.max(sample);
     }
-    let bits = largest.map(significant_bits);
-    if let (Some(bits), Some(largest)) = (bits, largest) {
-        notes.push(format!(
-            "16-bit images: {bits} bits are taken as significant, by the largest \
-                            value {largest} of {RANGE_PICTURES} images; --bits says otherwise"
-        ));
-    }
-    Ok(bits)
+    notes.extend(range.note());
+    range.bits()
 }
 
 /// The chosen rows of a table; `None` where one is missing.

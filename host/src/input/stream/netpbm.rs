@@ -6,8 +6,11 @@
 
 use super::Pair;
 use crate::formats::bounds::{check_decoding, check_sides};
-use crate::formats::{Decoded, decode_picture, significant_bits};
+use crate::formats::{
+    Decoded, Picture, RANGE_PICTURES, SampleRange, decode_picture, significant_bits,
+};
 use crate::input::source::{InputError, Stacking};
+use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
 
 /// Longest header, bytes: comments included.
@@ -20,15 +23,27 @@ pub struct NetpbmPairs<R> {
     bits: Option<u32>,
     /// Images read.
     images: usize,
+    /// Images that came before the significant bits were known, and what ended them.
+    waiting: VecDeque<Result<Picture, InputError>>,
     ended: bool,
+}
+
+/// Header of an image.
+struct Header {
+    bytes: Vec<u8>,
+    /// Bytes of pixels that follow.
+    len: usize,
+    /// Largest sample that an image can have.
+    maximum: usize,
 }
 
 impl<R: Read> NetpbmPairs<R> {
     /// Images of both cameras in turn, the left one first, or both in one where `stacking` says
-    /// how. `bits` are the significant bits of 16-bit samples; the first image tells them where
-    /// they are not given.
+    /// how. `bits` are the significant bits of 16-bit samples. Where they are not given the first
+    /// header's maximum tells them, unless it is 65535: then the first [`RANGE_PICTURES`] images
+    /// do, which are read before the first pair is handed out.
     pub fn new(bytes: R, stacking: Option<Stacking>, bits: Option<u32>) -> Self {
-        Self { bytes, stacking, bits, images: 0, ended: false }
+        Self { bytes, stacking, bits, images: 0, waiting: VecDeque::new(), ended: false }
     }
 
     fn error(&self, reason: impl Into<String>) -> InputError {
@@ -49,28 +64,61 @@ impl<R: Read> NetpbmPairs<R> {
         stacking.split(&first).map(Some).ok_or_else(uneven)
     }
 
+    /// The next image as the mapper takes it.
     fn image(&mut self) -> Result<Option<Decoded>, InputError> {
-        let Some((mut image, len)) = self.header()? else { return Ok(None) };
+        let picture = match self.waiting.pop_front() {
+            Some(waiting) => waiting?,
+            None => match self.picture()? {
+                Some(picture) => picture,
+                None => return Ok(None),
+            },
+        };
+        if self.bits.is_none() && picture.largest_sample().is_some() {
+            self.detect_bits(&picture);
+        }
+        Ok(Some(picture.to_8_bit(self.bits)))
+    }
+
+    /// Tells the significant bits by the first images, which then wait for their turn.
+    fn detect_bits(&mut self, first: &Picture) {
+        let mut range = SampleRange::default();
+        range.add(first);
+        while self.waiting.len() + 1 < RANGE_PICTURES
+            && let Some(picture) = self.picture().transpose()
+        {
+            let ended = picture.is_err();
+            picture.iter().for_each(|picture| range.add(picture));
+            self.waiting.push_back(picture);
+            if ended {
+                break;
+            }
+        }
+        self.bits = range.bits();
+    }
+
+    /// The next picture of the stream.
+    fn picture(&mut self) -> Result<Option<Picture>, InputError> {
+        let Some(Header { mut bytes, len, maximum }) = self.header()? else { return Ok(None) };
         // Memory is taken as bytes come, not as the header promises.
         let read = self
             .bytes
             .by_ref()
             .take(len as u64)
-            .read_to_end(&mut image)
+            .read_to_end(&mut bytes)
             .map_err(|error| self.error(error.to_string()))?;
         if read < len {
             return Err(self.error("the stream stopped inside it"));
         }
-        let picture = decode_picture(&image).map_err(|reason| self.error(reason))?;
-        if self.bits.is_none() {
-            self.bits = picture.largest_sample().map(significant_bits);
+        let picture = decode_picture(&bytes).map_err(|reason| self.error(reason))?;
+        if self.bits.is_none() && (256..65_535).contains(&maximum) {
+            self.bits = u16::try_from(maximum).ok().map(significant_bits);
         }
         self.images += 1;
-        Ok(Some(picture.to_8_bit(self.bits)))
+        Ok(Some(picture))
     }
 
-    /// The header's bytes, and how many bytes of pixels follow.
-    fn header(&mut self) -> Result<Option<(Vec<u8>, usize)>, InputError> {
+    /// The next header; `None` at the end.
+    fn header(&mut self) -> Result<Option<Header>, InputError> {
         let mut header = Vec::with_capacity(32);
         let Some(first) = self.byte()? else { return Ok(None) };
         header.push(first);
@@ -95,7 +143,7 @@ impl<R: Read> NetpbmPairs<R> {
         let len = width * height * channels * sample;
         // The image is held as it came, and decoded.
         check_decoding(width, height, 2 * len as u64).map_err(|reason| self.error(reason))?;
-        Ok(Some((header, len)))
+        Ok(Some(Header { bytes: header, len, maximum: largest }))
     }
 
     /// The next number of a header, and the one blank behind it.

@@ -41,6 +41,30 @@ fn images_come_as_pairs_and_the_stream_ends_between_two() {
     assert_eq!(pair[1].colour.as_ref().unwrap().pixels(), [[20, 20, 20]]);
 }
 
+/// Images of 16 bit with the same value in each pixel.
+fn deep(maximum: u16, values: &[u16]) -> Vec<u8> {
+    let image = |value: &u16| {
+        [format!("P5 2 2 {maximum}\n").into_bytes(), value.to_be_bytes().repeat(4)].concat()
+    };
+    values.iter().flat_map(image).collect()
+}
+
+#[test]
+fn bits_are_those_of_the_header_or_of_several_images() {
+    // A dim first pair says nothing of the others.
+    let values = [160, 160, 1_600, 1_600, 4_000, 4_000];
+    let of_12_bits = [Ok([10, 10]), Ok([100, 100]), Ok([250, 250])];
+    for maximum in [4_095, 65_535] {
+        let stream = deep(maximum, &values);
+        assert_eq!(greys(NetpbmPairs::new(&stream, None, None)), of_12_bits, "{maximum}");
+    }
+    // A stream that breaks while the first images are compared loses none of them.
+    let cut = deep(65_535, &values);
+    let read = greys(NetpbmPairs::new(&cut[..cut.len() - 1], None, None));
+    assert_eq!(read[..2], of_12_bits[..2]);
+    assert!(read[2].as_ref().unwrap_err().contains("stopped inside it"), "{read:?}");
+}
+
 #[test]
 fn a_stream_that_breaks_says_where_and_ends_there() {
     let good: Vec<u8> = [pgm(6, 4, 1), pgm(6, 4, 2)].concat();

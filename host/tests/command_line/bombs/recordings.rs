@@ -26,6 +26,16 @@ pub const KINDS: &[Bomb] = &[
     },
     Bomb { name: "MCAP of many topics", bound: "at most 256 are read", make: topics },
     Bomb { name: "MCAP whose end is a hole", bound: "mcap recover", make: hole },
+    Bomb {
+        name: "list of a recording's files with nested aliases",
+        bound: "no list of a recording's files",
+        make: list_aliases,
+    },
+    Bomb {
+        name: "recording of many files",
+        bound: "at most 1,000 are read",
+        make: many_files,
+    },
     Bomb { name: "MCAP with a long index", bound: "mcap recover", make: index },
 ];
 
@@ -139,6 +149,32 @@ fn topics(root: &Path, random: &mut Random) -> Call {
     }
     writer.finish().unwrap();
     call(random)
+}
+
+/// The folder of a recording, whose list is to be written.
+fn folder_of_one(root: &Path, list: &str) -> Call {
+    let folder = root.join("r");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("r_0.mcap"), "").unwrap();
+    fs::write(folder.join("metadata.yaml"), list).unwrap();
+    Call::new(&["inspect", "r"])
+}
+
+fn list_aliases(root: &Path, random: &mut Random) -> Call {
+    let mut list = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n".to_owned();
+    for at in 1..20 + random.below(20) {
+        let before = at - 1;
+        let aliases = vec![format!("*a{before}"); 10].join(", ");
+        list += &format!("a{at}: &a{at} [{aliases}]\n");
+    }
+    folder_of_one(root, &list)
+}
+
+fn many_files(root: &Path, random: &mut Random) -> Call {
+    let files = 1_001 + random.below(5_000);
+    let list: String = (0..files).map(|_| "  - r_0.mcap\n").collect();
+    let head = "rosbag2_bagfile_information:\n  relative_file_paths:\n";
+    folder_of_one(root, &format!("{head}{list}"))
 }
 
 fn hole(root: &Path, random: &mut Random) -> Call {

@@ -99,6 +99,56 @@ fn images_of_one_camera_are_refused_without_an_option_that_they_hold_both() {
     assert_eq!(open(root.path(), &options).unwrap().size(), (20, 32));
 }
 
+#[test]
+fn a_broken_first_image_is_refused_at_its_turn_and_no_earlier() {
+    let deep =
+        |value: u16| ImageBuffer::from_fn(40, 32, move |u, v| Luma([value + (u * v) as u16]));
+    let root = TempDir::new().unwrap();
+    fs::write(root.path().join("calib.txt"), CALIB).unwrap();
+    for side in ["left", "right"] {
+        fs::create_dir_all(root.path().join(side)).unwrap();
+        for at in 0..4 {
+            deep(200 + 800 * at).save(root.path().join(format!("{side}/{at}.png"))).unwrap();
+        }
+    }
+    for content in [&b""[..], b"\x89PNG\r\n", b"no picture"] {
+        fs::write(root.path().join("left/0.png"), content).unwrap();
+        let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+        assert_eq!((dataset.len(), dataset.size()), (4, (40, 32)));
+        let refused = dataset.frame(0).err().unwrap().to_string();
+        assert!(refused.contains("left/0.png cannot be read"), "{refused}");
+        assert!(dataset.frame(1).is_ok());
+        // The bits of 16-bit images are told by the others.
+        let noted = |words: &str| dataset.notes().iter().any(|note| note.contains(words));
+        assert!(noted("12 bits") && noted("of 3 images"), "{:?}", dataset.notes());
+    }
+    (0..4).for_each(|at| fs::write(root.path().join(format!("left/{at}.png")), "").unwrap());
+    assert!(refusal(root.path(), None).contains("left/0.png cannot be read"));
+}
+
+#[test]
+fn the_maximum_in_a_header_tells_the_bits() {
+    let root = TempDir::new().unwrap();
+    fs::write(root.path().join("calib.txt"), CALIB).unwrap();
+    for (maximum, value, expected) in
+        [(4_095u16, 800u16, 50), (1_000, 800, 200), (65_535, 800, 200)]
+    {
+        for side in ["left", "right"] {
+            fs::create_dir_all(root.path().join(side)).unwrap();
+            for at in 0..2 {
+                let header = format!("P5 40 32 {maximum}\n").into_bytes();
+                let pixels = value.to_be_bytes().repeat(40 * 32);
+                let path = root.path().join(format!("{side}/{at}.pgm"));
+                fs::write(path, [header, pixels].concat()).unwrap();
+            }
+        }
+        let dataset = open(root.path(), &OpenOptions::default()).unwrap();
+        assert_eq!(dataset.frame(0).unwrap().left.pixels()[0], expected, "{maximum}");
+        let noted = dataset.notes().iter().any(|note| note.contains("that the first one says"));
+        assert_eq!(noted, maximum < 65_535, "{:?}", dataset.notes());
+    }
+}
+
 /// A folder of frames 0 to 11 without frame 5, with a row of times and poses for each of the 12.
 fn without_the_sixth(times: impl Fn(u32) -> String) -> TempDir {
     let root = TempDir::new().unwrap();

@@ -1,25 +1,52 @@
-//! Messages in CDR, the encoding of ROS 2: numbers aligned to their size, behind four bytes that
-//! say their order.
+//! Messages of images and calibrations, in the encodings of ROS 2 and ROS 1.
+//!
+//! CDR (ROS 2) aligns numbers to their size, behind four bytes that say their order, and ends texts
+//! with a zero. ROS 1 aligns nothing, is little-endian, and its headers begin with a number.
 
 use std::fmt::Write;
 
 /// Most numbers in a list of a calibration.
 const MAX_NUMBERS: usize = 64;
 
+/// Arrangement of a message's bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// ROS 2.
+    Cdr,
+    /// ROS 1.
+    Ros1,
+}
+
+impl Encoding {
+    /// The encoding of a name in a file.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            _ => None,
+        }
+    }
+}
+
 /// Reads values one by one; `None` where the bytes end.
 struct Reader<'m> {
     bytes: &'m [u8],
     at: usize,
     little: bool,
+    encoding: Encoding,
 }
 
 impl<'m> Reader<'m> {
-    fn new(message: &'m [u8]) -> Option<Self> {
+    fn new(message: &'m [u8], encoding: Encoding) -> Option<Self> {
+        if encoding == Encoding::Ros1 {
+            return Some(Self { bytes: message, at: 0, little: true, encoding });
+        }
         let (head, bytes) = message.split_at_checked(4)?;
-        Some(Self { bytes, at: 0, little: head.get(1)? & 1 == 1 })
+        Some(Self { bytes, at: 0, little: head.get(1)? & 1 == 1, encoding })
     }
 
     fn take(&mut self, len: usize, align: usize) -> Option<&'m [u8]> {
+        let align = if self.encoding == Encoding::Cdr { align } else { 1 };
         let from = self.at.next_multiple_of(align);
         let bytes = self.bytes.get(from..from.checked_add(len)?)?;
         self.at = from + len;
@@ -53,6 +80,10 @@ impl<'m> Reader<'m> {
 
     /// The header's time, ns; its frame is passed over.
     fn stamp_ns(&mut self) -> Option<u64> {
+        if self.encoding == Encoding::Ros1 {
+            // The header's running number.
+            self.u32()?;
+        }
         let (seconds, ns) = (self.u32()?, self.u32()?);
         self.text()?;
         Some(u64::from(seconds) * 1_000_000_000 + u64::from(ns))
@@ -68,8 +99,8 @@ impl<'m> Reader<'m> {
 }
 
 /// Returns the time stamp of a message with a header, ns.
-pub fn stamp_ns(message: &[u8]) -> Option<u64> {
-    Reader::new(message)?.stamp_ns()
+pub fn stamp_ns(message: &[u8], encoding: Encoding) -> Option<u64> {
+    Reader::new(message, encoding)?.stamp_ns()
 }
 
 /// `sensor_msgs/Image`.
@@ -91,8 +122,8 @@ pub struct RawImage<'m> {
 
 impl<'m> RawImage<'m> {
     /// Reads the message.
-    pub fn read(message: &'m [u8]) -> Option<Self> {
-        let mut reader = Reader::new(message)?;
+    pub fn read(message: &'m [u8], encoding: Encoding) -> Option<Self> {
+        let mut reader = Reader::new(message, encoding)?;
         reader.stamp_ns()?;
         let (height, width) = (reader.u32()? as usize, reader.u32()? as usize);
         let encoding = reader.text()?;
@@ -103,8 +134,8 @@ impl<'m> RawImage<'m> {
 }
 
 /// The file in a `sensor_msgs/CompressedImage`.
-pub fn compressed_image(message: &[u8]) -> Option<&[u8]> {
-    let mut reader = Reader::new(message)?;
+pub fn compressed_image(message: &[u8], encoding: Encoding) -> Option<&[u8]> {
+    let mut reader = Reader::new(message, encoding)?;
     reader.stamp_ns()?;
     reader.text()?;
     reader.bytes()
@@ -125,8 +156,8 @@ pub struct CameraInfo {
 
 impl CameraInfo {
     /// Reads the message.
-    pub fn read(message: &[u8]) -> Option<Self> {
-        let mut reader = Reader::new(message)?;
+    pub fn read(message: &[u8], encoding: Encoding) -> Option<Self> {
+        let mut reader = Reader::new(message, encoding)?;
         reader.stamp_ns()?;
         let (height, width) = (reader.u32()?, reader.u32()?);
         let model = reader.text()?.to_owned();
@@ -144,6 +175,11 @@ impl CameraInfo {
             rotation: reader.array()?,
             projection: reader.array()?,
         })
+    }
+
+    /// Returns true if the camera was never calibrated: ROS then leaves zeros.
+    pub fn is_blank(&self) -> bool {
+        self.camera[0] == 0.0 || self.projection[0] == 0.0
     }
 
     /// Returns true if images come without distortion and rotation.
