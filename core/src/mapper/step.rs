@@ -358,7 +358,7 @@ impl Mapper<'_> {
         let Localization { camera, self_calibration, .. } = &mut self.localization;
         let mut digest = Digest::default();
         digest.u64(camera.digest(estimate));
-        digest.u64(Hasher::digest(|hasher| self_calibration.visit(hasher)));
+        digest.u64(self_calibration.digest());
         digest.finish()
     }
 

@@ -160,8 +160,14 @@ impl FrameRow {
                 self.report.segment.get()
             )
         });
-        let guessed = self.is_extrapolated().then(|| {
-            format!("no motion estimate ({}), the frame was not fused", motion.replace('_', " "))
+        // A rig that is off explains why matches disagree, which looks like other faults.
+        let offset = self.uncorrected_offset();
+        let guessed = self.is_extrapolated().then(|| match &offset {
+            Some(_) => "no motion estimate, the frame was not fused".to_owned(),
+            None => format!(
+                "no motion estimate ({}), the frame was not fused",
+                motion.replace('_', " ")
+            ),
         });
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
@@ -177,16 +183,23 @@ impl FrameRow {
             (objects.blocks_refused, "blocks of objects refused"),
             (objects.crops_dropped, "crops of objects dropped"),
             (self.report.internal_faults, "internal faults: please report them"),
-            (
-                u32::from(self.report.self_calibration.is_uncorrected()),
-                "disparity offset that is known and not corrected",
-            ),
         ];
         let counted = counts
             .iter()
             .filter(|(count, _)| *count > 0)
             .map(|(count, what)| format!("{count} {what}"));
-        guessed.into_iter().chain(lost).chain(counted).collect::<Vec<_>>().join("; ")
+        offset.into_iter().chain(guessed).chain(lost).chain(counted).collect::<Vec<_>>().join("; ")
+    }
+
+    /// Describes the rig's disparity offset where it is known and not corrected.
+    fn uncorrected_offset(&self) -> Option<String> {
+        let rig = &self.report.self_calibration;
+        rig.is_uncorrected().then(|| {
+            format!(
+                "disparity offset {:.1} px, not corrected (rig.self_calibration=\"apply\" does)",
+                rig.offset_px
+            )
+        })
     }
 
     /// Blocks the map lacks after this frame: refused, beyond its coordinates, or left out of the

@@ -4,7 +4,7 @@ use crate::{
     geometry::{DisparityCorrection, RowCorrection},
     settings::{
         Problems, Range, Rule, Setting,
-        Value::{Choice, F64},
+        Value::{Choice, F64, U32},
         check, choices, rules,
     },
 };
@@ -22,11 +22,34 @@ pub enum SelfCalibrationMode {
     Apply,
     /// The error is found and reported.
     Report,
-    /// The error is not looked for.
+    /// The error is not taken out, nor reported unless it affects the map.
     Off,
 }
 
 choices! { SelfCalibrationMode { "apply" = Apply, "report" = Report, "off" = Off } }
+
+/// Evidence on which a correction of disparities rests, as another run found it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct CorrectionEvidence {
+    /// Standard deviation of the offset, px: how firmly the search begins with it.
+    pub sigma_px: f64,
+    /// Independent frames.
+    pub frames: u32,
+    /// Way driven in these frames, m.
+    pub way_m: f64,
+}
+
+impl Default for CorrectionEvidence {
+    /// No evidence: the offset is within half a pixel of what it begins with.
+    fn default() -> Self {
+        Self { sigma_px: 0.5, frames: 0, way_m: 0.0 }
+    }
+}
 
 /// Settings of the rig in addition to its calibration. [`RigConfig::SETTINGS`] has their ranges.
 ///
@@ -54,6 +77,8 @@ pub struct RigConfig {
     /// Correction of disparities from the first frame on, as another run found it; with
     /// self-calibration the search begins there.
     pub disparity_correction: DisparityCorrection,
+    /// Evidence on which the correction of disparities rests.
+    pub correction_evidence: CorrectionEvidence,
     /// Correction of the right image's rows from the first frame on, as another run found it; with
     /// self-calibration the search begins there.
     pub row_correction: RowCorrection,
@@ -65,6 +90,7 @@ impl Default for RigConfig {
             self_calibration: SelfCalibrationMode::Apply,
             baseline_scale: 1.0,
             disparity_correction: DisparityCorrection::default(),
+            correction_evidence: CorrectionEvidence::default(),
             row_correction: RowCorrection::default(),
         }
     }
@@ -84,7 +110,7 @@ impl RigConfig {
     pub const SETTINGS: &'static [Row] = &[
         Row::user("rig.self_calibration", "", |c| Choice(&mut c.self_calibration)).text(
             "Use of the disparity error found while driving: it is found, reported and taken out; \
-             found and reported; or not looked for.",
+             found and reported; or only reported where it affects the map.",
         ),
         Row::user("rig.baseline_scale", "", |c| F64(&mut c.baseline_scale))
             .range(Range::Within(0.5, 2.0))
@@ -120,6 +146,24 @@ impl RigConfig {
             "Added to disparities: growth with the square of the distance from the middle row, from \
              there to the first row.",
         ),
+        Row::expert("rig.correction_evidence.sigma_px", "px", |c| {
+            F64(&mut c.correction_evidence.sigma_px)
+        })
+            .range(Range::Within(0.001, 5.0))
+            .text(
+                "Standard deviation of the offset to begin with: self-calibration leaves it the \
+                 less, the smaller this is.",
+            ),
+        Row::expert("rig.correction_evidence.frames", "", |c| {
+            U32(&mut c.correction_evidence.frames)
+        })
+        .text(
+            "Independent frames on which the correction to begin with rests. With five, and a \
+             deviation below 0.06 px, it counts as known.",
+        ),
+        Row::expert("rig.correction_evidence.way_m", "m", |c| F64(&mut c.correction_evidence.way_m))
+            .range(Range::NOT_NEGATIVE)
+            .text("Way on which the correction to begin with was found."),
         Row::expert("rig.row_correction.constant_px", "px", |c| {
             F64(&mut c.row_correction.constant_px)
         })

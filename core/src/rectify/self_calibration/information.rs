@@ -22,6 +22,14 @@ pub(super) struct FrameInformation<const P: usize> {
     pub vector: [f64; P],
 }
 
+/// One parameter without the others and without what was known before.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SingleEstimate {
+    pub px: f64,
+    /// Inverse of the variance, 1/px².
+    pub information: f64,
+}
+
 #[expect(
     clippy::indexing_slicing,
     clippy::needless_range_loop,
@@ -29,6 +37,15 @@ pub(super) struct FrameInformation<const P: usize> {
 )]
 impl<const P: usize> FrameInformation<P> {
     pub(super) const ZERO: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
+
+    /// Returns what the frame says of its first parameter if the others are as linearised, `at_px`
+    /// being where it was; `None` where it says nothing.
+    pub(super) fn offset_from(&self, at_px: f64) -> Option<SingleEstimate> {
+        let information = self.matrix[0][0];
+        // False for NaN as well.
+        (information > 0.0)
+            .then(|| SingleEstimate { px: at_px - self.vector[0] / information, information })
+    }
 
     fn is_finite(&self) -> bool {
         self.matrix.as_flattened().iter().chain(&self.vector).all(|value| value.is_finite())
@@ -130,8 +147,17 @@ pub(super) struct Prior<const P: usize> {
 impl<const P: usize> Information<P> {
     pub(super) const NONE: Self = Self { matrix: [[0.0; P]; P], vector: [0.0; P] };
 
-    /// Takes a frame in, linearised at `at`. With `F` the variances a frame may be off by, it
-    /// counts as `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no
+    /// Returns the first parameter if the others are 0, without the prior; `None` where nothing is
+    /// known of it.
+    pub(super) fn first_alone(&self) -> Option<SingleEstimate> {
+        let information = self.matrix[0][0];
+        (information > 0.0)
+            .then(|| SingleEstimate { px: self.vector[0] / information, information })
+    }
+
+    /// Takes a frame in, linearised at `at`, that is worth a `share` of an independent one. With
+    /// `F` the variances a frame may be off by, it counts as
+    /// `(S⁻¹ + F)⁻¹`, which is `S - S D (I + D S D)⁻¹ D S` with `D² = F` and needs no
     /// inverse of `S`.
     // Never inlined, as all that has many callers here: it is unrolled, and large.
     #[inline(never)]
@@ -140,6 +166,7 @@ impl<const P: usize> Information<P> {
         prior: &Prior<P>,
         frame: &FrameInformation<P>,
         at: [f64; P],
+        share: f64,
     ) -> Option<()> {
         // A frame's own deviation widens its covariance to S^-1 + D^2. Its inverse is S - S D (1 +
         // D S D)^-1 D S, which needs no inverse of S: S may be singular.
@@ -159,24 +186,26 @@ impl<const P: usize> Information<P> {
             *column = reduce(core::array::from_fn(|i| s[i][j]))?;
         }
         let vector = reduce(frame.target(at))?;
-        self.add(&matrix, &vector);
+        self.add(&matrix, &vector, share);
         Some(())
     }
 
     /// Takes a frame in, linearised at `at`, that is off by nothing but its noise.
     pub(super) fn take_exact(&mut self, frame: &FrameInformation<P>, at: [f64; P]) -> Option<()> {
         let target = FrameInformation { matrix: frame.matrix, vector: frame.target(at) };
-        target.is_finite().then(|| self.add(&target.matrix, &target.vector))
+        target.is_finite().then(|| self.add(&target.matrix, &target.vector, 1.0))
     }
 
-    /// Adds what a frame says, after forgetting a little of what was known.
+    /// Adds a share of what a frame says, after forgetting a little of what was known.
     #[inline]
-    fn add(&mut self, matrix: &[[f64; P]; P], vector: &[f64; P]) {
+    fn add(&mut self, matrix: &[[f64; P]; P], vector: &[f64; P], share: f64) {
+        // Frames that are worth little replace little.
+        let memory = 1.0 - share * (1.0 - MEMORY);
         for i in 0..P {
-            self.vector[i] = MEMORY * self.vector[i] + vector[i];
+            self.vector[i] = memory * self.vector[i] + share * vector[i];
             for j in 0..P {
                 self.matrix[i][j] =
-                    MEMORY * self.matrix[i][j] + 0.5 * (matrix[i][j] + matrix[j][i]);
+                    memory * self.matrix[i][j] + share * (0.5 * (matrix[i][j] + matrix[j][i]));
             }
         }
     }
@@ -194,6 +223,19 @@ impl<const P: usize> Information<P> {
         // A column of the inverse: its first entry is the first parameter's variance.
         let variance = solve(&matrix, core::array::from_fn(|i| if i == 0 { 1.0 } else { 0.0 }))?;
         Some((parameters, libm::sqrt(variance[0])))
+    }
+
+    /// The deviation of one parameter, px.
+    #[inline(never)]
+    pub(super) fn sigma_px(&self, prior: &Prior<P>, of: usize) -> Option<f64> {
+        let matrix: [[f64; P]; P] = core::array::from_fn(|i| {
+            core::array::from_fn(|j| {
+                let own = if i == j { 1.0 / (prior.sigma[i] * prior.sigma[i]) } else { 0.0 };
+                self.matrix[i][j] + own
+            })
+        });
+        let column = solve(&matrix, core::array::from_fn(|i| if i == of { 1.0 } else { 0.0 }))?;
+        column.get(of).map(|variance| libm::sqrt(*variance))
     }
 
     /// Visits every field.
@@ -256,7 +298,7 @@ mod tests {
         let mut information = Information::NONE;
         // A frame that is certain of 0.4 px, were it not for what the model lacks.
         let frame = FrameInformation { matrix: [[1e9]], vector: [-0.4e9] };
-        information.take(&prior, &frame, [0.0]).unwrap();
+        information.take(&prior, &frame, [0.0], 1.0).unwrap();
         let ([found], sigma) = information.estimate(&prior).unwrap();
         assert!((sigma - 0.098).abs() < 1e-3 && (found - 0.4).abs() < 0.02, "{found} {sigma}");
         let start = Prior { mean: [0.7], ..prior };

@@ -9,6 +9,8 @@ use crate::geometry::{
 const NOISE_PX: f64 = 0.2;
 /// Variances of left column, row and right column, in those of a column.
 const VARIANCES: [f64; 3] = [1.0, 0.5, 1.0];
+/// Squared error, in sigmas, from which a match has no weight for the witness.
+const STRICT_SQUARED: f64 = 25.0;
 /// Smallest disparity of a match that is used, px.
 const DISPARITY_MIN_PX: f64 = 1.0;
 /// Nearest depth of a point after the motion, m.
@@ -34,6 +36,16 @@ impl MatchRows {
         let square = share * share;
         let fourth = square * square;
         1.0 / ((1.0 + 0.25 * self.squared) * (1.0 + fourth * fourth))
+    }
+
+    /// Weight of the match for a witness: none where the error is larger than the motion explains
+    /// (Tukey), less towards the sides.
+    pub(super) fn strict_weight(&self, knee: f64) -> f64 {
+        let share = self.share / knee;
+        let square = share * share;
+        let fourth = square * square;
+        let left = 1.0 - self.squared / STRICT_SQUARED;
+        if left > 0.0 { left * left / (1.0 + fourth * fourth) } else { 0.0 }
     }
 }
 

@@ -84,6 +84,88 @@ fn driven(
     calibration
 }
 
+/// Points of the back of a truck that keeps its distance of 9 m: they do not move in the image.
+fn truck(random: &mut Random) -> Vec<[StereoObservation; 2]> {
+    let mut uniform = move |low: f64, high: f64| {
+        low + (high - low) * f64::from(random.next_u32()) / f64::from(u32::MAX)
+    };
+    (0..1_500)
+        .filter_map(|_| {
+            let exact = RIG.project([uniform(-1.2, 1.2), uniform(-2.0, 1.2), 9.0])?;
+            let mut noisy = || StereoObservation {
+                u_left_px: exact.u_left_px + uniform(-NOISE_PX, NOISE_PX),
+                u_right_px: exact.u_right_px + uniform(-NOISE_PX, NOISE_PX),
+                ..exact
+            };
+            Some([noisy(), noisy()])
+        })
+        .collect()
+}
+
+#[test]
+fn a_truck_that_keeps_its_distance_is_no_offset() {
+    let (mut random, motion) = (Random::new(5), Transform::new(DRIVING.turn, DRIVING.way_m));
+    let mut calibration = SelfCalibration::new(&RigConfig::default());
+    for _ in 0..40 {
+        let street = street(&offset(0.0), &motion, FAR_M, &mut random);
+        calibration.update(&RIG, street.into_iter().chain(truck(&mut random)), &motion);
+        assert!(calibration.applied.is_zero(), "{:?}", calibration.report());
+    }
+    let report = calibration.report();
+    assert!(report.found().is_none() && report.frames_disturbed > 30, "{report:?}");
+    // Once it is gone, the rig is known to be sound.
+    for _ in 0..20 {
+        calibration.update(&RIG, street(&offset(0.0), &motion, FAR_M, &mut random), &motion);
+    }
+    let report = calibration.report();
+    assert!(report.known && calibration.applied.offset_px == 0.0, "{report:?}");
+}
+
+#[test]
+fn frames_count_by_the_way_and_not_by_the_rate() {
+    // A tenth of the baseline a frame: twenty frames are worth two.
+    let slowly = Motion { way_m: DRIVING.way_m.map(|m| m * 0.06), ..DRIVING };
+    let report = driven(&RigConfig::default(), &offset(0.0), slowly, 15.0, 20).report();
+    assert!(report.frames == 0 || report.frames_independent < 2.1, "{report:?}");
+    assert!(!report.known, "{report:?}");
+    let report = driven(&RigConfig::default(), &offset(0.0), DRIVING, FAR_M, 20).report();
+    assert_eq!(report.frames_independent, f64::from(report.frames));
+    assert!((report.way_m - 0.9 * f64::from(report.frames)).abs() < 0.1, "{report:?}");
+}
+
+#[test]
+fn a_correction_that_frames_speak_against_is_taken_back() {
+    // As a file of another rig may bring it, with all firmness.
+    let config = RigConfig {
+        disparity_correction: offset(1.5),
+        correction_evidence: CorrectionEvidence { sigma_px: 0.02, frames: 40, way_m: 40.0 },
+        ..RigConfig::default()
+    };
+    assert_eq!(SelfCalibration::new(&config).report().found().unwrap().offset_px, 1.5);
+    let calibration = driven(&config, &offset(0.0), DRIVING, FAR_M, 30);
+    assert!(calibration.start_refuted && calibration.applied.offset_px == 0.0);
+    let report = calibration.report();
+    assert!(report.known && report.offset_px.abs() < 0.06, "{report:?}");
+}
+
+#[test]
+fn a_run_that_begins_with_evidence_keeps_what_was_found() {
+    let correction_evidence = CorrectionEvidence { sigma_px: 0.02, frames: 40, way_m: 40.0 };
+    let config = RigConfig {
+        disparity_correction: offset(1.0),
+        correction_evidence,
+        ..RigConfig::default()
+    };
+    // A stretch whose own error is a quarter of a pixel, as a curve may have.
+    for frames in [1, 5, 10] {
+        let report = driven(&config, &offset(0.75), DRIVING, FAR_M, frames).report();
+        assert!(report.known && report.offset_px > 0.85, "{frames}: {report:?}");
+    }
+    let without = RigConfig { disparity_correction: offset(1.0), ..RigConfig::default() };
+    let report = driven(&without, &offset(0.75), DRIVING, FAR_M, 10).report();
+    assert!(report.offset_px < 0.85, "without evidence it is a mere start: {report:?}");
+}
+
 fn offset(offset_px: f64) -> DisparityCorrection {
     DisparityCorrection { offset_px, ..DisparityCorrection::default() }
 }
@@ -156,13 +238,27 @@ fn the_correction_changes_gently() {
 }
 
 #[test]
-fn what_is_only_to_be_reported_is_not_applied_and_what_is_off_not_sought() {
+fn what_is_only_to_be_reported_is_not_applied() {
     let with = |self_calibration| RigConfig { self_calibration, ..RigConfig::default() };
     let reported = driven(&with(SelfCalibrationMode::Report), &offset(0.7), DRIVING, FAR_M, 30);
     assert!(reported.applied.is_zero() && (reported.report().offset_px - 0.7).abs() < 0.05);
     assert_eq!(reported.report().state(), CalibrationState::Inaccurate);
-    let off = driven(&with(SelfCalibrationMode::Off), &offset(0.7), DRIVING, FAR_M, 30);
-    assert_eq!(off.report(), SelfCalibrationReport::default());
+}
+
+#[test]
+fn an_offset_that_harms_the_map_is_named_without_self_calibration() {
+    let off = RigConfig { self_calibration: SelfCalibrationMode::Off, ..RigConfig::default() };
+    for planted in [-0.9, 0.9] {
+        let report = driven(&off, &offset(planted), DRIVING, FAR_M, 10).report();
+        assert!((report.offset_px - planted).abs() < 0.1, "{planted}: {report:?}");
+        assert!(report.is_uncorrected() && report.applied_offset_px == 0.0, "{report:?}");
+    }
+    let sound = driven(&off, &offset(0.1), DRIVING, FAR_M, 30);
+    assert_eq!(sound.report(), SelfCalibrationReport::default(), "what harms nothing is not said");
+    // An offset that is taken out by hand is none.
+    let by_hand = RigConfig { disparity_correction: offset(0.9), ..off };
+    let report = driven(&by_hand, &offset(0.9), DRIVING, FAR_M, 30).report();
+    assert!(!report.is_uncorrected(), "{report:?}");
 }
 
 #[test]
