@@ -14,7 +14,7 @@
 //! Through a lens of [`StreetLens`] images come raw, with a calibration; a [`RigError`] is what
 //! that calibration does not know.
 //!
-//! Left out: lens and motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the
+//! Left out: motion blur, rolling shutter, pedestrians, rain; glass shows no rooms; the
 //! LiDAR's revolution takes no time.
 //!
 //! ```
@@ -29,6 +29,9 @@ mod car;
 mod car_paint;
 mod config;
 mod facade;
+mod filter;
+#[cfg(test)]
+mod flow_tests;
 mod flown;
 mod frame;
 mod furniture;

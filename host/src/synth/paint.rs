@@ -13,7 +13,7 @@ use super::{car_paint, window_paint};
 pub struct SurfacePoint {
     /// Surface coordinates, m.
     pub surface_m: [f32; 3],
-    /// Extent of a pixel along each of them, m.
+    /// Extent of a pixel along each of them, lens included, m: twice the kernel's deviation.
     pub footprint_m: [f32; 3],
     /// Normal in the object's own frame.
     pub own_normal: [f32; 3],
@@ -44,19 +44,23 @@ pub struct Painter {
     shapes: [Shape; 5],
 }
 
-/// Share of a footprint that lies above an edge.
+/// Width of the kernel over a footprint: a parabola so wide has a deviation of half of it.
+const KERNEL_PX: f32 = 2.236;
+
+/// Share of a pixel's light from above an edge.
 #[inline]
 pub fn above(edge: f32, x: f32, footprint: f32) -> f32 {
-    ((x - edge) / (footprint + 1e-4) + 0.5).clamp(0.0, 1.0)
+    let at = ((x - edge) / (KERNEL_PX * footprint + 1e-4) + 0.5).clamp(0.0, 1.0);
+    at * at * (3.0 - 2.0 * at)
 }
 
-/// Share of a footprint between two edges.
+/// Share of a pixel's light from between two edges.
 #[inline]
 pub fn within(from: f32, to: f32, x: f32, footprint: f32) -> f32 {
     (above(from, x, footprint) - above(to, x, footprint)).max(0.0)
 }
 
-/// Share of a footprint on the stripes 0..width of every period.
+/// Share of a pixel's light from the stripes 0..width of every period.
 #[inline]
 pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
     let half = 0.5 * (footprint + 1e-4);
@@ -66,7 +70,9 @@ pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
         let periods = floor(count) as f32;
         periods * width + ((count - periods) * period).min(width)
     };
-    (sum(x + half) - sum(x - half)) / (2.0 * half)
+    // Three boxes as wide as the footprint, half of it apart, have the kernel's deviation.
+    let (near, far) = (sum(x + half) - sum(x - half), sum(x + 2.0 * half) - sum(x - 2.0 * half));
+    (near + far) / (6.0 * half)
 }
 
 /// One tone blended towards another.

@@ -8,13 +8,25 @@ use nalgebra::Vector3;
 
 /// Nothing seen: the sky.
 pub const SKY: u32 = u32::MAX;
-/// Samples per pixel: the centre, which gives depth and masks, and four around it for colour at
-/// edges.
-pub const SAMPLES: usize = 5;
-/// Positions of the samples, px from the pixel's centre.
-pub const OFFSETS_PX: [(f64, f64); SAMPLES] =
-    [(0.0, 0.0), (-0.125, -0.375), (0.375, -0.125), (0.125, 0.375), (-0.375, 0.125)];
+/// Samples per pixel: the centre, which gives depth and masks, and six around it.
+pub const SAMPLES: usize = 7;
+/// Positions of the samples, twelfths of a pixel from its centre. No two of the six share a column
+/// or a row.
+const OFFSETS_PX_12: [(f64, f64); SAMPLES] =
+    [(0.0, 0.0), (-5.0, -3.0), (-3.0, 1.0), (-1.0, 5.0), (1.0, -5.0), (3.0, -1.0), (5.0, 3.0)];
+/// Rows after which the samples' shifts repeat.
+pub const PHASES: usize = 8;
+/// Shift of a row's samples to the right, 96ths of a pixel: upright edges meet 48 positions within
+/// a pixel, not six. The centre stays.
+const SHIFTS_PX_96: [f64; PHASES] = [-7.0, 1.0, -3.0, 5.0, -5.0, 3.0, -1.0, 7.0];
 const NEAR_M: f64 = 0.05;
+
+/// Position of a sample in the pixels of a row, px from their centres.
+pub fn offset_px(sample: usize, row: usize) -> (f64, f64) {
+    let (right, down) = OFFSETS_PX_12[sample];
+    let shift = if sample == 0 { 0.0 } else { SHIFTS_PX_96[row % PHASES] };
+    (right * (1.0 / 12.0) + shift * (1.0 / 96.0), down * (1.0 / 12.0))
+}
 
 /// A pinhole as the rasteriser needs it.
 #[derive(Clone, Copy)]
@@ -39,7 +51,7 @@ pub struct Setup {
     /// Number of the triangle in its object.
     pub triangle: u32,
     /// Surface group: samples of one group share one colour.
-    pub group: u32,
+    pub group: u64,
     /// Columns it may touch, first and last.
     pub columns: (i32, i32),
     /// Rows it may touch, first and last.
@@ -150,7 +162,8 @@ impl Band {
         let [per_column, per_row, constant] = setup.inverse_depth();
         let slope = per_column as f32;
         let sides = Sides::new(setup);
-        for (sample, (du, dv)) in OFFSETS_PX.into_iter().enumerate() {
+        for sample in 0..SAMPLES {
+            let (_, dv) = offset_px(sample, 0);
             // Rows whose sample lies within the triangle's extent; casts saturate at the band's own
             // rows.
             let (top, bottom) = (setup.extent_px.0 - dv, setup.extent_px.1 - dv);
@@ -161,6 +174,7 @@ impl Band {
             for row in first.max(top_row)..=last.min(bottom as i32) {
                 let v = f64::from(row) + dv;
                 let row = row as usize;
+                let (du, _) = offset_px(sample, row);
                 let Some((from, to)) = sides.span(du, v) else { continue };
                 let start = (sample * self.rows + row - self.first_row) * self.width;
                 let begin =

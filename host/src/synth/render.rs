@@ -2,25 +2,26 @@
 //!
 //! The picture is cut into bands of fixed height; each is rasterized and shaded by itself, so that
 //! the number of threads cannot matter. A pixel's depth and instance are those of the ray through
-//! its centre; its colour is the mean of five samples where they see different surfaces.
+//! its centre; its colour is what a lens and the pixel's area see ([`super::filter`]).
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::filter::{Covers, Groups, Kernel, MARGIN_PX, SPREAD};
 use super::light::{Exposure, Light, develop};
-use super::mesh::{Mesh, Point, Vertex};
+use super::mesh::{Mesh, Point, Triangle, Vertex};
 use super::paint::{Painter, SurfacePoint};
-use super::raster::{Band, OFFSETS_PX, Pinhole, SAMPLES, SKY, Setup};
+use super::raster::{Band, Pinhole, SKY, Setup};
 use super::scene::{Scene, SceneObject};
 use super::sensor::Sensor;
 use super::surface::{Kind, Tone};
 
-const BAND_ROWS: usize = 16;
+const BAND_ROWS: usize = 32;
 /// Slight parts are left out where they are thinner than a third of a pixel: depth over focal
 /// length, m/px.
 const SLIGHT_PER_PX: f64 = 0.25;
-/// Group of the sky.
-const NO_GROUP: u32 = u32::MAX;
+/// A surface seen at less than this share of the inverse depth it was met at is near its horizon.
+const NEAR_HORIZON: f64 = 0.5;
 
 /// Scene, cameras and light from which pictures are rendered.
 pub struct Renderer<'a> {
@@ -47,33 +48,46 @@ pub struct Picture {
 impl Renderer<'_> {
     /// Draws the scene `offset_m` to the right of the left camera, with so much light let in.
     pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32, sensor: &Sensor) -> Picture {
+        let (width, height) = (self.pinhole.width, self.pinhole.height);
+        // The kernel reaches beyond the border: all below draws a picture with a margin.
+        let margin = MARGIN_PX as f64;
+        let (u, v) = self.pinhole.center_px;
+        let pinhole = Pinhole {
+            width: width + 2 * MARGIN_PX,
+            height: height + 2 * MARGIN_PX,
+            focal_px: self.pinhole.focal_px,
+            center_px: (u + margin, v + margin),
+        };
+        let wider = Renderer { pinhole, ..*self };
         let parts: Vec<Vec<Setup>> = scene
             .objects
             .par_iter()
             .enumerate()
-            .map(|(number, object)| self.set_up(object, number as u32, offset_m))
+            .map(|(number, object)| wider.set_up(object, number as u32, offset_m))
             .collect();
         let setups: Vec<Setup> = parts.into_iter().flatten().collect();
-        let (width, height) = (self.pinhole.width, self.pinhole.height);
-        let bands = height.div_ceil(BAND_ROWS);
-        // Each band lists the triangles that reach it, so that bands are independent.
-        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
-        for (number, setup) in setups.iter().enumerate() {
-            let (first, last) =
-                (setup.rows.0 as usize / BAND_ROWS, setup.rows.1 as usize / BAND_ROWS);
-            lists[first..=last].iter_mut().for_each(|list| list.push(number as u32));
-        }
+        let kernel = Kernel::new();
+        let shading = Shading {
+            renderer: &wider,
+            scene,
+            setups: &setups,
+            kernel: &kernel,
+            offset_m,
+            gain,
+            sensor,
+        };
+        let lists = lists(&setups, height);
         let bands: Vec<Picture> = lists
             .par_iter()
             .enumerate()
             .map(|(index, list)| {
                 let first_row = index * BAND_ROWS;
-                let mut band = Band::new(width, first_row, BAND_ROWS.min(height - first_row));
+                let rows = BAND_ROWS.min(height - first_row) + 2 * MARGIN_PX;
+                let mut band = Band::new(wider.pinhole.width, first_row, rows);
                 for &number in list {
                     band.rasterize(number, &setups[number as usize]);
                 }
-                Shading { renderer: self, scene, setups: &setups, offset_m, gain, sensor }
-                    .band(&band)
+                shading.band(&band)
             })
             .collect();
         // Bands come back in order.
@@ -114,9 +128,9 @@ impl Renderer<'_> {
             }
             let corners = triangle.corners.map(|corner| positions[corner as usize]);
             if let Some(setup) = Setup::new(&self.pinhole, corners, two_sided) {
-                // Triangles of one surface of one object form a group: samples of one group share
-                // their shade.
-                let group = number << 12 | u32::from(triangle.surface);
+                let group = u64::from(number) << 32
+                    | u64::from(triangle.surface) << 16
+                    | u64::from(facet(mesh, triangle));
                 setups.push(Setup { object: number, triangle: index as u32, group, ..setup });
             }
         }
@@ -142,10 +156,44 @@ impl Renderer<'_> {
     }
 }
 
+/// Triangles that reach each band, so that bands are independent; rows are those of the picture
+/// with its margin.
+fn lists(setups: &[Setup], height: usize) -> Vec<Vec<u32>> {
+    let bands = height.div_ceil(BAND_ROWS);
+    let mut lists: Vec<Vec<u32>> = vec![Vec::new(); bands];
+    for (number, setup) in setups.iter().enumerate() {
+        let (first, last) = (setup.rows.0 as usize, setup.rows.1 as usize);
+        // A band also holds the margin's rows below it.
+        let first = first.saturating_sub(2 * MARGIN_PX) / BAND_ROWS;
+        let last = (last / BAND_ROWS).min(bands - 1);
+        lists[first..=last].iter_mut().for_each(|list| list.push(number as u32));
+    }
+    lists
+}
+
+/// Tells parts of one surface apart that are shaded unlike: sides of a body by the axis they face,
+/// leaves one by one. Samples of one part share their shade.
+fn facet(mesh: &Mesh, triangle: &Triangle) -> u16 {
+    if mesh.surfaces[triangle.surface as usize].kind == Kind::Leaves {
+        return triangle.corners[0] as u16;
+    }
+    let normal = mesh.vertices[triangle.corners[0] as usize].normal;
+    let size = normal.map(f32::abs);
+    let axis = if size[0] >= size[1] && size[0] >= size[2] {
+        0
+    } else if size[1] >= size[2] {
+        1
+    } else {
+        2
+    };
+    2 * axis as u16 + u16::from(normal[axis] < 0.0)
+}
+
 struct Shading<'a> {
     renderer: &'a Renderer<'a>,
     scene: &'a Scene,
     setups: &'a [Setup],
+    kernel: &'a Kernel,
     offset_m: f64,
     gain: f32,
     sensor: &'a Sensor,
@@ -156,27 +204,31 @@ impl Shading<'_> {
         &self.scene.objects[self.setups[seen as usize].object as usize]
     }
 
-    fn group(&self, seen: u32) -> u32 {
-        if seen == SKY { NO_GROUP } else { self.setups[seen as usize].group }
-    }
-
     fn band(&self, band: &Band) -> Picture {
-        let width = self.renderer.pinhole.width;
-        let count = band.rows * width;
+        // Sizes and positions with the margin, and the picture's own.
+        let wide = self.renderer.pinhole.width;
+        let (rows, width) = (band.rows - 2 * MARGIN_PX, wide - 2 * MARGIN_PX);
+        let count = rows * width;
         let mut picture = Picture {
             rgb: Vec::with_capacity(count),
             depth_m: Vec::with_capacity(count),
             instances: Vec::with_capacity(count),
         };
-        for row in 0..band.rows {
-            let seen: [&[u32]; SAMPLES] = core::array::from_fn(|sample| band.row(sample, row));
+        let groups = Groups::new(band, self.setups, self.kernel, wide);
+        for row in MARGIN_PX..rows + MARGIN_PX {
+            let centres = band.row(0, row);
             let v = (band.first_row + row) as f64;
-            for (column, &centre) in seen[0].iter().enumerate() {
-                let samples = core::array::from_fn(|sample| seen[sample][column]);
-                let (light, depth_m) = self.pixel(column as f64, v, samples);
+            let first = (band.first_row + row - MARGIN_PX) * width;
+            for column in MARGIN_PX..width + MARGIN_PX {
+                let (u, centre) = (column as f64, centres[column]);
+                let (light, depth_m) = if groups.is_plain(row, column) {
+                    self.sample(u, v, centre)
+                } else {
+                    (self.edge(u, v, &groups.covers(row, column)), self.depth_m(u, v, centre))
+                };
                 // The exposure: light to grey levels.
                 let levels = light.map(|value| develop(value * self.gain));
-                picture.rgb.push(self.sensor.read((band.first_row + row) * width + column, levels));
+                picture.rgb.push(self.sensor.read(first + column - MARGIN_PX, levels));
                 picture.depth_m.push(depth_m);
                 picture.instances.push(if centre == SKY {
                     0
@@ -188,25 +240,35 @@ impl Shading<'_> {
         picture
     }
 
-    /// Colour and centre depth of one pixel.
-    fn pixel(&self, u: f64, v: f64, samples: [u32; SAMPLES]) -> (Tone, f32) {
-        let (centre, depth_m) = self.sample(u, v, samples[0]);
-        // All samples see one triangle: its tone varies little within a pixel.
-        if samples.iter().all(|&seen| seen == samples[0]) {
-            return (centre, depth_m);
+    /// Colour of a pixel that sees several surfaces.
+    fn edge(&self, u: f64, v: f64, covers: &Covers) -> Tone {
+        let (mut sum, mut weight) = ([0.0; 3], 0.0);
+        for cover in covers.seen() {
+            let [right, down] = cover.middle_px().map(f64::from);
+            let (mut u_part, mut v_part) = (u + right, v + down);
+            // A triangle's plane is not followed over its own horizon.
+            if cover.seen != SKY {
+                let [right, down] = cover.sure_px().map(f64::from);
+                let plane = self.setups[cover.seen as usize].inverse_depth();
+                let at = |u: f64, v: f64| plane[0] * u + plane[1] * v + plane[2];
+                if at(u_part, v_part) < NEAR_HORIZON * at(u + right, v + down) {
+                    (u_part, v_part) = (u + right, v + down);
+                }
+            }
+            let tone = self.sample(u_part, v_part, cover.seen).0;
+            sum = [0, 1, 2].map(|channel| sum[channel] + cover.weight * tone[channel]);
+            weight += cover.weight;
         }
-        let groups = samples.map(|seen| self.group(seen));
-        let mut tones = [centre; SAMPLES];
-        let mut sum = centre;
-        for k in 1..SAMPLES {
-            // Samples of one group share a tone: only edges between groups are worth another look.
-            tones[k] = match groups[..k].iter().position(|&group| group == groups[k]) {
-                Some(known) => tones[known],
-                None => self.sample(u + OFFSETS_PX[k].0, v + OFFSETS_PX[k].1, samples[k]).0,
-            };
-            sum = [0, 1, 2].map(|channel| sum[channel] + tones[k][channel]);
+        sum.map(|channel| channel / weight)
+    }
+
+    /// Depth along one ray; 0 for the sky.
+    fn depth_m(&self, u: f64, v: f64, seen: u32) -> f32 {
+        if seen == SKY {
+            return 0.0;
         }
-        (sum.map(|value| value * (1.0 / SAMPLES as f32)), depth_m)
+        let inverse = self.setups[seen as usize].inverse_depth();
+        (1.0 / (inverse[0] * u + inverse[1] * v + inverse[2])) as f32
     }
 
     /// Light and depth along one ray.
@@ -298,7 +360,7 @@ fn surface_point(setup: &Setup, corners: [&Vertex; 3], u: f64, v: f64) -> (Surfa
         let [p, q, r] = [corners[0].surface_m[k], corners[1].surface_m[k], corners[2].surface_m[k]];
         surface_point.surface_m[k] = p + b * (q - p) + c * (r - p);
         let (du, dv) = (b_u * (q - p) + c_u * (r - p), b_v * (q - p) + c_v * (r - p));
-        surface_point.footprint_m[k] = (du * du + dv * dv).sqrt();
+        surface_point.footprint_m[k] = SPREAD as f32 * (du * du + dv * dv).sqrt();
         let [p, q, r] = [corners[0].normal[k], corners[1].normal[k], corners[2].normal[k]];
         surface_point.own_normal[k] = p + b * (q - p) + c * (r - p);
     }
