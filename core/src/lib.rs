@@ -30,6 +30,7 @@ pub mod masks;
 pub mod memory;
 pub mod objects;
 pub mod parallel;
+pub mod places;
 pub mod planning;
 pub mod random;
 pub mod rectify;
@@ -46,9 +47,10 @@ pub mod view;
 pub mod volume;
 
 pub use mapper::{
-    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, Mapper,
-    MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
-    RestoreError, Scale, SetError, Severity, StageDigests, StepError, StereoFrame,
+    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, LoadPlacesError,
+    Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
+    RestoreError, SAVED_PLACES_HEADER_BYTES, Scale, SetError, Severity, StageDigests, StepError,
+    StereoFrame, saved_keyframes,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial};

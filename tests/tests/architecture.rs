@@ -145,6 +145,10 @@ const CORE: Layers = &[
         &["digest", "geometry", "image", "memory", "slices", "settings", "state", "view", "volume"],
     ),
     (
+        "places",
+        &["egomotion", "geometry", "image", "memory", "random", "scene_flow", "state"],
+    ),
+    (
         "mapper",
         &[
             "invariants",
@@ -156,6 +160,7 @@ const CORE: Layers = &[
             "memory",
             "objects",
             "parallel",
+            "places",
             "planning",
             "settings",
             "rectify",

@@ -218,6 +218,9 @@ typedef struct {
   size_t object_blocks;
   // Pixels of crops that wait for their object's motion.
   size_t crop_pixels;
+  // Keyframes by which places are recognised, at most 65,536; 0 makes none, and then it costs no
+  // byte.
+  size_t keyframes;
   // Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no
   // byte.
   size_t planning_width;

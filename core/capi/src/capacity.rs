@@ -53,6 +53,9 @@ pub struct DynvoxCapacity {
     pub object_blocks: usize,
     /// Pixels of crops that wait for their object's motion.
     pub crop_pixels: usize,
+    /// Keyframes by which places are recognised, at most 65,536; 0 makes none, and then it costs no
+    /// byte.
+    pub keyframes: usize,
     /// Width of the planner's window, cells, at most 1,024; 0 makes none, and then it costs no
     /// byte.
     pub planning_width: usize,
@@ -84,6 +87,7 @@ impl From<&Capacity> for DynvoxCapacity {
             objects: of.objects,
             object_blocks: of.object_blocks,
             crop_pixels: of.crop_pixels,
+            keyframes: of.keyframes,
             planning_width: of.planning_width,
             planning_length: of.planning_length,
             planning_height: of.planning_height,
@@ -113,6 +117,7 @@ impl DynvoxCapacity {
             objects: self.objects,
             object_blocks: self.object_blocks,
             crop_pixels: self.crop_pixels,
+            keyframes: self.keyframes,
             planning_width: self.planning_width,
             planning_length: self.planning_length,
             planning_height: self.planning_height,

@@ -166,6 +166,22 @@ impl Egomotion {
         self.refer_to_last();
     }
 
+    /// Leads the camera into another segment, in which its pose is known now; its motion stays.
+    pub fn join_segment(&mut self, segment: MapSegment, t_world_camera: &Transform) {
+        self.segment = segment;
+        self.relocalize(t_world_camera);
+    }
+
+    /// Places a camera that has not moved in the segment after another one. Returns false where no
+    /// number is left for it.
+    pub fn begin_after(&mut self, segment: MapSegment) -> bool {
+        let next = segment.next();
+        if let Some(next) = next {
+            (self.segment, self.newest_segment) = (next, next);
+        }
+        next.is_some()
+    }
+
     /// Begins another segment of the map, with the camera at its origin. Where no number is left
     /// for one, the camera stays lost, so that nothing is fused into a segment it is not in.
     pub fn begin_segment(&mut self) {

@@ -25,6 +25,7 @@ const MASK_WORD: u64 = 16;
 const CROP_PIXEL: u64 = 8;
 const CELL: u64 = 16;
 const COLUMN: u64 = 64;
+const KEYFRAME: u64 = 12_288;
 
 const fn product(units: usize, of: u64) -> u64 {
     (units as u64).saturating_mul(of)
@@ -54,6 +55,7 @@ impl Capacity {
             .saturating_add(product(self.mask_words, MASK_WORD))
             .saturating_add(product(self.objects, object))
             .saturating_add(product(self.crop_pixels, CROP_PIXEL))
+            .saturating_add(product(self.keyframes, KEYFRAME))
             .saturating_add(columns.saturating_mul(COLUMN))
             .saturating_add(cells.saturating_mul(CELL))
     }
@@ -96,6 +98,7 @@ mod tests {
             objects: up_to(4),
             object_blocks: 1 + up_to(14),
             crop_pixels: up_to(24),
+            keyframes: up_to(12),
             planning_width: up_to(10),
             planning_length: up_to(10),
             planning_height: 1 + up_to(8),

@@ -9,6 +9,7 @@
 use super::{MIN_HEIGHT, MIN_WIDTH};
 use crate::memory::Capacity;
 use crate::objects::MAX_OBJECTS;
+use crate::places::MAX_KEYFRAMES;
 use crate::planning::MAX_SIDE_CELLS;
 use crate::scene_flow::MAX_FEATURES;
 use crate::tracking::MAX_DETECTIONS;
@@ -226,6 +227,7 @@ impl Capacity {
             (self.crop_pixels <= MAX_COUNT, "crop_pixels", countable),
             (self.detections <= MAX_DETECTIONS, "detections", "must be at most 64"),
             (self.objects <= MAX_OBJECTS, "objects", "must be at most 16"),
+            (self.keyframes <= MAX_KEYFRAMES, "keyframes", "must be at most 65,536"),
             (
                 self.planning_width.max(self.planning_length) <= MAX_SIDE_CELLS,
                 "planning_width",
@@ -316,6 +318,7 @@ impl<'o> Question<'o> {
             objects: 0,
             object_blocks: 0,
             crop_pixels: 0,
+            keyframes: 0,
             planning_width: 0,
             planning_length: 0,
             planning_height: 0,

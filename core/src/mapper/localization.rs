@@ -10,6 +10,7 @@ use crate::{
     geometry::{StereoObservation, StereoRig, Transform},
     memory::Carver,
     parallel::Executor,
+    places::{FramePoints, PlaceCamera, PlaceView, Places, SegmentPose},
     rectify::self_calibration::SelfCalibration,
     scene_flow::{FlowStatus, Match},
     state::Visitor,
@@ -22,6 +23,8 @@ pub(super) struct Localization<'s> {
     pub camera: Egomotion,
     pub self_calibration: SelfCalibration,
     pub estimator: Estimator<'s>,
+    /// Keyframes of the places that the camera has been at.
+    pub places: Places<'s>,
     /// True if the right image's rows are moved otherwise in the next frame than in this one: it
     /// then differs from this one's even where the camera stands.
     pub rows_moved: bool,
@@ -66,7 +69,7 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
 impl<'s> Localization<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        Estimator::bytes(capacity)
+        Estimator::bytes(capacity) + Places::bytes(capacity)
     }
 
     /// Places a camera that has not moved at the world's origin.
@@ -75,6 +78,7 @@ impl<'s> Localization<'s> {
             camera: Egomotion::default(),
             self_calibration: SelfCalibration::new(&config.rig_settings),
             estimator: Estimator::new_in(capacity, carver),
+            places: Places::new_in(capacity, carver),
             rows_moved: false,
         }
     }
@@ -82,12 +86,13 @@ impl<'s> Localization<'s> {
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         // Estimates keep nothing.
-        let Self { camera, self_calibration, estimator: _, rows_moved } = self;
+        let Self { camera, self_calibration, estimator: _, places, rows_moved } = self;
         camera.visit(visitor);
         self_calibration.visit(visitor);
         let mut moved = u8::from(*rows_moved);
         visitor.u8(&mut moved);
         *rows_moved = moved != 0;
+        places.visit(visitor);
     }
 
     /// Sets the pose the frame brings, or estimates it.
@@ -101,7 +106,7 @@ impl<'s> Localization<'s> {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
         let segment = self.camera.segment();
-        let found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
+        let mut found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
             Found::new(if seen.number == 0 { PoseOrigin::First } else { PoseOrigin::Given })
@@ -126,6 +131,9 @@ impl<'s> Localization<'s> {
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
+        if self.recognise(seen, mask, &found) {
+            found.origin = PoseOrigin::Relocalized;
+        }
         let enters_segment = self.camera.segment() != segment;
         // A guess says nothing of how the camera moved, nor does a pose given in another segment:
         // objects get no motion from them.
@@ -146,6 +154,39 @@ impl<'s> Localization<'s> {
         let camera =
             CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
         Located { camera, found, enters_segment }
+    }
+
+    /// Hands the frame to the places. Returns whether they say that the camera is in another
+    /// segment, in which it goes on.
+    fn recognise(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        mask: &EgomotionMask<'_, '_>,
+        found: &Found,
+    ) -> bool {
+        let rig = seen.config.scaled_rig();
+        let view =
+            PlaceView { rig: &rig, egomotion: &seen.config.egomotion, image: seen.frame.left };
+        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
+        let still = selection.iter().filter(|&&index| mask.includes(index));
+        let still = still.filter_map(|&index| refined.get(index as usize));
+        let is_measured = matches!(
+            found.origin,
+            PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
+        );
+        let camera = PlaceCamera {
+            pose: SegmentPose {
+                segment: self.camera.segment(),
+                t_world_camera: *self.camera.t_world_camera(),
+            },
+            t_current_previous: is_measured.then(|| *self.camera.t_current_previous()),
+        };
+        let points = FramePoints { all: refined.iter(), still };
+        let joined = self.places.observe(&view, &camera, points, &mut self.estimator);
+        if let Some(SegmentPose { segment, t_world_camera }) = &joined {
+            self.camera.join_segment(*segment, t_world_camera);
+        }
+        joined.is_some()
     }
 
     /// Moves the camera on as before.

@@ -3,6 +3,7 @@
 mod errors;
 mod lost;
 mod mutations;
+mod places;
 mod plan;
 mod random_runs;
 mod raw;

@@ -46,6 +46,9 @@ pub struct Capacity {
     /// Pixels of crops that wait for their object's motion. The oldest crops go first, and are
     /// counted.
     pub crop_pixels: usize,
+    /// Keyframes by which places are recognised, at most 65,536; 0 makes none, and then it costs no
+    /// byte. A full table thins out. See [`crate::places`].
+    pub keyframes: usize,
     /// Width of the planner's window, cells, at most [`crate::planning::MAX_SIDE_CELLS`]; 0 makes
     /// none, and then it costs no byte. See
     /// [`crate::planning`].
@@ -78,6 +81,7 @@ impl Capacity {
         objects: 2,
         object_blocks: 150,
         crop_pixels: 30_000,
+        keyframes: 0,
         planning_width: 0,
         planning_length: 0,
         planning_height: 0,
@@ -101,6 +105,7 @@ impl Capacity {
         objects: 4,
         object_blocks: 700,
         crop_pixels: 150_000,
+        keyframes: 0,
         planning_width: 0,
         planning_length: 0,
         planning_height: 0,
@@ -124,6 +129,7 @@ impl Capacity {
         objects: 8,
         object_blocks: 1_200,
         crop_pixels: 800_000,
+        keyframes: 0,
         planning_width: 0,
         planning_length: 0,
         planning_height: 0,
@@ -147,6 +153,7 @@ impl Capacity {
         objects: 16,
         object_blocks: 4_000,
         crop_pixels: 4_000_000,
+        keyframes: 0,
         planning_width: 0,
         planning_length: 0,
         planning_height: 0,

@@ -29,6 +29,8 @@ struct CapacityDef {
     object_blocks: usize,
     crop_pixels: usize,
     #[serde(default)]
+    keyframes: usize,
+    #[serde(default)]
     planning_width: usize,
     #[serde(default)]
     planning_length: usize,

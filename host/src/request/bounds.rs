@@ -3,7 +3,6 @@
 use super::{Bytes, RequestError};
 use crate::formats::bounds::SETTINGS_TEXT;
 use crate::formats::{CapacityFile, CapacityTable, read_text_within};
-use dynvox_core::planning::Planning;
 use dynvox_core::rectify::Rectification;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use serde::{Deserialize, Serialize};
@@ -20,6 +19,8 @@ pub struct Bounds {
     pub memory: Memory,
     /// The planner's window around the camera; none is made when absent.
     pub planning: Option<PlanningWindow>,
+    /// Keyframes by which places are recognised; 0 leaves the number to `memory`'s bounds.
+    pub keyframes: usize,
 }
 
 /// Bytes or bounds of the mapper.
@@ -84,7 +85,7 @@ impl Bounds {
         let with_raw = |capacity: Capacity| Capacity {
             raw_width: capacity.raw_width.max(raw_width),
             raw_height: capacity.raw_height.max(raw_height),
-            ..self.with_window(capacity)
+            ..self.with_extras(capacity)
         };
         let memory = match &self.memory {
             Memory::Profile(name) => {
@@ -102,13 +103,15 @@ impl Bounds {
         // A budget's 64 tracks have a box each in the window.
         let images =
             Capacity { image_width: size.0, image_height: size.1, tracks: 64, ..Capacity::TINY };
-        let window = Planning::bytes(&self.with_window(images));
-        let left = Bytes(memory.0.saturating_sub(window));
-        Ok((memory.to_string(), self.with_window(solve(left, size, &options)?)))
+        let extras = self.with_extras(images).bytes() - images.bytes();
+        let left = Bytes(memory.0.saturating_sub(extras));
+        Ok((memory.to_string(), self.with_extras(solve(left, size, &options)?)))
     }
 
-    /// The bounds with the planner's window, where one is asked for.
-    fn with_window(&self, capacity: Capacity) -> Capacity {
+    /// The bounds with the keyframes and the planner's window that are asked for.
+    fn with_extras(&self, capacity: Capacity) -> Capacity {
+        let keyframes = if self.keyframes > 0 { self.keyframes } else { capacity.keyframes };
+        let capacity = Capacity { keyframes, ..capacity };
         let Some(PlanningWindow { cells, distance_3d }) = self.planning else { return capacity };
         let [planning_width, planning_length, planning_height] = cells;
         Capacity {
@@ -171,6 +174,7 @@ fn read(path: &Path) -> Result<Capacity, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dynvox_core::planning::Planning;
 
     fn named(name: &str) -> Memory {
         Memory::Profile(name.to_owned())
@@ -193,6 +197,19 @@ mod tests {
             Capacity::TINY.bytes() + Planning::bytes(&tiny),
             "on top of named bounds"
         );
+    }
+
+    #[test]
+    fn keyframes_are_paid_from_the_budget_and_come_on_top_of_named_bounds() {
+        let bounds = Bounds { keyframes: 500, ..Bounds::default() };
+        let (_, with) = bounds.resolve((1_242, 375), None, 0.05).unwrap();
+        let (_, without) = Bounds::default().resolve((1_242, 375), None, 0.05).unwrap();
+        assert!(with.bytes() <= 256 << 20 && with.blocks < without.blocks);
+        assert_eq!((with.keyframes, without.keyframes), (500, 0));
+        let named = Bounds { memory: named("tiny"), ..bounds };
+        let (_, tiny) = named.resolve((320, 96), None, 0.05).unwrap();
+        let more = tiny.bytes() - Capacity::TINY.bytes();
+        assert!((500 * 11_000..500 * 12_500).contains(&more), "{more} bytes");
     }
 
     #[test]

@@ -117,6 +117,10 @@ pub struct Options {
     /// Bounds from a file, as `dynvox budget --memory 48MiB --image 752x480` prints them
     #[arg(long, value_name = "FILE", help_heading = "Limits")]
     pub capacity: Option<PathBuf>,
+    /// Recognise places by so many keyframes, of 11.3 KiB each: a camera that was lost goes on in
+    /// the map where it comes back to it [default: none]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Limits")]
+    pub keyframes: Option<u32>,
     /// Make a map for planners around the camera and write it to planning/: cells to the sides,
     /// ahead and behind, and upwards, of planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x
     /// 4 m
@@ -388,7 +392,7 @@ impl Options {
         let planning = self
             .planning
             .map(|window| PlanningWindow { cells: window.0, distance_3d: self.planning_3d });
-        Ok(Bounds { memory, planning })
+        Ok(Bounds { memory, planning, keyframes: self.keyframes.unwrap_or(0) as usize })
     }
 
     /// The file's settings, those given one by one, and those that have an option of their own.

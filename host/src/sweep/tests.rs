@@ -17,7 +17,11 @@ fn request(kinds: &[Kind]) -> SweepRequest {
         prune_lag: 20,
         evaluation_delay: 40,
         common: Request {
-            bounds: Bounds { memory: Memory::Profile("small".to_owned()), planning: None },
+            bounds: Bounds {
+                memory: Memory::Profile("small".to_owned()),
+                planning: None,
+                keyframes: 0,
+            },
             ..Request::default()
         },
     }

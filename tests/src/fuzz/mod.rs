@@ -68,6 +68,7 @@ pub fn sizes(of: &mut Capacity) -> [&mut usize; 18] {
         &mut of.objects,
         &mut of.object_blocks,
         &mut of.crop_pixels,
+        &mut of.keyframes,
         &mut of.planning_width,
         &mut of.planning_length,
         &mut of.planning_height,
