@@ -144,10 +144,7 @@ const CORE: Layers = &[
         "planning",
         &["digest", "geometry", "image", "memory", "slices", "settings", "state", "view", "volume"],
     ),
-    (
-        "places",
-        &["egomotion", "geometry", "image", "memory", "random", "scene_flow", "state"],
-    ),
+    ("places", &["egomotion", "geometry", "image", "memory", "random", "scene_flow", "state"]),
     (
         "mapper",
         &[

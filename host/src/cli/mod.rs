@@ -10,6 +10,7 @@ mod fixtures;
 mod fleet;
 mod help;
 mod inspect;
+mod localize;
 mod manual;
 #[cfg(test)]
 mod messages;
@@ -67,6 +68,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Replay small clips against the digests on file
     Fixtures(fixtures::FixturesArgs),
+    /// Place a recording in the map of an old run, which stays as it is
+    Localize(Box<localize::LocalizeArgs>),
     /// Map many recordings, and add their maps in any order
     Fleet(fleet::FleetArgs),
     /// Write completions for a shell: dynvox completions bash >
@@ -121,6 +124,7 @@ pub fn main() -> ExitCode {
         Some(Command::Diff(args)) => return diff::main(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Fixtures(args)) => fixtures::run(&args),
+        Some(Command::Localize(args)) => localize::run(&args),
         Some(Command::Fleet(args)) => fleet::run(&args),
         Some(Command::Completions(args)) => {
             manual::completions(&args, Cli::command());

@@ -147,12 +147,14 @@ pub fn solve(
 ) -> Result<Capacity, RequestError> {
     Capacity::for_budget(memory.0, width, height, options).map_err(|error| match error {
         BudgetError::TooSmall { least } => RequestError::Invalid(format!(
-            "{memory} are too few for images of {width} x {height} px: the least that works is {least} bytes. Give --memory {}, or smaller \
-             images with --scale",
+            "{memory} are too few for images of {width} x {height} px: the least that works is \
+             {least} bytes. Give --memory {}, or smaller images with --scale",
             Bytes(least).rounded_up()
         )),
-        other => RequestError::Invalid(format!("there is no capacity for images of {width} x \
-            {height} px: {other}")),
+        other => RequestError::Invalid(format!(
+            "there is no capacity for images of {width} x \
+            {height} px: {other}"
+        )),
     })
 }
 

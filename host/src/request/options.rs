@@ -119,7 +119,12 @@ pub struct Options {
     pub capacity: Option<PathBuf>,
     /// Recognise places by so many keyframes, of 11.3 KiB each: a camera that was lost goes on in
     /// the map where it comes back to it [default: none]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Limits")]
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=65_536),
+        help_heading = "Limits"
+    )]
     pub keyframes: Option<u32>,
     /// Make a map for planners around the camera and write it to planning/: cells to the sides,
     /// ahead and behind, and upwards, of planning.cell_voxels voxels each: 200x200x20 is 40 x 40 x

@@ -33,6 +33,17 @@ pub enum RunError {
     /// An output and an input that overlap.
     #[error(transparent)]
     Overlap(#[from] Overlap),
+    /// Places of an old map that cannot be used.
+    #[error(
+        "{path} cannot be used: {reason}. Map the old recording with --keyframes 1000 and name the \
+         folder of that run"
+    )]
+    Places {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
     /// No memory for the slab.
     #[error(
         "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give \
@@ -96,8 +107,8 @@ pub enum RunError {
     },
     /// The process uses more memory than allowed.
     #[error(
-        "at frame {frame} the process uses {rss_bytes} bytes, more than the {limit_bytes} allowed. Allow more with --rss-limit-mib, or \
-         choose a smaller --memory"
+        "at frame {frame} the process uses {rss_bytes} bytes, more than the {limit_bytes} allowed. \
+         Allow more with --rss-limit-mib, or choose a smaller --memory"
     )]
     Resident {
         /// Number of the frame.

@@ -4,6 +4,7 @@ use super::checkpoint::Checkpoint;
 use super::disk_store::MeshOutput;
 use super::ending::Incomplete;
 use super::error::RunError;
+use super::places::{self, PLACES_FILE};
 use super::record::RunRecord;
 use super::saved::Saved;
 use super::session::Session;
@@ -165,6 +166,9 @@ fn map(
         PruneReport::default()
     });
     let Session { mut mapper, store, state, since, .. } = session;
+    if let Err(error) = places::write(&mut mapper, folder) {
+        Incomplete::add_missing(&mut incomplete, PLACES_FILE, &error.to_string());
+    }
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.static_map().pool().len(),

@@ -10,6 +10,7 @@ mod execute;
 mod folder;
 mod map_objects;
 mod mask_effect;
+mod places;
 mod progress;
 mod reader;
 mod record;
@@ -35,6 +36,7 @@ pub use folder::{
     FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, replace_whole,
     write_whole,
 };
+pub use places::{Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};
 pub use record::{RunRecord, StageStatistics};

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 /// Words that stand for any name in documents.
 const PLACEHOLDERS: [&str; 3] = ["STAGE", "NAME", "NNNNNN"];
 /// Commands whose options are looked up.
-const COMMANDS: [&str; 26] = [
+const COMMANDS: [&str; 27] = [
     "run",
     "settings",
     "inspect",
@@ -26,6 +26,7 @@ const COMMANDS: [&str; 26] = [
     "view",
     "diff",
     "bench",
+    "localize",
     "fixtures new",
     "fixtures verify",
     "fixtures bless",

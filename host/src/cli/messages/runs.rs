@@ -6,8 +6,8 @@ use crate::{
     owned::{NotOwned, check_overlap},
     run::{FolderError, ResumeError, RunError, store::StoreError},
 };
-use dynvox_core::{StepError, memory::SlabError};
-use std::io::ErrorKind;
+use dynvox_core::{LoadPlacesError, StepError, memory::SlabError};
+use std::io::{Error, ErrorKind};
 
 /// Errors while a run goes on, and of its folder.
 pub(super) fn all() -> Vec<(&'static str, Vec<String>)> {
@@ -20,6 +20,9 @@ pub(super) fn all() -> Vec<(&'static str, Vec<String>)> {
                 RunError::Observe(_), RunError::Threads { .. }];
                 RunError::SavedExists { .. } => RunError::SavedExists {
                     path: path("masks"), option: "--save-instances"
+                },
+                RunError::Places { .. } => RunError::Places {
+                    path: path("map.places"), reason: LoadPlacesError::<Error>::Rig.to_string()
                 },
                 RunError::NoMemory { .. } => RunError::NoMemory {
                     bytes: 268_435_456, profile: text("onboard")
