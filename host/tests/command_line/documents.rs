@@ -266,6 +266,14 @@ fn options(root: &Path, command: &str) -> BTreeMap<String, String> {
 }
 
 #[test]
+fn the_page_on_bits_shows_the_last_digest_of_the_clip_it_names() {
+    let lines = document("fixtures/street-320x96/digests.txt");
+    let digest = lines.lines().last().unwrap().split(' ').nth(1).unwrap();
+    let page = document("docs/bits.md");
+    assert!(page.lines().any(|line| line == digest), "docs/bits.md shows {digest}");
+}
+
+#[test]
 fn every_option_is_described_and_documents_use_options_that_are_there() {
     let root = TempDir::new().unwrap();
     // Options as the program's own help lists them.
