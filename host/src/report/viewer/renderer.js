@@ -44,22 +44,32 @@ class Renderer {
   }
 
   addTile(head, { bytes, indices, coarse }) {
-    const { gl } = this, array = gl.createVertexArray();
+    const { gl } = this, array = gl.createVertexArray(), buffers = [gl.createBuffer(), gl.createBuffer()];
     gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
     gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.STATIC_DRAW);
     [[3, gl.UNSIGNED_SHORT, 0], [2, gl.BYTE, 6], [3, gl.UNSIGNED_BYTE, 8], [3, gl.UNSIGNED_BYTE, VALUE_AT]].forEach(([size, kind, offset], at) => {
       gl.enableVertexAttribArray(at);
       gl.vertexAttribPointer(at, size, kind, true, VERTEX_BYTES, offset);
     });
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
     // All triangles, and behind them the few that stand for them while something moves.
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, 2 * (indices.length + coarse.length), gl.STATIC_DRAW);
     gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 0, indices);
     gl.bufferSubData(gl.ELEMENT_ARRAY_BUFFER, 2 * indices.length, coarse);
     gl.bindVertexArray(null);
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => head.low_m.map((low, axis) => (bits >> axis & 1 ? head.high_m[axis] : low)));
-    this.tiles.push({ head, array, whole: [0, indices.length], coarse: [indices.length, coarse.length], corners });
+    this.tiles.push({ head, array, buffers, whole: [0, indices.length], coarse: [indices.length, coarse.length], corners });
+  }
+
+  // Removes all tiles: a map that grows is drawn from new ones.
+  clearTiles() {
+    const { gl } = this;
+    for (const { array, buffers } of this.tiles) {
+      gl.deleteVertexArray(array);
+      buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+    }
+    this.tiles = [];
   }
 
   addCloud(head, bytes) {
