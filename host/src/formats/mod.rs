@@ -5,6 +5,7 @@
 //! [`FormatError`] that says what is wrong and what to do. Each takes memory and time within
 //! [`bounds`].
 
+mod bayer;
 pub mod bounds;
 pub mod calibration;
 mod capacity;
@@ -30,6 +31,8 @@ mod text;
 mod times;
 mod xml;
 
+pub use bayer::BayerPattern;
+pub(crate) use bayer::{Sample, demosaiced};
 pub use capacity::{CapacityFile, CapacityTable};
 pub use checksum::checksum_of;
 pub use error::{FormatError, read_bytes_within, read_text, read_text_within};

@@ -4,8 +4,8 @@
 //! [`super::data_sets`] lists them.
 
 use super::source::{FrameSource, InputError, Stacking};
-use crate::formats::FormatError;
 use crate::formats::calibration::{CalibrationHints, CameraGeometry, RectifiedSize};
+use crate::formats::{BayerPattern, FormatError};
 use dynvox_core::geometry::StereoRig;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -93,6 +93,8 @@ pub struct OpenOptions {
     pub cameras: CameraPair,
     /// Significant bits of 16-bit images; told from the data where they are not said.
     pub bits: Option<u32>,
+    /// Colour filters of images that are mosaics.
+    pub bayer: Option<BayerPattern>,
     /// Arrangement of both images in one file; told from the calibration if absent.
     pub stacking: Option<Stacking>,
     /// Topics of the left and the right camera in a recording of ROS; told by their names where

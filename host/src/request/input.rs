@@ -1,6 +1,7 @@
 //! Source of the images.
 
 use super::{Request, RequestError, stream};
+use crate::formats::BayerPattern;
 use crate::formats::calibration::CalibrationHints;
 use crate::input::Topics;
 use crate::input::faults::{self, Faults};
@@ -26,6 +27,8 @@ pub struct Input {
     pub cameras: CameraPair,
     /// Significant bits of 16-bit images, 8 to 16; told from some of them when absent.
     pub bits: Option<u32>,
+    /// Colour filters of images that are mosaics.
+    pub bayer: Option<BayerPattern>,
     /// Topics of both cameras in a recording of ROS; told by their names when absent.
     pub topics: Option<Topics>,
     /// Arrangement of a pair in one image; told from the calibration when absent.
@@ -87,6 +90,7 @@ fn options(request: &Request) -> OpenOptions {
         sequence: input.sequence.clone(),
         cameras: input.cameras,
         bits: input.bits,
+        bayer: input.bayer,
         stacking: input.stacking,
         topics: input.topics.clone(),
         calibration: input.calibration.clone(),

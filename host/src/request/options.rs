@@ -6,8 +6,8 @@ use super::{
     Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneExport,
     SceneScale, Settings, Source, Storage, UdpAddress, WindowSize, words,
 };
-use crate::formats::Axes;
 use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
+use crate::formats::{Axes, BayerPattern};
 use crate::input::Topics;
 use crate::input::depth::{DepthChoice, DepthScale};
 use crate::input::faults::Faults;
@@ -53,6 +53,9 @@ pub struct Options {
     /// otherwise
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=16), help_heading = "Input")]
     pub bits: Option<u32>,
+    /// Colour filters of images that are mosaics: the first two pixels of the first two rows
+    #[arg(long, value_enum, value_name = "PATTERN", help_heading = "Input")]
+    pub bayer: Option<BayerPattern>,
     /// Topics of both cameras in a recording of ROS [default: told by their names]
     #[arg(long, value_name = "LEFT,RIGHT", help_heading = "Input")]
     #[serde(deserialize_with = "words::parsed")]
@@ -319,6 +322,7 @@ impl Options {
             sequence: self.sequence.clone(),
             cameras: self.images.unwrap_or_default(),
             bits: self.bits,
+            bayer: self.bayer,
             topics: self.topics.clone(),
             stacking: match (self.side_by_side, self.top_bottom) {
                 (true, _) => Some(Stacking::SideBySide),

@@ -37,7 +37,8 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
         BufReader::with_capacity(BUFFER_BYTES, stdin()),
         input.stacking,
         input.bits,
-    );
+    )
+    .with_bayer(input.bayer);
     // An empty input is not an empty recording.
     match Stream::begin(options, stop.clone(), pairs) {
         Err(InputError::PastEnd { .. }) => Err(RequestError::invalid(

@@ -9,6 +9,7 @@ use std::num::NonZeroUsize;
 fn unlike_the_default() -> Request {
     let options: Options = serde_json::from_value(json!({
         "path": "rig", "sequence": "06", "dataset": "kitti-360", "images": "colour", "bits": 12,
+        "bayer": "rggb",
         "topics": "/left,/right", "top_bottom": true, "calibration": ["left.yaml", "right.yaml"],
         "faults": "freeze:right@20..,noise=0.1@5,seed=3", "start": 3, "frames": 40, "stride": 2,
         "scale": [0.3, "room"], "skip_bad_frames": true, "force": true, "depth": "disparity:depth",

@@ -336,6 +336,7 @@ class Dataset:
         dataset: str | None = None,
         images: str | None = None,
         bits: int | None = None,
+        bayer: str | None = None,
         topics: str | None = None,
         side_by_side: bool = False,
         top_bottom: bool = False,

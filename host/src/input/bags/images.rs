@@ -3,7 +3,7 @@
 use super::container::Topic;
 use super::messages::{RawImage, compressed_image};
 use crate::formats::bounds::{check_decoding, check_sides};
-use crate::formats::{Image, Picture, decode_picture};
+use crate::formats::{BayerPattern, Image, Picture, Sample, decode_picture, demosaiced};
 
 /// The picture in an image message of a topic.
 ///
@@ -42,7 +42,7 @@ pub fn picture(message: &[u8], topic: &Topic) -> Result<Picture, String> {
         size: (width, height),
         channels,
         blue_first: image.encoding.starts_with("bgr") || image.encoding == "8UC3",
-        red: pattern(image.encoding),
+        mosaic: pattern(image.encoding),
     };
     let rows = image.data.chunks(image.step.max(1)).take(height);
     let picture = if deep {
@@ -69,8 +69,8 @@ struct Layout {
     channels: usize,
     /// True if blue comes before green and red.
     blue_first: bool,
-    /// Column and row of the red pixel in a Bayer pattern.
-    red: Option<(usize, usize)>,
+    /// Pattern of a mosaic.
+    mosaic: Option<BayerPattern>,
 }
 
 impl Layout {
@@ -82,8 +82,8 @@ impl Layout {
         colour: fn(Image<[T; 3]>) -> Picture,
     ) -> Option<Picture> {
         let (width, height) = self.size;
-        let pixels = match self.red {
-            Some(red) => demosaiced(&samples, self.size, red),
+        let pixels = match self.mosaic {
+            Some(pattern) => demosaiced(&samples, self.size, pattern),
             None if self.channels > 1 => {
                 let pixel = |pixel: &[T]| {
                     let channel = |at: usize| pixel.get(at).copied().unwrap_or_default();
@@ -95,24 +95,6 @@ impl Layout {
             None => return Image::new(width, height, samples).map(grey),
         };
         Image::new(width, height, pixels).map(colour)
-    }
-}
-
-/// A sample of 8 or 16 bit.
-trait Sample: Copy + Default + Into<u32> {
-    /// The mean of samples, by their sum and number.
-    fn mean(sum: u32, count: u32) -> Self;
-}
-
-impl Sample for u8 {
-    fn mean(sum: u32, count: u32) -> Self {
-        (sum / count.max(1)) as Self
-    }
-}
-
-impl Sample for u16 {
-    fn mean(sum: u32, count: u32) -> Self {
-        (sum / count.max(1)) as Self
     }
 }
 
@@ -132,46 +114,8 @@ fn check_rows(image: &RawImage<'_>, row_bytes: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Column and row of the red pixel in each square of a Bayer pattern.
-fn pattern(encoding: &str) -> Option<(usize, usize)> {
+/// The pattern of a mosaic's encoding.
+fn pattern(encoding: &str) -> Option<BayerPattern> {
     let name = encoding.strip_prefix("bayer_")?;
-    Some(match name.trim_end_matches("16").trim_end_matches('8') {
-        "rggb" => (0, 0),
-        "grbg" => (1, 0),
-        "gbrg" => (0, 1),
-        "bggr" => (1, 1),
-        _ => return None,
-    })
-}
-
-/// Colours of a Bayer image: each the mean of the pixel's neighbours of that colour, itself
-/// included.
-fn demosaiced<T: Sample>(
-    samples: &[T],
-    (width, height): (usize, usize),
-    (red_u, red_v): (usize, usize),
-) -> Vec<[T; 3]> {
-    let channel = |u: usize, v: usize| match ((u + red_u) % 2, (v + red_v) % 2) {
-        (0, 0) => 0,
-        (1, 1) => 2,
-        _ => 1,
-    };
-    let pixel = |u: usize, v: usize| {
-        let own = channel(u, v);
-        let (mut sums, mut counts) = ([0u32; 3], [0u32; 3]);
-        for v in v.saturating_sub(1)..(v + 2).min(height) {
-            for u in u.saturating_sub(1)..(u + 2).min(width) {
-                let at = channel(u, v);
-                sums[at] += samples.get(v * width + u).copied().unwrap_or_default().into();
-                counts[at] += 1;
-            }
-        }
-        let mut rgb = [T::default(); 3];
-        for (at, value) in rgb.iter_mut().enumerate() {
-            *value = T::mean(sums[at], counts[at]);
-        }
-        rgb[own] = samples.get(v * width + u).copied().unwrap_or_default();
-        rgb
-    };
-    (0..height).flat_map(|v| (0..width).map(move |u| (u, v))).map(|(u, v)| pixel(u, v)).collect()
+    BayerPattern::from_name(name.trim_end_matches("16").trim_end_matches('8'))
 }

@@ -198,8 +198,8 @@ pub fn siblings_note(path: &Path) -> Option<String> {
 pub fn conversion(path: &Path) -> String {
     let to = path.with_extension("");
     format!(
-        "Convert it with {CONVERT} --src {} --dst {}-mcap --dst-storage mcap` (`pip install rosbags`) \
-         and give the result",
+        "Convert it with {CONVERT} --src {} --dst {}-mcap --dst-storage mcap` (`pip install \
+         rosbags`) and give the result",
         path.display(),
         to.display()
     )

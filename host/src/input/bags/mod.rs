@@ -63,7 +63,7 @@ pub const DATA_SET: Layout = Layout::new(&DataSet {
 /// # Errors
 /// A file is cut off or has no index, its topics cannot be told, or there is no calibration.
 fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
-    let recording = Recording::open(path)?;
+    let recording = Recording::open(path)?.with_bayer(options.bayer);
     let topics = topics::choose(&recording, options.topics.as_ref())?;
     let mut notes =
         vec![format!("{} (left) and {} (right), paired by time stamp", topics[0], topics[1])];
@@ -71,6 +71,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
     let pairs = pairs(&recording, &topics, &mut notes)?;
     let first = first_pair(&recording, &topics, &pairs)?;
     let image_size = first[0].size();
+    notes.extend(first[0].mosaic_note());
     let bits = match options.bits {
         Some(bits) => Some(bits),
         None => bits(&recording, &topics[0], &pairs, &mut notes),

@@ -5,8 +5,8 @@ use super::listing::{Kind, conversion, files_at};
 use super::mcap_file::McapFile;
 use super::messages::{CameraInfo, stamp_ns};
 use super::{images, listing};
-use crate::formats::Picture;
 use crate::formats::bounds::{MAX_BAG_IMAGES, MAX_BAG_INDEXES_BYTES, bytes_text, thousands};
+use crate::formats::{BayerPattern, Picture};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,8 @@ pub struct Recording {
     path: PathBuf,
     files: Vec<Box<dyn Container>>,
     topics: Vec<Topic>,
+    /// Colour filters of grey images that are mosaics.
+    bayer: Option<BayerPattern>,
 }
 
 impl Recording {
@@ -64,7 +66,12 @@ impl Recording {
             files.iter().flat_map(|file| file.topics().iter().cloned()).collect();
         topics.sort_by(|a, b| a.name.cmp(&b.name));
         topics.dedup();
-        Ok(Self { path: path.to_path_buf(), files, topics })
+        Ok(Self { path: path.to_path_buf(), files, topics, bayer: None })
+    }
+
+    /// Takes grey images for mosaics of a pattern.
+    pub fn with_bayer(self, bayer: Option<BayerPattern>) -> Self {
+        Self { bayer, ..self }
     }
 
     /// Returns the path of the recording.
@@ -165,7 +172,11 @@ impl Recording {
                 if stamp_ns(message.bytes, topic.encoding) != Some(entry.header_ns) {
                     return true;
                 }
-                found = Some(images::picture(message.bytes, topic));
+                let picture = images::picture(message.bytes, topic);
+                found = Some(picture.and_then(|picture| match self.bayer {
+                    Some(pattern) => picture.demosaiced(pattern),
+                    None => Ok(picture),
+                }));
                 false
             })?;
         }

@@ -80,6 +80,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         name: format!("cityscapes-{name}"),
         images: ImageFiles::Cameras([of_sequence(&left)?, of_sequence(&right)?]),
         bits: options.bits,
+        bayer: options.bayer,
         rectified: options.rectified,
         cameras: options.cameras_or(|| rig(&path.join("camera").join(&folder), &name))?,
         times: None,

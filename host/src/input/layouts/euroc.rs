@@ -52,6 +52,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         name: super::folder::name_of(root),
         images: ImageFiles::Cameras(cameras),
         bits: options.bits,
+        bayer: options.bayer,
         rectified: options.rectified,
         cameras: options.cameras_of(&cameras_from)?,
         times: None,

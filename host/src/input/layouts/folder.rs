@@ -42,6 +42,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         name: name_of(path),
         images: images(path, action, options.stacking, &cameras)?,
         bits: options.bits,
+        bayer: options.bayer,
         rectified: options.rectified,
         cameras,
         times: file("times.txt")

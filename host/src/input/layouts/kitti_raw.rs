@@ -119,6 +119,7 @@ fn open_drive(
         name: format!("{prefix}-{}", name_of(drive)),
         images: ImageFiles::Cameras(cameras),
         bits: options.bits,
+        bayer: options.bayer,
         rectified: options.rectified,
         cameras: options.cameras_or(own)?,
         times: None,

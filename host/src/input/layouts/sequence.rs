@@ -9,8 +9,8 @@ use crate::formats::calibration::{
     CameraGeometry, FittedGeometry, RectifiedSize, SettledCameras, StereoCalibration, Swap,
 };
 use crate::formats::{
-    Decoded, RANGE_PICTURES, SampleRange, TimeTable, Trajectory, declared_maximum, picture_size,
-    read_picture,
+    BayerPattern, Decoded, RANGE_PICTURES, SampleRange, TimeTable, Trajectory, declared_maximum,
+    picture_size, read_picture,
 };
 use crate::input::diagnosis;
 use crate::input::source::{
@@ -75,6 +75,8 @@ pub(super) struct Parts {
     pub images: ImageFiles,
     /// Number of significant bits of 16-bit images; told from the data if absent.
     pub bits: Option<u32>,
+    /// Colour filters of grey images that are mosaics.
+    pub bayer: Option<BayerPattern>,
     pub cameras: CameraGeometry,
     /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
@@ -100,13 +102,17 @@ impl Sequence {
         let size = first_size(&pairs, &parts.name)?;
         let image_size = stacking.map_or(size, |stacking| stacking.size_of_one(size));
         let exchanged = parts.cameras.hints().swap.is_some_and(Swap::images);
-        let reading = PairReading { stacking, exchanged, bits: parts.bits };
+        let reading = PairReading { stacking, exchanged, bits: parts.bits, bayer: parts.bayer };
         let rows = |calibration: &StereoCalibration| row_difference(&pairs, reading, calibration);
         let SettledCameras { cameras, notes: found } =
             parts.cameras.settled(image_size, Some(&rows))?;
         let geometry = cameras.fitted(image_size, &parts.rectified)?;
         notes.extend(found);
         notes.extend(raw_note(&cameras, &geometry));
+        if parts.bayer.is_none() {
+            let first = pairs.iter().find_map(|[left, _]| read_picture(left).ok());
+            notes.extend(first.and_then(|first| first.mosaic_note()));
+        }
         let bits = match parts.bits {
             Some(bits) => Some(bits),
             None => detected_bits(&pairs, &mut notes),
@@ -167,13 +173,22 @@ struct PairReading {
     exchanged: bool,
     /// Significant bits of 16-bit images.
     bits: Option<u32>,
+    /// Colour filters of grey images that are mosaics.
+    bayer: Option<BayerPattern>,
 }
 
 impl PairReading {
     /// The left and the right image.
     fn images(&self, [left, right]: &[PathBuf; 2]) -> Result<[Decoded; 2], InputError> {
         let read = |path: &Path| {
-            Ok::<_, InputError>(read_picture(path).map_err(InputError::image)?.to_8_bit(self.bits))
+            let picture = read_picture(path).map_err(InputError::image)?;
+            let picture = match self.bayer {
+                Some(pattern) => picture
+                    .demosaiced(pattern)
+                    .map_err(|reason| InputError::Image { path: path.to_path_buf(), reason })?,
+                None => picture,
+            };
+            Ok::<_, InputError>(picture.to_8_bit(self.bits))
         };
         let mut images = match self.stacking {
             None => [read(left)?, read(right)?],

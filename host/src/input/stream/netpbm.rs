@@ -7,7 +7,7 @@
 use super::Pair;
 use crate::formats::bounds::{check_decoding, check_sides};
 use crate::formats::{
-    Decoded, Picture, RANGE_PICTURES, SampleRange, decode_picture, significant_bits,
+    BayerPattern, Decoded, Picture, RANGE_PICTURES, SampleRange, decode_picture, significant_bits,
 };
 use crate::input::source::{InputError, Stacking};
 use std::collections::VecDeque;
@@ -21,6 +21,7 @@ pub struct NetpbmPairs<R> {
     bytes: R,
     stacking: Option<Stacking>,
     bits: Option<u32>,
+    bayer: Option<BayerPattern>,
     /// Images read.
     images: usize,
     /// Images that came before the significant bits were known, and what ended them.
@@ -43,7 +44,13 @@ impl<R: Read> NetpbmPairs<R> {
     /// header's maximum tells them, unless it is 65535: then the first [`RANGE_PICTURES`] images
     /// do, which are read before the first pair is handed out.
     pub fn new(bytes: R, stacking: Option<Stacking>, bits: Option<u32>) -> Self {
-        Self { bytes, stacking, bits, images: 0, waiting: VecDeque::new(), ended: false }
+        let waiting = VecDeque::new();
+        Self { bytes, stacking, bits, bayer: None, images: 0, waiting, ended: false }
+    }
+
+    /// Takes grey images for mosaics of a pattern.
+    pub fn with_bayer(self, bayer: Option<BayerPattern>) -> Self {
+        Self { bayer, ..self }
     }
 
     fn error(&self, reason: impl Into<String>) -> InputError {
@@ -109,7 +116,11 @@ impl<R: Read> NetpbmPairs<R> {
         if read < len {
             return Err(self.error("the stream stopped inside it"));
         }
-        let picture = decode_picture(&bytes).map_err(|reason| self.error(reason))?;
+        let picture = decode_picture(&bytes).and_then(|picture| match self.bayer {
+            Some(pattern) => picture.demosaiced(pattern),
+            None => Ok(picture),
+        });
+        let picture = picture.map_err(|reason| self.error(reason))?;
         if self.bits.is_none() && (256..65_535).contains(&maximum) {
             self.bits = u16::try_from(maximum).ok().map(significant_bits);
         }

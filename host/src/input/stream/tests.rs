@@ -2,7 +2,7 @@
 
 use super::netpbm::NetpbmPairs;
 use super::*;
-use crate::formats::Image;
+use crate::formats::{BayerPattern, Image};
 use crate::input::Stacking;
 use dynvox_core::geometry::StereoRig;
 use std::sync::mpsc::{Receiver, channel};
@@ -58,6 +58,11 @@ fn bits_are_those_of_the_header_or_of_several_images() {
         let stream = deep(maximum, &values);
         assert_eq!(greys(NetpbmPairs::new(&stream, None, None)), of_12_bits, "{maximum}");
     }
+    // A mosaic is one in a stream, too.
+    let mosaic = [&b"P5 2 2 255\n"[..], &[200, 100, 100, 20]].concat().repeat(2);
+    let mut pairs = NetpbmPairs::new(&mosaic[..], None, None).with_bayer(Some(BayerPattern::Rggb));
+    let [left, _] = pairs.next().unwrap().unwrap();
+    assert_eq!(left.colour.unwrap().pixels(), [[200, 100, 20]; 4]);
     // A stream that breaks while the first images are compared loses none of them.
     let cut = deep(65_535, &values);
     let read = greys(NetpbmPairs::new(&cut[..cut.len() - 1], None, None));

@@ -1,6 +1,7 @@
 //! One recording in every arrangement of a plain folder.
 
 use super::*;
+use crate::formats::BayerPattern;
 
 /// Writes a frame's pair below a folder.
 type Write = fn(&Path, u32, &[GrayImage; 2]);
@@ -146,6 +147,33 @@ fn the_maximum_in_a_header_tells_the_bits() {
         assert_eq!(dataset.frame(0).unwrap().left.pixels()[0], expected, "{maximum}");
         let noted = dataset.notes().iter().any(|note| note.contains("that the first one says"));
         assert_eq!(noted, maximum < 65_535, "{:?}", dataset.notes());
+    }
+}
+
+#[test]
+fn mosaics_become_colours_by_option_and_are_named_without_it() {
+    // Red 200, green 100, blue 20 over all of the image, as RGGB.
+    let seen = |u: u32, v: u32| [200u16, 100, 100, 20][(u % 2 + 2 * (v % 2)) as usize];
+    for ending in ["png", "tiff", "pgm"] {
+        let root = TempDir::new().unwrap();
+        fs::write(root.path().join("calib.txt"), CALIB).unwrap();
+        for side in ["left", "right"] {
+            fs::create_dir_all(root.path().join(side)).unwrap();
+            for at in 0..2 {
+                let path = root.path().join(format!("{side}/{at}.{ending}"));
+                ImageBuffer::from_fn(40, 32, |u, v| Luma([16 * seen(u, v)])).save(path).unwrap();
+            }
+        }
+        let plain = open(root.path(), &OpenOptions::default()).unwrap();
+        assert!(plain.frame(0).unwrap().colour.is_none());
+        let noted = |words: &str| plain.notes().iter().any(|note| note.contains(words));
+        assert!(noted("--bayer rggb or bggr"), "{:?}", plain.notes());
+        let bayer = Some(BayerPattern::Rggb);
+        let options = OpenOptions { bayer, ..OpenOptions::default() };
+        let colour = open(root.path(), &options).unwrap();
+        let pixels = colour.frame(1).unwrap().colour.unwrap();
+        assert!(pixels.pixels().iter().all(|rgb| *rgb == [200, 100, 20]), "{ending}");
+        assert!(!colour.notes().iter().any(|note| note.contains("--bayer")));
     }
 }
 
