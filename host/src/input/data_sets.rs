@@ -2,7 +2,7 @@
 
 use super::bags;
 use super::data_set::{Layout, OpenOptions};
-use super::layouts::{cityscapes, euroc, folder, kitti, kitti_raw};
+use super::layouts::{cityscapes, euroc, folder, kitti, kitti_raw, spring, vkitti};
 use super::source::{FrameSource, InputError};
 use clap::builder::PossibleValue;
 use serde::Deserialize;
@@ -18,6 +18,8 @@ pub static DATA_SETS: &[Layout] = &[
     kitti_raw::KITTI_360,
     kitti_raw::KITTI_RAW,
     kitti::TRACKING,
+    vkitti::DATA_SET,
+    spring::DATA_SET,
     folder::DATA_SET,
 ];
 

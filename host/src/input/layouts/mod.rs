@@ -1,5 +1,6 @@
 //! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360,
-//! Cityscapes, EuRoC and TUM VI, any folders of images; and the synthetic street.
+//! Cityscapes, EuRoC and TUM VI, Virtual KITTI 2, Spring, any folders of images; and the synthetic
+//! street.
 
 mod camera_folders;
 pub(super) mod cityscapes;
@@ -14,10 +15,13 @@ mod pairing;
 #[cfg(test)]
 mod raw_tests;
 mod sequence;
+pub(super) mod spring;
 mod street;
 mod tables;
 #[cfg(test)]
 mod tests;
+mod trees;
+pub(super) mod vkitti;
 
 pub(super) use pairing::nearest_stamps;
 pub use sequence::Sequence;

@@ -27,9 +27,17 @@ pub(super) struct TableFrames<'f> {
 }
 
 impl TableFrames<'_> {
-    /// Numbers in the images' names; `None` unless all names are numbers.
+    /// Numbers in the images' names; `None` unless all names are numbers behind one beginning:
+    /// `000123`, `rgb_00123`.
     fn numbers(&self) -> Option<Vec<usize>> {
-        self.files.iter().map(|path| stem_of(path).parse().ok()).collect()
+        let parts = |path: &PathBuf| {
+            let stem = stem_of(path);
+            let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+            Some((stem.get(digits..)?.parse().ok()?, stem.get(..digits)?.to_owned()))
+        };
+        let parts: Vec<(usize, String)> = self.files.iter().map(parts).collect::<Option<_>>()?;
+        let one = parts.windows(2).all(|pair| pair[0].1 == pair[1].1);
+        one.then(|| parts.into_iter().map(|(number, _)| number).collect())
     }
 
     /// The row of each frame in a table of `rows` rows without numbers or times, and a note where
@@ -102,8 +110,8 @@ impl TableFrames<'_> {
                 stamps_ns.iter().map(|&ns| read.near(ns as f64 / NS_PER_S, within_s)).collect()
             }
             (_, _, Some(_)) => {
-                let number = |at: &usize| stem_of(self.files.get(*at)?).parse().ok();
-                let of_frame = |at| read.of_frame(number(at)?);
+                let numbers = self.numbers().unwrap_or_default();
+                let of_frame = |at: &usize| read.of_frame(*numbers.get(*at)?);
                 self.positions.iter().map(of_frame).collect()
             }
             _ => match self.rows(read.poses.len()) {
@@ -181,6 +189,9 @@ mod tests {
         let from_one = ["1", "2", "4"];
         assert_eq!(rows(&from_one, false, 4), Ok(vec![0, 1, 3]), "counted from 1");
         assert_eq!(rows(&from_one, false, 5), Ok(vec![1, 2, 4]));
+        let behind_a_word = ["rgb_00000", "rgb_00001", "rgb_00003"];
+        assert_eq!(rows(&behind_a_word, false, 4), Ok(vec![0, 1, 3]));
+        assert!(rows(&["a_0", "a_1", "b_3"], false, 4).is_err(), "two beginnings");
         let named = ["apple", "berry", "cherry"];
         assert_eq!(rows(&named, false, 3), Ok(vec![0, 1, 2]));
         assert!(rows(&named, false, 4).unwrap_err().contains("names are no numbers"));

@@ -2,6 +2,7 @@
 
 mod data_sets;
 mod folders;
+mod published;
 
 use super::*;
 use crate::formats::luma;
