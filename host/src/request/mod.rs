@@ -20,6 +20,7 @@ mod input;
 mod limits;
 mod mapper;
 mod masks;
+mod opening;
 mod options;
 mod overrides;
 mod paths;

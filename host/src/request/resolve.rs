@@ -1,6 +1,7 @@
 //! From a request to a plan.
 
 use super::examine::{Examined, examine};
+use super::opening;
 use super::resident_limit_bytes;
 use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Source, input};
 use crate::input::{StopRequest, read_given_poses};
@@ -37,7 +38,13 @@ impl Request {
         let threads = self.threads()?;
         let recorded = input::open(self, stop)?;
         // Before networks, which would run on every image that is examined.
-        let Examined { warnings, interval_s } = examine(self, recorded.as_ref())?;
+        let Examined { mut warnings, interval_s } = examine(self, recorded.as_ref())?;
+        // Of a stream nothing is listed: it cannot be seen twice.
+        let listed = FrameNumbers::new(recorded.as_ref(), &self.frames)?;
+        let offset = opening::find(self, &self.settings, recorded.as_ref(), listed.listed());
+        if let Some(found) = &offset {
+            warnings.extend(opening::warning(found, &self.settings.rig));
+        }
         let dataset = input::dress(self, recorded, stop)?;
         let scaled = self.scaled_settings(&dataset.rig(), dataset.size().0)?;
         let (profile, capacity) = self.bounds.resolve(
@@ -46,7 +53,10 @@ impl Request {
             scaled.street_voxel_size_m,
         )?;
         // Settings that depend on the rate need the recording's own.
-        let settings = self.fitted_settings(scaled.settings, &capacity, interval_s);
+        let mut settings = self.fitted_settings(scaled.settings, &capacity, interval_s);
+        if let Some(found) = &offset {
+            opening::begin_with(found, &mut settings.rig);
+        }
         let frames = FrameNumbers::new(dataset.as_ref(), &self.frames)?;
         let poses = match &self.poses {
             Poses::Estimated => None,
