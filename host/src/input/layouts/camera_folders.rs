@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Names of the two cameras: as folders, or as prefixes and suffixes of file names.
-pub const SIDES: [[&str; 2]; 31] = [
+pub const SIDES: [[&str; 2]; 37] = [
     ["left", "right"],
     ["Left", "Right"],
     ["LEFT", "RIGHT"],
@@ -38,6 +38,13 @@ pub const SIDES: [[&str; 2]; 31] = [
     ["img0", "img1"],
     ["im0", "im1"],
     ["view0", "view1"],
+    // RealSense's and OAK cameras' own names.
+    ["Infra1", "Infra2"],
+    ["infrared_1", "infrared_2"],
+    ["Infrared_1", "Infrared_2"],
+    ["mono_left", "mono_right"],
+    ["rect_left", "rect_right"],
+    ["CAM_B", "CAM_C"],
     ["I1", "I2"],
     ["l", "r"],
     ["L", "R"],
@@ -171,6 +178,8 @@ mod tests {
             ["left0008", "left0009", "right0008", "right0009"],
             ["left01", "left02", "right01", "right02"],
             ["left-0000", "left-0001", "right-0000", "right-0001"],
+            ["Infrared_1_8", "Infrared_1_9", "Infrared_2_8", "Infrared_2_9"],
+            ["CAM_B_8", "CAM_B_9", "CAM_C_8", "CAM_C_9"],
             ["I1_000000", "I1_000001", "I2_000000", "I2_000001"],
             ["stereo_left_8", "stereo_left_9", "stereo_right_8", "stereo_right_9"],
         ] {
