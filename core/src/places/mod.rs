@@ -4,21 +4,20 @@
 //! degrees: 128 points with their disparities and binary descriptors, and the pose in the map's
 //! segment. In a segment that began because the camera was lost, frames are compared with the
 //! keyframes of all other segments. A place is believed where descriptors and the motion from the
-//! keyframe's points agree ([`recognition`]), no other place fits nearly as well, and three frames
-//! in a row say the same, moved on by the camera's own motion. Then the camera goes on in the older
-//! segment.
+//! keyframe's points agree (`recognition`), no other place fits nearly as well, and three frames
+//! say the same, moved on by the camera's own motion. Then the camera goes on in the older segment.
 //!
 //! All of it is integers but the motion, which is the camera's own estimator's. There is no trained
-//! vocabulary: [`index`] looks up parts of descriptors, in lists of bounded length.
+//! vocabulary: `index` looks up parts of descriptors, in lists of bounded length.
 //!
-//! **Memory.** 11.3 KiB for each of `Capacity::keyframes`, and 75 KiB; nothing where it is 0, and
+//! **Memory.** 11.2 KiB for each of `Capacity::keyframes`, and 46 KiB; nothing where it is 0, and
 //! then nothing is computed either.
 //!
 //! **Time.** 1,024 descriptors, as many look-ups, and at most six keyframes compared: only in
 //! segments that are not joined yet, in each of their first frames and every fourth one afterwards.
-//! Elsewhere 128 descriptors for each keyframe taken.
+//! Elsewhere 128 descriptors in each frame.
 //!
-//! **What can go wrong.** Lists that are full refuse entries. A full table thins out ([`table`]). A
+//! **What can go wrong.** Lists that are full refuse entries. A full table thins out. A
 //! place is not found from the opposite direction, nor where it looks otherwise; the camera then
 //! goes on in its own segment.
 
@@ -56,7 +55,7 @@ const SPACING_DEPTH_SHARE: f64 = 0.06;
 const SPACING_RAD: f64 = 0.16;
 /// Fewest points of a keyframe.
 const POINTS_MIN: usize = 40;
-/// Frames in a row that must recognise one place.
+/// Frames that must recognise one place.
 const CONSISTENT: u32 = 3;
 /// Frames in a row without a place after which the ones before are forgotten.
 const MISSES_MAX: u32 = 5;

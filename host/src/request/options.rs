@@ -120,7 +120,7 @@ pub struct Options {
     /// Bounds from a file, as `dynvox budget --memory 48MiB --image 752x480` prints them
     #[arg(long, value_name = "FILE", help_heading = "Limits")]
     pub capacity: Option<PathBuf>,
-    /// Recognise places by so many keyframes, of 11.3 KiB each: a camera that was lost goes on in
+    /// Recognise places by so many keyframes, of 11.2 KiB each: a camera that was lost goes on in
     /// the map where it comes back to it [default: none]
     #[arg(
         long,
