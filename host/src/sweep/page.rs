@@ -89,7 +89,7 @@ fn table(kind: Kind, rows: &[Row<'_>], common: &BTreeMap<String, (f64, u64)>) ->
         "ATE, m",
     ];
     html! {
-        div.scroll { table {
+        div.scroll tabindex="0" role="region" aria-label="table" { table {
             tr { th { (kind.name()) } th { "tracking" } @for name in numbers { th.n { (name) } } }
             @for (point, result) in rows {
                 tr {
@@ -143,7 +143,7 @@ fn originals(kind: Kind) -> Markup {
     match kind {
         Kind::Methods => html! {
             (heading("Table I: tracking sequence 09"))
-            div.scroll { table {
+            div.scroll tabindex="0" role="region" aria-label="table" { table {
                 tr {
                     th { "method" }
                     @for name in [
@@ -163,7 +163,7 @@ fn originals(kind: Kind) -> Markup {
         },
         Kind::Dynamic => html! {
             (heading("static accuracy on the tracking sequences, ELAS"))
-            div.scroll { table {
+            div.scroll tabindex="0" role="region" aria-label="table" { table {
                 tr { th { "sequence" } @for name in ["input", "off", "on"] { th.n { (name) } } }
                 @for (sequence, shares) in published::DYNAMIC_ELAS.iter().enumerate() {
                     tr { td { (format!("{sequence:02}")) } @for share in shares { td.n { (format!("{share:.4}")) } } }
@@ -172,7 +172,7 @@ fn originals(kind: Kind) -> Markup {
         },
         Kind::Depth => html! {
             (heading("odometry 00 to 10: means, and quartiles over frames of the static accuracy"))
-            div.scroll { table {
+            div.scroll tabindex="0" role="region" aria-label="table" { table {
                 tr {
                     th { "source" }
                     @for name in ["static accuracy", "static compl.", "dynamic accuracy", "dynamic compl.", "quartiles"] { th.n { (name) } }
@@ -197,7 +197,7 @@ fn commands(plan: &Plan) -> Markup {
             summary { "Commands" }
             p.soft.small { "Each run asks for its data set, and for these values unlike the \
                             defaults." }
-            div.scroll { table {
+            div.scroll tabindex="0" role="region" aria-label="table" { table {
                 @for (key, request) in &plan.runs { tr { td { code { (key) } } td { code { (request.words()) } } } }
             } }
         } }

@@ -215,6 +215,39 @@ report({ whole, moving, rest: Number(data.triangles), share, movingShare });
 
 #[dynvox_needs::browser]
 #[test]
+fn keys_play_and_step_and_are_shown_but_leave_controls_alone() {
+    let root = TempDir::new().unwrap();
+    FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());
+    let script = r#"
+const press = (code, on = document.body) => on.dispatchEvent(new KeyboardEvent("keydown", { code, bubbles: true, cancelable: true }));
+await scrub(3);
+const result = { from: data.frame };
+await drawn(() => press("ArrowRight"));
+result.right = data.frame;
+await drawn(() => press("ArrowLeft"));
+result.left = data.frame;
+result.taken = !press("Space", root.querySelector(".colour"));
+await scrub(0);
+press("Space");
+result.playing = root.querySelector(".play").textContent;
+await until(() => data.frame !== "0");
+press("Space");
+result.stopped = root.querySelector(".play").textContent;
+result.keys = root.querySelector(".keys").hidden;
+result.titles = [...root.querySelectorAll(".layers label")].filter((label) => !label.title).length;
+report(result);
+"#;
+    let of = visit(&viewer(root.path()), "", script);
+    assert_eq!((&of["from"], &of["right"], &of["left"]), (&"6".into(), &"8".into(), &"6".into()));
+    assert_eq!(
+        (&of["taken"], &of["keys"], &of["titles"]),
+        (&false.into(), &false.into(), &0.into())
+    );
+    assert_eq!((&of["playing"], &of["stopped"]), (&"❚❚".into(), &"▶".into()), "{of}");
+}
+
+#[dynvox_needs::browser]
+#[test]
 fn an_address_chooses_the_frame_and_a_phone_shows_it_whole() {
     let root = TempDir::new().unwrap();
     FakeRun { frames: 12, objects: 2, squares: 60, pictures: true }.write(root.path());

@@ -5,7 +5,8 @@ use crate::report::text::{MIB, counted, grouped};
 use crate::run::RunRecord;
 use maud::{Markup, html};
 
-pub fn section(run: &RunRecord) -> Markup {
+/// Name of the run and warnings: what stands above the map.
+pub fn title(run: &RunRecord) -> Markup {
     let (plan, (width, height)) = (&run.plan, run.plan.dataset.size());
     html! {
         h1 { (plan.dataset.name()) }
@@ -17,10 +18,15 @@ pub fn section(run: &RunRecord) -> Markup {
         @if let Some(incomplete) = &run.incomplete { p { b { "Incomplete: " (incomplete.reason) } } }
         @for warning in &plan.warnings { p { b { "Warning: " (warning) } } }
         @if let Some(warning) = poor_map::sentence(run) { p { b { "Warning: " (warning) } } }
-        @if !plan.dataset.notes().is_empty() {
-            ul.soft.small { @for note in plan.dataset.notes() { li { (note) } } }
-        }
+    }
+}
+
+/// Figures that a reader looks for first, and notes on the input.
+pub fn figures(run: &RunRecord) -> Markup {
+    let notes = run.plan.dataset.notes();
+    html! {
         div.cards { @for (value, name) in cards(run) { div.card { b { (value) } span { (name) } } } }
+        @if !notes.is_empty() { ul.soft.small { @for note in notes { li { (note) } } } }
     }
 }
 

@@ -65,7 +65,7 @@ fn bounds_table(run: &RunRecord) -> Vec<Vec<String>> {
 
 fn regions(run: &RunRecord) -> Markup {
     html! {
-        div.scroll { table {
+        div.scroll tabindex="0" role="region" aria-label="table" { table {
             tr { th { "region" } th.n { "bytes" } th.n { "used" } th.n { "peak" } th { "peak share" } }
             @for region in &run.sections.blocks.regions {
                 tr {

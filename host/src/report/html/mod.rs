@@ -42,8 +42,9 @@ pub fn page(title: &str, content: &Markup) -> Markup {
 pub fn write(out: &mut impl Write, run: &RunRecord, viewer: &Markup) -> io::Result<()> {
     // From what a reader asks first to what explains a fault.
     let content = html! {
-        (head::section(run))
+        (head::title(run))
         (viewer)
+        (head::figures(run))
         (trajectory::section(run))
         (pictures::section(run))
         (reference::section(run))
@@ -85,7 +86,7 @@ fn image(jpeg: &[u8], alt: &str) -> Markup {
 /// then rows of cells.
 fn table(heads: &[(&str, bool)], rows: &[Vec<String>]) -> Markup {
     html! {
-        div.scroll { table {
+        div.scroll tabindex="0" role="region" aria-label="table" { table {
             tr { @for (head, number) in heads { th.n[*number] { (head) } } }
             @for row in rows {
                 tr { @for (cell, (_, number)) in row.iter().zip(heads) { td.n[*number] { (cell) } } }

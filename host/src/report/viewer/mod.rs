@@ -106,7 +106,7 @@ fn panels(folder: &Path) -> Markup {
     html! {
         div #dynvox-viewer .viewer {
             div.view {
-                canvas tabindex="0" aria-label="map: drag to turn, wheel to zoom, right button or \
+                canvas tabindex="0" role="img" aria-label="map: drag to turn, wheel to zoom, right button or \
                     two fingers to move, W A S D Q E to fly" {}
                 figure.still {
                     @if let Some(jpeg) = &overview { img alt="the finished map from behind and \
@@ -137,8 +137,8 @@ fn panels(folder: &Path) -> Markup {
                 div.legend hidden { span.low {} i {} span.high {} }
                 div.note {}
             }
-            div.side hidden {
-                figure { canvas.left aria-label="left image with masks and \
+            div.side hidden tabindex="0" role="region" aria-label="pictures" {
+                figure { canvas.left role="img" aria-label="left image with masks and \
                     tracks" {} figcaption { "left image, masks and tracks" } }
                 figure { img.disparity alt="disparity"; figcaption { "disparity" } }
                 figure { img.map alt="the map from the camera's \
@@ -148,6 +148,11 @@ fn panels(folder: &Path) -> Markup {
                 button.play type="button" aria-label="play" { "▶" }
                 input.slider type="range" min="0" value="0" aria-label="frame";
                 output {}
+            }
+            p.keys hidden {
+                kbd { "Space" } " plays, " kbd { "←" } " " kbd { "→" } " step, " kbd { "F" }
+                " fills the screen. On the map: drag turns, the wheel zooms, the right button or \
+                 two fingers move, " kbd { "W A S D Q E" } " fly."
             }
             div.charts hidden {}
         }

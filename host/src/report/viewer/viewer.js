@@ -13,6 +13,18 @@ const SWEPT_BOXES = 24;
 const BOX_EDGES = [0, 1, 2].flatMap((bit) => [0, 1, 2, 3, 4, 5, 6, 7].filter((corner) => !(corner >> bit & 1)).map((corner) => [corner, corner | 1 << bit]));
 // Drawing slower than this, ms, draws coarser triangles, and then fewer pixels, until nothing moves.
 const SLOW_MS = 40;
+// Layers in a sentence each, for those whose name does not say it all.
+const LAYER_TITLES = {
+  map: "Surface of everything that stands still",
+  dynamic: "Objects known to move, at their pose in this frame", static: "Objects known to stand still", uncertain: "Objects whose motion is not known yet",
+  later: "Objects that are gone, where they were last seen",
+  tracks: "Path of each object",
+  swept: "Boxes that an object filled along its path",
+  pruned: "Parts of the map that were removed because they were seldom seen",
+  planning: "Cells that a planner takes for occupied",
+  masks: "Pixels of objects in the left image",
+  camera: "Path of the camera, and its view in this frame", truth: "Path that the camera truly took",
+};
 // Meshes of more triangles have coarse ones as well.
 const COARSE_OVER = 60000;
 
@@ -67,6 +79,7 @@ class Viewer {
       layers[key] = there && checked;
       if (!there) continue;
       const label = document.createElement("label"), box = document.createElement("input");
+      label.title = LAYER_TITLES[key] || "";
       Object.assign(box, { type: "checkbox", checked, value: key });
       box.addEventListener("change", () => { layers[key] = box.checked; this.show(); });
       label.append(box, ` ${text}`);
@@ -126,7 +139,23 @@ class Viewer {
       playing = setInterval(() => { if (this.at >= last) stop(); else this.go(this.at + 1); }, 100);
     });
     find(".time").hidden = last < 1;
+    find(".keys").hidden = false;
+    document.addEventListener("keydown", (event) => this.key(event, play));
     window.addEventListener("resize", () => this.show());
+  }
+
+  // Space plays, arrows step, F fills the screen; keys of a control are its own.
+  key(event, play) {
+    const isTaken = event.target.closest?.("input, select, button, summary, a, textarea");
+    if (isTaken || event.ctrlKey || event.metaKey || event.altKey) return;
+    const actions = {
+      Space: () => play.click(),
+      ArrowLeft: () => this.go(this.at - 1), ArrowRight: () => this.go(this.at + 1),
+      KeyF: () => (document.fullscreenElement ? document.exitFullscreen() : find(".view").requestFullscreen?.()),
+    };
+    if (!actions[event.code]) return;
+    event.preventDefault();
+    actions[event.code]();
   }
 
   buildView() {
