@@ -267,7 +267,13 @@ impl Egomotion {
             (self.t_world_camera * self.t_current_previous.inverse()).normalized();
     }
 
-    fn refer_to_last(&mut self) {
+    /// Tells that a motion was estimated or given since the camera began.
+    pub(crate) fn has_moved(&self) -> bool {
+        self.motion_s > 0.0 || self.t_current_previous != Transform::IDENTITY
+    }
+
+    /// Makes the last frame the one that matches are sought with, also if its pose is a guess.
+    pub(crate) fn refer_to_last(&mut self) {
         (self.t_world_reference, self.since_reference, self.reference_s) =
             (self.t_world_camera, 0, 0.0);
     }

@@ -17,7 +17,7 @@ use crate::{
     invariants::Invariants,
     objects::{NoSink, ObjectSink},
     rectify::Pair,
-    scene_flow::{FlowReport, Match},
+    scene_flow::{FlowReport, FlowStatus, Match},
     segmentation::SegmentationReport,
     state::Hasher,
     stereo::StereoReport,
@@ -279,10 +279,7 @@ impl Mapper<'_> {
             allocation,
             prune,
         } = outcome;
-        // A lost frame is skipped as a reference: the next one is matched with the last good one.
-        if self.localization.camera.since_reference() > 0 {
-            self.scene_flow.keep_previous();
-        }
+        self.choose_reference(&scene_flow);
         // Free space seen from a guessed pose would free the wrong cells.
         if fused {
             self.observe_free_space(&camera.t_world_camera, ground);
@@ -312,6 +309,22 @@ impl Mapper<'_> {
         };
         self.frame += 1;
         report
+    }
+
+    /// Chooses the frame that the next one is matched with: the last one, unless its pose is a
+    /// guess. A reference that shows little, such as a first image taken in the dark, gives way to
+    /// a frame that shows more.
+    fn choose_reference(&mut self, scene_flow: &FlowReport) {
+        let camera = &mut self.localization.camera;
+        if camera.since_reference() == 0 {
+            return;
+        }
+        let is_matched = scene_flow.status == FlowStatus::Matched;
+        if is_matched && !camera.has_moved() && self.scene_flow.is_much_richer() {
+            camera.refer_to_last();
+        } else {
+            self.scene_flow.keep_previous();
+        }
     }
 
     /// Number of conditions that must hold after a frame and do not.

@@ -2,6 +2,7 @@
 
 use super::{
     SceneFlowConfig,
+    exposure::{Gain, brightness, multiply},
     features::{Features, table},
     filter::{COLUMN_SUMS, Responses, filter},
     strongest::{CandidateSlot, Strongest, lists},
@@ -34,6 +35,13 @@ pub(super) struct Frame<'s> {
     pub pixels: &'s mut [u8],
     pub dense: Features<'s>,
     pub sparse: Features<'s>,
+}
+
+/// An image that comes in.
+pub(super) struct Incoming<'a> {
+    pub image: View<'a, u8>,
+    /// True if it can be matched with the one before.
+    pub follows: bool,
 }
 
 /// One camera.
@@ -130,9 +138,10 @@ impl<'s> Camera<'s> {
     }
 
     /// Makes the current frame the previous one and takes in an image no larger than the capacity.
+    /// If an image of that size came before, both are brought to one brightness.
     pub(super) fn take(
         &mut self,
-        image: View<'_, u8>,
+        Incoming { image, follows }: Incoming<'_>,
         invalid: Option<&InvalidPixels<'_>>,
         config: &SceneFlowConfig,
         vectors: Vectors,
@@ -145,7 +154,37 @@ impl<'s> Camera<'s> {
         for (copied, row) in frame.pixels.chunks_exact_mut(width.max(1)).zip(image.rows()) {
             copied.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
         }
+        let gain = if follows { self.multiply_darker([width, height]) } else { Gain::None };
+        if matches!(gain, Gain::Previous(_)) {
+            // What is found in the image before changed with it.
+            self.current = !self.current;
+            self.describe([width, height], invalid, config, vectors);
+            self.current = !self.current;
+        }
         self.describe([width, height], invalid, config, vectors)
+    }
+
+    /// Brings the darker of both images to the brightness of the other.
+    fn multiply_darker(&mut self, [width, height]: [usize; 2]) -> Gain {
+        let pixels = width * height;
+        let [a, b] = &mut self.frames;
+        let (previous, current) = if self.current { (a, b) } else { (b, a) };
+        let [before, now] = [&*previous, &*current]
+            .map(|frame| View::new(frame.pixels, width, height).map_or(0, brightness));
+        let gain = Gain::from_brightness(before, now, pixels);
+        let (frame, gain_q8) = match gain {
+            Gain::None => return gain,
+            Gain::Previous(gain_q8) => (previous, gain_q8),
+            Gain::Current(gain_q8) => (current, gain_q8),
+        };
+        multiply(frame.pixels.get_mut(..pixels).unwrap_or_default(), gain_q8);
+        gain
+    }
+
+    /// Returns true if the current image has more than twice the features of the previous one.
+    pub(super) fn is_much_richer(&self) -> bool {
+        let (previous, current) = self.frames();
+        current.dense.len() > 2 * previous.dense.len()
     }
 
     /// Makes the previous frame the current one again: the next image overwrites the last one.

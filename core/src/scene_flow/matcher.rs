@@ -5,7 +5,7 @@ mod passes;
 use super::{
     SceneFlowConfig,
     bucket::{Scored, select},
-    camera::{Camera, Names},
+    camera::{Camera, Incoming, Names},
     cells::{Cells, Shape},
     matches::Match,
     prior::Prior,
@@ -211,6 +211,12 @@ impl<'s> FlowMatcher<'s> {
         self.right.forget_current();
     }
 
+    /// Returns true if both images of the last frame have more than twice the features of those it
+    /// was matched with.
+    pub(crate) fn is_much_richer(&self) -> bool {
+        self.left.is_much_richer() && self.right.is_much_richer()
+    }
+
     /// Forgets the last frame: the next one is a first one.
     pub fn reset(&mut self) {
         self.last = None;
@@ -314,10 +320,11 @@ impl<'s> FlowMatcher<'s> {
         // The two cameras' features are found at the same time.
         let [invalid_left, invalid_right] =
             [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
-        let vectors = executor.vectors();
+        let (vectors, follows) = (executor.vectors(), self.last == Some(size));
+        let incoming = |image| Incoming { image, follows };
         let (left, right) = executor.join(
-            || self.left.take(left, invalid_left, config, vectors),
-            || self.right.take(right, invalid_right, config, vectors),
+            || self.left.take(incoming(left), invalid_left, config, vectors),
+            || self.right.take(incoming(right), invalid_right, config, vectors),
         );
         let mut report = FlowReport { left, right, ..FlowReport::default() };
         // A first frame has nothing to be matched with.

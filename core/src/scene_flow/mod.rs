@@ -38,6 +38,7 @@ mod camera;
 mod cells;
 mod circle;
 mod config;
+mod exposure;
 mod features;
 mod filter;
 mod matcher;

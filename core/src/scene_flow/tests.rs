@@ -1,3 +1,4 @@
+mod exposure;
 mod matching;
 
 use super::{
