@@ -1,7 +1,7 @@
 //! The motion estimate.
 
 use super::{
-    EgomotionConfig,
+    EgomotionConfig, MotionCovariance,
     normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
     synchrony::RightAhead,
@@ -45,7 +45,7 @@ pub enum MotionStatus {
 }
 
 /// A motion, or why it could not be estimated.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -61,6 +61,9 @@ pub struct MotionEstimate {
     pub inliers: u32,
     /// Root mean square error of one coordinate over the inliers, px.
     pub residual_rms_px: f64,
+    /// Covariance of the motion, in the current camera's frame; `None` unless `status` is
+    /// `Estimated`. It holds the noise of the inliers as measured, and what all of them share.
+    pub covariance: Option<MotionCovariance>,
     /// Hypotheses drawn.
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
@@ -79,6 +82,7 @@ impl MotionEstimate {
             matches: matches as u32,
             inliers: inliers as u32,
             residual_rms_px: 0.0,
+            covariance: None,
             samples,
             steps: 0,
             right_ahead: None,
@@ -195,6 +199,7 @@ impl<'s> Estimator<'s> {
         MotionEstimate {
             status: MotionStatus::Estimated,
             t_current_previous: Some(motion),
+            covariance: self.covariance(config, rig, &motion),
             ..estimate
         }
     }
@@ -278,6 +283,22 @@ impl<'s> Estimator<'s> {
             }
         }
         None
+    }
+
+    /// The covariance of a refined motion, with the weights of its refinement.
+    fn covariance(
+        &self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        motion: &Transform,
+    ) -> Option<MotionCovariance> {
+        let matrix = RotationMatrix::new(motion);
+        let weighted = self.inlier_points().map(|point| {
+            let mut one = NormalEquations::ZERO;
+            one.add(&point, &matrix, rig, |_| 1.0);
+            (point, side_weight(config, rig, &point) * robust_weight(config, one.error))
+        });
+        MotionCovariance::from_points(motion, rig, weighted)
     }
 
     fn inlier_points(&self) -> impl Iterator<Item = Point> {

@@ -44,6 +44,7 @@
 //! ```
 
 mod config;
+mod covariance;
 mod estimate;
 pub mod icp;
 mod normal_equations;
@@ -52,6 +53,7 @@ mod synchrony;
 mod track;
 
 pub use config::EgomotionConfig;
+pub use covariance::MotionCovariance;
 pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};
 pub use synchrony::RightAhead;
 pub use track::{Egomotion, MAX_REFERENCE_FRAMES, TimedMatches};

@@ -136,6 +136,36 @@ impl NormalEquations {
         self.solve_for(self.vector.map(|x| -x))
     }
 
+    /// Slope of the error: J'r.
+    pub(super) fn vector(&self) -> [f64; N] {
+        self.vector
+    }
+
+    /// Adds the sums of other points.
+    pub(super) fn merge(&mut self, other: &Self) {
+        for (row, from) in self.matrix.iter_mut().zip(&other.matrix) {
+            row.iter_mut().zip(from).for_each(|(sum, one)| *sum += one);
+        }
+        self.vector.iter_mut().zip(other.vector).for_each(|(sum, one)| *sum += one);
+        self.error += other.error;
+        self.weight += other.weight;
+    }
+
+    /// The covariance of the step to the minimum, from that of the slope (symmetric): both sides
+    /// multiplied by the inverse of the sums' matrix. `None` where it has none.
+    pub(super) fn sandwich(&self, slope: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
+        let mut half = [[0.0; N]; N];
+        for (row, from) in half.iter_mut().zip(slope) {
+            *row = self.solve_for(*from)?;
+        }
+        // Rows of the half are solutions; its columns are what remains to be solved for.
+        let mut whole = [[0.0; N]; N];
+        for (at, row) in whole.iter_mut().enumerate() {
+            *row = self.solve_for(half.map(|row| row.get(at).copied().unwrap_or_default()))?;
+        }
+        Some(whole)
+    }
+
     /// Solves the sums' matrix for `right`.
     #[expect(clippy::indexing_slicing, reason = "all indices run below N, the length of every row")]
     fn solve_for(&self, right: [f64; N]) -> Option<[f64; N]> {

@@ -110,7 +110,8 @@ impl Egomotion {
             .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
         // A motion that no camera can make is not taken, however many matches agree.
         if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
-            estimate = MotionEstimate { status, t_current_previous: None, ..estimate };
+            estimate =
+                MotionEstimate { status, t_current_previous: None, covariance: None, ..estimate };
         }
         // A pose is chained to its reference frame, so that guesses in between leave no trace.
         match (&estimate.t_current_previous, motion) {

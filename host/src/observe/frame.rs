@@ -4,7 +4,7 @@ use super::DepthCensus;
 use crate::formats::shown_pose;
 use crate::input::MaskRefusals;
 use dynvox_core::egomotion::icp::IcpStatus;
-use dynvox_core::egomotion::{MotionStatus, RightAhead};
+use dynvox_core::egomotion::{MotionCovariance, MotionStatus, RightAhead};
 use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::rectify::self_calibration::SelfCalibrationReport;
 use dynvox_core::view::RaycastView;
@@ -115,6 +115,11 @@ impl FrameRow {
     /// Distance of the right camera ahead of its place, where matches show it.
     pub fn right_ahead(&self) -> Option<RightAhead> {
         self.report.egomotion.and_then(|motion| motion.right_ahead)
+    }
+
+    /// Covariance of the camera's motion, where it was estimated from matches.
+    pub fn motion_sigma(&self) -> Option<MotionCovariance> {
+        self.report.egomotion.and_then(|motion| motion.covariance)
     }
 
     /// Findings of self-calibration, where enough is known.

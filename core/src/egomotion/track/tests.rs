@@ -30,6 +30,7 @@ fn estimated(inliers: u32) -> MotionEstimate {
         matches: 100,
         inliers,
         residual_rms_px: 0.5,
+        covariance: None,
         samples: 3,
         steps: 9,
         right_ahead: None,

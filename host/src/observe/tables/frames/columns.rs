@@ -53,6 +53,27 @@ static POSE: &[FrameColumn] = &[
     column("residual_px", "px", "RMS error of the inliers", |row| {
         Cell::rounded(row.matches().2, 4)
     }),
+    column("motion_sigma_right_m", "m", "standard deviation of the motion to the right", |row| {
+        Cell::if_known(row.motion_sigma().map(|sigma| sigma.translation_sigma_m()[0]), 5)
+    }),
+    column("motion_sigma_down_m", "m", "standard deviation of the motion downwards", |row| {
+        Cell::if_known(row.motion_sigma().map(|sigma| sigma.translation_sigma_m()[1]), 5)
+    }),
+    column("motion_sigma_ahead_m", "m", "standard deviation of the motion ahead", |row| {
+        Cell::if_known(row.motion_sigma().map(|sigma| sigma.translation_sigma_m()[2]), 5)
+    }),
+    column("motion_sigma_pitch_rad", "rad", "standard deviation of the turn up or down", |row| {
+        Cell::if_known(row.motion_sigma().map(|sigma| sigma.rotation_sigma_rad()[0]), 7)
+    }),
+    column("motion_sigma_yaw_rad", "rad", "standard deviation of the turn to a side", |row| {
+        Cell::if_known(row.motion_sigma().map(|sigma| sigma.rotation_sigma_rad()[1]), 7)
+    }),
+    column(
+        "motion_sigma_roll_rad",
+        "rad",
+        "standard deviation of the turn about the view",
+        |row| Cell::if_known(row.motion_sigma().map(|sigma| sigma.rotation_sigma_rad()[2]), 7),
+    ),
     column(
         "right_ahead_m",
         "m",

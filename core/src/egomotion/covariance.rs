@@ -1,0 +1,186 @@
+//! Covariance of a motion, from the inliers' errors as measured and from their geometry.
+//!
+//! Each inlier pulls at the motion by its own error; at rest the pulls cancel, and their spread is
+//! what the motion may be off by (Huber's sandwich estimator). No noise is assumed: rain or blurred
+//! images make errors larger, and far points alone make their effect larger. Errors that all
+//! matches share cancel in no sum and show in no residual, so that they are added by name.
+
+use super::{
+    normal_equations::{NormalEquations, RotationMatrix},
+    points::Point,
+};
+use crate::geometry::{StereoRig, Transform};
+
+const N: usize = 6;
+/// Entries of the lower half of a matrix of six rows.
+const ENTRIES: usize = N * (N + 1) / 2;
+/// Factor on the spread: neighbouring matches, and both images of one, err alike.
+const SPREAD: f64 = 1.5;
+/// Standard deviation of what all matches share, px: columns of both images, rows of both, and
+/// columns of the left image alone.
+const SHARED_PX: [f64; 3] = [0.03, 0.03, 0.02];
+/// Standard deviation of the rig's scale: baseline and focal length.
+const SCALE_SHARE: f64 = 0.005;
+
+/// Covariance of a rotation (rad) and a translation (m), in the current camera's frame: x to the
+/// right, y down, z ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MotionCovariance {
+    /// Lower half, row by row: three rows of the rotation vector, three of the translation.
+    lower: [f64; ENTRIES],
+}
+
+impl MotionCovariance {
+    /// Covariance of a motion that is known.
+    pub const ZERO: Self = Self { lower: [0.0; ENTRIES] };
+
+    /// Derives the covariance of `motion` from the points it explains, each with its weight. `None`
+    /// if they do not determine one.
+    pub(super) fn from_points(
+        motion: &Transform,
+        rig: &StereoRig,
+        points: impl Iterator<Item = (Point, f64)>,
+    ) -> Option<Self> {
+        let matrix = RotationMatrix::new(motion);
+        let mut sums = NormalEquations::ZERO;
+        let mut spread = [[0.0; N]; N];
+        let mut shared = [[0.0; N]; SHARED_PX.len()];
+        for (point, weight) in points {
+            let mut one = NormalEquations::ZERO;
+            one.add(&point, &matrix, rig, |_| weight);
+            let pull = one.vector();
+            // Two matches of one corner err together; the factor stands for that.
+            add_outer(&mut spread, pull, SPREAD * SPREAD);
+            // What the shared errors change in the pulls, had every point been seen so.
+            for (sum, shifted) in shared.iter_mut().zip(shifts(&point)) {
+                let mut seen = NormalEquations::ZERO;
+                seen.add(&shifted, &matrix, rig, |_| weight);
+                sum.iter_mut().zip(seen.vector()).zip(pull).for_each(|((s, m), p)| *s += m - p);
+            }
+            sums.merge(&one);
+        }
+        for pull in shared {
+            add_outer(&mut spread, pull, 1.0);
+        }
+        let mut covariance = sums.sandwich(&spread)?;
+        // A wrong scale lengthens the way that was driven.
+        let [x, y, z] = motion.translation_m;
+        add_outer(&mut covariance, [0.0, 0.0, 0.0, x, y, z], SCALE_SHARE * SCALE_SHARE);
+        Some(Self::from_matrix(&covariance))
+    }
+
+    /// Covariance from a symmetric matrix (its lower half counts): rotation vector (rad),
+    /// then translation (m).
+    pub fn from_matrix(matrix: &[[f64; N]; N]) -> Self {
+        let mut entries = (1..).zip(matrix).flat_map(|(len, row)| row.iter().take(len));
+        Self { lower: core::array::from_fn(|_| entries.next().copied().unwrap_or_default()) }
+    }
+
+    /// Symmetric matrix: rotation vector (rad), then translation (m).
+    pub fn matrix(&self) -> [[f64; N]; N] {
+        core::array::from_fn(|row| core::array::from_fn(|column| self.entry(row, column)))
+    }
+
+    /// Standard deviations of the rotation about the current camera's axes, rad.
+    pub fn rotation_sigma_rad(&self) -> [f64; 3] {
+        core::array::from_fn(|axis| libm::sqrt(self.entry(axis, axis)))
+    }
+
+    /// Standard deviations of the translation along the current camera's axes, m: to the right,
+    /// down, ahead.
+    pub fn translation_sigma_m(&self) -> [f64; 3] {
+        core::array::from_fn(|axis| libm::sqrt(self.entry(axis + 3, axis + 3)))
+    }
+
+    /// Standard deviation of the position, over all directions, m.
+    pub fn distance_sigma_m(&self) -> f64 {
+        libm::sqrt((3..N).map(|axis| self.entry(axis, axis)).sum())
+    }
+
+    /// Standard deviation of the orientation, over all axes, rad.
+    pub fn angle_sigma_rad(&self) -> f64 {
+        libm::sqrt((0..3).map(|axis| self.entry(axis, axis)).sum())
+    }
+
+    /// Covariance of a pose after a motion, whose own covariance this is, from that of the pose
+    /// `before` it. Errors of both count as independent.
+    ///
+    /// ```
+    /// use dynvox_core::{egomotion::MotionCovariance, geometry::Transform};
+    ///
+    /// // Yaw (about the axis that points down) is known within 0.01 rad, ten metres ago.
+    /// let mut matrix = [[0.0; 6]; 6];
+    /// matrix[1][1] = 1e-4;
+    /// let ahead = Transform::from_translation([0.0, 0.0, -10.0]);
+    /// let pose = MotionCovariance::ZERO.after(&MotionCovariance::from_matrix(&matrix), &ahead);
+    /// let [right_m, _, ahead_m] = pose.translation_sigma_m();
+    /// assert!((right_m - 0.1).abs() < 1e-9 && ahead_m == 0.0);
+    /// ```
+    #[must_use]
+    pub fn after(&self, before: &Self, t_current_previous: &Transform) -> Self {
+        let [a, b, c] = t_current_previous.rotation_matrix();
+        // An error of orientation swings the way driven since; the way starts at the camera before.
+        let [x, y, z] = t_current_previous.translation_m;
+        let swing = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+        let rotation = [a, b, c];
+        let turned: [[f64; 3]; 3] = swing.map(|row| {
+            core::array::from_fn(|to| {
+                row.iter().zip(rotation).map(|(factor, from)| factor * pick(&from, to)).sum()
+            })
+        });
+        // Rows of the change: rotation, then translation.
+        let change: [[f64; N]; N] = core::array::from_fn(|row| {
+            core::array::from_fn(|column| match (row < 3, column < 3) {
+                (true, true) => entry_of(&rotation, row, column),
+                (true, false) => 0.0,
+                (false, true) => entry_of(&turned, row - 3, column),
+                (false, false) => entry_of(&rotation, row - 3, column - 3),
+            })
+        });
+        let (before, mut sum) = (before.matrix(), self.matrix());
+        for (sums, row) in sum.iter_mut().zip(&change) {
+            let carried = before.map(|from| dot(row, &from));
+            sums.iter_mut().zip(&change).for_each(|(s, other)| *s += dot(&carried, other));
+        }
+        Self::from_matrix(&sum)
+    }
+
+    fn entry(&self, row: usize, column: usize) -> f64 {
+        let (high, low) = if row < column { (column, row) } else { (row, column) };
+        self.lower.get(high * (high + 1) / 2 + low).copied().unwrap_or_default()
+    }
+}
+
+/// The point as it would be seen with each of the shared errors.
+fn shifts(point: &Point) -> [Point; SHARED_PX.len()] {
+    let [columns, rows, left] = SHARED_PX;
+    let shifted = |left_u: f64, right_u: f64, v: f64| Point {
+        left: [point.left[0] + left_u, point.left[1] + v],
+        right: [point.right[0] + right_u, point.right[1] + v],
+        ..*point
+    };
+    [shifted(columns, columns, 0.0), shifted(0.0, 0.0, rows), shifted(left, 0.0, 0.0)]
+}
+
+fn add_outer(sum: &mut [[f64; N]; N], vector: [f64; N], factor: f64) {
+    for (row, a) in sum.iter_mut().zip(vector) {
+        row.iter_mut().zip(vector).for_each(|(entry, b)| *entry += factor * a * b);
+    }
+}
+
+fn dot(a: &[f64; N], b: &[f64; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn pick(row: &[f64; 3], at: usize) -> f64 {
+    row.get(at).copied().unwrap_or_default()
+}
+
+fn entry_of(matrix: &[[f64; 3]; 3], row: usize, column: usize) -> f64 {
+    matrix.get(row).map_or(0.0, |row| pick(row, column))
+}
+
+#[cfg(test)]
+mod tests;
