@@ -1,5 +1,6 @@
 //! Quality of a run, where the truth is known.
 
+pub mod certainty;
 pub mod faults;
 pub mod histogram;
 pub mod masks;

@@ -1,13 +1,10 @@
 //! `dynvox evaluate faults`.
 
+use super::mapped::each_report;
 use crate::cli::run;
 use crate::evaluate::faults::{EvaluatedFrame, FaultOutcome};
-use crate::input::InstanceMask;
 use crate::request::{Plan, Request};
-use crate::run::{Threads, stereo_frame};
 use anyhow::{Context, bail};
-use dynvox_core::memory::SLAB_ALIGN;
-use dynvox_core::{Mapper, StereoFrame};
 use serde::Serialize;
 
 #[derive(Debug, clap::Args)]
@@ -137,36 +134,16 @@ fn outcome(request: &Request, fault: &str, at: usize) -> anyhow::Result<FaultOut
 
 /// Maps the frames of a plan and puts the truth beside each.
 fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
-    let Some(truth) = plan.dataset.truth() else {
-        bail!(
-            "{} has no true poses. Give a data set that has, or none for the synthetic street",
-            plan.dataset.name()
-        );
-    };
-    let mut slab = vec![0; plan.capacity.bytes() + SLAB_ALIGN];
-    let mut mapper = Mapper::new(&plan.capacity, &plan.config, &mut slab)?;
-    let threads = Threads::new(plan.threads)?;
     let mut frames = Vec::new();
-    for (_, index) in plan.frames.from_position(0) {
-        let images = plan.dataset.frame(index)?;
-        let detections: Vec<_> =
-            images.masks.instances.iter().map(InstanceMask::detection).collect();
-        let (Some(frame), Some(&true_pose)) =
-            (stereo_frame(&images, &detections), truth.get(index))
-        else {
-            bail!("frame {index} has no images or no true pose. Choose other frames with --frames");
-        };
-        let frame = StereoFrame { time_ns: plan.dataset.stamp_ns(index), ..frame };
-        // A frame whose time stamp goes back is refused, and nothing is mapped of it.
-        let Ok(report) = threads.run(|| mapper.step(&frame, &threads)) else { continue };
+    each_report(plan, |report, true_t_world_camera| {
         frames.push(EvaluatedFrame {
             t_world_camera: report.t_world_camera,
-            true_t_world_camera: true_pose,
+            true_t_world_camera: *true_t_world_camera,
             pose: report.pose,
             severity: report.severity(),
             fused: report.fused,
             segment: report.segment.get().into(),
         });
-    }
+    })?;
     Ok(frames)
 }

@@ -1,7 +1,9 @@
 //! `dynvox evaluate`: figures from files, without a run.
 
+mod certainty;
 mod faults;
 mod flight;
+mod mapped;
 mod masks;
 mod stereo;
 mod trajectory;
@@ -20,6 +22,8 @@ enum Subject {
     Stereo(stereo::StereoArgs),
     /// Evaluate instance masks against true ones: IoU mask by mask, and recall
     Masks(masks::MasksArgs),
+    /// Compare the errors of motions and poses with the sigmas that are told of them
+    Certainty(certainty::CertaintyArgs),
     /// Map with one fault after the other and say what is reported of each
     Faults(faults::FaultsArgs),
     /// Fly through the synthetic street on what the map tells an autopilot, and count collisions
@@ -31,6 +35,7 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         Subject::Trajectory(args) => trajectory::run(args),
         Subject::Stereo(args) => stereo::run(args),
         Subject::Masks(args) => masks::run(args),
+        Subject::Certainty(args) => certainty::run(args),
         Subject::Faults(args) => faults::run(args),
         Subject::Flight(args) => flight::run(args),
     }
