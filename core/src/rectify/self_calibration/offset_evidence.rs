@@ -94,8 +94,10 @@ impl FrameEvidence {
             return true;
         };
         let sigma_px = 1.0 / libm::sqrt(filter.information);
-        // True for NaN as well.
-        !(libm::fabs(filter.px - witness.px) <= PULL_MAX_PX + PULL_MAX_SIGMAS * sigma_px)
+        let bound_px = PULL_MAX_PX + PULL_MAX_SIGMAS * sigma_px;
+        // NaN is a disturbance as well.
+        let agree = libm::fabs(filter.px - witness.px) <= bound_px;
+        !agree
     }
 }
 
