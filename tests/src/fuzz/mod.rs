@@ -51,7 +51,7 @@ pub const TARGETS: [Target; 17] = [
 ];
 
 /// The sizes that bound a mapper, to be made any number.
-pub fn sizes(of: &mut Capacity) -> [&mut usize; 18] {
+pub fn sizes(of: &mut Capacity) -> [&mut usize; 19] {
     [
         &mut of.image_width,
         &mut of.image_height,
