@@ -50,7 +50,7 @@ pub use mapper::{
     BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, Digested, LoadPlacesError,
     Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests, PoseOrigin, Report,
     RestoreError, SAVED_PLACES_HEADER_BYTES, Scale, SetError, Severity, StageDigests, StepError,
-    StereoFrame, saved_keyframes,
+    StereoFrame, WorkUnits, saved_keyframes,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial};

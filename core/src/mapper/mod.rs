@@ -23,6 +23,7 @@ mod static_map;
 mod step;
 #[cfg(test)]
 mod tests;
+mod work;
 
 pub use budget::{BudgetError, BudgetOptions, CapacityProblem, MAX_SIDE};
 pub use config::Config;
@@ -35,6 +36,7 @@ pub use scale::{SCALED_SETTINGS, Scale};
 pub use set::SetError;
 pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
+pub use work::WorkUnits;
 
 use clock::Clock;
 use localization::Localization;

@@ -1,6 +1,6 @@
 //! Report of one step, as plain values.
 
-use super::StageDigests;
+use super::{StageDigests, WorkUnits};
 use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
@@ -12,7 +12,7 @@ use crate::{
     segmentation::SegmentationReport,
     stereo::StereoReport,
     tracking::TrackingReport,
-    volume::{AllocationReport, PruneReport},
+    volume::{AllocationReport, BLOCK_VOXELS, PruneReport},
 };
 
 /// Severity of a step's events.
@@ -184,6 +184,9 @@ pub struct Report {
     pub prune: PruneReport,
     /// The static map's pool.
     pub blocks: BlockCount,
+    /// Work of the step, in units that are the same on every machine and for any number of threads.
+    /// No digest depends on it.
+    pub work: WorkUnits,
     /// Contradictions in what the core itself keeps: always 0, or the core has a fault.
     pub internal_faults: u32,
     /// Digests of what went in and of what each stage made of it.
@@ -256,6 +259,32 @@ impl Report {
             digest.finish()
         });
         Self { digests: StageDigests { input, ..self.digests }, rectify, digest, ..self }
+    }
+
+    /// The report with the units of work that its counts stand for. `fused` tells that the visible
+    /// blocks were updated.
+    pub(super) fn with_work(self, fused: bool) -> Self {
+        let Self { stereo, scene_flow: flow, allocate, prune, .. } = &self;
+        let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();
+        let voxels = |blocks: u32| u64::from(blocks) * BLOCK_VOXELS as u64;
+        let eviction = &allocate.eviction;
+        let work = WorkUnits {
+            stereo_pixels: u64::from(stereo.pixels),
+            support_candidates: u64::from(stereo.candidates),
+            triangles: sum(&[stereo.triangles_left, stereo.triangles_right]),
+            features: sum(&[
+                flow.left.dense,
+                flow.left.sparse,
+                flow.right.dense,
+                flow.right.sparse,
+            ]),
+            circles: sum(&[flow.sparse.closed, flow.dense.closed]),
+            block_requests: u64::from(allocate.requests),
+            moved_blocks: sum(&[eviction.stored, eviction.lost, eviction.empty, eviction.loaded]),
+            fused_voxels: voxels(if fused { self.blocks.visible } else { 0 }),
+            pruned_voxels: voxels(prune.visited),
+        };
+        Self { work, ..self }
     }
 
     /// Features and matches beyond the capacity.

@@ -3,7 +3,7 @@
 
 use super::{
     BlockCount, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report, StageDigests, StepError,
-    StereoFrame,
+    StereoFrame, WorkUnits,
     localization::{Localization, Located},
     matched::MatchedFrame,
     segmentation::Segmentation,
@@ -217,7 +217,7 @@ impl Mapper<'_> {
             allocation,
             prune,
         };
-        self.finish_frame(outcome)
+        self.finish_frame(outcome).with_work(fused)
     }
 
     /// Depth from the pair, unless it is given, and matches over this pair and the last: neither
@@ -303,6 +303,7 @@ impl Mapper<'_> {
             allocate: allocation,
             prune,
             blocks: self.block_count(),
+            work: WorkUnits::default(),
             internal_faults: self.check_invariants(),
             digests,
             digest: digests.whole(self.frame),

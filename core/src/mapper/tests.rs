@@ -12,6 +12,7 @@ mod rows;
 mod self_calibration;
 mod set;
 mod views;
+mod work;
 
 use super::*;
 use crate::{

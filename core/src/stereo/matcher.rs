@@ -76,7 +76,7 @@ impl core::fmt::Debug for StereoMatcher<'_> {
 }
 
 /// Support points there can be: one per candidate.
-const fn max_points(capacity: &Capacity) -> usize {
+pub(crate) const fn max_points(capacity: &Capacity) -> usize {
     support::candidates(capacity.image_width, CANDIDATE_STEP)
         * support::candidates(capacity.image_height, CANDIDATE_STEP)
 }

@@ -44,6 +44,8 @@ pub struct AllocationReport {
     pub beyond: u32,
     /// Visible blocks left out of the list because it was full.
     pub unlisted: u32,
+    /// Requests for blocks that rays ran through. A block may be requested more than once.
+    pub requests: u32,
     /// Most blocks the index had to compare to find one, or to find it missing.
     pub probes_most: u32,
     /// Blocks evicted for others, and blocks loaded again.
@@ -84,6 +86,7 @@ impl Volume<'_> {
         while !bands.iter().all(Band::is_done) {
             each(executor, bands.each_mut(), |band| rays.walk(band));
             for band in &mut bands {
+                report.requests += band.len() as u32;
                 band.drain().for_each(|block| self.request(block, base, store, &mut report));
             }
         }

@@ -48,6 +48,7 @@ pub(crate) use observed::ObservedDepth;
 pub use pool::{Full, Slot, SlotPool};
 pub use prune::PruneReport;
 pub use request::MAX_BLOCKS_PER_RAY;
+pub(crate) use request::PIXEL_STEP;
 pub use sampler::{Sampler, VoxelSample};
 pub use store::{BlockStore, EvictedBlock, EvictionReport, LoadedBlock, NoStore};
 pub(crate) use surroundings::{BLOCK, EDGE_Q8, Surroundings};

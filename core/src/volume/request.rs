@@ -20,7 +20,7 @@ pub const MAX_BLOCKS_PER_RAY: usize = 16 * 2 + 3;
 /// Rows and columns from one pixel whose ray is walked to the next, where a block is narrower than
 /// [`WIDE_PX`]: at KITTI's focal length it is 14 px wide at 20 m. Twice as many from that width on,
 /// four times from twice that on (docs/decisions/0047-fewer-rays-where-blocks-are-wide.md).
-const PIXEL_STEP: usize = 2;
+pub(crate) const PIXEL_STEP: usize = 2;
 const WIDE_PX: f64 = 16.0;
 /// Entries of a band's cache, as a power of two, and of its list.
 const CACHE_BITS: u32 = 11;
@@ -120,6 +120,11 @@ impl Band<'_> {
     /// Returns true if all rows were walked and the list is empty.
     pub fn is_done(&self) -> bool {
         self.next[0] >= self.end && self.len == 0
+    }
+
+    /// Number of blocks in the list.
+    pub fn len(&self) -> usize {
+        self.len
     }
 
     /// Empties the list: the blocks met, relative to the camera's, in order. One may come twice.

@@ -6,7 +6,7 @@ use crate::observe::FrameRow;
 use std::borrow::Cow;
 
 /// All tables, in the order of the columns.
-pub(super) static TABLES: [&[FrameColumn]; 5] = [FRAME, POSE, INPUT, MAP, OBJECTS];
+pub(super) static TABLES: [&[FrameColumn]; 6] = [FRAME, POSE, INPUT, MAP, OBJECTS, WORK];
 
 type Of = fn(&FrameRow) -> Cell;
 
@@ -198,5 +198,42 @@ static OBJECTS: &[FrameColumn] = &[
     column("object_blocks", "", "blocks of all objects", |row| row.report.objects.blocks.into()),
     column("matches_excluded", "", "matches excluded from egomotion", |row| {
         row.report.tracking.matches_excluded.into()
+    }),
+];
+
+/// Units of work, the same on every machine.
+static WORK: &[FrameColumn] = &[
+    column("work_stereo_pixels", "", "pixels that stereo matched or took", |row| {
+        row.report.work.stereo_pixels.into()
+    }),
+    column(
+        "work_support_candidates",
+        "",
+        "support points looked for, each over all disparities",
+        |row| row.report.work.support_candidates.into(),
+    ),
+    column("work_triangles", "", "triangles of the support points of both images", |row| {
+        row.report.work.triangles.into()
+    }),
+    column("work_features", "", "features kept in both images, of both passes", |row| {
+        row.report.work.features.into()
+    }),
+    column("work_circles", "", "circles of matches that closed, of both passes", |row| {
+        row.report.work.circles.into()
+    }),
+    column("work_block_requests", "", "blocks looked up because a ray ran through them", |row| {
+        row.report.work.block_requests.into()
+    }),
+    column(
+        "work_moved_blocks",
+        "",
+        "blocks that left the pool for others, or were loaded",
+        |row| row.report.work.moved_blocks.into(),
+    ),
+    column("work_fused_voxels", "", "voxels of the blocks that the frame was fused into", |row| {
+        row.report.work.fused_voxels.into()
+    }),
+    column("work_pruned_voxels", "", "voxels of the blocks that pruning visited", |row| {
+        row.report.work.pruned_voxels.into()
     }),
 ];

@@ -1,0 +1,125 @@
+//! Work of a step, counted in units that depend on no clock, and the bound on each unit.
+//!
+//! A count is the same on every machine and for every number of threads. The bound on it follows
+//! from the capacity and the settings alone, like the bytes of [`Capacity::bytes`].
+
+use super::Config;
+use crate::{
+    Capacity, stereo,
+    volume::{BLOCK_VOXELS, MAX_BLOCKS_PER_RAY, PIXEL_STEP},
+};
+
+/// Triangles of a triangulation, at most so many per point.
+const TRIANGLES_PER_POINT: usize = 2;
+
+/// Units of work, by kind: of one step in a report, the most of any step in [`Capacity::work`].
+///
+/// Not counted yet, and without a bound here: descriptor distances, hypotheses of egomotion and
+/// segmentation, rays of raycasts, and the voxels of objects.
+///
+/// ```
+/// use dynvox_core::{Capacity, Config, geometry::StereoRig};
+///
+/// let rig = StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+/// let bound = Capacity::TINY.work(&Config::for_rig(rig));
+/// assert_eq!(bound.stereo_pixels, 320 * 96);
+/// assert_eq!(bound.fused_voxels, 512 * Capacity::TINY.visible_blocks as u64);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct WorkUnits {
+    /// Pixels that got or were given a disparity, or were looked at for one.
+    pub stereo_pixels: u64,
+    /// Support points looked for, each over the whole range of disparities.
+    pub support_candidates: u64,
+    /// Triangles of the support points of both images.
+    pub triangles: u64,
+    /// Features kept in both images, of both passes.
+    pub features: u64,
+    /// Circles of matches that closed, of both passes.
+    pub circles: u64,
+    /// Blocks looked up because a ray ran through them. A block that several rays meet may count
+    /// more than once.
+    pub block_requests: u64,
+    /// Blocks that left the pool for others, and blocks loaded from the store.
+    pub moved_blocks: u64,
+    /// Voxels of the blocks that a frame was fused into.
+    pub fused_voxels: u64,
+    /// Voxels of the blocks that pruning visited.
+    pub pruned_voxels: u64,
+}
+
+impl WorkUnits {
+    /// Number of units.
+    pub const COUNT: usize = 9;
+
+    /// Name and count of each unit, in pipeline order.
+    ///
+    /// ```
+    /// use dynvox_core::WorkUnits;
+    ///
+    /// assert_eq!(WorkUnits::default().named()[0], ("stereo_pixels", 0));
+    /// ```
+    pub const fn named(&self) -> [(&'static str, u64); Self::COUNT] {
+        let Self {
+            stereo_pixels,
+            support_candidates,
+            triangles,
+            features,
+            circles,
+            block_requests,
+            moved_blocks,
+            fused_voxels,
+            pruned_voxels,
+        } = *self;
+        [
+            ("stereo_pixels", stereo_pixels),
+            ("support_candidates", support_candidates),
+            ("triangles", triangles),
+            ("features", features),
+            ("circles", circles),
+            ("block_requests", block_requests),
+            ("moved_blocks", moved_blocks),
+            ("fused_voxels", fused_voxels),
+            ("pruned_voxels", pruned_voxels),
+        ]
+    }
+}
+
+impl Capacity {
+    /// The most units of work that any step of a mapper of this capacity does on any input.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, geometry::StereoRig};
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let config = Config::for_rig(rig);
+    /// let (tiny, small) = (Capacity::TINY.work(&config), Capacity::SMALL.work(&config));
+    /// assert!(tiny.named().iter().zip(small.named()).all(|(tiny, small)| tiny.1 <= small.1));
+    /// ```
+    pub fn work(&self, config: &Config) -> WorkUnits {
+        let points = stereo::max_points(self);
+        // The sparse pass keeps a quarter of what the dense one does.
+        let features = self.features + self.features / 4;
+        let rays = self.image_width.div_ceil(PIXEL_STEP) * self.image_height.div_ceil(PIXEL_STEP);
+        let requests = rays * MAX_BLOCKS_PER_RAY;
+        let pruned = self.blocks.min(config.volume.prune_blocks_per_frame as usize);
+        WorkUnits {
+            stereo_pixels: self.pixels() as u64,
+            support_candidates: points as u64,
+            // Of both images.
+            triangles: (2 * TRIANGLES_PER_POINT * points) as u64,
+            features: (2 * features) as u64,
+            // A feature of the previous left image begins one circle.
+            circles: features as u64,
+            block_requests: requests as u64,
+            // A request evicts one block at most, and loads one.
+            moved_blocks: (2 * requests) as u64,
+            fused_voxels: (self.visible_blocks * BLOCK_VOXELS) as u64,
+            pruned_voxels: (pruned * BLOCK_VOXELS) as u64,
+        }
+    }
+}
