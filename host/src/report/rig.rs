@@ -215,7 +215,7 @@ mod tests {
             }
         );
         assert_eq!(rig.row_correction, report.rows);
-        let first = CorrectionEvidence { sigma_px: 0.0313, frames: 12, way_m: 20.5 };
+        let first = CorrectionEvidence { sigma_px: 0.0312, frames: 12, way_m: 20.5 };
         assert_eq!(rig.correction_evidence, first);
         // A second run adds its own to it, unless it refuted it.
         let again = |report: &SelfCalibrationReport| {
