@@ -43,6 +43,7 @@ const PROMISES: &[(&str, &str)] = &[
     ("Rows of its images, px, at most", "bounds_beyond_their_limits_are_refused"),
     ("Widest raw image that is rectified, px, at most", "bounds_beyond_their_limits_are_refused"),
     ("Detections in one frame, at most 64", "bounds_beyond_their_limits_are_refused"),
+    ("Keyframes by which places are recognised, at most", "bounds_beyond_their_limits_are_refused"),
     ("Width of the planner's window, cells, at most", "bounds_beyond_their_limits_are_refused"),
     ("Nothing to say.", "a_frame_without_events_has_the_severity_info"),
     ("The upper left pixel; `stride` times", CALLER),
@@ -233,10 +234,11 @@ fn every_status_has_a_sentence_of_its_own() {
 
 #[test]
 fn bounds_beyond_their_limits_are_refused() {
-    let change: [fn(&mut DynvoxCapacity); 5] = [
+    let change: [fn(&mut DynvoxCapacity); 6] = [
         |of| of.raw_width = 4_097,
         |of| of.raw_height = 4_097,
         |of| of.detections = 65,
+        |of| of.keyframes = 65_537,
         |of| of.planning_width = 1_025,
         |of| of.blocks = 0,
     ];

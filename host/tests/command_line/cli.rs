@@ -152,7 +152,7 @@ fn a_strict_run_ends_at_the_first_affected_frame_and_says_why() {
         "--set",
         "street.height=96",
         "--set",
-        "street.frames=4",
+        "street.frames=8",
         "--profile",
         "tiny",
         "--quiet",

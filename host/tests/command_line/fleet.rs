@@ -210,7 +210,7 @@ fn recordings_are_aligned_carried_into_the_world_and_reported() {
     assert_eq!(fs::read(&file).unwrap(), first, "the same bits");
     let alignment: serde_json::Value = serde_json::from_slice(&first).unwrap();
     let along = |at: usize| alignment["recordings"][at]["t_world_camera"][11].as_f64().unwrap();
-    assert!(along(0).abs() < 1e-8 && alignment["pairs"][0]["refused"].is_null(), "{alignment}");
+    assert!(along(0).abs() < 1e-7 && alignment["pairs"][0]["refused"].is_null(), "{alignment}");
     // Four frames of 0.8 m lie between the two; nothing was given, so the limit of what poses may
     // be off does not let it find more.
     // Recordings that moved are resampled again; the others are not.

@@ -47,7 +47,9 @@ pub fn timed(
     }
     let counts = sides.each_ref().map(Vec::len);
     for entries in &mut sides {
-        entries.retain(|entry| entry.time_ns != 0 || entry.header_ns != 0 || counts == [1, 1]);
+        // A simulator's clock begins at zero: the first image may bear it, none that come later.
+        let first_ns = entries.iter().map(|entry| entry.log_ns).min();
+        entries.retain(|entry| entry.time_ns != 0 || Some(entry.log_ns) == first_ns);
     }
     let unset = [0, 1].map(|side| counts[side] - sides[side].len());
     for entries in &mut sides {
@@ -118,6 +120,11 @@ mod tests {
              the time of another: skipped"
         );
         assert_eq!(run(&[5, 6], &[5, 6]).unwrap().2, "");
+        // A clock may begin at zero.
+        assert_eq!(
+            run(&[0, 6, 7], &[0, 6, 7]).unwrap(),
+            (vec![0, 6, 7], vec![0, 6, 7], String::new())
+        );
         // One pair needs no time.
         assert_eq!(run(&[0], &[0]).unwrap().0, [0]);
     }

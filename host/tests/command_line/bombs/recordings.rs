@@ -72,7 +72,8 @@ fn recording(root: &Path, kind: &str, messages: usize, message: &[u8]) {
         .map(|topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap());
     for at in 0..messages {
         for channel_id in channels {
-            let log_time = at as u64;
+            // Zero is no time.
+            let log_time = at as u64 + 1;
             let header =
                 MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
             writer.write_to_known_channel(&header, message).unwrap();
