@@ -25,6 +25,7 @@ use super::{Mapper, NewError};
 use crate::{
     Capacity, Config,
     digest::Digest,
+    memory::Carver,
     state::{ReadError, Reader, Visitor, Writer},
 };
 use core::fmt::{self, Write};
@@ -194,13 +195,15 @@ impl<'s> Mapper<'s> {
         slab: &'s mut [u8],
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<Self, RestoreError<E>> {
-        // Used where it lies, as a mapper is some kilobytes: each move would take as much stack
-        // again.
-        let mut made = Self::new(capacity, config, slab);
-        if let Ok(mapper) = &mut made {
-            mapper.read(source)?;
-        }
-        made.map_err(RestoreError::New)
+        // The steps of `Mapper::new`, not a call of it: a mapper is some kilobytes, and each move
+        // takes as much stack again.
+        Self::check(capacity, config, slab).map_err(RestoreError::New)?;
+        let carver = Carver::new(slab, capacity.bytes());
+        let mut carver = carver.map_err(|error| RestoreError::New(error.into()))?;
+        let mut mapper = Self::new_in(capacity, config, &mut carver);
+        mapper.prepare(config, &carver).map_err(RestoreError::New)?;
+        mapper.read(source)?;
+        Ok(mapper)
     }
 
     /// Restores like [`Mapper::restore`], into `slot`: what it holds is dropped first, and it is
