@@ -38,6 +38,7 @@ impl MotionCovariance {
 
     /// Derives the covariance of `motion` from the points it explains, each with its weight. `None`
     /// if they do not determine one.
+    #[inline(never)]
     pub(super) fn from_points(
         motion: &Transform,
         rig: &StereoRig,

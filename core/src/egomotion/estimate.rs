@@ -149,6 +149,8 @@ impl<'s> Estimator<'s> {
     /// current one.
     ///
     /// Matches beyond `capacity.matches` are ignored.
+    // Never inlined: what it needs of the stack must not lie below a look at the map.
+    #[inline(never)]
     pub fn estimate<'m>(
         &mut self,
         config: &EgomotionConfig,

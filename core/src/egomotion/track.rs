@@ -86,6 +86,7 @@ impl Default for Egomotion {
 impl Egomotion {
     /// Moves the camera by one frame: as estimated or, failing that, as before (constant velocity).
     /// The estimate is of the motion since the reference.
+    #[inline(never)]
     pub fn step<'m>(
         &mut self,
         config: &EgomotionConfig,

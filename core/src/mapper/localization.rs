@@ -158,6 +158,7 @@ impl<'s> Localization<'s> {
 
     /// Hands the frame to the places. Returns whether they say that the camera is in another
     /// segment, in which it goes on.
+    #[inline(never)]
     fn recognise(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
@@ -205,6 +206,7 @@ impl<'s> Localization<'s> {
     }
 
     /// Estimates the motion from the matches the mask includes.
+    #[inline(never)]
     fn estimate_from_matches<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,

@@ -166,9 +166,10 @@ impl<'s> Table<'s> {
         let known = self.slots().position(|other| other == slot);
         match known {
             Some(at) => {
-                if let Some(later) = self.order.get_mut(at..self.len) {
-                    later.rotate_left(1);
-                }
+                // Each of those after it moves down by one; `rotate_left` could panic.
+                let mut next = slot as u32;
+                let later = self.order.get_mut(at..self.len).unwrap_or_default();
+                later.iter_mut().rev().for_each(|entry| core::mem::swap(entry, &mut next));
             }
             None => {
                 if let Some(last) = self.order.get_mut(self.len) {

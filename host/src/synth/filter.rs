@@ -130,15 +130,15 @@ impl Kernel {
         for phase in 0..PHASES {
             let mut raw = [[0.0; SAMPLES]; NEIGHBOURS];
             let mut sum = 0.0;
-            for neighbour in 0..NEIGHBOURS {
+            for (neighbour, pixel) in raw.iter_mut().enumerate() {
                 let (right, down) = (neighbour % 3, neighbour / 3);
                 // The row of the neighbour decides how its samples are shifted.
                 let row = phase + PHASES + down - 1;
-                for sample in 0..SAMPLES {
+                for (sample, weight) in pixel.iter_mut().enumerate() {
                     let (x, y) = offset_px(sample, row);
                     let (x, y) = (x + right as f64 - 1.0, y + down as f64 - 1.0);
-                    raw[neighbour][sample] = spline(x) * spline(y);
-                    sum += raw[neighbour][sample];
+                    *weight = spline(x) * spline(y);
+                    sum += *weight;
                     kernel.offsets_px[phase][neighbour][sample] = [x as f32, y as f32];
                 }
             }

@@ -219,8 +219,10 @@ impl Shading<'_> {
             let centres = band.row(0, row);
             let v = (band.first_row + row) as f64;
             let first = (band.first_row + row - MARGIN_PX) * width;
-            for column in MARGIN_PX..width + MARGIN_PX {
-                let (u, centre) = (column as f64, centres[column]);
+            for (column, &centre) in
+                centres.iter().enumerate().take(width + MARGIN_PX).skip(MARGIN_PX)
+            {
+                let u = column as f64;
                 let (light, depth_m) = if groups.is_plain(row, column) {
                     self.sample(u, v, centre)
                 } else {

@@ -152,6 +152,8 @@ impl SelfCalibration {
     /// Learns from a frame: what both cameras saw before and see now, corrected as
     /// [`SelfCalibration::pixel_correction`] says, in a stated order, and the motion in between as found
     /// from them. Observations no motion explains may be among them.
+    // Never inlined: the sums of a frame take stack that a look at the map needs.
+    #[inline(never)]
     pub(crate) fn update<O>(
         &mut self,
         rig: &StereoRig,
