@@ -71,11 +71,31 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     let mut slot = None;
     let made = Mapper::new_into(&mut slot, black_box(&CAPACITY), black_box(&config), slab);
     let (Ok(()), Some(mapper)) = (made, slot.as_mut()) else { return 0 };
-    let [width, height] = clip.size();
     let (mut blocks, mut objects) = (Leaving(Digest::default()), Leaving(Digest::default()));
     let mut digest = Digest::default();
+    if !step(mapper, clip, [&mut blocks, &mut objects], &mut digest) {
+        return 0;
+    }
+    inspect(mapper, &mut digest);
+    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
+    digest.u64(u64::from(mapper.stream_out(&mut blocks).stored));
+    digest.u64(blocks.0.finish());
+    digest.u64(objects.0.finish());
+    digest.finish()
+}
+
+/// Takes the frames; false where one is not taken.
+// Never inlined: reports must not lie below what the map shows.
+#[inline(never)]
+fn step(
+    mapper: &mut Mapper<'_>,
+    clip: &Clip<'_>,
+    [blocks, objects]: [&mut Leaving; 2],
+    digest: &mut Digest,
+) -> bool {
+    let [width, height] = clip.size();
     for (index, frame) in clip.frames().enumerate().take(FRAMES) {
-        let Frame::Pair(pair) = frame else { return 0 };
+        let Frame::Pair(pair) = frame else { return false };
         let seen = pair.stereo();
         let late = index >= FRAMES / 2;
         let frame = StereoFrame {
@@ -89,25 +109,28 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
             t_world_camera: late.then(|| *mapper.t_world_camera()),
             ..seen
         };
-        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, &mut blocks, &mut objects)
-        else {
-            return 0;
+        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, blocks, objects) else {
+            return false;
         };
         digest.u64(report.digest);
         digest.u64(report.severity() as u64);
     }
-    inspect(mapper, &mut digest);
-    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
-    digest.u64(u64::from(mapper.stream_out(&mut blocks).stored));
-    digest.u64(blocks.0.finish());
-    digest.u64(objects.0.finish());
-    digest.finish()
+    true
 }
 
 /// All that the map shows.
-// Never inlined: what it needs of the stack must not stay below the steps.
+// Never inlined, here and below: what it needs of the stack must not stay below the steps, nor what
+// one part needs below another.
 #[inline(never)]
 fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
+    views(mapper, digest);
+    plan(mapper, digest);
+    surfaces(mapper, digest);
+}
+
+/// The map as cameras see it.
+#[inline(never)]
+fn views(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let pose = *mapper.t_world_camera();
     let mut hash_view = |seen: Option<&Raycaster<'_>>| {
         let depth_m =
@@ -120,7 +143,11 @@ fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     hash_view(mapper.raycast(&pose, &Serial).ok());
     hash_view(mapper.raycast_composed(&pose, &Serial).ok());
     hash_view(mapper.raycast_object(black_box(1), &pose, &Serial).ok());
-    plan(mapper, digest);
+}
+
+/// The map's triangles, and what is tracked.
+#[inline(never)]
+fn surfaces(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     let triangles = mapper.triangles(&mut |triangle| {
         triangle
             .vertices
