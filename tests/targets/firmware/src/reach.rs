@@ -64,13 +64,10 @@ impl ObjectSink for Leaving {
 /// Goes every way; 0 where one is closed. What the compiler must not know is hidden from it.
 #[inline(never)]
 pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
-    let mut config = fixture::CONFIG;
-    config.volume.observation_weight = black_box(ObservationWeight::Depth);
-    config.stereo.median = black_box(true);
     // In its slot from the first: the mapper is never twice on the stack.
     let mut slot = None;
-    let made = Mapper::new_into(&mut slot, black_box(&CAPACITY), black_box(&config), slab);
-    let (Ok(()), Some(mapper)) = (made, slot.as_mut()) else { return 0 };
+    make(&mut slot, slab);
+    let Some(mapper) = slot.as_mut() else { return 0 };
     let (mut blocks, mut objects) = (Leaving(Digest::default()), Leaving(Digest::default()));
     let mut digest = Digest::default();
     if !step(mapper, clip, [&mut blocks, &mut objects], &mut digest) {
@@ -82,6 +79,17 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     digest.u64(blocks.0.finish());
     digest.u64(objects.0.finish());
     digest.finish()
+}
+
+/// Makes the mapper; the slot stays empty where that fails.
+// Never inlined: its settings must not lie below what comes later.
+#[inline(never)]
+fn make<'s>(slot: &mut Option<Mapper<'s>>, slab: &'s mut [u8]) {
+    let mut config = fixture::CONFIG;
+    config.volume.observation_weight = black_box(ObservationWeight::Depth);
+    config.stereo.median = black_box(true);
+    // What fails shows in the slot.
+    let _ = Mapper::new_into(slot, black_box(&CAPACITY), black_box(&config), slab);
 }
 
 /// Takes the frames; false where one is not taken.
@@ -109,9 +117,9 @@ fn step(
             t_world_camera: late.then(|| *mapper.t_world_camera()),
             ..seen
         };
-        let Ok(report) = mapper.step_with(black_box(&frame), &Serial, blocks, objects) else {
-            return false;
-        };
+        // By reference: a report is some kilobytes.
+        let taken = mapper.step_with(black_box(&frame), &Serial, blocks, objects);
+        let Ok(report) = &taken else { return false };
         digest.u64(report.digest);
         digest.u64(report.severity() as u64);
     }
