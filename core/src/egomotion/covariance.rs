@@ -6,7 +6,7 @@
 //! matches share cancel in no sum and show in no residual, so that they are added by name.
 
 use super::{
-    normal_equations::{NormalEquations, RotationMatrix},
+    normal_equations::{NormalEquations, PointRows, RotationMatrix},
     points::Point,
 };
 use crate::geometry::{StereoRig, Transform};
@@ -16,9 +16,10 @@ const N: usize = 6;
 const ENTRIES: usize = N * (N + 1) / 2;
 /// Factor on the spread: neighbouring matches, and both images of one, err alike.
 const SPREAD: f64 = 1.5;
-/// Standard deviation of what all matches share, px: columns of both images, rows of both, and
-/// columns of the left image alone.
-const SHARED_PX: [f64; 3] = [0.03, 0.03, 0.02];
+/// Standard deviations of what all matches share, px, as the errors it makes of a point (column in
+/// the left and in the right image, both rows together): columns of both images, rows of both,
+/// columns of the left image only.
+const SHARED_PX: [[f64; 3]; 3] = [[0.03, 0.03, 0.0], [0.0, 0.0, 0.06], [0.02, 0.0, 0.0]];
 /// Standard deviation of the rig's scale: baseline and focal length.
 const SCALE_SHARE: f64 = 0.005;
 
@@ -36,31 +37,30 @@ impl MotionCovariance {
     /// Covariance of a motion that is known.
     pub const ZERO: Self = Self { lower: [0.0; ENTRIES] };
 
-    /// Derives the covariance of `motion` from the points it explains, each with its weight. `None`
-    /// if they do not determine one.
+    /// Derives the covariance of `motion` from the points it explains, each weighted by itself and
+    /// by its squared error (px²). `None` if they do not determine one.
     #[inline(never)]
     pub(super) fn from_points(
         motion: &Transform,
         rig: &StereoRig,
-        points: impl Iterator<Item = (Point, f64)>,
+        points: impl Iterator<Item = Point>,
+        weight: impl Fn(&Point, f64) -> f64,
     ) -> Option<Self> {
         let matrix = RotationMatrix::new(motion);
         let mut sums = NormalEquations::ZERO;
         let mut spread = [[0.0; N]; N];
         let mut shared = [[0.0; N]; SHARED_PX.len()];
-        for (point, weight) in points {
-            let mut one = NormalEquations::ZERO;
-            one.add(&point, &matrix, rig, |_| weight);
-            let pull = one.vector();
+        for point in points {
+            let Some(rows) = PointRows::new(&point, &matrix, rig) else { continue };
+            let weight = weight(&point, rows.squared);
+            sums.add_rows(&rows, weight);
+            let pull = rows.slope(rows.residuals).map(|slope| weight * slope);
             // Two matches of one corner err together; the factor stands for that.
             add_outer(&mut spread, pull, SPREAD * SPREAD);
-            // What the shared errors change in the pulls, had every point been seen so.
-            for (sum, shifted) in shared.iter_mut().zip(shifts(&point)) {
-                let mut seen = NormalEquations::ZERO;
-                seen.add(&shifted, &matrix, rig, |_| weight);
-                sum.iter_mut().zip(seen.vector()).zip(pull).for_each(|((s, m), p)| *s += m - p);
+            // A shared error adds to the pulls of all points.
+            for (sum, error) in shared.iter_mut().zip(SHARED_PX) {
+                sum.iter_mut().zip(rows.slope(error)).for_each(|(s, slope)| *s += weight * slope);
             }
-            sums.merge(&one);
         }
         for pull in shared {
             add_outer(&mut spread, pull, 1.0);
@@ -152,17 +152,6 @@ impl MotionCovariance {
         let (high, low) = if row < column { (column, row) } else { (row, column) };
         self.lower.get(high * (high + 1) / 2 + low).copied().unwrap_or_default()
     }
-}
-
-/// The point as it would be seen with each of the shared errors.
-fn shifts(point: &Point) -> [Point; SHARED_PX.len()] {
-    let [columns, rows, left] = SHARED_PX;
-    let shifted = |left_u: f64, right_u: f64, v: f64| Point {
-        left: [point.left[0] + left_u, point.left[1] + v],
-        right: [point.right[0] + right_u, point.right[1] + v],
-        ..*point
-    };
-    [shifted(columns, columns, 0.0), shifted(0.0, 0.0, rows), shifted(left, 0.0, 0.0)]
 }
 
 fn add_outer(sum: &mut [[f64; N]; N], vector: [f64; N], factor: f64) {

@@ -294,13 +294,10 @@ impl<'s> Estimator<'s> {
         rig: &StereoRig,
         motion: &Transform,
     ) -> Option<MotionCovariance> {
-        let matrix = RotationMatrix::new(motion);
-        let weighted = self.inlier_points().map(|point| {
-            let mut one = NormalEquations::ZERO;
-            one.add(&point, &matrix, rig, |_| 1.0);
-            (point, side_weight(config, rig, &point) * robust_weight(config, one.error))
-        });
-        MotionCovariance::from_points(motion, rig, weighted)
+        let weight = |point: &Point, squared: f64| {
+            side_weight(config, rig, point) * robust_weight(config, squared)
+        };
+        MotionCovariance::from_points(motion, rig, self.inlier_points(), weight)
     }
 
     fn inlier_points(&self) -> impl Iterator<Item = Point> {

@@ -40,15 +40,50 @@ impl RotationMatrix {
     }
 }
 
-/// Errors of one point: predicted minus seen, as u left, u right, v left, v right.
-fn residual(predicted: &StereoObservation, point: &Point) -> [f64; 4] {
-    let StereoObservation { u_left_px, v_px, u_right_px } = *predicted;
-    [
-        u_left_px - point.left[0],
-        u_right_px - point.right[0],
-        v_px - point.left[1],
-        v_px - point.right[1],
-    ]
+/// Derivatives of a point's projection by the step, and the errors it leaves.
+pub(super) struct PointRows {
+    u_left: [f64; N],
+    u_right: [f64; N],
+    /// Row of either image: both cameras see a point in the same one, so it serves twice.
+    v: [f64; N],
+    /// Predicted minus seen, px: column in the left and in the right image, both rows together.
+    pub residuals: [f64; 3],
+    /// Sum of the squares of all four errors, px².
+    pub squared: f64,
+}
+
+impl PointRows {
+    /// Rows of a point; `None` for one behind the camera.
+    #[inline]
+    pub(super) fn new(point: &Point, motion: &RotationMatrix, rig: &StereoRig) -> Option<Self> {
+        let p = motion.transform(point.xyz);
+        let StereoObservation { u_left_px, v_px, u_right_px } = rig.project(p)?;
+        let (left, right) = (u_left_px - point.left[0], u_right_px - point.right[0]);
+        let (up_left, up_right) = (v_px - point.left[1], v_px - point.right[1]);
+        let squared = left * left + right * right + up_left * up_left + up_right * up_right;
+        let [x, y, z] = p;
+        // Derivatives of the projection by the carried point, times those of the carried point by
+        // the step: a cross product and itself.
+        let [u_left, [_, b, c], u_right] = rig.project_jacobian(p);
+        // Columns do not depend on y, nor the row on x: those derivatives are zero and left out.
+        let row = |[a, _, c]: [f64; 3]| [c * y, a * z - c * x, -a * y, a, 0.0, c];
+        Some(Self {
+            u_left: row(u_left),
+            u_right: row(u_right),
+            v: [c * y - b * z, -c * x, b * x, 0.0, b, c],
+            residuals: [left, right, up_left + up_right],
+            squared,
+        })
+    }
+
+    /// Slope of half the squared error by the step, were these the errors.
+    #[inline]
+    pub(super) fn slope(&self, [left, right, both]: [f64; 3]) -> [f64; N] {
+        let mut columns = self.u_left.iter().zip(&self.u_right).zip(&self.v);
+        core::array::from_fn(|_| {
+            columns.next().map_or(0.0, |((l, r), v)| l * left + r * right + v * both)
+        })
+    }
 }
 
 impl NormalEquations {
@@ -57,10 +92,6 @@ impl NormalEquations {
 
     /// Adds a point; one behind the camera adds nothing.
     #[inline]
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "both indices run below N, the length of every row"
-    )]
     pub(super) fn add(
         &mut self,
         point: &Point,
@@ -68,30 +99,29 @@ impl NormalEquations {
         rig: &StereoRig,
         weight: impl Fn(f64) -> f64,
     ) {
-        let p = motion.transform(point.xyz);
-        let Some(predicted) = rig.project(p) else { return };
-        let [x, y, z] = p;
-        let [left, right, up_left, up_right] = residual(&predicted, point);
-        let squared = left * left + right * right + up_left * up_left + up_right * up_right;
-        let weight = weight(squared);
-        // Derivatives of the projection by the carried point, times those of the carried point by
-        // the step: a cross product and itself.
-        let [u_left, v, u_right] = rig.project_jacobian(p);
-        // Columns do not depend on y, nor the row on x: those derivatives are zero and left out.
-        let row = |[a, _, c]: [f64; 3]| [c * y, a * z - c * x, -a * y, a, 0.0, c];
-        let (u_left, u_right, [_, b, c]) = (row(u_left), row(u_right), v);
-        let v = [c * y - b * z, -c * x, b * x, 0.0, b, c];
-        // Both cameras see a point in the same row, so its derivatives serve twice.
-        let both = up_left + up_right;
+        let Some(rows) = PointRows::new(point, motion, rig) else { return };
+        self.add_rows(&rows, weight(rows.squared));
+    }
+
+    /// Adds the rows of a point.
+    #[inline]
+    #[expect(
+        clippy::indexing_slicing,
+        reason = "both indices run below N, the length of every row"
+    )]
+    pub(super) fn add_rows(&mut self, rows: &PointRows, weight: f64) {
+        let PointRows { u_left, u_right, v, .. } = rows;
+        for (sum, slope) in self.vector.iter_mut().zip(rows.slope(rows.residuals)) {
+            *sum += weight * slope;
+        }
         for i in 0..N {
-            self.vector[i] += weight * (u_left[i] * left + u_right[i] * right + v[i] * both);
             // The matrix is symmetric: only its lower triangle is summed.
             for j in 0..=i {
                 self.matrix[i][j] +=
                     weight * (u_left[i] * u_left[j] + u_right[i] * u_right[j] + 2.0 * v[i] * v[j]);
             }
         }
-        self.error += weight * squared;
+        self.error += weight * rows.squared;
         self.weight += weight;
     }
 
@@ -134,21 +164,6 @@ impl NormalEquations {
     /// not determine one.
     pub(super) fn solve(&self) -> Option<[f64; N]> {
         self.solve_for(self.vector.map(|x| -x))
-    }
-
-    /// Slope of the error: J'r.
-    pub(super) fn vector(&self) -> [f64; N] {
-        self.vector
-    }
-
-    /// Adds the sums of other points.
-    pub(super) fn merge(&mut self, other: &Self) {
-        for (row, from) in self.matrix.iter_mut().zip(&other.matrix) {
-            row.iter_mut().zip(from).for_each(|(sum, one)| *sum += one);
-        }
-        self.vector.iter_mut().zip(other.vector).for_each(|(sum, one)| *sum += one);
-        self.error += other.error;
-        self.weight += other.weight;
     }
 
     /// The covariance of the step to the minimum, from that of the slope (symmetric): both sides

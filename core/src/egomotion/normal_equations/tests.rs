@@ -19,7 +19,9 @@ fn points() -> [Point; 3] {
 /// Errors of a point after the motion is shifted by a step.
 fn residual_after(point: &Point, step: [f64; N]) -> [f64; 4] {
     let carried = motion().retract(step).transform_point(point.xyz);
-    residual(&RIG.project(carried).unwrap(), point)
+    let StereoObservation { u_left_px, v_px, u_right_px } = RIG.project(carried).unwrap();
+    let [[left_u, left_v], [right_u, right_v]] = [point.left, point.right];
+    [u_left_px - left_u, u_right_px - right_u, v_px - left_v, v_px - right_v]
 }
 
 fn close(found: f64, expected: f64) -> bool {
