@@ -76,20 +76,12 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
             files.iter().map(|file| Some(number(file)? * 1_000_000_000 / RATE_HZ)).collect();
         Ok(CameraFiles { files, stamps_ns })
     };
+    let images = ImageFiles::Cameras([of_sequence(&left)?, of_sequence(&right)?]);
+    let cameras = options.cameras_or(|| rig(&path.join("camera").join(&folder), &name))?;
     Sequence::from_parts(Parts {
-        name: format!("cityscapes-{name}"),
-        images: ImageFiles::Cameras([of_sequence(&left)?, of_sequence(&right)?]),
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(|| rig(&path.join("camera").join(&folder), &name))?,
-        times: None,
-        poses: None,
-        numbered: false,
         notes: vec![format!("times by the data set's {RATE_HZ} frames a second")],
         instances: path.join("instances").join(&name),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, format!("cityscapes-{name}"), images, cameras)
     })
 }
 

@@ -48,20 +48,12 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let poses =
         truth.is_file().then(|| read_poses(&truth).map(|read| (truth, read))).transpose()?;
     let root = sensors.parent().filter(|root| *root != Path::new("")).unwrap_or(&sensors);
+    let images = ImageFiles::Cameras(cameras);
+    let cameras = options.cameras_of(&cameras_from)?;
     Sequence::from_parts(Parts {
-        name: super::folder::name_of(root),
-        images: ImageFiles::Cameras(cameras),
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_of(&cameras_from)?,
-        times: None,
         poses,
-        numbered: false,
-        notes: Vec::new(),
         instances: path.join("instances"),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, super::folder::name_of(root), images, cameras)
     })
 }
 

@@ -38,24 +38,16 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
         },
         (given, _) => options.cameras_of(given)?,
     };
+    let images = images(path, action, options.stacking, &cameras)?;
     Sequence::from_parts(Parts {
-        name: name_of(path),
-        images: images(path, action, options.stacking, &cameras)?,
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras,
         times: file("times.txt")
             .map(|file| read_times(&file).map(|times| (file, times)))
             .transpose()?,
         poses: file("poses.txt")
             .map(|file| read_poses(&file).map(|read| (file, read)))
             .transpose()?,
-        numbered: false,
-        notes: Vec::new(),
         instances: path.join("instances"),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, name_of(path), images, cameras)
     })
 }
 

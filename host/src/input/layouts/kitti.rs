@@ -78,20 +78,16 @@ fn open_odometry(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         }
         None => None,
     };
+    let images = ImageFiles::in_folders(&left_folder, &right_folder)?;
+    let cameras = options.cameras_or(|| calibration.rig(left, right))?;
     Sequence::from_parts(Parts {
-        name: format!("kitti-odometry-{number}"),
-        images: ImageFiles::in_folders(&left_folder, &right_folder)?,
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(|| calibration.rig(left, right))?,
         times,
         poses,
         numbered: true,
         notes,
         instances: folder.join("instances"),
-        objects: Vec::new(),
         lidar: LidarFiles::at(folder.join("velodyne"), &calibration, [left, right])?,
+        ..Parts::new(options, format!("kitti-odometry-{number}"), images, cameras)
     })
 }
 
@@ -145,23 +141,18 @@ fn open_tracking(path: &Path, options: &OpenOptions) -> Result<Sequence, InputEr
         )?,
         None => Vec::new(),
     };
+    let images = ImageFiles::in_folders(
+        &present(split.join("image_02").join(&name), action)?,
+        &present(split.join("image_03").join(&name), action)?,
+    )?;
+    let cameras = options.cameras_or(|| calibration.rig(2, 3))?;
     Sequence::from_parts(Parts {
-        images: ImageFiles::in_folders(
-            &present(split.join("image_02").join(&name), action)?,
-            &present(split.join("image_03").join(&name), action)?,
-        )?,
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(|| calibration.rig(2, 3))?,
-        times: None,
         poses: if poses.is_file() { Some((poses.clone(), read_poses(&poses)?)) } else { None },
         numbered: true,
-        notes: Vec::new(),
         instances: split.join("instances").join(&name),
         objects,
         lidar: LidarFiles::at(split.join("velodyne").join(&name), &calibration, [2, 3])?,
-        name: format!("kitti-tracking-{name}"),
+        ..Parts::new(options, format!("kitti-tracking-{name}"), images, cameras)
     })
 }
 

@@ -115,20 +115,13 @@ fn open_drive(
     let cameras = [camera(left)?, camera(right)?];
     let own = || KittiCalibration::read(&files.calibration)?.rig(left, right);
     let poses = files.poses.as_ref().filter(|poses| left == 0 && poses.is_file());
+    let images = ImageFiles::Cameras(cameras);
+    let cameras = options.cameras_or(own)?;
     Sequence::from_parts(Parts {
-        name: format!("{prefix}-{}", name_of(drive)),
-        images: ImageFiles::Cameras(cameras),
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(own)?,
-        times: None,
         poses: poses.map(|path| read_poses(path).map(|read| (path.clone(), read))).transpose()?,
         numbered: true,
-        notes: Vec::new(),
         instances: drive.join("instances"),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, format!("{prefix}-{}", name_of(drive)), images, cameras)
     })
 }
 

@@ -12,6 +12,7 @@ use crate::formats::{
     BayerPattern, Decoded, RANGE_PICTURES, SampleRange, TimeTable, Trajectory, declared_maximum,
     picture_size, read_picture,
 };
+use crate::input::data_set::OpenOptions;
 use crate::input::diagnosis;
 use crate::input::source::{
     ASSUMED_HZ, AvailableMasks, FrameInfo, FrameSource, InputError, LidarScan, ObjectsTruth,
@@ -92,6 +93,32 @@ pub(super) struct Parts {
     /// True objects by frame number; empty where nothing is known.
     pub objects: Vec<ObjectsTruth>,
     pub lidar: Option<LidarFiles>,
+}
+
+impl Parts {
+    /// Images and cameras, with nothing beside them.
+    pub(super) fn new(
+        options: &OpenOptions,
+        name: String,
+        images: ImageFiles,
+        cameras: CameraGeometry,
+    ) -> Self {
+        Self {
+            name,
+            images,
+            bits: options.bits,
+            bayer: options.bayer,
+            cameras,
+            rectified: options.rectified,
+            times: None,
+            poses: None,
+            numbered: false,
+            notes: Vec::new(),
+            instances: PathBuf::new(),
+            objects: Vec::new(),
+            lidar: None,
+        }
+    }
 }
 
 impl Sequence {

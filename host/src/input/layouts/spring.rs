@@ -43,20 +43,12 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let action = "Fetch the right images of the data set: a stereo mapper needs both cameras";
     let right = present(folder.join("frame_right"), action)?;
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let images = ImageFiles::in_folders(&folder.join("frame_left"), &right)?;
+    let cameras = options.cameras_or(|| rig(&folder.join(INTRINSICS)))?;
     Sequence::from_parts(Parts {
-        name: format!("spring-{name}"),
-        images: ImageFiles::in_folders(&folder.join("frame_left"), &right)?,
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(|| rig(&folder.join(INTRINSICS)))?,
-        times: None,
-        poses: None,
-        numbered: false,
         notes: vec![format!("baseline {BASELINE_M} m, as the data set's page has it")],
         instances: folder.join("instances"),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, format!("spring-{name}"), images, cameras)
     })
 }
 

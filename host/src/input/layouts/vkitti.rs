@@ -63,20 +63,13 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     let mut words: Vec<String> =
         folder.iter().rev().take(2).map(|word| word.to_string_lossy().into_owned()).collect();
     words.reverse();
+    let images = ImageFiles::in_folders(&left, &present(right, action)?)?;
+    let cameras = options.cameras_or(|| rig(&folder.join("intrinsic.txt")))?;
     Sequence::from_parts(Parts {
-        name: format!("vkitti-{}", words.join("-")),
-        images: ImageFiles::in_folders(&left, &present(right, action)?)?,
-        bits: options.bits,
-        bayer: options.bayer,
-        rectified: options.rectified,
-        cameras: options.cameras_or(|| rig(&folder.join("intrinsic.txt")))?,
-        times: None,
         poses,
-        numbered: false,
         notes: vec![format!("baseline {BASELINE_M} m, as the data set's page has it")],
         instances: folder.join("instances"),
-        objects: Vec::new(),
-        lidar: None,
+        ..Parts::new(options, format!("vkitti-{}", words.join("-")), images, cameras)
     })
 }
 
