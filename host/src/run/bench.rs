@@ -1,15 +1,13 @@
 //! What a step costs, stage by stage: work, span, and the bound on two threads, over the frames of
 //! a plan.
 
-use super::error::{RunError, refused, step_reason};
+use super::error::{RunError, failed_step};
+use super::frames::{each_frame, with_mapper};
 use super::spans::{Cost, Spans};
-use super::{read_ahead, stereo_frame};
 use crate::evaluate::quantile::median;
-use crate::input::InstanceMask;
 use crate::request::Plan;
-use crate::slab::HostSlab;
+use dynvox_core::Stage;
 use dynvox_core::parallel::Vectors;
-use dynvox_core::{Mapper, Stage};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -43,29 +41,18 @@ pub struct Bench {
 /// # Errors
 /// The plan cannot be run, or a frame cannot be read or mapped.
 pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
-    plan.check()?;
-    let slab_bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(slab_bytes)
-        .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut())
-        .map_err(|error| refused(&plan.profile, error))?;
     let spans = Spans::new(vectors);
     let mut costs = Vec::new();
-    read_ahead(plan.dataset.as_ref(), plan.frames.from_position(0), false, |read| {
-        for frame in read {
-            let images = frame.images?;
-            let detections: Vec<_> =
-                images.masks.instances.iter().map(InstanceMask::detection).collect();
-            let failed = |reason: String| RunError::Step { frame: frame.index, reason };
-            let stereo = stereo_frame(&images, &detections)
-                .ok_or_else(|| failed("an image is empty".to_owned()))?;
-            let (report, step, mut stages) = spans.measure(|| mapper.step(&stereo, &spans));
-            let pose = report.map_err(|error| failed(step_reason(error)))?.t_world_camera;
+    with_mapper(plan, |mapper| {
+        each_frame(plan, |index, frame| {
+            let (report, step, mut stages) = spans.measure(|| mapper.step(frame, &spans));
+            let report = report.map_err(|error| failed_step(index, error))?;
+            let pose = report.t_world_camera;
             let (_, _, raycast) = spans.measure(|| mapper.raycast(&pose, &spans).is_ok());
             stages[Stage::Raycast as usize] = raycast[Stage::Raycast as usize];
             costs.push((step, stages));
-        }
-        Ok::<(), RunError>(())
+            Ok(())
+        })
     })?;
     let counted = costs.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(&costs);
     let of_stage = |stage: Stage| {

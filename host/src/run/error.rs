@@ -178,6 +178,11 @@ pub(super) fn refused(profile: &str, error: NewError) -> RunError {
     RunError::Slab { profile: profile.to_owned(), reason }
 }
 
+/// The core's refusal of a frame, as an error.
+pub(super) fn failed_step(frame: usize, error: StepError) -> RunError {
+    RunError::Step { frame, reason: step_reason(error) }
+}
+
 /// The core's refusal of a frame, in words.
 pub fn step_reason(error: StepError) -> String {
     match error {

@@ -8,6 +8,7 @@ mod ending;
 mod error;
 mod execute;
 mod folder;
+mod frames;
 mod map_objects;
 mod mask_effect;
 mod places;
@@ -36,6 +37,7 @@ pub use folder::{
     FolderError, PREVIOUS_SNAPSHOT_FILE, RunFolder, SNAPSHOT_FILE, has_snapshot, replace_whole,
     write_whole,
 };
+pub use frames::{each_frame, with_mapper};
 pub use places::{Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};

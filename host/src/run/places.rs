@@ -1,14 +1,11 @@
 //! Places of a run as a file of its folder, and frames that are placed among them.
 
-use super::error::{RunError, refused, step_reason};
-use super::{FolderError, RunFolder, Threads, read_ahead, stereo_frame};
-use crate::input::InstanceMask;
+use super::error::{RunError, failed_step};
+use super::frames::{each_frame, with_mapper};
+use super::{FolderError, RunFolder, Threads};
 use crate::request::Plan;
-use crate::slab::HostSlab;
 use dynvox_core::geometry::{MapSegment, Transform};
-use dynvox_core::{
-    Mapper, PoseOrigin, Report, SAVED_PLACES_HEADER_BYTES, StereoFrame, saved_keyframes,
-};
+use dynvox_core::{Mapper, PoseOrigin, Report, SAVED_PLACES_HEADER_BYTES, saved_keyframes};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -86,35 +83,22 @@ impl Localized {
 /// # Errors
 /// The plan cannot be run, the places cannot be used, or a frame cannot be read or mapped.
 pub fn localize(plan: &Plan, old: &Path) -> Result<Localized, RunError> {
-    plan.check()?;
-    let slab_bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(slab_bytes)
-        .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
-    let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut())
-        .map_err(|error| refused(&plan.profile, error))?;
-    let keyframes = load(&mut mapper, &old.join(PLACES_FILE))?;
-    // Segments begun by this recording come after those of the old map.
-    let own = mapper.segment();
-    let mut localized = Localized { keyframes, ..Localized::default() };
     let threads = Threads::new(plan.threads)
         .map_err(|source| RunError::Threads { count: plan.threads, source })?;
-    read_ahead(plan.dataset.as_ref(), plan.frames.from_position(0), false, |read| {
-        for frame in read {
-            let images = frame.images?;
-            let detections: Vec<_> =
-                images.masks.instances.iter().map(InstanceMask::detection).collect();
-            let failed = |reason: String| RunError::Step { frame: frame.index, reason };
-            let stereo = stereo_frame(&images, &detections)
-                .ok_or_else(|| failed("an image is empty".to_owned()))?;
-            let stereo = StereoFrame { time_ns: frame.stamp_ns, ..stereo };
-            let report =
-                mapper.step(&stereo, &threads).map_err(|error| failed(step_reason(error)))?;
-            let time_ns = frame.stamp_ns.unwrap_or((frame.time_s * 1e9).round() as u64);
-            localized.add(frame.index, time_ns, &report, own);
-        }
-        Ok::<(), RunError>(())
-    })?;
-    Ok(localized)
+    with_mapper(plan, |mapper| {
+        let keyframes = load(mapper, &old.join(PLACES_FILE))?;
+        // Segments begun by this recording come after those of the old map.
+        let own = mapper.segment();
+        let mut localized = Localized { keyframes, ..Localized::default() };
+        each_frame(plan, |index, frame| {
+            let report = mapper.step(frame, &threads).map_err(|error| failed_step(index, error))?;
+            let elapsed_ns = || (plan.dataset.time_s(index) * 1e9).round() as u64;
+            let time_ns = frame.time_ns.unwrap_or_else(elapsed_ns);
+            localized.add(index, time_ns, &report, own);
+            Ok(())
+        })?;
+        Ok(localized)
+    })
 }
 
 /// Loads places from a file into a new mapper.
