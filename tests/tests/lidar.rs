@@ -72,6 +72,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
         let exact_q8 = disparity_q8(&street, &frame);
         let view = |pixels| View::new(pixels, 640, 192).unwrap();
         let stereo = StereoFrame {
+            ignored: None,
             left: view(&frame.left_grey),
             right: view(&frame.right_grey),
             colour: None,

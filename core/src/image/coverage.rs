@@ -48,8 +48,8 @@ impl<'a> InvalidPixels<'a> {
 pub(crate) struct InvalidPair<'a> {
     /// Pixels of the left image.
     pub left: InvalidPixels<'a>,
-    /// Pixels of the right image.
-    pub right: InvalidPixels<'a>,
+    /// Pixels of the right image; `None` where all are used.
+    pub right: Option<InvalidPixels<'a>>,
 }
 
 /// A grey pair with the pixels of it that are not to be used.

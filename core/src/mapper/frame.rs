@@ -7,9 +7,12 @@ use crate::{
     tracking::Detection,
 };
 
+/// Number that tells ignored pixels from other images in a frame's digest.
+const IGNORED_MARK: u64 = 0x6967_6E6F_7265;
+
 /// One stereo frame as the core takes it, 8 bit: rectified images of equal sizes, or raw ones for a
-/// mapper that rectifies ([`crate::Config::rectification`]). Classes, disparities and detections
-/// belong to the rectified left image in either case.
+/// mapper that rectifies ([`crate::Config::rectification`]). Classes, disparities, ignored pixels
+/// and detections belong to the rectified left image in either case.
 ///
 /// ```
 /// use dynvox_core::{StereoFrame, geometry::Transform, image::View};
@@ -34,6 +37,9 @@ pub struct StereoFrame<'a> {
     /// own. Motion still needs both images. Values no pair of this width can have are refused and
     /// counted.
     pub disparity_q8: Option<View<'a, u16>>,
+    /// Pixels of the left image that no stage uses, marked by any value but 0: the car's own
+    /// bonnet, a dirty lens. They get no match and no depth, also not a given one.
+    pub ignored: Option<View<'a, u8>>,
     /// Pose of the left camera, camera to world, from elsewhere: it replaces the camera's own
     /// egomotion. Give it with every frame, in one world.
     pub t_world_camera: Option<Transform>,
@@ -55,14 +61,15 @@ impl<'a> StereoFrame<'a> {
             colour: None,
             class: None,
             disparity_q8: None,
+            ignored: None,
             t_world_camera: None,
             time_ns: None,
             detections: &[],
         }
     }
 
-    /// Digest of the images, row by row, of given disparities, pose and time, and of the detections
-    /// in any order.
+    /// Digest of the images, row by row, of given disparities, ignored pixels, pose and time, and
+    /// of the detections in any order.
     ///
     /// ```
     /// use dynvox_core::{StereoFrame, image::View};
@@ -82,6 +89,11 @@ impl<'a> StereoFrame<'a> {
             // A mark first, so that a given disparity is never taken for an image of classes.
             digest.u64(u64::from(DISPARITY_ONE_PX));
             disparity.rows().for_each(|row| digest.u16s(row));
+        }
+        if let Some(ignored) = &self.ignored {
+            // A mark here as well.
+            digest.u64(IGNORED_MARK);
+            ignored.rows().for_each(|row| digest.bytes(row));
         }
         if let Some(pose) = &self.t_world_camera {
             pose.rotation.iter().chain(&pose.translation_m).for_each(|&value| digest.f64(value));

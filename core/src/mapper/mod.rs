@@ -7,6 +7,7 @@ mod config;
 mod digests;
 mod error;
 mod frame;
+mod ignored;
 mod localization;
 mod matched;
 mod places;
@@ -39,6 +40,7 @@ pub use snapshot::RestoreError;
 pub use work::WorkUnits;
 
 use clock::Clock;
+use ignored::IgnoredPixels;
 use localization::Localization;
 use static_map::StaticMap;
 
@@ -82,6 +84,7 @@ pub struct Mapper<'s> {
     rectifier: Rectifier<'s>,
     rectified: RectifiedImages<'s>,
     aligned: AlignedImage<'s>,
+    ignored: IgnoredPixels<'s>,
     stereo: StereoMatcher<'s>,
     scene_flow: FlowMatcher<'s>,
     localization: Localization<'s>,
@@ -119,6 +122,7 @@ impl Capacity {
             + Rectifier::bytes(self)
             + RectifiedImages::bytes(self)
             + AlignedImage::bytes(self)
+            + IgnoredPixels::bytes(self)
     }
 
     /// Every region a mapper of this capacity cuts out of its slab.
@@ -250,6 +254,7 @@ impl<'s> Mapper<'s> {
             rectifier: Rectifier::new_in(capacity, carver),
             rectified: RectifiedImages::new_in(capacity, carver),
             aligned: AlignedImage::new_in(capacity, carver),
+            ignored: IgnoredPixels::new_in(capacity, carver),
             size: None,
             frame: 0,
             clock: Clock::new(config.tracking.frame_interval_s),
@@ -272,13 +277,14 @@ impl<'s> Mapper<'s> {
             return Err(StepError::RawSizeDiffers { width: left[0], height: left[1] });
         }
         let same = |width: usize, height: usize| size == [width, height];
-        // Colour and left image come from one camera; the images of classes and disparities are
-        // rectified.
+        // Colour and left image come from one camera; the images of classes, disparities and
+        // ignored pixels are rectified.
         let right = right == [frame.right.width(), frame.right.height()];
         let colour = frame.colour.is_none_or(|image| left == [image.width(), image.height()]);
         let class = frame.class.is_none_or(|image| same(image.width(), image.height()));
         let disparity = frame.disparity_q8.is_none_or(|image| same(image.width(), image.height()));
-        if !(right && colour && class && disparity) {
+        let ignored = frame.ignored.is_none_or(|image| same(image.width(), image.height()));
+        if !(right && colour && class && disparity && ignored) {
             return Err(StepError::SizesDiffer);
         }
         // Buffers have the capacity's size; the matchers need a margin around each pixel.

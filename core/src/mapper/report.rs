@@ -150,6 +150,9 @@ pub struct Report {
     pub t_world_camera: Transform,
     /// Report of the rectification; `None` if pairs come rectified.
     pub rectify: Option<RectifyReport>,
+    /// Pixels of the left image that no stage used because the caller ignores them
+    /// ([`crate::StereoFrame::ignored`]).
+    pub ignored_pixels: u32,
     /// The stereo matcher.
     pub stereo: StereoReport,
     /// The scene flow.

@@ -14,6 +14,7 @@
 //! | 8, 8 | fingerprint of the capacity, of the configuration: a digest of their `Debug` text |
 //! | 4 | frames taken |
 //! | 4, 8, 4 | whether the last frame had a time, that time, ns, and the time since the frame before, s |
+//! | 4 | ignored pixels, and their bits if there are any |
 //! | 4, 4 | image width and height, px (0 before the first frame) |
 //! | | last pair, camera, self-calibration, tracks, masks, objects, static map, planner's window |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
@@ -33,7 +34,7 @@ use core::fmt::{self, Write};
 /// First bytes of a snapshot.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 7;
+pub const VERSION: u32 = 8;
 
 /// Reason that a mapper cannot be restored. There is no mapper then; the slab may be used again.
 ///
@@ -276,6 +277,7 @@ impl<'s> Mapper<'s> {
             size,
             frame,
             clock,
+            ignored,
             // Told by the caller; a fingerprint stands for them.
             config,
             capacity,
@@ -292,6 +294,7 @@ impl<'s> Mapper<'s> {
         visitor.count(&mut width, capacity.image_width);
         visitor.count(&mut height, capacity.image_height);
         *size = (width * height > 0).then_some([width, height]);
+        ignored.visit([width, height], visitor);
         scene_flow.visit(visitor);
         localization.visit(visitor);
         tracker.visit(visitor);
@@ -308,7 +311,8 @@ impl<'s> Mapper<'s> {
     fn rebuild(&mut self) -> bool {
         self.static_map.volume.enter_segment(self.localization.camera.segment());
         self.tracker.set_frame_interval_s(self.clock.interval_s());
-        self.scene_flow.rebuild(&self.config.scene_flow, self.rectifier.invalid().as_ref());
+        let unused = self.ignored.pair(self.size.unwrap_or_default(), self.rectifier.invalid());
+        self.scene_flow.rebuild(&self.config.scene_flow, unused.as_ref());
         self.objects.rebuild() && self.static_map.volume.rebuild()
     }
 }

@@ -227,9 +227,11 @@ impl Mapper<'_> {
         frame: &StereoFrame<'_>,
         executor: &E,
     ) -> (StereoReport, FlowReport) {
-        let Self { config, rectifier, stereo, scene_flow, localization, .. } = self;
-        // Pixels that no raw pixel covers take no part.
-        let invalid = rectifier.invalid();
+        let Self { config, rectifier, ignored, stereo, scene_flow, localization, .. } = self;
+        // Pixels that no raw pixel covers take no part, nor do those the caller ignores.
+        let covered = rectifier.invalid();
+        ignored.update(frame.ignored, covered);
+        let invalid = ignored.pair([frame.left.width(), frame.left.height()], covered);
         let pair = MaskedPair {
             left: frame.left,
             right: frame.right,
@@ -237,7 +239,7 @@ impl Mapper<'_> {
             right_moved: localization.rows_moved,
         };
         let compute_disparity = || match frame.disparity_q8 {
-            Some(given) => stereo.take(given),
+            Some(given) => stereo.take(given, invalid.as_ref().filter(|_| frame.ignored.is_some())),
             None => stereo.compute_within(&config.stereo, &pair, executor),
         };
         let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
@@ -289,6 +291,7 @@ impl Mapper<'_> {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
             rectify: None,
+            ignored_pixels: self.ignored.count(),
             stereo,
             scene_flow,
             pose: found.origin,

@@ -1,6 +1,7 @@
 //! The mapper as a whole, in a scene with known geometry.
 
 mod errors;
+mod ignored;
 mod lost;
 mod mutations;
 mod places;

@@ -248,7 +248,7 @@ impl<'s> Rectifier<'s> {
         let [width, height] = [width as usize, height as usize];
         Some(InvalidPair {
             left: InvalidPixels::new(self.left.invalid, width, height)?,
-            right: InvalidPixels::new(self.right.invalid, width, height)?,
+            right: Some(InvalidPixels::new(self.right.invalid, width, height)?),
         })
     }
 

@@ -276,7 +276,8 @@ impl<'s> FlowMatcher<'s> {
         if let Some([width, height]) = self.last {
             let vectors = Vectors::BASELINE;
             self.left.describe([width, height], invalid.map(|pair| &pair.left), config, vectors);
-            self.right.describe([width, height], invalid.map(|pair| &pair.right), config, vectors);
+            let invalid_right = invalid.and_then(|pair| pair.right.as_ref());
+            self.right.describe([width, height], invalid_right, config, vectors);
         }
     }
 
@@ -319,7 +320,7 @@ impl<'s> FlowMatcher<'s> {
         }
         // The two cameras' features are found at the same time.
         let [invalid_left, invalid_right] =
-            [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+            [invalid.map(|pair| &pair.left), invalid.and_then(|pair| pair.right.as_ref())];
         let (vectors, follows) = (executor.vectors(), self.last == Some(size));
         let incoming = |image| Incoming { image, follows };
         let (left, right) = executor.join(

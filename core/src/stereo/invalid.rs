@@ -21,8 +21,8 @@ pub(super) fn remove(invalid: &InvalidPair<'_>, width: usize, disparity_q8: &mut
     for (v, row) in disparity_q8.chunks_exact_mut(width.max(1)).enumerate() {
         for (u, disparity) in row.iter_mut().enumerate().filter(|(_, disparity)| **disparity != 0) {
             let pixels = usize::from((*disparity + DISPARITY_ONE_PX / 2) / DISPARITY_ONE_PX);
-            let partner =
-                u.checked_sub(pixels).is_none_or(|partner| invalid.right.contains(partner, v));
+            let is_unused = |partner| invalid.right.is_some_and(|right| right.contains(partner, v));
+            let partner = u.checked_sub(pixels).is_none_or(is_unused);
             if partner || invalid.left.contains(u, v) {
                 *disparity = 0;
             }
@@ -40,8 +40,11 @@ mod tests {
         let (left, right) = ([1 << 5], [1 << 1]);
         let [left, right] = [&left, &right].map(|words| InvalidPixels::new(words, 8, 1).unwrap());
         let mut row = [0, 0, 300, 600, 3 * 256, 256, 256, 0];
-        remove(&InvalidPair { left, right }, 8, &mut row);
+        remove(&InvalidPair { left, right: Some(right) }, 8, &mut row);
         assert_eq!(row, [0, 0, 0, 0, 0, 0, 256, 0], "2 - 1, 3 - 2 and 4 - 3 are 1");
+        let mut row = [0, 0, 300, 600, 3 * 256, 256, 256, 0];
+        remove(&InvalidPair { left, right: None }, 8, &mut row);
+        assert_eq!(row, [0, 0, 300, 600, 3 * 256, 0, 256, 0], "all of the right image is used");
         let mut plane = [7; 8];
         flatten(&left, 8, &mut plane);
         assert_eq!(plane, [7, 7, 7, 7, 7, FLAT, 7, 7]);

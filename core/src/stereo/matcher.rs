@@ -14,7 +14,7 @@ use super::{
 use crate::{
     digest::Digest,
     geometry::PixelCorrection,
-    image::{DISPARITY_ONE_PX, MaskedPair, View},
+    image::{DISPARITY_ONE_PX, InvalidPair, MaskedPair, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{BANDS, Bands, Executor, Work, each, zip2},
     settings::Problems,
@@ -253,8 +253,13 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Takes disparities from elsewhere (1/256 px, 0 none) instead of a pair's own. Of an image
-    /// larger than the capacity, which the mapper refuses, what fits is taken.
-    pub(crate) fn take(&mut self, disparity_q8: View<'_, u16>) -> StereoReport {
+    /// larger than the capacity, which the mapper refuses, what fits is taken. Nothing is taken at
+    /// the pixels that are not to be used.
+    pub(crate) fn take(
+        &mut self,
+        disparity_q8: View<'_, u16>,
+        unused: Option<&InvalidPair<'_>>,
+    ) -> StereoReport {
         self.width = disparity_q8.width().min(self.image_width).max(1);
         self.height = disparity_q8.height().min(self.image_height).max(1);
         self.disparity.fill(0);
@@ -265,12 +270,12 @@ impl<'s> StereoMatcher<'s> {
         };
         // A match this far to the left lies outside the right image at every column.
         let absurd = self.width as u32 * u32::from(DISPARITY_ONE_PX);
-        for (to, from) in
-            self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows())
-        {
-            for (to, &given) in to.iter_mut().zip(from) {
+        let rows = self.disparity.chunks_exact_mut(self.width.max(1)).zip(disparity_q8.rows());
+        for (v, (to, from)) in rows.enumerate() {
+            for (u, (to, &given)) in to.iter_mut().zip(from).enumerate() {
                 let accepted = u32::from(given) < absurd;
-                *to = if accepted { given } else { 0 };
+                let is_used = unused.is_none_or(|pair| !pair.left.contains(u, v));
+                *to = if accepted && is_used { given } else { 0 };
                 report.refused += u32::from(!accepted);
                 report.valid += u32::from(*to != 0);
             }

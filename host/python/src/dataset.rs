@@ -201,7 +201,7 @@ impl Dataset {
 
 /// The keywords of a step; what was decoded is taken over, not copied.
 fn frame(py: Python<'_>, images: StereoImages) -> PyResult<Bound<'_, PyDict>> {
-    let StereoImages { left, right, colour, depth, masks, .. } = images;
+    let StereoImages { left, right, colour, depth, masks, ignored, .. } = images;
     let frame = PyDict::new(py);
     let size = |image: &Image<u8>| [image.height(), image.width()];
     let (of_left, of_right) = (size(&left), size(&right));
@@ -215,6 +215,10 @@ fn frame(py: Python<'_>, images: StereoImages) -> PyResult<Bound<'_, PyDict>> {
         let size = [depth.disparity_q8.height(), depth.disparity_q8.width()];
         frame
             .set_item("disparity_q8", arrays::image(py, depth.disparity_q8.into_pixels(), size)?)?;
+    }
+    if let Some(ignored) = ignored {
+        let pixels = ignored.pixels().to_vec();
+        frame.set_item("ignored", arrays::image(py, pixels, size(&ignored))?)?;
     }
     if !masks.instances.is_empty() {
         let detections = masks

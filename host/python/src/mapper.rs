@@ -132,11 +132,12 @@ impl Mapper {
     /// fused in colour, and grey is computed. Nothing is copied whose pixels lie side by side in
     /// their rows; rows may lie apart, as in a part of a larger array. Other views, as `[...,
     /// ::-1]`, are copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo
-    /// matching: give them with every frame. A pose must be a rigid motion within the map's bounds.
-    /// `fused` in the report is true only if something was fused.
+    /// matching: give them with every frame. No stage uses the pixels of `ignored`, height x width
+    /// of the rectified left picture, that are not 0. A pose must be a rigid motion within the
+    /// map's bounds. `fused` in the report is true only if something was fused.
     #[pyo3(signature = (
-        left, right, *, colour=None, classes=None, disparity_q8=None, t_world_camera=None,
-        time_ns=None, detections=None
+        left, right, *, colour=None, classes=None, disparity_q8=None, ignored=None,
+        t_world_camera=None, time_ns=None, detections=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn step<'py>(
@@ -147,6 +148,7 @@ impl Mapper {
         colour: Option<Bound<'py, PyAny>>,
         classes: Option<Bound<'py, PyAny>>,
         disparity_q8: Option<Bound<'py, PyAny>>,
+        ignored: Option<Bound<'py, PyAny>>,
         t_world_camera: Option<Bound<'py, PyAny>>,
         time_ns: Option<u64>,
         detections: Option<Bound<'py, PyAny>>,
@@ -157,6 +159,7 @@ impl Mapper {
         let classes = classes.map(|array| Borrowed::<u8>::new("classes", &array)).transpose()?;
         let disparity_q8 =
             disparity_q8.map(|array| Borrowed::<u16>::new("disparity_q8", &array)).transpose()?;
+        let ignored = ignored.map(|array| Borrowed::<u8>::new("ignored", &array)).transpose()?;
         let found = detections.map(|list| {
             list.try_iter()?.map(|one| BorrowedDetection::new(&one?)).collect::<PyResult<Vec<_>>>()
         });
@@ -168,6 +171,7 @@ impl Mapper {
             colour: colour.as_ref().map(Borrowed::colour).transpose()?.or(left.colour),
             class: classes.as_ref().map(Borrowed::view).transpose()?,
             disparity_q8: disparity_q8.as_ref().map(Borrowed::view).transpose()?,
+            ignored: ignored.as_ref().map(Borrowed::view).transpose()?,
             t_world_camera: t_world_camera
                 .map(|pose| pose::given("t_world_camera", &pose))
                 .transpose()?,

@@ -3,10 +3,10 @@
 //!
 //! [`source`] says what a source of frames is and what a frame holds; it depends on nothing else
 //! here. [`layouts`] reads recordings, [`bags`] those of ROS, [`stream`] what comes through a pipe
-//! or from an iterator, [`depth`] and [`masks`] lay files over any source, [`faults`] spoils one on
-//! purpose; [`diagnosis`] examines images before they are mapped. Loaders guess nothing silently:
-//! what they assume stands in [`FrameSource::notes`], and what they cannot use is an [`InputError`]
-//! that says what to do.
+//! or from an iterator, [`depth`] and [`masks`] lay files over any source, [`ignored`] leaves
+//! pixels out, [`faults`] spoils one on purpose; [`diagnosis`] examines images before they are
+//! mapped. Loaders guess nothing silently: what they assume stands in [`FrameSource::notes`], and
+//! what they cannot use is an [`InputError`] that says what to do.
 
 pub mod bags;
 mod data_set;
@@ -14,6 +14,7 @@ mod data_sets;
 pub mod depth;
 pub mod diagnosis;
 pub mod faults;
+pub mod ignored;
 pub mod layouts;
 pub mod masks;
 pub mod source;

@@ -8,7 +8,7 @@ use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
 use crate::input::{
     self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest,
-    StreetFrames, depth, masks,
+    StreetFrames, depth, ignored, masks,
 };
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -41,6 +41,8 @@ pub struct Input {
     pub calibration: Vec<PathBuf>,
     /// Answers of a person to what the files of a calibration leave open.
     pub hints: CalibrationHints,
+    /// Picture whose white pixels no stage uses.
+    pub ignore_mask: Option<PathBuf>,
     /// Faults to inject.
     pub faults: Option<Faults>,
 }
@@ -80,7 +82,12 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
     };
     let dataset = depth::attach(dataset, &request.depth, request.depth_scale.as_ref())?;
     let scale = request.frames.scale;
-    Ok(if scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, scale)?) })
+    let scaled: Box<dyn FrameSource> =
+        if scale == 1.0 { dataset } else { Box::new(Scaled::new(dataset, scale)?) };
+    Ok(match &request.input.ignore_mask {
+        Some(path) => ignored::attach(scaled, path)?,
+        None => scaled,
+    })
 }
 
 fn options(request: &Request) -> OpenOptions {

@@ -84,6 +84,7 @@ fn search(
     let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&capacity, &config, &mut slab).ok()?;
     let mut pairs = RectifiedSource::new(source).ok()?;
+    let ignored = source.info().ignored.clone();
     let no_disparity = vec![0; capacity.image_width * capacity.image_height];
     let mut last = None;
     for &index in frames.iter().take(MAX_FRAMES) {
@@ -91,6 +92,7 @@ fn search(
         let [left, right] = pairs.pair(index).ok()??;
         let frame = StereoFrame {
             disparity_q8: View::new(&no_disparity, left.width(), left.height()),
+            ignored: ignored.as_ref().and_then(|ignored| ignored.view()),
             time_ns: source.frame_info(index).stamp_ns,
             ..StereoFrame::pair(left.view()?, right.view()?)
         };

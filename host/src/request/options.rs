@@ -109,6 +109,10 @@ pub struct Options {
     /// [default: the least that leaves no pixel without image]
     #[arg(long, value_name = "PX", requires = "rectified", help_heading = "Input")]
     pub rectified_focal: Option<f64>,
+    /// Picture of what no stage shall use, white, of the size of the left images: the car's own
+    /// bonnet, a dirty lens
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    pub ignore_mask: Option<PathBuf>,
     /// Bounds by name: tiny, small, onboard or desktop
     #[arg(long, value_name = "NAME", conflicts_with_all = ["memory", "capacity"], help_heading = "Limits")]
     pub profile: Option<String>,
@@ -338,6 +342,7 @@ impl Options {
                 swap: self.swap,
                 colour: false,
             },
+            ignore_mask: self.ignore_mask.clone(),
             faults: self.faults.clone(),
         })
     }

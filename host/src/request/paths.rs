@@ -41,6 +41,7 @@ impl Request {
         if let Source::Recording(path) = &mut input.source {
             paths.push(path);
         }
+        paths.extend(&mut input.ignore_mask);
         match depth {
             DepthChoice::Files(_, path) => paths.push(path),
             DepthChoice::Elas | DepthChoice::Exact => {}
@@ -73,13 +74,16 @@ mod tests {
         request.depth = "files:depth".parse().unwrap();
         request.masks.source = "files:masks".parse().unwrap();
         request.poses = Poses::File("poses.txt".into());
+        request.input.ignore_mask = Some("bonnet.png".into());
         request.exports.instances = Some("saved".into());
         let inputs = request.inputs();
-        for name in ["recording", "left.yaml", "right.yaml", "depth", "masks", "poses.txt"] {
+        for name in
+            ["recording", "left.yaml", "right.yaml", "depth", "masks", "poses.txt", "bonnet.png"]
+        {
             assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
         }
         // The folder of saved masks is an output.
-        assert_eq!(inputs.len(), 6, "{inputs:?}");
+        assert_eq!(inputs.len(), 7, "{inputs:?}");
         assert_eq!(request.saved_folders().count(), 1);
     }
 }

@@ -30,6 +30,7 @@ pub fn stereo_frame<'f>(
     Some(StereoFrame {
         colour: images.colour.as_ref().and_then(|colour| colour.view()),
         disparity_q8: images.depth.as_ref().and_then(|depth| depth.disparity_q8.view()),
+        ignored: images.ignored.as_ref().and_then(|ignored| ignored.view()),
         detections,
         ..StereoFrame::pair(images.left.view()?, images.right.view()?)
     })

@@ -42,7 +42,7 @@ impl StereoMatcher<'_> {
         let [left_du, left_dv, right_du, right_dv] =
             split_planes(self.gradients, width * self.height);
         let [left_invalid, right_invalid] =
-            [invalid.map(|pair| &pair.left), invalid.map(|pair| &pair.right)];
+            [invalid.map(|pair| &pair.left), invalid.and_then(|pair| pair.right.as_ref())];
         for (image, invalid, du, dv) in
             [(left, left_invalid, left_du, left_dv), (right, right_invalid, right_du, right_dv)]
         {

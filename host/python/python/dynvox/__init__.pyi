@@ -245,6 +245,7 @@ class Mapper:
         colour: NDArray[np.uint8] | None = None,
         classes: NDArray[np.uint8] | None = None,
         disparity_q8: NDArray[np.uint16] | None = None,
+        ignored: NDArray[np.uint8] | None = None,
         t_world_camera: ArrayLike | Pose | None = None,
         time_ns: int | None = None,
         detections: Iterable[Detection] | None = None,
@@ -255,7 +256,7 @@ class Mapper:
         Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then fused in colour, and grey is computed.
         Nothing is copied whose pixels lie side by side in their rows; rows may lie apart, as in a part of a larger array. Other views, as `[..., ::-1]`, are
         copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo matching: give them with every frame. A pose must be a rigid motion within
-        the map's bounds. `fused` in the report is true only if something was fused.
+        the map's bounds. No stage uses the pixels of `ignored`, height x width of the rectified left picture, that are not 0. `fused` in the report is true only if something was fused.
         """
 
     @property
@@ -344,6 +345,7 @@ class Dataset:
         calibration: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
         rectified: str | None = None,
         rectified_focal: float | None = None,
+        ignore_mask: str | PathLike[str] | None = None,
         start: int | None = None,
         frames: int | None = None,
         stride: int | None = None,

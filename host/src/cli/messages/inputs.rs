@@ -105,6 +105,10 @@ fn of_recordings() -> Vec<String> {
         InputError::Masks { .. } => InputError::Masks {
             path: path("masks/000007.png"), reason: text("the file ends early")
         },
+        InputError::IgnoreMask { .. } => InputError::IgnoreMask {
+            path: path("bonnet.png"),
+            reason: text("it has no white pixel. Paint what is to be ignored with 255"),
+        },
         InputError::Network { .. } => InputError::Network {
             path: path("yolo.onnx"), reason: text("its file ends early. Export it anew")
         },

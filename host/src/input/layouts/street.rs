@@ -31,6 +31,7 @@ impl StreetFrames {
             masks: AvailableMasks::Exact,
             truth: Some((0..frames).map(|index| street.t_world_camera(index)).collect()),
             notes: Vec::new(),
+            ignored: None,
         };
         Ok(Self { street, info })
     }
@@ -72,6 +73,7 @@ impl FrameSource for StreetFrames {
             exact: exact(),
             objects: Some(objects),
             masks: FrameMasks::default(),
+            ignored: None,
         })
     }
 

@@ -169,6 +169,14 @@ pub enum InputError {
         /// Reason, as it completes the message's sentence.
         reason: String,
     },
+    /// A mask of ignored pixels that cannot be used.
+    #[error("the mask of ignored pixels {path} cannot be used: {reason}")]
+    IgnoreMask {
+        /// The file.
+        path: PathBuf,
+        /// Reason, and what to do.
+        reason: String,
+    },
     /// A network that cannot be used.
     #[error("the network {path} cannot be used: {reason}")]
     Network {

@@ -1,9 +1,11 @@
 //! A source of frames, and what is known of it before a frame is read.
 
 use super::{AvailableMasks, InputError, LidarScan, StereoImages, StreamState};
+use crate::formats::Image;
 use crate::formats::calibration::FittedGeometry;
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
+use std::sync::Arc;
 
 /// Facts about a source that hold for all its frames.
 #[derive(Clone, Debug)]
@@ -28,6 +30,8 @@ pub struct SourceInfo {
     pub truth: Option<Vec<Transform>>,
     /// Assumptions and omissions, as sentences.
     pub notes: Vec<String>,
+    /// Pixels of the rectified left image that are not used in any frame, 255; the others are 0.
+    pub ignored: Option<Arc<Image<u8>>>,
 }
 
 impl SourceInfo {
@@ -43,6 +47,7 @@ impl SourceInfo {
             masks: AvailableMasks::Absent,
             truth: None,
             notes: Vec::new(),
+            ignored: None,
         }
     }
 }

@@ -28,6 +28,7 @@ pub use truth::{ObjectsTruth, TrueObject};
 
 use crate::formats::{Decoded, Image};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Frames a second assumed of images without times.
 pub const ASSUMED_HZ: f64 = 10.0;
@@ -49,6 +50,9 @@ pub struct StereoImages {
     pub objects: Option<ObjectsTruth>,
     /// Instance masks of the left image; empty until a source of masks is laid over this one.
     pub masks: FrameMasks,
+    /// Pixels of the rectified left image that are not used, 255, in all frames alike; the others
+    /// are 0.
+    pub ignored: Option<Arc<Image<u8>>>,
 }
 
 impl StereoImages {
@@ -62,6 +66,7 @@ impl StereoImages {
             exact: None,
             objects: None,
             masks: FrameMasks::default(),
+            ignored: None,
         }
     }
 }

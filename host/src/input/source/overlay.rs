@@ -1,5 +1,8 @@
 //! A source of frames with depth or masks laid over it.
 
+use crate::formats::Image;
+use std::sync::Arc;
+
 use super::{FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState};
 
 /// Adds depth or masks to the frames of a data set.
@@ -29,6 +32,12 @@ impl<L: OverlaySource> Overlay<L> {
         let mut info = dataset.info().clone();
         info.notes.push(note);
         Self { dataset, source, info }
+    }
+
+    /// Tells which pixels of the frames are not used.
+    pub fn ignoring(mut self, ignored: Arc<Image<u8>>) -> Self {
+        self.info.ignored = Some(ignored);
+        self
     }
 }
 

@@ -173,6 +173,7 @@ impl FrameSource for Scaled {
             }),
             objects: frame.objects.map(|truth| truth.scaled(self.scale)),
             masks: frame.masks,
+            ignored: None,
         })
     }
 
