@@ -5,6 +5,7 @@ use super::{
     normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
     synchrony::RightAhead,
+    weights::{robust_weight, side_weight},
 };
 use crate::{
     geometry::{StereoRig, Transform},
@@ -40,6 +41,9 @@ pub enum MotionStatus {
     /// The cameras of the pair do not seem to expose at the same time
     /// ([`EgomotionConfig::right_ahead_max_m`]), and too few matches agree.
     Unsynchronized,
+    /// Two groups of matches move differently, each as a world may, and nothing tells which of them
+    /// carries the camera.
+    Contested,
     /// The rig cannot be used.
     BadRig,
 }
@@ -165,16 +169,42 @@ impl<'s> Estimator<'s> {
         // The share of inliers is asked of all matches, so it sets the bound before any is drawn.
         self.points.fill(matches, rig);
         let matches = self.points.len();
-        let needed = usize::from(config.matches_min).max(3);
-        if matches < needed {
+        if matches < usize::from(config.matches_min).max(3) {
             return MotionEstimate::failed(MotionStatus::TooFewMatches, matches, 0, 0);
         }
-        let needed = needed.max(libm::ceilf(config.inlier_share_min * matches as f32) as usize);
         // A hypothesis from the last motion needs fewer steps than one from rest.
         let start = initial.copied().unwrap_or(Transform::IDENTITY);
         let (best, samples) = self.ransac(config, rig, random, &start);
+        self.refine_best(config, rig, &best, samples)
+    }
+
+    /// Estimates the motion near `start`, without another hypothesis.
+    pub(super) fn estimate_near<'m>(
+        &mut self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        matches: impl IntoIterator<Item = &'m Match>,
+        start: &Transform,
+    ) -> MotionEstimate {
+        self.inlier_len = 0;
+        self.points.fill(matches, rig);
+        self.refine_best(config, rig, start, 0)
+    }
+
+    /// Refines a hypothesis on its inliers among the points, which are chosen anew in each round.
+    #[inline(never)]
+    fn refine_best(
+        &mut self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        best: &Transform,
+        samples: u32,
+    ) -> MotionEstimate {
+        let matches = self.points.len();
+        let share = libm::ceilf(config.inlier_share_min * matches as f32) as usize;
+        let needed = usize::from(config.matches_min).max(3).max(share);
         let mut estimate = MotionEstimate::failed(MotionStatus::TooFewInliers, matches, 0, samples);
-        let mut motion = best;
+        let mut motion = *best;
         // Each round refines on the inliers of the motion before it.
         for round in 0..ROUNDS {
             let inlier_px = if round == 0 { config.inlier_px } else { config.refined_inlier_px };
@@ -350,26 +380,6 @@ fn required_iterations(config: &EgomotionConfig, inliers: u32, points: usize) ->
     }
     let required = libm::ceil(libm::log(1.0 - config.confidence) / libm::log(1.0 - clean));
     if required < f64::from(config.samples) { required as u32 } else { u32::from(config.samples) }
-}
-
-/// Weight by distance from the middle column ([`EgomotionConfig::side_knee`]).
-fn side_weight(config: &EgomotionConfig, rig: &StereoRig, point: &Point) -> f64 {
-    let knee_px = config.side_knee * libm::fabs(rig.center_u_px);
-    if knee_px <= 0.0 {
-        // A principal point in the first column has no middle to be far from.
-        return 1.0;
-    }
-    let share = point.left[0] / knee_px;
-    let square = share * share;
-    let fourth = square * square;
-    1.0 / (1.0 + fourth * fourth)
-}
-
-/// Weight by the squared error of a match, px² (Geman and McClure's,
-/// [`EgomotionConfig::robust_px`]).
-fn robust_weight(config: &EgomotionConfig, squared_px: f64) -> f64 {
-    let share = 1.0 / (1.0 + squared_px / (config.robust_px * config.robust_px));
-    share * share
 }
 
 fn largest(step: [f64; 6]) -> f64 {

@@ -51,6 +51,7 @@ mod normal_equations;
 mod points;
 mod synchrony;
 mod track;
+mod weights;
 
 pub use config::EgomotionConfig;
 pub use covariance::MotionCovariance;

@@ -202,7 +202,7 @@ impl<'s> Points<'s> {
 /// A motion and a rig in single precision, for scoring: hundreds of hypotheses times a thousand
 /// points. Its projection divides once and never branches, which the one of [`StereoRig`] in double
 /// precision does not allow.
-struct SinglePrecision {
+pub(super) struct SinglePrecision {
     rotation: [[f32; 3]; 3],
     translation: [f32; 3],
     focal: f32,
@@ -210,13 +210,21 @@ struct SinglePrecision {
 }
 
 impl SinglePrecision {
-    fn new(motion: &Transform, rig: &StereoRig) -> Self {
+    pub(super) fn new(motion: &Transform, rig: &StereoRig) -> Self {
         Self {
             rotation: motion.rotation_matrix().map(|row| row.map(|x| x as f32)),
             translation: motion.translation_m.map(|x| x as f32),
             focal: rig.focal_px as f32,
             focal_baseline: rig.focal_baseline_px_m() as f32,
         }
+    }
+
+    /// Tells whether the motion puts a match within so many pixels of where it is seen.
+    pub(super) fn explains(&self, m: &Match, rig: &StereoRig, within_px: f32) -> bool {
+        triangulate(m, rig).is_some_and(|Point { xyz, left, right }| {
+            let [left, right] = [left, right].map(|at| at.map(|x| x as f32));
+            self.error(xyz.map(|x| x as f32), left, right) < within_px * within_px
+        })
     }
 
     #[inline(always)]

@@ -1,5 +1,6 @@
 mod camera;
 mod clip;
+mod rivals;
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MAX_REFERENCE_FRAMES, MotionEstimate, MotionHypotheses,

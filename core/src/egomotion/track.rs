@@ -1,5 +1,9 @@
 //! The camera's motion from frame to frame, also where it cannot be estimated.
 
+mod rivals;
+
+use rivals::Contest;
+
 use super::{
     EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, RightAhead,
 };
@@ -101,10 +105,12 @@ impl Egomotion {
         let (expected, matches) = (self.expected(), matches.into_iter());
         let right_ahead = RightAhead::from_matches(rig, matches.clone());
         let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
-        let found = estimator.estimate(config, rig, matches, hypotheses);
+        let found = estimator.estimate(config, rig, matches.clone(), hypotheses);
+        self.reference_s += f64::from(interval_s);
+        let contest = Contest { camera: self, config, rig };
+        let found = contest.choose(matches, estimator, found);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.
-        self.reference_s += f64::from(interval_s);
         let frames = self.since_reference + 1;
         let motion = estimate
             .t_current_previous

@@ -102,6 +102,7 @@ impl FrameRow {
             Some(MotionStatus::NotConverged) => "not_converged",
             Some(MotionStatus::Implausible) => "implausible",
             Some(MotionStatus::Unsynchronized) => "unsynchronized_cameras",
+            Some(MotionStatus::Contested) => "contested",
             Some(MotionStatus::BadRig) => "bad_rig",
         }
     }

@@ -1,6 +1,7 @@
 //! The estimate's parts: how many hypotheses, which points, what weighs how much.
 
 use super::*;
+use crate::egomotion::weights::side_weight;
 use crate::memory::Slab;
 use std::boxed::Box;
 
