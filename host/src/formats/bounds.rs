@@ -16,6 +16,7 @@
 //! | images of a topic; image topics | [`MAX_BAG_IMAGES`], [`MAX_BAG_TOPICS`] |
 //! | text: bytes, lines, bytes of a line | [`CALIBRATION_TEXT`], [`SETTINGS_TEXT`] |
 //! | as above | [`MANIFEST_TEXT`], [`TABLE_TEXT`] |
+//! | as above; inertial samples | [`INERTIAL_TEXT`], [`MAX_INERTIAL_SAMPLES`] |
 //! | line of a table that is read row by row | [`MAX_ROW_BYTES`] |
 //! | XML: elements, attributes of one | [`MAX_XML_NODES`], [`MAX_XML_ATTRIBUTES`] |
 //! | YAML: values, aliases | [`MAX_YAML_NODES`], [`MAX_YAML_ALIASES`] |
@@ -76,6 +77,12 @@ pub const CALIBRATION_TEXT: TextBound =
 /// Tables: poses, times, labels, detections and run-length masks.
 pub const TABLE_TEXT: TextBound =
     TextBound { what: "a table", bytes: 64 * MIB, lines: 500_000, line_bytes: 1 << 20 };
+
+/// Inertial samples: an hour and more at 1,000 Hz.
+pub const INERTIAL_TEXT: TextBound =
+    TextBound { what: "a table", bytes: 768 * MIB, lines: 5_000_000, line_bytes: 1 << 16 };
+/// Samples of an inertial unit.
+pub const MAX_INERTIAL_SAMPLES: usize = 5_000_000;
 
 /// Lists of jobs, alignments and results, which programs write on one line.
 pub const MANIFEST_TEXT: TextBound = TextBound {

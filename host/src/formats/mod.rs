@@ -14,6 +14,7 @@ mod decode;
 mod error;
 mod gnss;
 mod image;
+mod inertial;
 mod opencv_xml;
 mod pfm;
 mod picture;
@@ -38,6 +39,9 @@ pub use checksum::checksum_of;
 pub use error::{FormatError, read_bytes_within, read_text, read_text_within};
 pub use gnss::{Fix, LocalPlane, read_gnss};
 pub use image::{Image, luma};
+pub use inertial::{
+    GRAVITY_M_S2, INERTIAL_FORMATS, InertialFormat, InertialTable, TimedReading, read_inertial,
+};
 pub use opencv_xml::read_opencv_depth;
 pub use pfm::read_pfm;
 pub use picture::{

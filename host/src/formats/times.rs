@@ -163,8 +163,18 @@ pub(super) fn seconds_text(ns: u64) -> String {
     if digits.ends_with('.') { format!("{digits}0") } else { digits.to_owned() }
 }
 
+/// A number of either sign in 1e-9, to the last digit where it is written as a decimal.
+pub(super) fn parse_signed_nano(text: &str) -> Option<i128> {
+    let text = text.trim();
+    let (sign, digits) = match text.strip_prefix('-') {
+        Some(digits) => (-1, digits),
+        None => (1, text.strip_prefix('+').unwrap_or(text)),
+    };
+    i128::try_from(parse_nano(digits)?).ok().map(|nano| sign * nano)
+}
+
 /// `2011-09-26 13:02:25.964389445` as ns since 1970.
-fn parse_date(text: &str) -> Option<u64> {
+pub(super) fn parse_date(text: &str) -> Option<u64> {
     let (date, time) = text.split_once([' ', 'T'])?;
     let [year, month, day] = numbers(date, '-')?;
     let mut parts = time.splitn(3, ':');

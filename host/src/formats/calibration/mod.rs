@@ -16,7 +16,8 @@ pub use kitti::{KittiCalibration, Projection};
 pub use plain::read_rig;
 pub use raw::{
     CALIBRATION_FORMATS, CalibrationFiles, CalibrationFormat, CalibrationRead, Cameras, Placement,
-    RectifiedCameras, StereoCalibration, to_kalibr, to_toml,
+    RectifiedCameras, StereoCalibration, UnitCalibration, UnitCamera, UnitNoise, to_kalibr,
+    to_toml,
 };
 pub use rectified_size::{LARGEST_PX, RectifiedSize};
 

@@ -62,7 +62,7 @@ fn read(root: Node<'_>) -> Result<StereoCalibration, FormatError> {
     })
 }
 
-fn pose(node: Node<'_>) -> Result<Pose, FormatError> {
+pub(super) fn pose(node: Node<'_>) -> Result<Pose, FormatError> {
     let numbers = |keys: [&str; 3]| -> Result<[f64; 3], FormatError> {
         let [a, b, c] = keys;
         Ok([node.value_of(a)?, node.value_of(b)?, node.value_of(c)?])

@@ -30,6 +30,8 @@ mod sections;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod unit;
+mod unit_kitti;
 mod vins;
 mod zed;
 
@@ -37,6 +39,7 @@ pub use format::{CalibrationFormat, Cameras};
 pub use kalibr::to_kalibr;
 pub use own::to_toml;
 pub use read::{CalibrationFiles, CalibrationRead};
+pub use unit::{UnitCalibration, UnitCamera, UnitNoise};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;
