@@ -1,16 +1,21 @@
 //! `dynvox inspect`.
 
+mod unit;
+
 use crate::evaluate::stereo::{StereoSetError, find_stereo_set};
 use crate::formats::calibration::CalibrationHints;
 use crate::formats::{SETTINGS_FILE, SUMMARY_FILE};
 use crate::input::diagnosis;
-use crate::input::{self, AvailableMasks, Found, FrameSource, InputError, Layout, OpenOptions};
+use crate::input::{
+    self, AvailableMasks, Found, FrameSource, InertialChoice, InputError, Layout, OpenOptions,
+};
 use crate::terminal::{name, quoted};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{BudgetError, BudgetOptions, Capacity};
 use serde::{Serialize, Serializer};
 use serde_json::json;
 use std::path::PathBuf;
+use unit::UnitFound;
 
 #[derive(Debug, clap::Args)]
 pub struct InspectArgs {
@@ -24,6 +29,12 @@ pub struct InspectArgs {
     calibration: Vec<PathBuf>,
     #[command(flatten)]
     hints: CalibrationHints,
+    /// Samples of an inertial unit instead of the recording's own, or none
+    #[arg(long, value_name = "FILE|none")]
+    inertial: Option<InertialChoice>,
+    /// Mounting of that unit on the left camera, once for each file
+    #[arg(long, value_name = "FILE")]
+    inertial_calibration: Vec<PathBuf>,
     /// Write what is found to standard output as JSON
     #[arg(long)]
     json: bool,
@@ -34,6 +45,8 @@ pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
         layout: args.dataset,
         calibration: args.calibration.clone(),
         hints: args.hints,
+        inertial: args.inertial.clone().unwrap_or_default(),
+        inertial_calibration: args.inertial_calibration.clone(),
         ..OpenOptions::default()
     };
     let (layout, found) = match input::survey(&args.path, &options) {
@@ -132,7 +145,19 @@ fn command(args: &InspectArgs, found: &Found) -> String {
         .unwrap_or_default();
     let files = args.calibration.iter().map(|file| format!(" --calibration {}", quoted(file)));
     let hints = args.hints.options();
-    format!("dynvox run {}{sequence}{}{hints}", quoted(&args.path), files.collect::<String>())
+    let unit = match &args.inertial {
+        None | Some(InertialChoice::Auto) => String::new(),
+        Some(InertialChoice::None) => " --inertial none".to_owned(),
+        Some(InertialChoice::File(path)) => format!(" --inertial {}", quoted(path)),
+    };
+    let mounting = args.inertial_calibration.iter();
+    let mounting = mounting.map(|file| format!(" --inertial-calibration {}", quoted(file)));
+    format!(
+        "dynvox run {}{sequence}{}{hints}{unit}{}",
+        quoted(&args.path),
+        files.collect::<String>(),
+        mounting.collect::<String>()
+    )
 }
 
 /// One sequence, or why it cannot be used.
@@ -177,6 +202,8 @@ struct Description {
     masks: &'static str,
     frames_with_masks: usize,
     frames_with_lidar: usize,
+    /// Inertial unit in use; absent without one.
+    inertial: Option<UnitFound>,
     /// Doubts about the images.
     findings: Vec<Doubt>,
     /// Files that exist and cannot be read.
@@ -238,6 +265,7 @@ impl Description {
             masks,
             frames_with_masks,
             frames_with_lidar: scans.len(),
+            inertial: dataset.info().inertial.as_deref().map(UnitFound::new),
             findings: findings
                 .into_iter()
                 .map(|finding| Doubt { refused: finding.refused, message: finding.message })
@@ -289,6 +317,10 @@ impl Description {
                 "  LiDAR scans of {frames} frames: --evaluate lidar measures accuracy and \
                  completeness"
             ),
+        }
+        match &self.inertial {
+            Some(unit) => unit.print(),
+            None => outln!("  no inertial unit in use"),
         }
         self.unreadable.iter().for_each(|what| outln!("  {what}"));
         for Doubt { refused, message } in &self.findings {

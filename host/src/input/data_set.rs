@@ -3,6 +3,7 @@
 //! Each file of [`super::layouts`] and [`super::bags`] holds such a row as `DATA_SET`;
 //! [`super::data_sets`] lists them.
 
+use super::inertial::choice::InertialChoice;
 use super::source::{FrameSource, InputError, Stacking};
 use crate::formats::calibration::{CalibrationHints, CameraGeometry, RectifiedSize};
 use crate::formats::{BayerPattern, FormatError};
@@ -106,6 +107,10 @@ pub struct OpenOptions {
     pub hints: CalibrationHints,
     /// Size to which raw pairs are rectified.
     pub rectified: RectifiedSize,
+    /// Source of inertial samples.
+    pub inertial: InertialChoice,
+    /// Files with the inertial unit's mounting instead of the recording's own.
+    pub inertial_calibration: Vec<PathBuf>,
 }
 
 impl OpenOptions {

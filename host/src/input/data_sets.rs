@@ -96,7 +96,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn FrameSource>, 
         return Err(InputError::Absent { path: path.to_path_buf() });
     }
     let layout = layout_of(path, options)?;
-    (layout.row().open)(path, options)
+    super::inertial::attached((layout.row().open)(path, options)?, options)
 }
 
 /// The layout that is asked for, else the one at a path. A folder of pictures is one where their

@@ -15,6 +15,7 @@ pub mod depth;
 pub mod diagnosis;
 pub mod faults;
 pub mod ignored;
+mod inertial;
 pub mod layouts;
 pub mod masks;
 pub mod source;
@@ -22,9 +23,10 @@ pub mod stream;
 
 pub use data_set::{CameraPair, DataSet, Layout, OpenOptions, Topics};
 pub use data_sets::{DATA_SETS, Found, open, sequences_at, survey};
+pub use inertial::choice::InertialChoice;
 pub use layouts::{Sequence, StreetFrames};
 pub use source::{
     AvailableMasks, DepthRefusals, ExactFrame, FrameInfo, FrameMasks, FrameSource, GivenDepth,
-    InputError, InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled, SourceInfo, Stacking,
-    StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
+    InertialUnitData, InputError, InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled,
+    SourceInfo, Stacking, StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
 };

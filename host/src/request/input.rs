@@ -7,8 +7,8 @@ use crate::input::Topics;
 use crate::input::faults::{self, Faults};
 use crate::input::stream::WhenLate;
 use crate::input::{
-    self, CameraPair, FrameSource, Layout, OpenOptions, Scaled, Stacking, StopRequest,
-    StreetFrames, depth, ignored, masks,
+    self, CameraPair, FrameSource, InertialChoice, Layout, OpenOptions, Scaled, Stacking,
+    StopRequest, StreetFrames, depth, ignored, masks,
 };
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -43,6 +43,10 @@ pub struct Input {
     pub hints: CalibrationHints,
     /// Picture whose white pixels no stage uses.
     pub ignore_mask: Option<PathBuf>,
+    /// Source of inertial samples.
+    pub inertial: InertialChoice,
+    /// Files with the inertial unit's mounting instead of the recording's own.
+    pub inertial_calibration: Vec<PathBuf>,
     /// Faults to inject.
     pub faults: Option<Faults>,
 }
@@ -70,6 +74,14 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
             "--rate and --when-late are for a stream: `dynvox run -`",
         ));
     }
+    let has_unit = matches!(request.input.inertial, InertialChoice::File(_))
+        || !request.input.inertial_calibration.is_empty();
+    if has_unit && !matches!(source, Source::Recording(_)) {
+        return Err(RequestError::invalid(
+            "--inertial FILE and --inertial-calibration belong to a recording: `dynvox run PATH`. \
+             The synthetic street has a unit of its own: --set street.inertial.rate_hz=200",
+        ));
+    }
     let dataset: Box<dyn FrameSource> = match source {
         Source::Stream => stream::open(request, stop)?,
         Source::Recording(path) => input::open(path, &options(request))?,
@@ -78,7 +90,13 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
                 "--dataset and --sequence need a data set. Give its path: `dynvox run PATH`",
             ));
         }
-        Source::Street => Box::new(StreetFrames::new(request.settings.street())?),
+        Source::Street => {
+            let mut street = request.settings.street();
+            if request.input.inertial == InertialChoice::None {
+                street.inertial = None;
+            }
+            Box::new(StreetFrames::new(street)?)
+        }
     };
     let dataset = depth::attach(dataset, &request.depth, request.depth_scale.as_ref())?;
     let scale = request.frames.scale;
@@ -103,6 +121,8 @@ fn options(request: &Request) -> OpenOptions {
         calibration: input.calibration.clone(),
         hints: input.hints,
         rectified: request.settings.rectify,
+        inertial: input.inertial.clone(),
+        inertial_calibration: input.inertial_calibration.clone(),
     }
 }
 

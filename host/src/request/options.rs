@@ -13,7 +13,7 @@ use crate::input::depth::{DepthChoice, DepthScale};
 use crate::input::faults::Faults;
 use crate::input::masks::MaskChoice;
 use crate::input::stream::WhenLate;
-use crate::input::{CameraPair, Layout, Stacking};
+use crate::input::{CameraPair, InertialChoice, Layout, Stacking};
 use serde::Deserialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -100,6 +100,16 @@ pub struct Options {
         help_heading = "Input"
     )]
     pub swap: Option<Swap>,
+    /// Samples of an inertial unit: a table with the columns time,wx,wy,wz,ax,ay,az, EuRoC's
+    /// imu0/data.csv, KITTI raw's oxts; none for no unit [default: the recording's own]
+    #[arg(long, value_name = "FILE|none", help_heading = "Input")]
+    #[serde(deserialize_with = "words::parsed")]
+    pub inertial: Option<InertialChoice>,
+    /// Mounting of that unit on the left camera: Kalibr's camchain with T_cam_imu (and imu.yaml,
+    /// given twice), EuRoC's imu0/sensor.yaml and cam0/sensor.yaml, or the 12 numbers of a matrix
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    #[serde(deserialize_with = "words::paths")]
+    pub inertial_calibration: Vec<PathBuf>,
     /// Size raw pairs are rectified to
     /// [default: the calibration's own, else all that both cameras see, at most 1920x1088]
     #[arg(long, value_name = "WxH", help_heading = "Input")]
@@ -343,6 +353,8 @@ impl Options {
                 colour: false,
             },
             ignore_mask: self.ignore_mask.clone(),
+            inertial: self.inertial.clone().unwrap_or_default(),
+            inertial_calibration: self.inertial_calibration.clone(),
             faults: self.faults.clone(),
         })
     }

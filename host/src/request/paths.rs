@@ -1,6 +1,7 @@
 //! Paths of a request, which are absolute: a request means the same in every folder.
 
 use super::{Exports, Poses, Request, Source};
+use crate::input::InertialChoice;
 use crate::input::depth::DepthChoice;
 use crate::input::masks::MaskChoice;
 use std::path::PathBuf;
@@ -37,7 +38,11 @@ impl Request {
     fn inputs_mut(&mut self) -> Vec<&mut PathBuf> {
         // A path that is read is added here, and no output may contain it.
         let Self { input, depth, masks, poses, exports: _, .. } = self;
-        let mut paths: Vec<&mut PathBuf> = input.calibration.iter_mut().collect();
+        let mut paths: Vec<&mut PathBuf> =
+            input.calibration.iter_mut().chain(&mut input.inertial_calibration).collect();
+        if let InertialChoice::File(path) = &mut input.inertial {
+            paths.push(path);
+        }
         if let Source::Recording(path) = &mut input.source {
             paths.push(path);
         }
@@ -71,19 +76,29 @@ mod tests {
         let mut request = Request::default();
         request.input.source = Source::Recording("recording".into());
         request.input.calibration = vec!["left.yaml".into(), "right.yaml".into()];
+        request.input.inertial = InertialChoice::File("imu.csv".into());
+        request.input.inertial_calibration = vec!["camchain.yaml".into()];
         request.depth = "files:depth".parse().unwrap();
         request.masks.source = "files:masks".parse().unwrap();
         request.poses = Poses::File("poses.txt".into());
         request.input.ignore_mask = Some("bonnet.png".into());
         request.exports.instances = Some("saved".into());
         let inputs = request.inputs();
-        for name in
-            ["recording", "left.yaml", "right.yaml", "depth", "masks", "poses.txt", "bonnet.png"]
-        {
+        for name in [
+            "recording",
+            "left.yaml",
+            "right.yaml",
+            "imu.csv",
+            "camchain.yaml",
+            "depth",
+            "masks",
+            "poses.txt",
+            "bonnet.png",
+        ] {
             assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
         }
         // The folder of saved masks is an output.
-        assert_eq!(inputs.len(), 7, "{inputs:?}");
+        assert_eq!(inputs.len(), 9, "{inputs:?}");
         assert_eq!(request.saved_folders().count(), 1);
     }
 }

@@ -16,6 +16,9 @@ const YAW: [(f64, f64); 2] = [(0.0080, 0.17), (0.0015, 0.71)];
 const BOUNCE_M: [(f64, f64); 2] = [(0.012, 0.61), (0.006, 1.53)];
 const DRIFT_M: [(f64, f64); 2] = [(0.14, 0.06), (0.03, 0.23)];
 
+/// Time from one side to the other and back, s.
+const SWAY_S: f64 = 2.0;
+
 /// Height of the cameras above the road, m.
 pub const CAMERA_HEIGHT_M: f64 = 1.65;
 
@@ -38,6 +41,8 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
     };
     let (pitch, roll, yaw, bounce, drift) =
         (wave(PITCH), wave(ROLL), wave(YAW), wave(BOUNCE_M), wave(DRIFT_M));
+    // A street without sway keeps the bits it had before there was any.
+    let yaw = if config.sway_deg_s == 0.0 { yaw } else { yaw + sway_rad(config, time_s) };
     // Rotations in the order yaw, pitch, roll, as a car's body moves on its springs.
     let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - CAMERA_HEIGHT_M, 0.0);
@@ -45,6 +50,13 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
         * Transform::new(Vector3::zeros(), height)
         * Transform::new(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())
         * Transform::new(Vector3::new(0.0, 0.0, roll), Vector3::zeros())
+}
+
+/// Turn to the side at a time, rad.
+fn sway_rad(config: &StreetConfig, time_s: f64) -> f64 {
+    let full_circle_rad = 2.0 * core::f64::consts::PI;
+    let widest_rad = config.sway_deg_s.to_radians() * SWAY_S / full_circle_rad;
+    widest_rad * libm::sin(full_circle_rad * time_s / SWAY_S)
 }
 
 /// The rig of a configured street: KITTI's proportions.

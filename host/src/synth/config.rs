@@ -3,6 +3,7 @@
 use dynvox_core::settings::{Problems, check};
 use serde::{Deserialize, Serialize};
 
+use super::inertial_unit::StreetUnit;
 use super::lens::{RigError, StreetLens};
 
 /// The synthetic street's appearance, its traffic and its cameras.
@@ -33,6 +34,9 @@ pub struct StreetConfig {
     pub hills: f64,
     /// Scale of the camera's pitch, roll and bounce; 0 is a rail.
     pub shake: f64,
+    /// Fastest turn to the sides, degrees/s: the camera looks to one side and the other once in two
+    /// seconds; 0 looks ahead.
+    pub sway_deg_s: f64,
     /// Noise of one colour channel at mid grey, grey levels (1 sigma): half the variance is read
     /// noise, half shot noise; 0 is off.
     pub noise_sigma: f64,
@@ -45,6 +49,8 @@ pub struct StreetConfig {
     pub lens: StreetLens,
     /// Misalignment of the right camera relative to its calibration.
     pub rig_error: RigError,
+    /// Inertial unit of the camera.
+    pub inertial: Option<StreetUnit>,
     /// Traffic on the street.
     pub traffic: Traffic,
 }
@@ -63,11 +69,13 @@ impl Default for StreetConfig {
             curvature: true,
             hills: 0.0,
             shake: 1.0,
+            sway_deg_s: 0.0,
             noise_sigma: 1.6,
             gain_difference: 0.03,
             parked_density: 0.6,
             lens: StreetLens::Ideal,
             rig_error: RigError::default(),
+            inertial: None,
             traffic: Traffic::default(),
         }
     }
@@ -88,7 +96,8 @@ impl StreetConfig {
     pub fn problem(&self) -> Option<String> {
         let mut problems = Problems::new();
         check(Self::CHECKS, self, &mut problems);
-        problems.first().map(ToString::to_string).or_else(|| self.traffic.problem())
+        let unit = || self.inertial.and_then(|unit| unit.problem());
+        problems.first().map(ToString::to_string).or_else(unit).or_else(|| self.traffic.problem())
     }
 }
 

@@ -1,10 +1,10 @@
 //! A synthetic street: seeded, endless, with exact truth about everything in it.
 //!
 //! A [`Street`] gives rectified stereo pairs in colour and grey with sensor noise, exact depth,
-//! instance masks, poses of the camera and of every car, and simulated LiDAR. Frame `i` depends on
-//! the configuration and `i` alone: frames may be asked for in any order, on any number of threads.
-//! Only plain arithmetic, the root and `libm` are used, so that the pictures are the same bits on
-//! every machine.
+//! instance masks, poses of the camera and of every car, simulated LiDAR, and the samples of an
+//! inertial unit. Frame `i` depends on the configuration and `i` alone: frames may be asked for in
+//! any order, on any number of threads. Only plain arithmetic, the root and `libm` are used, so
+//! that the pictures are the same bits on every machine.
 //!
 //! Memory: about a dozen [`SEGMENT_M`]-metre segments of street near the camera and one frame's
 //! buffers, however far the camera drives. Time: about 40,000 triangles a view are set up at any
@@ -35,6 +35,8 @@ mod flow_tests;
 mod flown;
 mod frame;
 mod furniture;
+mod inertial;
+mod inertial_unit;
 mod layout;
 mod lens;
 mod lidar;
@@ -66,6 +68,8 @@ pub use camera::CAMERA_HEIGHT_M;
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
 pub use flown::{FlownView, StreetPose};
 pub use frame::{ObjectTruth, SynthFrame};
+pub use inertial::t_camera_unit;
+pub use inertial_unit::{StreetUnit, UnitFault};
 pub use lens::{RigError, StreetLens};
 pub use path::SEGMENT_M;
 pub use street::{Street, SynthError};

@@ -62,6 +62,12 @@ impl StreetConfig {
         Row::expert("street.shake", "", |c| F64(&mut c.shake))
             .range(Range::Within(0.0, 5.0))
             .text("Scale of the camera's pitch, roll and bounce; 0 is a rail."),
+        Row::expert("street.sway_deg_s", "degrees/s", |c| F64(&mut c.sway_deg_s))
+            .range(Range::Within(0.0, 250.0))
+            .text(
+                "Fastest turn of the camera to the sides: it looks to one side and the other once \
+                 in two seconds; 0 looks ahead.",
+            ),
         Row::expert("street.noise_sigma", "grey levels", |c| F64(&mut c.noise_sigma))
             .range(Range::Within(0.0, 50.0))
             .text(
@@ -95,6 +101,11 @@ impl StreetConfig {
         Row::expert("street.rig_error.pitch_deg", "degrees", |c| F64(&mut c.rig_error.pitch_deg))
             .range(TURN)
             .text("Upward pitch of the right camera."),
+        Row::expert("street.inertial", "", |_| Number(None)).text(
+            "Inertial unit of the camera, with the keys of \
+             [your inertial unit](inertial.md#the-synthetic-street): rate_hz (0: no unit), \
+             turn_noise, force_noise, turn_bias_rad_s, force_bias_m_s2, clock_offset_s, gap_s, fault.",
+        ),
         Row::user("street.traffic.mode", "", |_| Number(None)).text(
             "Traffic besides the camera: `moving` (scripted cars and a thin endless flow) or \
              `none` (parked cars only).",

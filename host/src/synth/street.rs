@@ -151,15 +151,13 @@ impl Street {
 
     /// Camera pose at frame `index`; exactly the identity at frame 0.
     pub fn t_world_camera(&self, index: u32) -> Transform {
-        let at = libm::floor(camera::along_m(&self.config, self.time_s(index)) / SEGMENT_M) as i64;
-        self.to_world(
-            &camera::t_street_camera(
-                &self.config,
-                &self.centerline.span(at, at),
-                self.time_s(index),
-            ),
-            index,
-        )
+        self.to_world(&self.t_street_camera(self.time_s(index)), index)
+    }
+
+    /// Camera pose on the street at a time since frame 0, which may lie before it.
+    pub(super) fn t_street_camera(&self, time_s: f64) -> Transform {
+        let at = libm::floor(camera::along_m(&self.config, time_s) / SEGMENT_M) as i64;
+        camera::t_street_camera(&self.config, &self.centerline.span(at, at), time_s)
     }
 
     fn to_world(&self, t_street_camera: &Transform, index: u32) -> Transform {

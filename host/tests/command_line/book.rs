@@ -5,10 +5,11 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 19] = [
+const PAGES: [&str; 20] = [
     "README.md",
     "docs/bits.md",
     "docs/fleet.md",
+    "docs/inertial.md",
     "docs/inputs.md",
     "docs/measurements/accuracy.md",
     "docs/measurements/memory.md",

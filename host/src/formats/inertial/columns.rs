@@ -1,7 +1,8 @@
 //! Columns of a table of inertial samples, by the names in its heading.
 //!
-//! A name has a quantity, an axis and at times a unit: `wx`, `gyro_x [deg/s]`, `w_RS_S_x [rad s^-1]`,
-//! `angular_velocity.x`, `Gyroscope x (rad/s)`, `acc_x_g`. Columns of other names are passed over.
+//! A name has a quantity, an axis and at times a unit: `wx`, `gyro_x [deg/s]`, `acc_x_g`,
+//! `w_RS_S_x [rad s^-1]`, `angular_velocity.x`, `Gyroscope x (rad/s)`. Columns of other names are
+//! passed over.
 
 use crate::formats::TimeUnit;
 

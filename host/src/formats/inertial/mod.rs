@@ -85,8 +85,8 @@ pub struct InertialFormat {
     read: fn(&Path) -> Result<InertialTable, FormatError>,
 }
 
-/// All formats of files and folders; messages of ROS are read by the reader of recordings. A path is
-/// of the first that matches it.
+/// All formats of files and folders; messages of ROS are read by the reader of recordings. A path
+/// is of the first that matches it.
 pub static INERTIAL_FORMATS: &[&InertialFormat] = &[&oxts::FORMAT, &table::FORMAT];
 
 /// Reads the samples of a file or folder.

@@ -22,8 +22,8 @@ pub(super) static FORMAT: InertialFormat = InertialFormat {
 /// Longest median interval between a unit's samples, s, and the shortest.
 const INTERVAL_S: [f64; 2] = [0.000_2, 0.25];
 /// Next action for a table that cannot be read.
-const ACTION: &str = "A table of inertial samples has a heading `time,wx,wy,wz,ax,ay,az` and rows of \
-                      numbers: s or ns, rad/s, m/s2";
+const ACTION: &str = "A table of inertial samples has a heading `time,wx,wy,wz,ax,ay,az` and rows \
+                      of numbers: s or ns, rad/s, m/s2";
 /// Shortest unread rows of a file that was cut off.
 const CUT_ROWS: usize = 1;
 

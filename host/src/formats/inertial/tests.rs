@@ -60,7 +60,7 @@ fn tables_of_every_tool_give_the_same_samples() {
     ] {
         assert_is_plain(&read(table(heading, separator, per_second)).unwrap(), heading);
     }
-    // A heading with more columns, in another order, of which one is a message's own stamp.
+    // A heading with more columns, in another order, one of them a message's own stamp.
     let text = (0..20).fold(
         "%time,field.header.seq,field.header.stamp,field.orientation.w,\
          field.angular_velocity.x,field.angular_velocity.y,field.angular_velocity.z,\

@@ -1,8 +1,9 @@
-//! Messages of images and calibrations, in the encodings of ROS 2 and ROS 1.
+//! Messages of images, calibrations and inertial samples, in the encodings of ROS 2 and ROS 1.
 //!
 //! CDR (ROS 2) aligns numbers to their size, behind four bytes that say their order, and ends texts
 //! with a zero. ROS 1 aligns nothing, is little-endian, and its headers begin with a number.
 
+use crate::formats::TimedReading;
 use std::fmt::Write;
 
 /// Most numbers in a list of a calibration.
@@ -139,6 +140,17 @@ pub fn compressed_image(message: &[u8], encoding: Encoding) -> Option<&[u8]> {
     reader.stamp_ns()?;
     reader.text()?;
     reader.bytes()
+}
+
+/// The sample in a `sensor_msgs/Imu`, at the time of its header.
+pub fn inertial_reading(message: &[u8], encoding: Encoding) -> Option<TimedReading> {
+    let mut reader = Reader::new(message, encoding)?;
+    let time_ns = i64::try_from(reader.stamp_ns()?).ok()?;
+    // Orientation and its covariance are not of the sensors.
+    reader.array::<13>()?;
+    let turn_rate = reader.array()?;
+    reader.array::<9>()?;
+    Some(TimedReading { time_ns, turn_rate, force: reader.array()? })
 }
 
 /// `sensor_msgs/CameraInfo`.

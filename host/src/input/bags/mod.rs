@@ -1,4 +1,4 @@
-//! Recordings of ROS as MCAP files: `sensor_msgs/Image`, `CompressedImage` and `CameraInfo`.
+//! Recordings of ROS as MCAP files: `sensor_msgs/Image`, `CompressedImage`, `CameraInfo` and `Imu`.
 //!
 //! Opening reads all files once, chunk by chunk, for the time stamp of every image and the first
 //! calibration of each camera. A frame is then read by its time through its file's index. Memory:
@@ -7,6 +7,7 @@
 mod cameras;
 mod container;
 mod images;
+mod inertial;
 mod listing;
 mod mcap_file;
 mod messages;
@@ -18,6 +19,7 @@ mod topics;
 mod tests;
 
 use super::data_set::{DataSet, Layout, OpenOptions, no_sequences};
+use super::inertial::choice::InertialChoice;
 use super::layouts::nearest_stamps;
 use super::source::{
     FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState,
@@ -87,7 +89,12 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Bag, InputError> {
     let geometry = cameras.fitted(image_size, &options.rectified)?;
     let name = path.file_stem();
     let name = name.map_or_else(|| "bag".to_owned(), |stem| stem.to_string_lossy().into_owned());
-    let info = SourceInfo { notes, ..SourceInfo::new(name, pairs.len(), &geometry) };
+    // Reading all messages of a unit takes as long as listing the images.
+    let own_unit = match options.inertial {
+        InertialChoice::Auto => inertial::unit(&recording, &topics[0])?,
+        _ => None,
+    };
+    let info = SourceInfo { own_unit, notes, ..SourceInfo::new(name, pairs.len(), &geometry) };
     Ok(Bag { info, recording, topics, pairs, image_size, bits, exchanged })
 }
 

@@ -3,10 +3,12 @@
 use super::container::{Container, Topic};
 use super::listing::{Kind, conversion, files_at};
 use super::mcap_file::McapFile;
-use super::messages::{CameraInfo, stamp_ns};
+use super::messages::{CameraInfo, inertial_reading, stamp_ns};
 use super::{images, listing};
-use crate::formats::bounds::{MAX_BAG_IMAGES, MAX_BAG_INDEXES_BYTES, bytes_text, thousands};
-use crate::formats::{BayerPattern, Picture};
+use crate::formats::bounds::{
+    MAX_BAG_IMAGES, MAX_BAG_INDEXES_BYTES, MAX_INERTIAL_SAMPLES, bytes_text, thousands,
+};
+use crate::formats::{BayerPattern, Picture, TimedReading};
 use crate::input::source::InputError;
 use std::path::{Path, PathBuf};
 
@@ -119,6 +121,23 @@ impl Recording {
             return Err(InputError::bag(&self.path, reason));
         }
         Ok(entries)
+    }
+
+    /// Every inertial sample of a topic, in the order of the files, at the times of their headers;
+    /// one more than are read where there are too many. Messages that are not whole are left out.
+    ///
+    /// # Errors
+    /// A file is damaged.
+    pub fn inertial(&self, topic: &str) -> Result<Vec<TimedReading>, InputError> {
+        let mut readings = Vec::new();
+        for container in &self.files {
+            let Some(encoding) = encoding_of(container.as_ref(), topic) else { continue };
+            container.messages(topic, 0..=u64::MAX, &mut |message| {
+                readings.extend(inertial_reading(message.bytes, encoding));
+                readings.len() <= MAX_INERTIAL_SAMPLES
+            })?;
+        }
+        Ok(readings)
     }
 
     /// The first calibration of a topic.

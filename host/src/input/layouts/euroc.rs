@@ -3,6 +3,7 @@
 
 use super::camera_folders::camera_in;
 use super::sequence::{ImageFiles, Parts, Sequence, present};
+use super::units;
 use crate::formats::calibration::beside;
 use crate::formats::read_poses;
 use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
@@ -53,6 +54,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
     Sequence::from_parts(Parts {
         poses,
         instances: path.join("instances"),
+        unit: units::of_folder(&sensors.join("imu0"), &sensors.join("cam0")),
         ..Parts::new(options, super::folder::name_of(root), images, cameras)
     })
 }

@@ -5,6 +5,7 @@ use super::camera_folders::{camera_in, side_folders, split_by_mark};
 use super::names::pictures_in;
 use super::pairing::CameraFiles;
 use super::sequence::{ImageFiles, Parts, Sequence, camera_files, present, stamps_in_names};
+use super::units;
 use crate::formats::calibration::{CameraGeometry, beside};
 use crate::formats::{picture_size, read_poses, read_times};
 use crate::input::data_set::{DataSet, Layout, OpenOptions, no_sequences};
@@ -47,6 +48,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Sequence, InputError> {
             .map(|file| read_poses(&file).map(|read| (file, read)))
             .transpose()?,
         instances: path.join("instances"),
+        unit: units::beside_images(path),
         ..Parts::new(options, name_of(path), images, cameras)
     })
 }

@@ -5,6 +5,7 @@ use super::camera_folders::camera_in;
 use super::folder::name_of;
 use super::kitti::{chosen, sequences};
 use super::sequence::{ImageFiles, Parts, Sequence, present};
+use super::units;
 use crate::formats::calibration::{CalibrationHints, KittiCalibration};
 use crate::formats::read_poses;
 use crate::input::data_set::{CameraPair, DataSet, Layout, OpenOptions};
@@ -121,6 +122,7 @@ fn open_drive(
         poses: poses.map(|path| read_poses(path).map(|read| (path.clone(), read))).transpose()?,
         numbered: true,
         instances: drive.join("instances"),
+        unit: units::of_kitti_raw(drive, &files.calibration),
         ..Parts::new(options, format!("{prefix}-{}", name_of(drive)), images, cameras)
     })
 }

@@ -21,6 +21,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod trees;
+mod units;
 pub(super) mod vkitti;
 
 pub(super) use pairing::nearest_stamps;

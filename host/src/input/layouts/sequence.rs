@@ -16,7 +16,7 @@ use crate::input::data_set::OpenOptions;
 use crate::input::diagnosis;
 use crate::input::source::{
     ASSUMED_HZ, AvailableMasks, FrameInfo, FrameSource, InputError, LidarScan, ObjectsTruth,
-    SourceInfo, Stacking, StereoImages, StreamState, require_size,
+    OwnUnit, SourceInfo, Stacking, StereoImages, StreamState, require_size,
 };
 use std::path::{Path, PathBuf};
 
@@ -93,6 +93,8 @@ pub(super) struct Parts {
     /// True objects by frame number; empty where nothing is known.
     pub objects: Vec<ObjectsTruth>,
     pub lidar: Option<LidarFiles>,
+    /// Inertial unit of the recording.
+    pub unit: Option<OwnUnit>,
 }
 
 impl Parts {
@@ -117,6 +119,7 @@ impl Parts {
             instances: PathBuf::new(),
             objects: Vec::new(),
             lidar: None,
+            unit: None,
         }
     }
 }
@@ -166,6 +169,7 @@ impl Sequence {
         let info = SourceInfo {
             masks,
             truth,
+            own_unit: parts.unit,
             notes,
             ..SourceInfo::new(parts.name, pairs.len(), &geometry)
         };

@@ -1,12 +1,15 @@
 //! The synthetic street as a source of frames.
 
-use crate::formats::Image;
+use crate::formats::calibration::UnitNoise;
+use crate::formats::{Image, TimedReading};
 use crate::input::source::{
-    AvailableMasks, ExactFrame, FrameInfo, FrameMasks, FrameSource, InputError, LidarScan,
-    ObjectsTruth, SourceInfo, StereoImages, StreamState, TrueObject,
+    AvailableMasks, ExactFrame, FrameInfo, FrameMasks, FrameSource, InertialUnitData, InputError,
+    LidarScan, ObjectsTruth, SourceInfo, StereoImages, StreamState, TrueObject,
 };
-use crate::synth::{Street, StreetConfig, SynthFrame};
+use crate::synth::{Street, StreetConfig, StreetUnit, SynthFrame, t_camera_unit};
 use dynvox_core::masks::PixelBox;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Frames of a street.
 pub struct StreetFrames {
@@ -30,6 +33,8 @@ impl StreetFrames {
             rectification: street.rectification(),
             masks: AvailableMasks::Exact,
             truth: Some((0..frames).map(|index| street.t_world_camera(index)).collect()),
+            own_unit: None,
+            inertial: unit(&street).map(Arc::new),
             notes: Vec::new(),
             ignored: None,
         };
@@ -88,6 +93,28 @@ impl FrameSource for StreetFrames {
         let points_m = self.street.lidar(index as u32).iter().map(point).collect();
         Ok((index < self.info.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
     }
+}
+
+/// The inertial unit of a street that has one.
+fn unit(street: &Street) -> Option<InertialUnitData> {
+    let readings = street.inertial();
+    let StreetUnit { rate_hz, turn_noise, force_noise, gap_s, .. } = street.config().inertial?;
+    let last_ns = (street.time_s(street.config().frames.saturating_sub(1)) * 1e9).round() as i64;
+    let within = |reading: &&TimedReading| (0..=last_ns).contains(&reading.time_ns);
+    (!readings.is_empty()).then(|| InertialUnitData {
+        path: PathBuf::from("street"),
+        within_frames: readings.iter().filter(within).count(),
+        readings,
+        t_camera_unit: t_camera_unit(),
+        clock_offset_s: 0.0,
+        noise: UnitNoise {
+            turn_density: (turn_noise > 0.0).then_some(turn_noise),
+            force_density: (force_noise > 0.0).then_some(force_noise),
+            ..UnitNoise::default()
+        },
+        rate_hz,
+        longest_gap_s: gap_s + 1.0 / rate_hz,
+    })
 }
 
 /// The truth of a frame: the cars with a pixel in the left image.

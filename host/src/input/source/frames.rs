@@ -1,6 +1,8 @@
 //! A source of frames, and what is known of it before a frame is read.
 
-use super::{AvailableMasks, InputError, LidarScan, StereoImages, StreamState};
+use super::{
+    AvailableMasks, InertialUnitData, InputError, LidarScan, OwnUnit, StereoImages, StreamState,
+};
 use crate::formats::Image;
 use crate::formats::calibration::FittedGeometry;
 use dynvox_core::geometry::{StereoRig, Transform};
@@ -28,6 +30,10 @@ pub struct SourceInfo {
     pub masks: AvailableMasks,
     /// True `t_world_camera` of every frame's left camera, if known.
     pub truth: Option<Vec<Transform>>,
+    /// Inertial unit of the recording, as its layout knows of it.
+    pub own_unit: Option<OwnUnit>,
+    /// Inertial unit in use.
+    pub inertial: Option<Arc<InertialUnitData>>,
     /// Assumptions and omissions, as sentences.
     pub notes: Vec<String>,
     /// Pixels of the rectified left image that are not used in any frame, 255; the others are 0.
@@ -46,6 +52,8 @@ impl SourceInfo {
             rectification: geometry.rectification,
             masks: AvailableMasks::Absent,
             truth: None,
+            own_unit: None,
+            inertial: None,
             notes: Vec::new(),
             ignored: None,
         }

@@ -4,6 +4,7 @@ mod depth;
 mod error;
 mod frames;
 mod given_poses;
+mod inertial;
 mod lidar;
 mod masks;
 mod overlay;
@@ -16,11 +17,12 @@ pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
 pub use error::{InputError, read_failed};
 pub use frames::{FrameInfo, FrameSource, SourceInfo};
 pub use given_poses::read_given_poses;
+pub use inertial::{InertialUnitData, OwnUnit, UnitSamples};
 pub use lidar::LidarScan;
 pub use masks::{
     FrameMasks, InstanceMask, MAX_BYTES, MAX_MASKS, MaskRefusals, bounding_boxes, union,
 };
-pub use overlay::{Overlay, OverlaySource};
+pub use overlay::{Overlay, OverlaySource, with_inertial_unit};
 pub use scaled::Scaled;
 pub use stacking::Stacking;
 pub use stop::StopRequest;

@@ -1,9 +1,11 @@
 //! A source of frames with depth or masks laid over it.
 
+use super::{
+    FrameInfo, FrameSource, InertialUnitData, InputError, LidarScan, SourceInfo, StereoImages,
+    StreamState,
+};
 use crate::formats::Image;
 use std::sync::Arc;
-
-use super::{FrameInfo, FrameSource, InputError, LidarScan, SourceInfo, StereoImages, StreamState};
 
 /// Adds depth or masks to the frames of a data set.
 pub trait OverlaySource: Send + Sync {
@@ -39,6 +41,27 @@ impl<L: OverlaySource> Overlay<L> {
         self.info.ignored = Some(ignored);
         self
     }
+}
+
+/// Leaves frames as they are.
+struct Unchanged;
+
+impl OverlaySource for Unchanged {
+    fn add(&self, _: &dyn FrameSource, _: usize, _: &mut StereoImages) -> Result<(), InputError> {
+        Ok(())
+    }
+}
+
+/// A data set with an inertial unit and notes about it.
+pub fn with_inertial_unit(
+    dataset: Box<dyn FrameSource>,
+    unit: Option<InertialUnitData>,
+    notes: Vec<String>,
+) -> Box<dyn FrameSource> {
+    let mut info = dataset.info().clone();
+    info.inertial = unit.map(Arc::new);
+    info.notes.extend(notes);
+    Box::new(Overlay { dataset, source: Unchanged, info })
 }
 
 impl<L: OverlaySource> FrameSource for Overlay<L> {

@@ -17,6 +17,7 @@ mod keys;
 mod kitti_raw;
 mod lens;
 mod middlebury;
+mod mounting;
 mod opencv;
 mod orbslam;
 mod ost;
@@ -37,9 +38,9 @@ mod zed;
 
 pub use format::{CalibrationFormat, Cameras};
 pub use kalibr::to_kalibr;
+pub use mounting::{UnitCalibration, UnitCamera, UnitNoise};
 pub use own::to_toml;
 pub use read::{CalibrationFiles, CalibrationRead};
-pub use unit::{UnitCalibration, UnitCamera, UnitNoise};
 
 use crate::formats::FormatError;
 use dynvox_core::geometry::StereoRig;

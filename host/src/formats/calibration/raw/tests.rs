@@ -1,6 +1,7 @@
 //! Each format contains_all the same rig; each way to damage a file is answered by a sentence.
 
 mod others;
+mod units;
 mod variants;
 
 use super::*;

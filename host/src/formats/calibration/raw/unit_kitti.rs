@@ -1,9 +1,9 @@
-//! Mounting of KITTI raw's inertial unit: `calib_imu_to_velo.txt` and `calib_velo_to_cam.txt` lead to
-//! camera 0, and `R_rect_00` of `calib_cam_to_cam.txt` to that of rectified pictures.
+//! Mounting of KITTI raw's inertial unit: `calib_imu_to_velo.txt` and `calib_velo_to_cam.txt` lead
+//! to camera 0, and `R_rect_00` of `calib_cam_to_cam.txt` to that of rectified pictures.
 
+use super::mounting::{UnitCalibration, UnitCamera, checked};
 use super::pose::Pose;
 use super::tree::Tree;
-use super::unit::{UnitCalibration, UnitCamera, UnitNoise, checked};
 use crate::formats::FormatError;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -29,13 +29,7 @@ pub(super) fn read(path: &Path) -> Result<UnitCalibration, FormatError> {
     let tree = Tree::of_lines(&text, &cameras);
     let r_rectified = Matrix3::from_row_slice(&tree.root().need("R_rect_00")?.array::<9>()?);
     let rectified = Pose { r: r_rectified, t_m: Vector3::zeros() }.after(&t_camera_unit);
-    Ok(UnitCalibration {
-        t_camera_unit: checked(&rectified, &unit)?,
-        camera: UnitCamera::Rectified,
-        clock_offset_s: 0.0,
-        noise: UnitNoise::default(),
-        path: unit,
-    })
+    Ok(UnitCalibration::new(checked(&rectified, &unit)?, UnitCamera::Rectified, &unit))
 }
 
 /// A rigid motion in lines `R:` and `T:`.

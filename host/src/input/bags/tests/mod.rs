@@ -4,7 +4,7 @@ mod recordings;
 
 use super::container::Topic;
 use super::images;
-use super::messages::{CameraInfo, Encoding, RawImage, stamp_ns};
+use super::messages::{CameraInfo, Encoding, RawImage, inertial_reading, stamp_ns};
 use crate::formats::Picture;
 
 /// The picture in a raw image of ROS 2.
@@ -129,4 +129,24 @@ fn sizes_that_the_data_does_not_hold_are_refused_before_any_row() {
     let last = picture(&image(2, 2, "mono8", 3, &[1, 2, 9, 3, 4])).unwrap();
     assert_eq!(last.to_8_bit(None).grey.pixels(), [1, 2, 3, 4]);
     assert!(refused(&image(0, 2, "mono8", 0, &[])).contains("no pixels"));
+}
+
+#[test]
+fn inertial_messages_hold_turn_rates_and_accelerations_in_both_encodings() {
+    let numbers: Vec<u8> = (0..37).flat_map(|at| f64::from(at).to_le_bytes()).collect();
+    let mut ros2 = vec![0, 1, 0, 0, 7, 0, 0, 0, 5, 0, 0, 0];
+    text(&mut ros2, "imu");
+    align(&mut ros2, 8);
+    ros2.extend(&numbers);
+    let header = [9u32, 7, 5, 3].map(u32::to_le_bytes).concat();
+    let ros1 = [&header[..], b"imu", &numbers].concat();
+    for (message, encoding) in [(ros2, Encoding::Cdr), (ros1, Encoding::Ros1)] {
+        let reading = inertial_reading(&message, encoding).unwrap();
+        assert_eq!(reading.time_ns, 7_000_000_005);
+        assert_eq!(reading.turn_rate, [13.0, 14.0, 15.0]);
+        assert_eq!(reading.force, [25.0, 26.0, 27.0]);
+        // The last nine numbers are not needed.
+        let needed = message.len() - 72;
+        assert!((0..needed).all(|len| inertial_reading(&message[..len], encoding).is_none()));
+    }
 }

@@ -27,6 +27,8 @@ struct Rig {
     header_ns: fn(u64) -> u64,
     /// Factor of the pixels of frame `n`.
     gain: fn(u64) -> u16,
+    /// Topics of inertial samples with their turn rate and acceleration, 20 a frame.
+    units: &'static [(&'static str, f64, f64)],
 }
 
 const P: [f64; 12] = [60.0, 0.0, 47.5, 0.0, 0.0, 60.0, 31.5, 0.0, 0.0, 0.0, 1.0, 0.0];
@@ -43,8 +45,26 @@ impl Default for Rig {
             right_projection,
             header_ns: |frame| (frame + 1) * NS,
             gain: |_| 1,
+            units: &[],
         }
     }
+}
+
+/// `sensor_msgs/Imu` at a time.
+fn inertial(time_ns: u64, turn: f64, force: f64) -> Vec<u8> {
+    let mut bytes = vec![0, 1, 0, 0];
+    bytes.extend(((time_ns / 1_000_000_000) as u32).to_le_bytes());
+    bytes.extend(((time_ns % 1_000_000_000) as u32).to_le_bytes());
+    text(&mut bytes, "imu");
+    align(&mut bytes, 8);
+    // Orientation and covariance; turn rates; theirs; accelerations; theirs.
+    let numbers = (0..37).map(|at| match at {
+        13 => turn,
+        27 => force,
+        _ => 0.0,
+    });
+    bytes.extend(numbers.flat_map(f64::to_le_bytes));
+    bytes
 }
 
 /// A texture that two cameras see at one distance.
@@ -121,6 +141,21 @@ impl Rig {
                     };
                     writer.write_to_known_channel(&header, &message).unwrap();
                 }
+            }
+        }
+        let kind = writer.add_schema("sensor_msgs/msg/Imu", "ros2msg", b"").unwrap();
+        for (topic, turn, force) in self.units {
+            let channel = writer.add_channel(kind, topic, "cdr", &BTreeMap::new()).unwrap();
+            for at in 0..140u64 {
+                let time_ns = NS + at * 5_000_000;
+                let message = inertial(time_ns, turn * at as f64, *force);
+                let header = MessageHeader {
+                    channel_id: channel,
+                    sequence: 0,
+                    log_time: time_ns,
+                    publish_time: time_ns,
+                };
+                writer.write_to_known_channel(&header, &message).unwrap();
             }
         }
         writer.finish().unwrap();
@@ -240,4 +275,33 @@ fn a_file_without_chunks_or_end_is_refused_with_a_command() {
     fs::write(&path, &whole[..whole.len() - 9]).unwrap();
     let cut = refusal(&path);
     assert!(cut.contains("cut off") && cut.contains("mcap recover"), "{cut}");
+}
+
+#[test]
+fn inertial_messages_become_a_unit_where_its_mounting_is_given() {
+    let folder = TempDir::new().unwrap();
+    let mounting = folder.path().join("mount.txt");
+    fs::write(&mounting, "0 -1 0 0.05 0 0 -1 0 1 0 0 0\n").unwrap();
+    let given = OpenOptions { inertial_calibration: vec![mounting], ..OpenOptions::default() };
+    for units in [&[("/imu", 0.01, 9.8)][..], &[("/cam/accel", 0.0, 9.8), ("/cam/gyro", 0.01, 0.0)]]
+    {
+        let rig = Rig { units, ..Rig::default() };
+        let path = folder.path().join("a.mcap");
+        rig.record(&path, 0..6, WriteOptions::new());
+        let source = open(&path, &given).unwrap();
+        let unit = source.info().inertial.clone().unwrap();
+        assert!((unit.rate_hz - 200.0).abs() < 1e-6);
+        let of_frame = unit.between(Some(2 * NS), 3 * NS);
+        assert_eq!((of_frame.len(), of_frame[0].time_ns), (20, 205_000_000));
+        assert!((of_frame[0].turn_rate[0] - 0.21).abs() < 1e-9, "{:?}", of_frame[0]);
+        assert_eq!(of_frame[0].force, [0.0, 0.0, 9.8]);
+        // Without a mounting the unit is said, and not used.
+        let source = rig.open_in(&folder).unwrap();
+        assert!(source.info().inertial.is_none());
+        let notes = source.info().notes.join("\n");
+        assert!(notes.contains("nothing says how the inertial unit is mounted"), "{notes}");
+    }
+    let silent = Rig { units: &[("/imu", 0.01, 0.0)], ..Rig::default() };
+    let source = silent.open_in(&folder).unwrap();
+    assert!(source.info().own_unit.is_none(), "a gyroscope alone is no unit");
 }

@@ -1,0 +1,52 @@
+//! Inertial units of layouts: where their samples and the files with their mounting lie.
+
+use crate::input::source::{OwnUnit, UnitSamples};
+use std::path::{Path, PathBuf};
+
+/// Names of tables of samples in a folder of images.
+const TABLES: [&str; 6] =
+    ["imu0/data.csv", "imu.csv", "imu_data.csv", "inertial.csv", "imu/data.csv", "imu.txt"];
+/// Names of files with a unit's mounting in a folder of images, and with its noise.
+const MOUNTINGS: [&str; 6] = [
+    "camchain-imucam.yaml",
+    "camchain.yaml",
+    "kalibr_imucam_chain.yaml",
+    "imu_to_camera.txt",
+    "imu_to_camera0.txt",
+    "calib.json",
+];
+const NOISES: [&str; 2] = ["imu.yaml", "kalibr_imu_chain.yaml"];
+
+/// The unit of EuRoC's layout: `imu0` with its table and `sensor.yaml`, next to the camera's.
+pub fn of_folder(unit: &Path, camera: &Path) -> Option<OwnUnit> {
+    let samples = Some(unit.join("data.csv")).filter(|table| table.is_file())?;
+    let calibration = [unit, camera].map(|folder| folder.join("sensor.yaml"));
+    let whole = calibration.iter().all(|file| file.is_file());
+    Some(OwnUnit {
+        samples: UnitSamples::Files(samples),
+        calibration: if whole { calibration.to_vec() } else { Vec::new() },
+    })
+}
+
+/// The unit of a recording of KITTI raw: `oxts` in it, and the files of the day next to the
+/// cameras'.
+pub fn of_kitti_raw(recording: &Path, cameras: &Path) -> Option<OwnUnit> {
+    let samples = Some(recording.join("oxts")).filter(|folder| folder.join("data").is_dir())?;
+    let mounting = cameras.with_file_name("calib_imu_to_velo.txt");
+    let calibration = if mounting.is_file() { vec![mounting] } else { Vec::new() };
+    Some(OwnUnit { samples: UnitSamples::Files(samples), calibration })
+}
+
+/// The unit of a folder of images, by the names of its files.
+pub fn beside_images(folder: &Path) -> Option<OwnUnit> {
+    let there = |name: &&str| Some(folder.join(name)).filter(|file| file.is_file());
+    let samples = TABLES.iter().find_map(|name| there(name))?;
+    let mounting = MOUNTINGS.iter().find_map(|name| there(name));
+    let noise = mounting.as_ref().and_then(|_| NOISES.iter().find_map(|name| there(name)));
+    let mut calibration: Vec<PathBuf> = mounting.into_iter().chain(noise).collect();
+    let euroc = [folder.join("imu0"), folder.join("cam0")].map(|at| at.join("sensor.yaml"));
+    if calibration.is_empty() && euroc.iter().all(|file| file.is_file()) {
+        calibration = euroc.to_vec();
+    }
+    Some(OwnUnit { samples: UnitSamples::Files(samples), calibration })
+}

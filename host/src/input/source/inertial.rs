@@ -1,0 +1,112 @@
+//! The inertial unit of a source: its samples on the clock of the frames.
+
+use crate::formats::InertialTable;
+use crate::formats::TimedReading;
+use crate::formats::calibration::UnitNoise;
+use dynvox_core::geometry::Transform;
+use std::path::PathBuf;
+
+/// Samples before the first frame that it is given, ns.
+const BEFORE_FIRST_NS: i64 = 1_000_000_000;
+
+/// Files of an inertial unit that a layout knows of, before any is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnUnit {
+    /// The samples.
+    pub samples: UnitSamples,
+    /// Files with the unit's mounting; empty where the layout has none.
+    pub calibration: Vec<PathBuf>,
+}
+
+/// Samples of a recording's own unit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum UnitSamples {
+    /// A file or folder.
+    Files(PathBuf),
+    /// Messages of a recording of ROS.
+    Read(InertialTable),
+    /// Messages that cannot be used, with the reason.
+    Refused(String),
+}
+
+/// An inertial unit: samples on the clock of the frames, mounting, noise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InertialUnitData {
+    /// File or folder of the samples.
+    pub path: PathBuf,
+    /// Samples, each later than the one before.
+    pub readings: Vec<TimedReading>,
+    /// Unit to rectified left camera coordinates.
+    pub t_camera_unit: Transform,
+    /// Seconds to add to the samples' times, as a calibration says it.
+    pub clock_offset_s: f64,
+    /// Noise, as a calibration says it.
+    pub noise: UnitNoise,
+    /// Samples a second, by the median interval.
+    pub rate_hz: f64,
+    /// Longest interval between two samples, s.
+    pub longest_gap_s: f64,
+    /// Samples between the first and the last frame.
+    pub within_frames: usize,
+}
+
+impl InertialUnitData {
+    /// Samples later than one frame's time and up to another's; of the first frame those of the
+    /// second before it.
+    pub fn between(&self, before_ns: Option<u64>, until_ns: u64) -> &[TimedReading] {
+        let until = self.position_after(i64::try_from(until_ns).unwrap_or(i64::MAX));
+        let until_ns = i64::try_from(until_ns).unwrap_or(i64::MAX);
+        let from = match before_ns {
+            Some(before_ns) => self.position_after(i64::try_from(before_ns).unwrap_or(i64::MAX)),
+            None => self.position_after(until_ns.saturating_sub(BEFORE_FIRST_NS)),
+        };
+        self.readings.get(from..until).unwrap_or_default()
+    }
+
+    /// Number of samples up to a time.
+    fn position_after(&self, time_ns: i64) -> usize {
+        self.readings.partition_point(|reading| reading.time_ns <= time_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_sample_belongs_to_one_frame_for_any_choice_of_frames() {
+        let reading = |at: i64| TimedReading {
+            time_ns: at * 5_000_000 - 2_000_000_000,
+            turn_rate: [0.0; 3],
+            force: [0.0, 0.0, 9.8],
+        };
+        let unit = InertialUnitData {
+            path: PathBuf::new(),
+            readings: (0..1_000).map(reading).collect(),
+            t_camera_unit: Transform::IDENTITY,
+            clock_offset_s: 0.0,
+            noise: UnitNoise::default(),
+            rate_hz: 200.0,
+            longest_gap_s: 0.005,
+            within_frames: 0,
+        };
+        // Of the first frame the second before it, and times below zero are among them.
+        let first = unit.between(None, 0);
+        assert_eq!((first.len(), first[199].time_ns), (200, 0));
+        // Frames that are left out give theirs to the next.
+        let (mut before, mut taken) = (0, 0);
+        for time_ns in [100_000_000u64, 150_000_000, 900_000_000] {
+            let samples = unit.between(Some(before), time_ns);
+            assert!(samples.iter().all(|one| one.time_ns > before as i64));
+            assert!(samples.iter().all(|one| one.time_ns <= time_ns as i64));
+            taken += samples.len();
+            before = time_ns;
+        }
+        assert_eq!(taken, 180);
+        // A frame without a later time, and one beyond the last sample, have none.
+        assert!(unit.between(Some(900_000_000), 900_000_000).is_empty());
+        assert!(unit.between(Some(900_000_000), 100_000_000).is_empty());
+        assert!(unit.between(Some(20_000_000_000), 21_000_000_000).is_empty());
+        assert!(unit.between(Some(u64::MAX - 1), u64::MAX).is_empty());
+    }
+}
