@@ -3,6 +3,7 @@
 pub mod certainty;
 pub mod faults;
 pub mod histogram;
+pub mod inertial;
 pub mod masks;
 pub mod objects;
 pub mod quantile;

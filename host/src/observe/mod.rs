@@ -12,6 +12,7 @@ mod frame_pictures;
 mod gallery;
 mod growing_file;
 mod health;
+mod inertial;
 mod instances;
 mod keyframes;
 mod map_disparity;
@@ -43,6 +44,7 @@ pub use frame_pictures::FramePictures;
 pub use gallery::GalleryObserver;
 pub use growing_file::GrowingFile;
 pub use health::{HealthObserver, HealthSection};
+pub use inertial::InertialObserver;
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
 pub use map_disparity::MapDisparityObserver;
@@ -63,6 +65,7 @@ pub use trajectory::{
 pub use volume_copy::VolumeCopy;
 pub use written_file::WrittenFile;
 
+use crate::evaluate::inertial::UnitFindings;
 use crate::formats::Mesh;
 use crate::input::{InputError, StereoImages};
 use crate::request::Plan;
@@ -265,6 +268,7 @@ pub struct Observers {
     map_disparity: MapDisparityObserver,
     planning: PlanningObserver,
     mavlink: MavlinkObserver,
+    inertial: InertialObserver,
     scene_export: SceneExportObserver,
 }
 
@@ -293,6 +297,8 @@ pub struct Sections {
     pub health: HealthSection,
     /// Messages to an autopilot; `None` where the run sends none.
     pub mavlink: Option<MavlinkSection>,
+    /// The inertial unit against the camera's path; `None` where the source has none.
+    pub inertial: Option<UnitFindings>,
 }
 
 impl Observers {
@@ -344,6 +350,7 @@ impl Observer for Observers {
         self.instances.frame(run, frame)?;
         self.map_disparity.frame(run, frame)?;
         self.mavlink.frame(run, frame)?;
+        self.inertial.frame(run, frame)?;
         self.planning.frame(run, frame)?;
         self.scene_export.frame(run, frame)
     }
@@ -383,6 +390,7 @@ impl Observer for Observers {
             bounds: self.bounds.finish(run, finished)?,
             health: self.health.finish(run, finished)?,
             mavlink: self.mavlink.finish(run, finished)?,
+            inertial: self.inertial.finish(run, finished)?,
         })
     }
 }

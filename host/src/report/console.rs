@@ -51,6 +51,10 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.extend(run.sections.mavlink.map(|MavlinkSection { sent, failed }| {
         ("MAVLink", format!("{sent} obstacle messages sent, {failed} refused by the system"))
     }));
+    lines.extend(run.sections.inertial.as_ref().map(|found| {
+        let name = if found.is_doubted() { "inertial WARNING" } else { "inertial unit" };
+        (name, found.sentence())
+    }));
     lines.extend(pose_lines(run));
     // A miscalibrated rig is the one finding that makes all others doubtful.
     lines.push((

@@ -7,6 +7,7 @@ pub mod compare;
 mod console;
 mod csv;
 pub mod html;
+mod inertial;
 mod poor_map;
 pub mod rig;
 mod summary;

@@ -2,6 +2,7 @@
 //! unknown.
 
 use super::bounds::CapacitySummary;
+use super::inertial::InertialSummary;
 use super::rig::RigSummary;
 use crate::evaluate::masks::MovingFigures;
 use crate::evaluate::objects::{ObjectFigures, TrackErrors};
@@ -36,6 +37,9 @@ pub struct Summary {
     /// Error of the calibration that the run found.
     #[serde(skip_serializing_if = "Option::is_none")]
     rig: Option<RigSummary>,
+    /// Inertial unit against the camera's path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inertial: Option<InertialSummary>,
     #[serde(skip_serializing_if = "Option::is_none")]
     lidar: Option<ReferenceFigures>,
     /// Every track, by number.
@@ -239,6 +243,7 @@ impl Summary {
                 .collect(),
             egomotion: EgomotionSummary::new(&sections.trajectory),
             rig: super::rig::summary(run),
+            inertial: sections.inertial.as_ref().map(InertialSummary::new),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),
             objects: sections
                 .tracks

@@ -154,6 +154,12 @@ impl Street {
         self.to_world(&self.t_street_camera(self.time_s(index)), index)
     }
 
+    /// Direction that points up in the world of the poses, a unit vector.
+    pub fn up_in_world(&self) -> [f64; 3] {
+        // The street's y axis points down.
+        self.t_camera0_street.rotate([0.0, -1.0, 0.0])
+    }
+
     /// Camera pose on the street at a time since frame 0, which may lie before it.
     pub(super) fn t_street_camera(&self, time_s: f64) -> Transform {
         let at = libm::floor(camera::along_m(&self.config, time_s) / SEGMENT_M) as i64;
