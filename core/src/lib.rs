@@ -23,6 +23,7 @@ pub mod egomotion;
 mod flags;
 pub mod geometry;
 pub mod image;
+pub mod inertial;
 mod invariants;
 mod lanes;
 pub mod mapper;

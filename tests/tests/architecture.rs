@@ -36,6 +36,7 @@ const CORE: Layers = &[
     ("geometry", &["image"]),
     ("state", &["digest", "geometry"]),
     ("random", &["state"]),
+    ("inertial", &["digest", "geometry", "settings", "state"]),
     (
         "rectify",
         &["digest", "geometry", "image", "memory", "parallel", "slices", "settings", "state"],
@@ -153,6 +154,7 @@ const CORE: Layers = &[
             "egomotion",
             "geometry",
             "image",
+            "inertial",
             "masks",
             "memory",
             "objects",

@@ -73,6 +73,7 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
         let view = |pixels| View::new(pixels, 640, 192).unwrap();
         let stereo = StereoFrame {
             ignored: None,
+            inertial: &[],
             left: view(&frame.left_grey),
             right: view(&frame.right_grey),
             colour: None,

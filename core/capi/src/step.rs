@@ -65,6 +65,7 @@ pub unsafe extern "C" fn dynvox_step_with(
                 detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: disparity(&frame, buffer)?,
                 ignored: None,
+                inertial: &[],
                 time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
                 t_world_camera: if frame.t_world_camera.is_null() {
                     None

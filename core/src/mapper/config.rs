@@ -4,6 +4,7 @@ use super::MapperConfig;
 use crate::{
     egomotion::{EgomotionConfig, icp::IcpConfig},
     geometry::{RigProblem, StereoRig},
+    inertial::InertialUnit,
     objects::ObjectsConfig,
     planning::PlanningConfig,
     rectify::Rectification,
@@ -34,6 +35,8 @@ pub struct Config {
     pub rig: StereoRig,
     /// Rectification of raw pairs to `rig`; `None` if they come rectified.
     pub rectification: Option<Rectification>,
+    /// Inertial unit whose samples come with the frames; `None` without one.
+    pub inertial: Option<InertialUnit>,
     /// Settings of the rig in addition to its calibration.
     pub rig_settings: RigConfig,
     /// Stereo matching.
@@ -68,6 +71,7 @@ impl Config {
         Self {
             rig,
             rectification: None,
+            inertial: None,
             rig_settings: RigConfig::default(),
             stereo: StereoConfig::default(),
             scene_flow: SceneFlowConfig::default(),
@@ -123,6 +127,9 @@ impl Config {
             "rig.baseline_m",
             "must be a positive number",
         );
+        if let Some(unit) = &self.inertial {
+            unit.validate(&mut problems);
+        }
         self.rig_settings.validate(&mut problems);
         self.stereo.validate(&mut problems);
         self.scene_flow.validate(&mut problems);

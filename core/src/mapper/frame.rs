@@ -4,6 +4,7 @@ use crate::{
     digest::Digest,
     geometry::Transform,
     image::{DISPARITY_ONE_PX, View},
+    inertial::InertialSample,
     tracking::Detection,
 };
 
@@ -49,6 +50,11 @@ pub struct StereoFrame<'a> {
     pub time_ns: Option<u64>,
     /// Detections in the left image, in any order; empty without a detector.
     pub detections: &'a [Detection<'a>],
+    /// Samples of [`crate::Config::inertial`] since the frame before, in order of time, on the
+    /// clock of `time_ns`: with the first frame those of the second before it. At most
+    /// [`crate::inertial::INERTIAL_SAMPLES_PER_FRAME`] are read; more are counted. Empty without a
+    /// unit.
+    pub inertial: &'a [InertialSample],
 }
 
 impl<'a> StereoFrame<'a> {
@@ -65,6 +71,7 @@ impl<'a> StereoFrame<'a> {
             t_world_camera: None,
             time_ns: None,
             detections: &[],
+            inertial: &[],
         }
     }
 
@@ -102,6 +109,8 @@ impl<'a> StereoFrame<'a> {
             // An absent time adds nothing to the digest.
             digest.u64(time_ns);
         }
+        // Absent samples add nothing either.
+        self.inertial.iter().for_each(|sample| sample.hash_into(&mut digest));
         // A sum, so that the order in which a detector lists its finds does not matter.
         digest.u64(self.detections.iter().map(Detection::digest).fold(0, u64::wrapping_add));
         digest.finish()

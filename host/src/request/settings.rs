@@ -143,6 +143,7 @@ impl Settings {
         Config {
             rig,
             rectification: rectification.copied(),
+            inertial: None,
             rig_settings: *rig_settings,
             stereo: *stereo,
             scene_flow: *scene_flow,
