@@ -101,6 +101,7 @@ targets!(
     calibration,
     poses,
     times,
+    inertial,
     recording,
     pictures,
     depth,

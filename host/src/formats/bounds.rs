@@ -78,11 +78,11 @@ pub const CALIBRATION_TEXT: TextBound =
 pub const TABLE_TEXT: TextBound =
     TextBound { what: "a table", bytes: 64 * MIB, lines: 500_000, line_bytes: 1 << 20 };
 
-/// Inertial samples: an hour and more at 1,000 Hz.
+/// Inertial samples: two and a half hours at 200 Hz.
 pub const INERTIAL_TEXT: TextBound =
-    TextBound { what: "a table", bytes: 768 * MIB, lines: 5_000_000, line_bytes: 1 << 16 };
+    TextBound { what: "a table", bytes: 192 * MIB, lines: 2_000_000, line_bytes: 1 << 16 };
 /// Samples of an inertial unit.
-pub const MAX_INERTIAL_SAMPLES: usize = 5_000_000;
+pub const MAX_INERTIAL_SAMPLES: usize = 2_000_000;
 
 /// Lists of jobs, alignments and results, which programs write on one line.
 pub const MANIFEST_TEXT: TextBound = TextBound {

@@ -7,10 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use dynvox::evaluate::trajectory::read_trajectory;
-use dynvox::formats::calibration::{KittiCalibration, StereoCalibration, read_rig};
+use dynvox::formats::calibration::{
+    KittiCalibration, StereoCalibration, UnitCalibration, read_rig,
+};
 use dynvox::formats::{
-    read_numbered, read_opencv_depth, read_pfm, read_png_deep, read_png_u16, read_poses,
-    read_stamped_names, read_times,
+    read_inertial, read_numbered, read_opencv_depth, read_pfm, read_png_deep, read_png_u16,
+    read_poses, read_stamped_names, read_times,
 };
 use dynvox::input::masks::{MaskChoice, attach};
 use dynvox::input::stream::netpbm::NetpbmPairs;
@@ -92,6 +94,16 @@ pub fn times(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     let path = folder.file("times.txt", bytes);
     read_times(&path).is_ok() | read_stamped_names(&path).is_ok()
+}
+
+/// Files of an inertial unit, by the first byte.
+const UNIT_FILES: [&str; 3] = ["imu.csv", "camchain.yaml", "mount.txt"];
+
+pub fn inertial(bytes: &[u8]) -> bool {
+    let Some((name, content)) = choose(bytes, &UNIT_FILES) else { return false };
+    let folder = Folder::new();
+    let path = folder.file(name, content);
+    read_inertial(&path).is_ok() | UnitCalibration::read(&[path]).is_ok()
 }
 
 /// The files of a recording in the layout of the tracking benchmark, by the first byte.

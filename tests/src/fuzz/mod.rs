@@ -30,10 +30,11 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 17] = [
+pub const TARGETS: [Target; 18] = [
     Target { name: "calibration", seeds: seeds::calibrations, run: files::calibration },
     Target { name: "poses", seeds: seeds::poses, run: files::poses },
     Target { name: "times", seeds: seeds::times, run: files::times },
+    Target { name: "inertial", seeds: seeds::inertial, run: files::inertial },
     Target { name: "recording", seeds: seeds::recording, run: files::recording },
     Target { name: "pictures", seeds: seeds::pictures, run: files::pictures },
     Target { name: "depth", seeds: seeds::depth, run: files::depth },

@@ -84,6 +84,18 @@ pub fn times() -> Vec<Vec<u8>> {
     vec![b"0.0\n0.1\n0.2\n".to_vec(), dates.to_vec(), table.to_vec()]
 }
 
+pub fn inertial() -> Vec<Vec<u8>> {
+    let table: &[u8] =
+        b"time_s,wx,wy [deg/s],wz,ax,ay,az [g]\n0.00,0.1,0,0,0,0,1\n0.01,0.1,0,0,0,0,1\n";
+    let euroc: &[u8] = b"#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad \
+s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n\
+1403636579758555392,0,0.1,0,9.8,0,0\n1403636579763555584,0,0.1,0,9.8,0,0\n";
+    let plain: &[u8] = b"0;0,1;0;0;0;0;9,8\n5000000;0,1;0;0;0;0;9,8\n";
+    let mounting: &[u8] = b"cam0:\n  T_cam_imu: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]\n";
+    let matrix: &[u8] = b"1 0 0 0\n0 1 0 0\n0 0 1 0\n";
+    chosen(&[(0, table), (0, euroc), (0, plain), (1, mounting), (2, matrix)])
+}
+
 pub fn recording() -> Vec<Vec<u8>> {
     chosen(&[(0, LABEL), (1, &[0; 64]), (2, KITTI), (3, POSE)])
 }

@@ -346,6 +346,8 @@ class Dataset:
         rectified: str | None = None,
         rectified_focal: float | None = None,
         ignore_mask: str | PathLike[str] | None = None,
+        inertial: str | PathLike[str] | None = None,
+        inertial_calibration: str | PathLike[str] | Sequence[str | PathLike[str]] | None = None,
         start: int | None = None,
         frames: int | None = None,
         stride: int | None = None,

@@ -24,8 +24,8 @@ const INTERVAL_S: [f64; 2] = [0.000_2, 0.25];
 /// Next action for a table that cannot be read.
 const ACTION: &str = "A table of inertial samples has a heading `time,wx,wy,wz,ax,ay,az` and rows \
                       of numbers: s or ns, rad/s, m/s2";
-/// Shortest unread rows of a file that was cut off.
-const CUT_ROWS: usize = 1;
+/// Rows by which the unit of times is told.
+const UNIT_ROWS: usize = 4_096;
 
 /// Reads a table.
 fn read(path: &Path) -> Result<InertialTable, FormatError> {
@@ -33,21 +33,8 @@ fn read(path: &Path) -> Result<InertialTable, FormatError> {
     let mut notes = Vec::new();
     let refuse = |reason: String| FormatError::content(path, reason, ACTION);
     let Rows { columns, rows } = rows(&text, path, &mut notes).map_err(refuse)?;
-    let most = rows.last().map_or(0, |(line, _)| *line);
-    let mut read = Vec::with_capacity(rows.len());
-    let mut cut = 0;
-    for (line, row) in rows {
-        match parsed(&row, &columns) {
-            Ok(row) => read.push(row),
-            // A recording that was interrupted ends within a row.
-            Err(_) if line == most && cut < CUT_ROWS && !read.is_empty() => cut += 1,
-            Err(reason) => return Err(refuse(format!("line {line} {reason}"))),
-        }
-    }
-    if cut > 0 {
-        notes.push(format!("{}: its last row is cut off: left out", path.display()));
-    }
-    let unit = unit_of_times(&columns, &read);
+    let last = rows.len().saturating_sub(1);
+    let unit = unit_of_times(&columns, &rows);
     if unit != TimeUnit::Seconds && !matches!(columns.time, TimeColumns::One(_, Some(_))) {
         notes.push(format!(
             "{}: times are in {}, as their interval tells",
@@ -55,42 +42,42 @@ fn read(path: &Path) -> Result<InertialTable, FormatError> {
             unit.symbol()
         ));
     }
-    let per_second = i128::from(unit.per_second());
-    let reading = |row: RawRow| {
-        let time_ns = i64::try_from(row.nano.div_euclid(per_second)).ok()?;
-        Some(TimedReading { time_ns, turn_rate: row.turn, force: row.force })
-    };
-    let readings: Option<Vec<TimedReading>> = read.into_iter().map(reading).collect();
-    let readings = readings
-        .ok_or_else(|| refuse("it has a time beyond the years that a clock counts".to_owned()))?;
+    let mut readings = Vec::with_capacity(rows.len());
+    for (at, (line, row)) in rows.iter().enumerate() {
+        match parsed(&split(row), &columns, unit) {
+            Ok(reading) => readings.push(reading),
+            // A recording that was interrupted ends within a row.
+            Err(_) if at == last && at > 0 => {
+                notes.push(format!("{}: its last row is cut off: left out", path.display()));
+            }
+            Err(reason) => return Err(refuse(format!("line {line} {reason}"))),
+        }
+    }
     InertialTable::from_readings(path, FORMAT.name, readings, notes)
 }
 
-/// Values of a row; the time in 1e-9 of its unit.
-struct RawRow {
-    nano: i128,
-    turn: [f64; 3],
-    force: [f64; 3],
-}
-
-/// Columns of a table, and the words of its rows with their line numbers.
+/// Columns of a table, and its rows with their line numbers.
 struct Rows<'t> {
     columns: Columns,
-    rows: Vec<(usize, Vec<&'t str>)>,
+    rows: Vec<(usize, &'t str)>,
 }
 
 /// Splits a table into a heading and rows. The heading is the last line of words before the first
 /// row of numbers; it may be a comment.
 fn rows<'t>(text: &'t str, path: &Path, notes: &mut Vec<String>) -> Result<Rows<'t>, String> {
     let mut heading = None;
-    let mut rows = Vec::new();
+    let mut rows: Vec<(usize, &str)> = Vec::new();
     for (line, row) in (1..).zip(text.lines().map(str::trim)) {
         let is_comment = row.starts_with(['#', '%']);
         if row.is_empty() || (is_comment && !rows.is_empty()) {
             continue;
         }
-        let words = split(row);
-        if rows.is_empty() && (is_comment || is_heading(&words)) {
+        if rows.is_empty() {
+            let words = split(row);
+            if !is_comment && !is_heading(&words) {
+                rows.push((line, row));
+                continue;
+            }
             // Sentences may stand over a heading: the line with the most known columns is it.
             match (heading.take(), Columns::named(&words)) {
                 (Some(Ok(columns)), Err(_)) => heading = Some(Ok(columns)),
@@ -99,12 +86,13 @@ fn rows<'t>(text: &'t str, path: &Path, notes: &mut Vec<String>) -> Result<Rows<
             }
             continue;
         }
-        rows.push((line, words));
+        rows.push((line, row));
     }
-    let columns = match (heading, rows.first()) {
+    let first = rows.first().map(|(_, row)| split(row).len());
+    let columns = match (heading, first) {
         (_, None) => return Err("it has no rows".to_owned()),
         (Some(Ok(columns)), _) => columns,
-        (None, Some((_, first))) if first.len() == 7 => {
+        (None, Some(7)) => {
             notes.push(format!(
                 "{}: it has no heading: taken as time,wx,wy,wz,ax,ay,az, rad/s and m/s2",
                 path.display()
@@ -112,8 +100,8 @@ fn rows<'t>(text: &'t str, path: &Path, notes: &mut Vec<String>) -> Result<Rows<
             Columns::WITHOUT_HEADING
         }
         (Some(Err(reason)), _) => return Err(reason),
-        (None, Some((_, first))) => {
-            return Err(format!("it has {} columns without a heading", first.len()));
+        (None, Some(first)) => {
+            return Err(format!("it has {first} columns without a heading"));
         }
     };
     Ok(Rows { columns, rows })
@@ -138,53 +126,65 @@ fn is_heading(words: &[&str]) -> bool {
     !words.iter().any(is_value)
 }
 
-/// Values of a row's cells; the error completes "line 3 ...".
-fn parsed(words: &[&str], columns: &Columns) -> Result<RawRow, String> {
-    let cell =
-        |at: usize| {
-            words.get(at).copied().filter(|word| !word.is_empty()).ok_or_else(|| {
-                format!("has {} columns, and column {} is missing", words.len(), at + 1)
-            })
-        };
-    let number = |at: usize| {
-        let word = cell(at)?;
+/// Cell of a row; the error completes "line 3 ...".
+fn cell<'r>(words: &[&'r str], at: usize) -> Result<&'r str, String> {
+    words
+        .get(at)
+        .copied()
+        .filter(|word| !word.is_empty())
+        .ok_or_else(|| format!("has {} columns, and column {} is missing", words.len(), at + 1))
+}
+
+/// Time of a row in 1e-9 of its unit.
+fn nano(words: &[&str], columns: &Columns) -> Result<i128, String> {
+    let nano = |at: usize| {
+        let word = cell(words, at)?;
+        let nano = parse_date(word).map(i128::from);
         // Decimal commas stand between semicolons and tabs.
+        nano.or_else(|| parse_signed_nano(&word.replacen(',', ".", 1)))
+            .ok_or_else(|| format!("has {word:?} in column {}, which is not a time", at + 1))
+    };
+    match columns.time {
+        TimeColumns::One(at, _) => nano(at),
+        TimeColumns::Parts(seconds, rest) => Ok(nano(seconds)? + nano(rest)? / 1_000_000_000),
+    }
+}
+
+/// Sample of a row's cells; the error completes "line 3 ...".
+fn parsed(words: &[&str], columns: &Columns, unit: TimeUnit) -> Result<TimedReading, String> {
+    let number = |at: usize| {
+        let word = cell(words, at)?;
         word.replacen(',', ".", 1)
             .parse::<f64>()
             .map_err(|_| format!("has {word:?} in column {}, which is not a number", at + 1))
     };
-    let mut turn = [0.0; 3];
+    let mut turn_rate = [0.0; 3];
     let mut force = [0.0; 3];
     for axis in 0..3 {
-        turn[axis] = number(columns.turn[axis].at)? * columns.turn[axis].unit;
+        turn_rate[axis] = number(columns.turn[axis].at)? * columns.turn[axis].unit;
         force[axis] = number(columns.force[axis].at)? * columns.force[axis].unit;
     }
-    let nano = |at: usize| {
-        let word = cell(at)?;
-        let nano = parse_date(word).map(i128::from);
-        nano.or_else(|| parse_signed_nano(&word.replacen(',', ".", 1)))
-            .ok_or_else(|| format!("has {word:?} in column {}, which is not a time", at + 1))
-    };
-    let nano = match columns.time {
-        TimeColumns::One(at, _) => nano(at)?,
-        TimeColumns::Parts(seconds, rest) => nano(seconds)? + nano(rest)? / 1_000_000_000,
-    };
-    Ok(RawRow { nano, turn, force })
+    let time = nano(words, columns)?.div_euclid(i128::from(unit.per_second()));
+    let time_ns = i64::try_from(time)
+        .map_err(|_| "has a time beyond the years that a clock counts".to_owned())?;
+    Ok(TimedReading { time_ns, turn_rate, force })
 }
 
 /// Unit of the times: as the heading says it, else the longest in which the median interval is one
 /// of a unit's samples.
-fn unit_of_times(columns: &Columns, rows: &[RawRow]) -> TimeUnit {
+fn unit_of_times(columns: &Columns, rows: &[(usize, &str)]) -> TimeUnit {
     match columns.time {
         TimeColumns::One(_, Some(unit)) => return unit,
         TimeColumns::Parts(..) => return TimeUnit::Seconds,
         TimeColumns::One(_, None) => {}
     }
-    let mut intervals: Vec<i128> = rows
-        .windows(2)
-        .map(|pair| (pair[1].nano - pair[0].nano).abs())
-        .filter(|d| *d > 0)
+    let times: Vec<i128> = rows
+        .iter()
+        .take(UNIT_ROWS)
+        .filter_map(|(_, row)| nano(&split(row), columns).ok())
         .collect();
+    let mut intervals: Vec<i128> =
+        times.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|d| *d > 0).collect();
     intervals.sort_unstable();
     let Some(median) = intervals.get(intervals.len() / 2) else { return TimeUnit::Seconds };
     let interval = *median as f64 * 1e-9;

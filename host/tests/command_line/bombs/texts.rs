@@ -46,6 +46,11 @@ pub const KINDS: &[Bomb] = &[
     },
     Bomb { name: "poses on many lines", bound: "the 500,000 that are read", make: poses },
     Bomb { name: "times on one line", bound: "at most 1 MiB of a line", make: times },
+    Bomb {
+        name: "sparse inertial samples",
+        bound: "at most 192 MiB of a table",
+        make: inertial,
+    },
     Bomb { name: "sparse COCO", bound: "at most 16 MiB of COCO's JSON", make: sparse_coco },
     Bomb { name: "COCO of deep nesting", bound: "COCO's annotations", make: deep_coco },
     Bomb { name: "COCO of many numbers", bound: "COCO's annotations", make: wide_coco },
@@ -176,6 +181,12 @@ fn times(root: &Path, random: &mut Random) -> Call {
 fn with(root: &Path, option: &str, value: &str) -> Call {
     rig(root, 2);
     Call::new(&["run", "rig", "--quiet", "--profile", "tiny", option, value])
+}
+
+fn inertial(root: &Path, random: &mut Random) -> Call {
+    fs::write(root.join("imu.csv"), "time,wx,wy,wz,ax,ay,az\n").unwrap();
+    widened(&root.join("imu.csv"), random);
+    with(root, "--inertial", "imu.csv")
 }
 
 fn sparse_coco(root: &Path, random: &mut Random) -> Call {
