@@ -4,9 +4,9 @@ use super::examine::{Examined, examine};
 use super::opening;
 use super::resident_limit_bytes;
 use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Source, input};
-use crate::input::{StopRequest, read_given_poses};
+use crate::input::{InertialUnitData, StopRequest, read_given_poses};
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::{Capacity, Scale};
+use dynvox_core::{Capacity, Config, Scale};
 
 const MIB: u64 = 1 << 20;
 /// Threads at most.
@@ -62,9 +62,13 @@ impl Request {
             Poses::Estimated => None,
             Poses::File(path) => Some(read_given_poses(path, dataset.as_ref(), frames.listed())?),
         };
+        let unit = dataset.info().inertial.as_deref();
         Ok(Plan {
             request: self.clone(),
-            config: settings.config(dataset.rig(), dataset.rectification()),
+            config: Config {
+                inertial: unit.map(InertialUnitData::config),
+                ..settings.config(dataset.rig(), dataset.rectification())
+            },
             config_toml: file_of(&settings, self.input.source == Source::Street)?,
             rss_limit_bytes: match self.limits.rss_mib {
                 Some(mib) => mib.saturating_mul(MIB),

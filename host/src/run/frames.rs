@@ -1,7 +1,7 @@
 //! Frames of a plan, one after the other, for those who write no run folder.
 
 use super::error::{RunError, refused};
-use super::{read_ahead, stereo_frame};
+use super::{inertial_samples, read_ahead, stereo_frame};
 use crate::input::InstanceMask;
 use crate::request::Plan;
 use crate::slab::HostSlab;
@@ -33,6 +33,7 @@ pub fn each_frame(
     mut visit: impl FnMut(usize, &StereoFrame<'_>) -> Result<(), RunError>,
 ) -> Result<(), RunError> {
     read_ahead(plan.dataset.as_ref(), plan.frames.from_position(0), false, |read| {
+        let mut before_ns = None;
         for frame in read {
             let images = frame.images?;
             let detections: Vec<_> =
@@ -41,7 +42,9 @@ pub fn each_frame(
                 frame: frame.index,
                 reason: "an image is empty".to_owned(),
             })?;
-            visit(frame.index, &StereoFrame { time_ns: frame.stamp_ns, ..stereo })?;
+            let inertial = inertial_samples(plan.dataset.as_ref(), before_ns, frame.stamp_ns);
+            visit(frame.index, &StereoFrame { time_ns: frame.stamp_ns, inertial, ..stereo })?;
+            before_ns = frame.stamp_ns;
         }
         Ok(())
     })

@@ -40,7 +40,7 @@ pub use folder::{
 pub use frames::{each_frame, with_mapper};
 pub use places::{Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
 pub use progress::Progress;
-pub use reader::{AHEAD, ReadFrame, read_ahead, stereo_frame};
+pub use reader::{AHEAD, ReadFrame, inertial_samples, read_ahead, stereo_frame};
 pub use record::{RunRecord, StageStatistics};
 pub use resident::resident_bytes;
 pub use spans::{Cost, Spans};

@@ -2,6 +2,7 @@
 
 use crate::input::{FrameSource, InputError, StereoImages};
 use dynvox_core::StereoFrame;
+use dynvox_core::inertial::InertialSample;
 use dynvox_core::tracking::Detection;
 use std::sync::mpsc::{Receiver, sync_channel};
 
@@ -34,6 +35,16 @@ pub fn stereo_frame<'f>(
         detections,
         ..StereoFrame::pair(images.left.view()?, images.right.view()?)
     })
+}
+
+/// Samples of the source's inertial unit since the frame before; none without a unit or a time.
+pub fn inertial_samples(
+    source: &dyn FrameSource,
+    before_ns: Option<u64>,
+    stamp_ns: Option<u64>,
+) -> &[InertialSample] {
+    let unit = source.info().inertial.as_deref().zip(stamp_ns);
+    unit.map_or(&[], |(unit, stamp_ns)| unit.between(before_ns, stamp_ns))
 }
 
 /// Runs `consume` with the frames of the source that `frames` numbers, decoded ahead in order.

@@ -9,8 +9,8 @@ use super::retired::RetiredVolumes;
 use super::state::RunState;
 use super::view::LiveMap;
 use super::{
-    FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, read_ahead, resident_bytes,
-    stereo_frame,
+    FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, inertial_samples, read_ahead,
+    resident_bytes, stereo_frame,
 };
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
@@ -27,6 +27,16 @@ use std::time::Instant;
 
 /// Address space that the end of a run needs: the mesh writer's window, the report, the viewer.
 const END_BYTES: u64 = 64 << 20;
+
+/// Position and time of a frame.
+struct FrameTime {
+    /// Position in the run.
+    position: usize,
+    /// Time stamp, ns.
+    stamp_ns: Option<u64>,
+    /// Time stamp of the frame that was mapped before it, ns.
+    before_ns: Option<u64>,
+}
 
 /// A run under way.
 pub(super) struct Session<'p, 's> {
@@ -124,7 +134,15 @@ impl<'p, 's> Session<'p, 's> {
         let detections: Vec<_> =
             images.masks.instances.iter().map(InstanceMask::detection).collect();
         let digest = self
-            .stereo_frame((position, row.stamp_ns), &images, &detections)
+            .stereo_frame(
+                &FrameTime {
+                    position,
+                    stamp_ns: row.stamp_ns,
+                    before_ns: self.state.before_last_ns,
+                },
+                &images,
+                &detections,
+            )
             .map(|frame| frame.digest());
         if digest == Some(row.report.digests.input) {
             return Ok(());
@@ -138,12 +156,21 @@ impl<'p, 's> Session<'p, 's> {
     /// The mapper's input at a position and time; `None` where an image is empty.
     fn stereo_frame<'f>(
         &self,
-        (position, stamp_ns): (usize, Option<u64>),
+        time: &FrameTime,
         images: &'f StereoImages,
         detections: &'f [Detection<'f>],
-    ) -> Option<StereoFrame<'f>> {
-        let t_world_camera = self.poses.as_ref().and_then(|poses| poses.get(position).copied());
-        Some(StereoFrame { time_ns: stamp_ns, t_world_camera, ..stereo_frame(images, detections)? })
+    ) -> Option<StereoFrame<'f>>
+    where
+        'p: 'f,
+    {
+        let poses = self.poses.as_ref();
+        let plan: &'p Plan = self.plan;
+        Some(StereoFrame {
+            time_ns: time.stamp_ns,
+            t_world_camera: poses.and_then(|poses| poses.get(time.position).copied()),
+            inertial: inertial_samples(plan.dataset.as_ref(), time.before_ns, time.stamp_ns),
+            ..stereo_frame(images, detections)?
+        })
     }
 
     /// Maps the remaining frames. What ends the run early is returned once a frame is mapped;
@@ -301,8 +328,11 @@ impl<'p, 's> Session<'p, 's> {
         let refused = |reason: String| RunError::Step { frame: index, reason };
         let detections: Vec<_> =
             images.masks.instances.iter().map(InstanceMask::detection).collect();
+        // Samples of frames that were left out go to the next.
+        let before_ns = self.state.frames.last().and_then(|row| row.stamp_ns);
+        let time = FrameTime { position, stamp_ns, before_ns };
         let frame = self
-            .stereo_frame((position, stamp_ns), &images, &detections)
+            .stereo_frame(&time, &images, &detections)
             .ok_or_else(|| refused("the images are empty".to_owned()))?;
         self.threads.take_times();
         let begin = Instant::now();
@@ -310,6 +340,7 @@ impl<'p, 's> Session<'p, 's> {
         let mut retired = RetiredVolumes::default();
         let stepped = threads.run(|| mapper.step_with(&frame, threads, store, &mut retired));
         let report = stepped.map_err(|error| refused(step_reason(error)))?;
+        self.state.before_last_ns = before_ns;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
         let times = self.threads.take_times();
         let row = FrameRow {

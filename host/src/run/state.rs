@@ -15,6 +15,8 @@ pub(super) struct RunState {
     pub skipped: SkippedFrames,
     pub observers: Observers,
     pub timers: Timers,
+    /// Time stamp of the frame before the last one, ns.
+    pub before_last_ns: Option<u64>,
 }
 
 impl RunState {

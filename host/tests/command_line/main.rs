@@ -20,6 +20,7 @@ mod faults;
 mod first_steps;
 mod fixtures;
 mod fleet;
+mod inertial;
 mod layouts;
 mod masks;
 mod networks;

@@ -10,8 +10,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
 
-/// A street with traffic, detected and found by its motion, whose map outgrows its pool.
-const STREET: [&str; 18] = [
+/// A street with traffic, detected and found by its motion, whose map outgrows its pool; with an
+/// inertial unit.
+const STREET: [&str; 20] = [
     "run",
     "--profile",
     "tiny",
@@ -21,6 +22,8 @@ const STREET: [&str; 18] = [
     "street.height=96",
     "--set",
     "street.frames=24",
+    "--set",
+    "street.inertial.rate_hz=100",
     "--set",
     "volume.voxel_size_m=0.05",
     "--set",

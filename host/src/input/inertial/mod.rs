@@ -107,6 +107,7 @@ fn unit(
         longest_gap_s: table.longest_gap_s(),
         path: table.path,
         within_frames,
+        samples: InertialUnitData::samples_of(&readings),
         readings,
     };
     notes.insert(

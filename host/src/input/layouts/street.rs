@@ -104,6 +104,7 @@ fn unit(street: &Street) -> Option<InertialUnitData> {
     (!readings.is_empty()).then(|| InertialUnitData {
         path: PathBuf::from("street"),
         within_frames: readings.iter().filter(within).count(),
+        samples: InertialUnitData::samples_of(&readings),
         readings,
         t_camera_unit: t_camera_unit(),
         clock_offset_s: 0.0,

@@ -4,10 +4,11 @@ use crate::formats::InertialTable;
 use crate::formats::TimedReading;
 use crate::formats::calibration::UnitNoise;
 use dynvox_core::geometry::Transform;
+use dynvox_core::inertial::{InertialSample, InertialUnit};
 use std::path::PathBuf;
 
 /// Samples before the first frame that it is given, ns.
-const BEFORE_FIRST_NS: i64 = 1_000_000_000;
+const BEFORE_FIRST_NS: u64 = 1_000_000_000;
 
 /// Files of an inertial unit that a layout knows of, before any is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,8 @@ pub struct InertialUnitData {
     pub path: PathBuf,
     /// Samples, each later than the one before.
     pub readings: Vec<TimedReading>,
+    /// Samples from time zero on, as the mapper takes them.
+    pub samples: Vec<InertialSample>,
     /// Unit to rectified left camera coordinates.
     pub t_camera_unit: Transform,
     /// Seconds to add to the samples' times, as a calibration says it.
@@ -51,21 +54,41 @@ pub struct InertialUnitData {
 }
 
 impl InertialUnitData {
-    /// Samples later than one frame's time and up to another's; of the first frame those of the
-    /// second before it.
-    pub fn between(&self, before_ns: Option<u64>, until_ns: u64) -> &[TimedReading] {
-        let until = self.position_after(i64::try_from(until_ns).unwrap_or(i64::MAX));
-        let until_ns = i64::try_from(until_ns).unwrap_or(i64::MAX);
-        let from = match before_ns {
-            Some(before_ns) => self.position_after(i64::try_from(before_ns).unwrap_or(i64::MAX)),
-            None => self.position_after(until_ns.saturating_sub(BEFORE_FIRST_NS)),
+    /// Samples as the mapper takes them: those from time zero on.
+    pub fn samples_of(readings: &[TimedReading]) -> Vec<InertialSample> {
+        let sample = |reading: &TimedReading| {
+            let TimedReading { time_ns, turn_rate, force } = *reading;
+            Some(InertialSample { time_ns: u64::try_from(time_ns).ok()?, turn_rate, force })
         };
-        self.readings.get(from..until).unwrap_or_default()
+        readings.iter().filter_map(sample).collect()
     }
 
-    /// Number of samples up to a time.
-    fn position_after(&self, time_ns: i64) -> usize {
-        self.readings.partition_point(|reading| reading.time_ns <= time_ns)
+    /// Samples later than one frame's time and up to another's; of the first frame those of the
+    /// second before it.
+    pub fn between(&self, before_ns: Option<u64>, until_ns: u64) -> &[InertialSample] {
+        let position_after =
+            |time_ns: u64| self.samples.partition_point(|sample| sample.time_ns <= time_ns);
+        let from = match before_ns {
+            Some(before_ns) => position_after(before_ns),
+            None => {
+                let begin_ns = until_ns.saturating_sub(BEFORE_FIRST_NS);
+                self.samples.partition_point(|sample| sample.time_ns < begin_ns)
+            }
+        };
+        self.samples.get(from..position_after(until_ns)).unwrap_or_default()
+    }
+
+    /// The unit as the mapper's configuration has it. The clock's offset is in the samples' times.
+    pub fn config(&self) -> InertialUnit {
+        let usual = InertialUnit::new(self.t_camera_unit);
+        let known = |value: Option<f64>, usual: f64| {
+            value.filter(|value| value.is_finite() && *value > 0.0).unwrap_or(usual)
+        };
+        InertialUnit {
+            turn_density: known(self.noise.turn_density, usual.turn_density),
+            turn_walk: known(self.noise.turn_walk, usual.turn_walk),
+            ..usual
+        }
     }
 }
 
@@ -80,9 +103,11 @@ mod tests {
             turn_rate: [0.0; 3],
             force: [0.0, 0.0, 9.8],
         };
+        let readings: Vec<TimedReading> = (0..1_000).map(reading).collect();
         let unit = InertialUnitData {
             path: PathBuf::new(),
-            readings: (0..1_000).map(reading).collect(),
+            samples: InertialUnitData::samples_of(&readings),
+            readings,
             t_camera_unit: Transform::IDENTITY,
             clock_offset_s: 0.0,
             noise: UnitNoise::default(),
@@ -90,15 +115,20 @@ mod tests {
             longest_gap_s: 0.005,
             within_frames: 0,
         };
-        // Of the first frame the second before it, and times below zero are among them.
-        let first = unit.between(None, 0);
-        assert_eq!((first.len(), first[199].time_ns), (200, 0));
+        // Of the first frame the second before it; the mapper's times begin at zero.
+        assert_eq!(unit.samples.len(), 600);
+        assert_eq!(unit.between(None, 0).len(), 1);
+        let first = unit.between(None, 1_500_000_000);
+        assert_eq!(
+            (first.len(), first[0].time_ns, first[200].time_ns),
+            (201, 500_000_000, 1_500_000_000)
+        );
         // Frames that are left out give theirs to the next.
         let (mut before, mut taken) = (0, 0);
         for time_ns in [100_000_000u64, 150_000_000, 900_000_000] {
             let samples = unit.between(Some(before), time_ns);
-            assert!(samples.iter().all(|one| one.time_ns > before as i64));
-            assert!(samples.iter().all(|one| one.time_ns <= time_ns as i64));
+            assert!(samples.iter().all(|one| one.time_ns > before));
+            assert!(samples.iter().all(|one| one.time_ns <= time_ns));
             taken += samples.len();
             before = time_ns;
         }
