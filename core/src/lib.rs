@@ -17,6 +17,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod attached;
 mod bits;
 pub mod digest;
 pub mod egomotion;

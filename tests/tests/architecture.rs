@@ -68,6 +68,7 @@ const CORE: Layers = &[
         "egomotion",
         &["digest", "geometry", "image", "memory", "settings", "random", "scene_flow", "state"],
     ),
+    ("attached", &["geometry", "image", "memory", "scene_flow", "state"]),
     ("masks", &["digest", "image", "memory", "slices", "state"]),
     (
         "tracking",
@@ -149,6 +150,7 @@ const CORE: Layers = &[
     (
         "mapper",
         &[
+            "attached",
             "invariants",
             "digest",
             "egomotion",

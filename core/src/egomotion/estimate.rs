@@ -1,7 +1,7 @@
 //! The motion estimate.
 
 use super::{
-    EgomotionConfig, MotionCovariance,
+    EgomotionConfig, MotionCovariance, WeakDirections,
     normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
     synchrony::RightAhead,
@@ -68,6 +68,9 @@ pub struct MotionEstimate {
     /// Covariance of the motion, in the current camera's frame; `None` unless `status` is
     /// `Estimated`. It holds the noise of the inliers as measured, and what all of them share.
     pub covariance: Option<MotionCovariance>,
+    /// For the camera: directions in which the motion is not determined; along them the last one
+    /// was continued, if there was one.
+    pub weak: WeakDirections,
     /// Hypotheses drawn.
     pub samples: u32,
     /// Gauss-Newton steps of the refinement.
@@ -87,6 +90,7 @@ impl MotionEstimate {
             inliers: inliers as u32,
             residual_rms_px: 0.0,
             covariance: None,
+            weak: WeakDirections::default(),
             samples,
             steps: 0,
             right_ahead: None,

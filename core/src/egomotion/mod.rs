@@ -57,7 +57,7 @@ pub use config::EgomotionConfig;
 pub use covariance::MotionCovariance;
 pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};
 pub use synchrony::RightAhead;
-pub use track::{Egomotion, MAX_REFERENCE_FRAMES, TimedMatches};
+pub use track::{Egomotion, MAX_REFERENCE_FRAMES, TimedMatches, WeakDirections};
 
 #[cfg(test)]
 mod tests;

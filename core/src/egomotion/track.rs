@@ -1,8 +1,10 @@
 //! The camera's motion from frame to frame, also where it cannot be estimated.
 
 mod rivals;
+mod weak;
 
 use rivals::Contest;
+pub use weak::WeakDirections;
 
 use super::{
     EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, RightAhead,
@@ -108,7 +110,7 @@ impl Egomotion {
         let found = estimator.estimate(config, rig, matches.clone(), hypotheses);
         self.reference_s += f64::from(interval_s);
         let contest = Contest { camera: self, config, rig };
-        let found = contest.choose(matches, estimator, found);
+        let found = self.hold_weak_directions(contest.choose(matches, estimator, found));
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.
         let frames = self.since_reference + 1;

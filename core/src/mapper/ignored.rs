@@ -1,11 +1,13 @@
-//! Pixels of the left image that no stage uses: those the caller ignores, and with them those that
-//! no raw pixel covers.
+//! Pixels of the left image that no stage uses: those the caller ignores, those attached to the
+//! camera, and with them those that no raw pixel covers.
 //!
 //! **Memory.** A bit a pixel. **Time.** A read of each pixel in frames that bring a mask, nothing
 //! in others.
 
+use super::StereoFrame;
 use crate::{
     Capacity,
+    attached::{AttachedCells, CELL_PX},
     image::{InvalidPair, InvalidPixels, View},
     memory::{Carver, region_bytes},
     state::Visitor,
@@ -21,6 +23,8 @@ pub(super) struct IgnoredPixels<'s> {
     words: &'s mut [u64],
     /// Pixels that the caller ignores in the last frame.
     count: u32,
+    /// Other pixels that lie in attached cells.
+    attached: u32,
 }
 
 /// Words for the largest image.
@@ -36,14 +40,15 @@ impl<'s> IgnoredPixels<'s> {
 
     /// Allocates the bits. Nothing is ignored until [`IgnoredPixels::update`].
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
-        Self { words: carver.alloc("ignored", words(capacity)), count: 0 }
+        Self { words: carver.alloc("ignored", words(capacity)), count: 0, attached: 0 }
     }
 
     /// Visits the bits, if there are any, of images of that size.
     pub fn visit(&mut self, [width, height]: [usize; 2], visitor: &mut impl Visitor) {
-        let Self { words, count } = self;
+        let Self { words, count, attached } = self;
         visitor.u32(count);
-        if *count > 0 {
+        visitor.u32(attached);
+        if *count > 0 || *attached > 0 {
             let used = InvalidPixels::words_a_row(width) * height;
             visitor.u64s(words.iter_mut().take(used));
         }
@@ -54,21 +59,53 @@ impl<'s> IgnoredPixels<'s> {
         self.count
     }
 
-    /// Takes a frame's mask, any value but 0 being ignored, and adds the pixels that no raw pixel
-    /// covers.
-    pub fn update(&mut self, mask: Option<View<'_, u8>>, covered: Option<InvalidPair<'_>>) {
-        self.count = 0;
-        let Some(mask) = mask else { return };
-        let row_words = InvalidPixels::words_a_row(mask.width());
-        let rows = self.words.chunks_exact_mut(row_words.max(1)).zip(mask.rows());
-        for (v, (words, pixels)) in rows.enumerate() {
+    /// Tells that a mask or an attached cell hides pixels in the last frame.
+    pub fn is_used(&self) -> bool {
+        self.count + self.attached > 0
+    }
+
+    /// Pixels that lie in attached cells, and that the caller does not ignore.
+    pub fn attached(&self) -> u32 {
+        self.attached
+    }
+
+    /// Takes a frame's mask, any value but 0 being ignored, adds attached cells, and then the
+    /// pixels that no raw pixel covers.
+    pub fn update(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        attached: &AttachedCells<'_>,
+        covered: Option<InvalidPair<'_>>,
+    ) {
+        let [width, height] = [frame.left.width(), frame.left.height()];
+        (self.count, self.attached) = (0, 0);
+        if frame.ignored.is_none() && attached.is_empty() {
+            return;
+        }
+        let row_words = InvalidPixels::words_a_row(width);
+        let used = self.words.get_mut(..row_words * height).unwrap_or_default();
+        used.fill(0);
+        let rows = used.chunks_exact_mut(row_words.max(1));
+        for (words, pixels) in rows.zip(frame.ignored.iter().flat_map(View::rows)) {
             for (word, pixels) in words.iter_mut().zip(pixels.chunks(WORD)) {
-                let bits = pixels.iter().rev().fold(0, |bits, &pixel| bits << 1 | set(pixel));
-                self.count += u64::count_ones(bits);
-                *word = bits;
+                *word = pixels.iter().rev().fold(0, |bits, &pixel| bits << 1 | set(pixel));
+                self.count += word.count_ones();
             }
+        }
+        for [column, row] in attached.attached() {
+            let (left, top) = (column * CELL_PX, row * CELL_PX);
+            // A cell lies in one word, because words begin at multiples of its side.
+            let bits = (left..width.min(left + CELL_PX)).fold(0, |bits, u| bits | 1 << (u % WORD));
+            for v in top..height.min(top + CELL_PX) {
+                if let Some(word) = used.get_mut(v * row_words + left / WORD) {
+                    self.attached += u64::count_ones(bits & !*word);
+                    *word |= bits;
+                }
+            }
+        }
+        for v in 0..height {
             for u in covered.iter().flat_map(|pair| pair.left.in_row(v)) {
-                if let Some(word) = words.get_mut(u / WORD) {
+                if let Some(word) = used.get_mut(v * row_words + u / WORD) {
                     *word |= 1 << (u % WORD);
                 }
             }
@@ -81,7 +118,7 @@ impl<'s> IgnoredPixels<'s> {
         [width, height]: [usize; 2],
         covered: Option<InvalidPair<'a>>,
     ) -> Option<InvalidPair<'a>> {
-        if self.count == 0 {
+        if !self.is_used() {
             return covered;
         }
         // A match needs its left pixel, so that the right image needs no mask of its own.

@@ -38,6 +38,13 @@ pub(super) struct Located {
     pub enters_segment: bool,
 }
 
+impl Located {
+    /// Motion since the last frame, if it was estimated from this one.
+    pub fn estimated_motion(&self) -> Option<Transform> {
+        self.camera.t_current_previous.filter(|_| self.found.origin == PoseOrigin::Estimated)
+    }
+}
+
 /// Origin of a pose, and the report of the stage that found it.
 pub(super) struct Found {
     pub origin: PoseOrigin,
@@ -47,7 +54,17 @@ pub(super) struct Found {
     pub matches_excluded: u32,
 }
 
+/// Deviation of a motion from which on it is imprecise, as a share of a voxel.
+const IMPRECISE_SHARE: f64 = 0.5;
+
 impl Found {
+    /// Tells whether the motion may be off by a large share of a voxel.
+    pub fn is_imprecise(&self, voxel_size_m: f32) -> bool {
+        let covariance = self.egomotion.and_then(|motion| motion.covariance);
+        let limit_m = IMPRECISE_SHARE * f64::from(voxel_size_m);
+        covariance.is_some_and(|covariance| covariance.distance_sigma_m() > limit_m)
+    }
+
     fn new(origin: PoseOrigin) -> Self {
         Self { origin, egomotion: None, icp: None, matches_excluded: 0 }
     }

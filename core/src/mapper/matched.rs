@@ -2,11 +2,12 @@
 
 use super::{Config, StereoFrame};
 use crate::{
+    attached::{AttachedCells, AttachedInput},
     geometry::{StereoRig, Transform},
     image::View,
     objects::{ObjectFrame, Picture},
     scene_flow::{FlowMatcher, FlowStatus, Match},
-    tracking::{FrameMatches, GuidedMatching},
+    tracking::{Assigned, FrameMatches, GuidedMatching, MatchOwner},
     volume::Viewpoint,
 };
 
@@ -57,6 +58,28 @@ impl<'f, 's> MatchedFrame<'f, 's> {
     pub fn search(&self) -> Option<GuidedMatching<'f, 's>> {
         let Self { scene_flow: matcher, disparity_q8, .. } = *self;
         self.with_last.then_some(GuidedMatching { matcher, disparity_q8 })
+    }
+
+    /// Counts the matches for and against what is attached to the camera, given its motion since
+    /// the last frame, where that was estimated. Those on detected objects do not count.
+    #[inline(never)]
+    pub fn observe_attached(
+        &self,
+        attached: &mut AttachedCells<'_>,
+        motion: Option<Transform>,
+        assigned: &Assigned<'_, '_, '_>,
+    ) {
+        let motion = motion.filter(|_| self.with_last);
+        let (Some(t_current_previous), Some(left)) = (&motion, self.scene_flow.left_images())
+        else {
+            return;
+        };
+        let rig = self.config.scaled_rig();
+        let [codes, _] = assigned.match_owners();
+        let unowned = self.scene_flow.refined().iter().zip(codes);
+        let unowned = unowned.filter(|(_, code)| code.get() == MatchOwner::None);
+        let input = AttachedInput { rig: &rig, t_current_previous, left };
+        attached.observe(&input, unowned.map(|(m, _)| m));
     }
 
     /// Frames are fused at an interval, and this one is due.

@@ -46,6 +46,7 @@ use static_map::StaticMap;
 
 use crate::{
     Capacity, Footprint,
+    attached::AttachedCells,
     geometry::{StereoRig, Transform},
     image::View,
     memory::{Carver, SlabError},
@@ -85,6 +86,7 @@ pub struct Mapper<'s> {
     rectified: RectifiedImages<'s>,
     aligned: AlignedImage<'s>,
     ignored: IgnoredPixels<'s>,
+    attached: AttachedCells<'s>,
     stereo: StereoMatcher<'s>,
     scene_flow: FlowMatcher<'s>,
     localization: Localization<'s>,
@@ -123,6 +125,7 @@ impl Capacity {
             + RectifiedImages::bytes(self)
             + AlignedImage::bytes(self)
             + IgnoredPixels::bytes(self)
+            + AttachedCells::bytes(self)
     }
 
     /// Every region a mapper of this capacity cuts out of its slab.
@@ -255,6 +258,7 @@ impl<'s> Mapper<'s> {
             rectified: RectifiedImages::new_in(capacity, carver),
             aligned: AlignedImage::new_in(capacity, carver),
             ignored: IgnoredPixels::new_in(capacity, carver),
+            attached: AttachedCells::new_in(capacity, carver),
             size: None,
             frame: 0,
             clock: Clock::new(config.tracking.frame_interval_s),

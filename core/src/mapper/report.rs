@@ -153,6 +153,9 @@ pub struct Report {
     /// Pixels of the left image that no stage used because the caller ignores them
     /// ([`crate::StereoFrame::ignored`]).
     pub ignored_pixels: u32,
+    /// Other pixels of the left image that no stage used because they are attached to the camera:
+    /// they stay in place while it moves, as its own bonnet does.
+    pub attached_pixels: u32,
     /// The stereo matcher.
     pub stereo: StereoReport,
     /// The scene flow.
@@ -167,6 +170,9 @@ pub struct Report {
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose
     /// was given.
     pub egomotion: Option<MotionEstimate>,
+    /// True if the standard deviation of the motion estimated from matches is more than half a
+    /// voxel: what is fused at this pose is blurred by it.
+    pub imprecise: bool,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
@@ -239,11 +245,13 @@ impl Report {
             + self.internal_faults;
         if self.pose == PoseOrigin::Extrapolated
             || self.segment > MapSegment::FIRST
+            || self.egomotion.is_some_and(|motion| motion.weak.any())
             || refused > 0
             || self.self_calibration.is_uncorrected()
         {
             Severity::MapAffected
         } else if self.pose == PoseOrigin::Relocalized
+            || self.imprecise
             || self.dropped_features() + self.prune.early > 0
             || self.self_calibration.state() > CalibrationState::Sound
         {

@@ -14,7 +14,8 @@
 //! | 8, 8 | fingerprint of the capacity, of the configuration: a digest of their `Debug` text |
 //! | 4 | frames taken |
 //! | 4, 8, 4 | whether the last frame had a time, that time, ns, and the time since the frame before, s |
-//! | 4 | ignored pixels, and their bits if there are any |
+//! | 4, 4 | ignored pixels, attached ones, and their bits if there are any |
+//! | 4, 4, 4 | columns, rows and number of attached cells, and the score of each cell |
 //! | 4, 4 | image width and height, px (0 before the first frame) |
 //! | | last pair, camera, self-calibration, tracks, masks, objects, static map, planner's window |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
@@ -278,6 +279,7 @@ impl<'s> Mapper<'s> {
             frame,
             clock,
             ignored,
+            attached,
             // Told by the caller; a fingerprint stands for them.
             config,
             capacity,
@@ -295,6 +297,7 @@ impl<'s> Mapper<'s> {
         visitor.count(&mut height, capacity.image_height);
         *size = (width * height > 0).then_some([width, height]);
         ignored.visit([width, height], visitor);
+        attached.visit(visitor);
         scene_flow.visit(visitor);
         localization.visit(visitor);
         tracker.visit(visitor);

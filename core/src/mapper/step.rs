@@ -158,6 +158,7 @@ impl Mapper<'_> {
             with_last: self.localization.camera.since_reference() == 0,
         };
         let Self { tracker, segmenter, localization, static_map, objects, planning, .. } = self;
+        let attached = &mut self.attached;
         // (B) Detections, associated with tracks, and the matches assigned to them.
         tracker.set_frame_interval_s(seen.interval_s);
         let (detections, matches) = (frame.detections, seen.matches());
@@ -168,6 +169,7 @@ impl Mapper<'_> {
         let mask = assigned.egomotion_mask();
         let locate = || localization.locate(&seen, &mask, static_map, executor);
         let located = executor.stage(Stage::Egomotion, locate);
+        seen.observe_attached(attached, located.estimated_motion(), &assigned);
         // Another segment has its own frame of reference: what was known in the one before is not.
         static_map.volume.enter_segment(localization.camera.segment());
         if located.enters_segment {
@@ -227,10 +229,12 @@ impl Mapper<'_> {
         frame: &StereoFrame<'_>,
         executor: &E,
     ) -> (StereoReport, FlowReport) {
-        let Self { config, rectifier, ignored, stereo, scene_flow, localization, .. } = self;
-        // Pixels that no raw pixel covers take no part, nor do those the caller ignores.
+        let Self { config, rectifier, ignored, attached, stereo, scene_flow, localization, .. } =
+            self;
+        // Pixels that no raw pixel covers take no part, nor do those the caller ignores, nor the
+        // camera's own parts.
         let covered = rectifier.invalid();
-        ignored.update(frame.ignored, covered);
+        ignored.update(frame, attached, covered);
         let invalid = ignored.pair([frame.left.width(), frame.left.height()], covered);
         let pair = MaskedPair {
             left: frame.left,
@@ -239,7 +243,7 @@ impl Mapper<'_> {
             right_moved: localization.rows_moved,
         };
         let compute_disparity = || match frame.disparity_q8 {
-            Some(given) => stereo.take(given, invalid.as_ref().filter(|_| frame.ignored.is_some())),
+            Some(given) => stereo.take(given, invalid.as_ref().filter(|_| ignored.is_used())),
             None => stereo.compute_within(&config.stereo, &pair, executor),
         };
         let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
@@ -292,11 +296,13 @@ impl Mapper<'_> {
             t_world_camera: camera.t_world_camera,
             rectify: None,
             ignored_pixels: self.ignored.count(),
+            attached_pixels: self.ignored.attached(),
             stereo,
             scene_flow,
             pose: found.origin,
             segment: self.localization.camera.segment(),
             egomotion: found.egomotion,
+            imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
             tracking: TrackingReport { matches_excluded: found.matches_excluded, ..tracking },

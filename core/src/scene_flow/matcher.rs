@@ -147,6 +147,15 @@ impl<'s> FlowMatcher<'s> {
         self.selection().iter().filter_map(|&index| self.refined().get(index as usize))
     }
 
+    /// Previous and current left image, brought to one brightness; `None` where the last frame was
+    /// not matched with one before.
+    pub(crate) fn left_images(&self) -> Option<[View<'_, u8>; 2]> {
+        let [width, height] = self.last.filter(|_| self.matched)?;
+        let (previous, current) = self.left.frames();
+        let view = |pixels| View::new(pixels, width, height);
+        Some([view(previous.pixels)?, view(current.pixels)?])
+    }
+
     /// Looks for a scene point where it is expected: the patch around its current left position, a
     /// whole pixel, is found again below the pixel in the other three images. `None` without a
     /// frame before, where it is expected outside an image or at no number, and where it is lost:

@@ -4,7 +4,7 @@ use super::DepthCensus;
 use crate::formats::shown_pose;
 use crate::input::MaskRefusals;
 use dynvox_core::egomotion::icp::IcpStatus;
-use dynvox_core::egomotion::{MotionCovariance, MotionStatus, RightAhead};
+use dynvox_core::egomotion::{MotionCovariance, MotionStatus, RightAhead, WeakDirections};
 use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::rectify::self_calibration::SelfCalibrationReport;
 use dynvox_core::view::RaycastView;
@@ -175,6 +175,12 @@ impl FrameRow {
                 motion.replace('_', " ")
             ),
         });
+        let weak = self.report.egomotion.map(|motion| motion.weak).filter(WeakDirections::any);
+        let weak = weak.map(|weak| {
+            format!(
+                "matches do not hold the camera ({weak}): along these axes its last motion went on"
+            )
+        });
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
             (allocation.beyond, "points beyond the map's coordinates"),
@@ -194,7 +200,14 @@ impl FrameRow {
             .iter()
             .filter(|(count, _)| *count > 0)
             .map(|(count, what)| format!("{count} {what}"));
-        offset.into_iter().chain(guessed).chain(lost).chain(counted).collect::<Vec<_>>().join("; ")
+        offset
+            .into_iter()
+            .chain(guessed)
+            .chain(weak)
+            .chain(lost)
+            .chain(counted)
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 
     /// Describes the rig's disparity offset where it is known and not corrected.

@@ -43,7 +43,7 @@ fn ahead(way_m: f64) -> Transform {
 fn travel(
     frames: usize,
     mut see: impl FnMut(usize, &mut Scene<'_>),
-) -> Vec<(Transform, MotionStatus)> {
+) -> Vec<(Transform, MotionEstimate)> {
     let mut slab = Box::new(Slab([0; BYTES]));
     let (mut estimator, mut camera) = (estimator(&mut slab), Egomotion::default());
     let mut random = Random::new(11);
@@ -53,7 +53,7 @@ fn travel(
             see(frame, &mut scene);
             let timed = at_10_hz(&scene.matches);
             let estimate = camera.step(&EgomotionConfig::default(), &RIG, timed, &mut estimator);
-            (*camera.t_world_camera(), estimate.status)
+            (*camera.t_world_camera(), estimate)
         })
         .collect()
 }
@@ -103,8 +103,8 @@ fn witnesses_that_disagree_leave_the_pose_a_guess() {
             &ahead(if stops { 0.0 } else { 1.5 }),
         );
     });
-    assert_eq!(poses[3].1, MotionStatus::Estimated);
-    assert_eq!(poses[4].1, MotionStatus::Contested);
+    assert_eq!(poses[3].1.status, MotionStatus::Estimated);
+    assert_eq!(poses[4].1.status, MotionStatus::Contested);
     let way_m = poses[4].0.translation_m[2];
     assert!((way_m - 7.5).abs() < 0.1, "the motion goes on: {way_m} m");
 }

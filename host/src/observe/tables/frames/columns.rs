@@ -53,6 +53,12 @@ static POSE: &[FrameColumn] = &[
     column("residual_px", "px", "RMS error of the inliers", |row| {
         Cell::rounded(row.matches().2, 4)
     }),
+    column("weak_directions", "", "directions in which matches do not hold the camera", |row| {
+        row.report.egomotion.map_or(Cell::Unknown, |motion| match motion.weak.any() {
+            true => Cell::Text(motion.weak.to_string().replace(", ", "+")),
+            false => Cell::Unknown,
+        })
+    }),
     column("motion_sigma_right_m", "m", "standard deviation of the motion to the right", |row| {
         Cell::if_known(row.motion_sigma().map(|sigma| sigma.translation_sigma_m()[0]), 5)
     }),
@@ -121,6 +127,15 @@ static INPUT: &[FrameColumn] = &[
     column("disparity_mean_px", "px", "mean disparity of these pixels", |row| {
         Cell::if_known(row.depth.disparity_mean_px, 4)
     }),
+    column("ignored_pixels", "", "pixels left out by --ignore-mask", |row| {
+        row.report.ignored_pixels.into()
+    }),
+    column(
+        "attached_pixels",
+        "",
+        "other pixels left out because they move with the camera",
+        |row| row.report.attached_pixels.into(),
+    ),
     column("depth_refused", "", "invalid values of given depth", |row| row.depth_refused.into()),
     charted("rss_bytes", "bytes", "resident memory of the process", |row| row.rss_bytes.into()),
 ];
