@@ -10,7 +10,7 @@
 //! **Time.** Seven raycasts and two registrations, in the one frame that ends a loss. **Memory.**
 //! The raycaster's.
 
-use super::{localization::Localization, matched::MatchedFrame, static_map::StaticMap};
+use super::{localization::Localization, matched::MatchedFrame, static_map::StaticMap, work};
 use crate::{
     egomotion::icp::{IcpConfig, IcpStatus},
     geometry::Transform,
@@ -32,8 +32,6 @@ const ASIDE_RAD: f64 = 0.04;
 const SIGNAL_FACTOR: f64 = 1.07;
 /// Least share of the image that the map must show.
 const SHOWN_MIN: f64 = 0.1;
-/// Number of times that the pose is refined.
-const REGISTRATIONS: usize = 2;
 /// Registration with the map: a guess is off by more than a frame's motion, and much of the view
 /// may be new.
 const REGISTRATION: IcpConfig = IcpConfig {
@@ -79,7 +77,7 @@ impl StaticMap<'_> {
         let mut correlation = self.correlation_at(seen, &t_world_camera, executor)?;
         // Registration may run off: the best of all steps counts, not the last.
         let mut best = (correlation, t_world_camera, self.mean_depth_m());
-        for _ in 0..REGISTRATIONS {
+        for _ in 0..work::REGISTRATIONS {
             let report = self.register(seen, &REGISTRATION);
             if report.status != IcpStatus::Tracked {
                 break;
@@ -103,7 +101,8 @@ impl StaticMap<'_> {
         let around = |angle_rad: f64| {
             ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m)
         };
-        let aside = [ahead(ASIDE_M), ahead(-ASIDE_M), around(ASIDE_RAD), around(-ASIDE_RAD)];
+        let aside: [_; work::POSES_ASIDE] =
+            [ahead(ASIDE_M), ahead(-ASIDE_M), around(ASIDE_RAD), around(-ASIDE_RAD)];
         (correlation >= CORRELATION_MIN && aside.iter().all(is_less_like)).then_some(t_world_camera)
     }
 

@@ -273,8 +273,8 @@ impl Report {
     }
 
     /// The report with the units of work that its counts stand for. `fused` tells that the visible
-    /// blocks were updated.
-    pub(super) fn with_work(self, fused: bool) -> Self {
+    /// blocks were updated; `cast_pixels` are of pictures that the step took of the map.
+    pub(super) fn with_work(self, fused: bool, cast_pixels: u64) -> Self {
         let Self { stereo, scene_flow: flow, allocate, prune, .. } = &self;
         let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();
         let voxels = |blocks: u32| u64::from(blocks) * BLOCK_VOXELS as u64;
@@ -290,6 +290,7 @@ impl Report {
                 flow.right.sparse,
             ]),
             circles: sum(&[flow.sparse.closed, flow.dense.closed]),
+            cast_pixels,
             block_requests: u64::from(allocate.requests),
             moved_blocks: sum(&[eviction.stored, eviction.lost, eviction.empty, eviction.loaded]),
             fused_voxels: voxels(if fused { self.blocks.visible } else { 0 }),

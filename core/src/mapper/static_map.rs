@@ -26,6 +26,8 @@ pub(super) struct StaticMap<'s> {
     /// scratch for ICP's pyramid.
     depth_m: &'s mut [f32],
     pub raycaster: Raycaster<'s>,
+    /// Pixels of the pictures that this step took of the map so far.
+    cast_pixels: u64,
 }
 
 impl<'s> StaticMap<'s> {
@@ -42,13 +44,14 @@ impl<'s> StaticMap<'s> {
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             volume: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
+            cast_pixels: 0,
         }
     }
 
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        // Both images belong to one frame.
-        let Self { volume, depth_m: _, raycaster: _ } = self;
+        // Both images and the count belong to one frame.
+        let Self { volume, depth_m: _, raycaster: _, cast_pixels: _ } = self;
         volume.visit(visitor);
     }
 
@@ -125,7 +128,13 @@ impl<'s> StaticMap<'s> {
 
     /// Looks at the map from a pose; whether that could be done.
     pub fn cast<E: Executor>(&mut self, view: &Viewpoint, executor: &E) -> bool {
+        self.cast_pixels += (view.width * view.height) as u64;
         self.raycaster.cast(&self.volume, view, executor).is_ok()
+    }
+
+    /// Pixels cast by [`Self::cast`] since this was asked last.
+    pub fn take_cast_pixels(&mut self) -> u64 {
+        core::mem::take(&mut self.cast_pixels)
     }
 
     /// Looks at a segment of the map from a pose in it.

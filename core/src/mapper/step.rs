@@ -219,7 +219,8 @@ impl Mapper<'_> {
             allocation,
             prune,
         };
-        self.finish_frame(outcome).with_work(fused)
+        let cast_pixels = self.static_map.take_cast_pixels();
+        self.finish_frame(outcome).with_work(fused, cast_pixels)
     }
 
     /// Depth from the pair, unless it is given, and matches over this pair and the last: neither

@@ -3,7 +3,7 @@
 //! A count is the same on every machine and for every number of threads. The bound on it follows
 //! from the capacity and the settings alone, like the bytes of [`Capacity::bytes`].
 
-use super::Config;
+use super::{Config, MotionSource};
 use crate::{
     Capacity, stereo,
     volume::{BLOCK_VOXELS, MAX_BLOCKS_PER_RAY, PIXEL_STEP},
@@ -11,11 +11,17 @@ use crate::{
 
 /// Triangles of a triangulation, at most so many per point.
 const TRIANGLES_PER_POINT: usize = 2;
+/// Number of times that the pose of a camera that was lost is refined.
+pub(super) const REGISTRATIONS: usize = 2;
+/// Poses aside from which the map must look less like the image for the camera to be found.
+pub(super) const POSES_ASIDE: usize = 4;
+/// Most pictures of the map in one frame: from the guess, after each registration, from aside.
+const CASTS_MAX: usize = 1 + REGISTRATIONS + POSES_ASIDE;
 
 /// Units of work, by kind: of one step in a report, the most of any step in [`Capacity::work`].
 ///
 /// Not counted yet, and without a bound here: descriptor distances, hypotheses of egomotion and
-/// segmentation, rays of raycasts, and the voxels of objects.
+/// segmentation, keyframes that places compare, and the voxels of objects.
 ///
 /// ```
 /// use dynvox_core::{Capacity, Config, geometry::StereoRig};
@@ -40,6 +46,9 @@ pub struct WorkUnits {
     pub features: u64,
     /// Circles of matches that closed, of both passes.
     pub circles: u64,
+    /// Pixels of the pictures that the step itself takes of the map, to find a camera again or to
+    /// register depth. Pictures that a caller asks for are not among them.
+    pub cast_pixels: u64,
     /// Blocks looked up because a ray ran through them. A block that several rays meet may count
     /// more than once.
     pub block_requests: u64,
@@ -53,7 +62,7 @@ pub struct WorkUnits {
 
 impl WorkUnits {
     /// Number of units.
-    pub const COUNT: usize = 9;
+    pub const COUNT: usize = 10;
 
     /// Name and count of each unit, in pipeline order.
     ///
@@ -69,6 +78,7 @@ impl WorkUnits {
             triangles,
             features,
             circles,
+            cast_pixels,
             block_requests,
             moved_blocks,
             fused_voxels,
@@ -80,6 +90,7 @@ impl WorkUnits {
             ("triangles", triangles),
             ("features", features),
             ("circles", circles),
+            ("cast_pixels", cast_pixels),
             ("block_requests", block_requests),
             ("moved_blocks", moved_blocks),
             ("fused_voxels", fused_voxels),
@@ -107,6 +118,11 @@ impl Capacity {
         let rays = self.image_width.div_ceil(PIXEL_STEP) * self.image_height.div_ceil(PIXEL_STEP);
         let requests = rays * MAX_BLOCKS_PER_RAY;
         let pruned = self.blocks.min(config.volume.prune_blocks_per_frame as usize);
+        // A camera is found again by several whole pictures; registering depth takes one.
+        let casts = match config.mapper.egomotion {
+            MotionSource::Stereo => CASTS_MAX,
+            MotionSource::Icp => 1,
+        };
         WorkUnits {
             stereo_pixels: self.pixels() as u64,
             support_candidates: points as u64,
@@ -115,6 +131,7 @@ impl Capacity {
             features: (2 * features) as u64,
             // A feature of the previous left image begins one circle.
             circles: features as u64,
+            cast_pixels: (casts * self.pixels()) as u64,
             block_requests: requests as u64,
             // A request evicts one block at most, and loads one.
             moved_blocks: (2 * requests) as u64,

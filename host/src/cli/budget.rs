@@ -1,6 +1,7 @@
 //! `dynvox budget`.
 
 mod targets;
+mod work;
 
 use crate::formats::CapacityFile;
 use crate::report::text::grouped;
@@ -13,6 +14,8 @@ use std::fmt::Write;
 const SPEED_M_S: f64 = 10.0;
 /// Blocks a metre of the synthetic street leaves in the map (docs/measurements/memory.md).
 const BLOCKS_PER_M: u32 = 1_000;
+/// Profile whose work is shown where none is named: what `dynvox run` has room for.
+const DEFAULT: &str = "onboard";
 
 #[derive(Debug, clap::Args)]
 pub struct BudgetArgs {
@@ -43,6 +46,12 @@ pub struct BudgetArgs {
     /// Sum up slab, stack and code for the targets they are known for
     #[arg(long)]
     stack: bool,
+    /// Show the most work of any step, in units that depend on no machine
+    #[arg(long, conflicts_with = "stack")]
+    work: bool,
+    /// Setting that the work depends on: volume.prune_blocks_per_frame=500
+    #[arg(long, value_name = "KEY=VALUE", requires = "work")]
+    set: Vec<String>,
     /// Write the tables to standard output as JSON
     #[arg(long)]
     json: bool,
@@ -58,11 +67,18 @@ pub fn run(args: &BudgetArgs) -> anyhow::Result<()> {
             raw_image: args.raw.map_or([0; 2], |ImageSize(width, height)| [width, height]),
         };
         let capacity = request::solve(memory, (width, height), &options)?;
+        if args.work {
+            return work::show((&memory.to_string(), &capacity), &args.set, args.json);
+        }
         return if args.stack {
             targets::show(&[(memory.to_string(), capacity)], args.json)
         } else {
             solved(args, memory, &capacity)
         };
+    }
+    if args.work {
+        let (name, capacity) = request::profile(args.profile.as_deref().unwrap_or(DEFAULT))?;
+        return work::show((&name, &capacity), &args.set, args.json);
     }
     match &args.profile {
         Some(name) if args.stack => targets::show(&[request::profile(name)?], args.json)?,

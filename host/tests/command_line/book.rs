@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 20] = [
+const PAGES: [&str; 21] = [
     "README.md",
     "docs/bits.md",
     "docs/fleet.md",
@@ -26,6 +26,7 @@ const PAGES: [&str; 20] = [
     "docs/run_folder.md",
     "docs/rust.md",
     "docs/scale.md",
+    "docs/work.md",
 ];
 
 /// The lines of a page's shell blocks, continued ones as one, without comments.

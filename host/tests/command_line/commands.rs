@@ -247,3 +247,30 @@ fn a_run_of_some_frames_is_evaluated_against_the_true_poses_of_all() {
         output_text(&refused)
     );
 }
+
+#[test]
+fn a_budget_of_work_follows_the_profile_and_the_settings() {
+    let root = TempDir::new().unwrap();
+    let most = |more: &[&str]| -> Vec<(String, u64)> {
+        let args = [&["budget", "--work", "--json"], more].concat();
+        let table: serde_json::Value =
+            serde_json::from_slice(&dynvox(root.path(), &args).stdout).unwrap();
+        let unit = |row: &serde_json::Value| {
+            (row["unit"].as_str().unwrap().to_owned(), row["most"].as_u64().unwrap())
+        };
+        table["work"].as_array().unwrap().iter().map(unit).collect()
+    };
+    let of = |name: &str, rows: &[(String, u64)]| {
+        rows.iter().find(|(unit, _)| unit == name).map(|(_, most)| *most).unwrap()
+    };
+    let tiny = most(&["--profile", "tiny"]);
+    assert_eq!(of("stereo_pixels", &tiny), 320 * 96);
+    assert!(most(&[]).iter().zip(&tiny).all(|((_, onboard), (_, tiny))| onboard >= tiny));
+    let fewer = most(&["--profile", "tiny", "--set", "volume.prune_blocks_per_frame=100"]);
+    assert_eq!(of("pruned_voxels", &fewer), 100 * 512);
+    // Another capacity, found for a number of bytes.
+    let solved = most(&["--memory", "48MiB", "--image", "752x480"]);
+    assert_eq!(of("stereo_pixels", &solved), 752 * 480);
+    let refused = dynvox(root.path(), &["budget", "--work", "--set", "volume.nothing=1"]);
+    assert!(!refused.status.success());
+}

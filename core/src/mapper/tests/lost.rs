@@ -194,3 +194,17 @@ fn objects_of_the_first_segment_retire_where_the_second_begins() {
     let segments: std::collections::BTreeSet<_> = store.0.iter().map(|key| key.segment).collect();
     assert_eq!(Vec::from_iter(segments), [MapSegment::FIRST, SECOND]);
 }
+
+#[test]
+fn a_camera_that_is_found_again_costs_as_many_pictures_as_the_bound_says() {
+    let capacity = Capacity { colour: true, ..CAPACITY };
+    let mut config = Walk::config();
+    let bound = capacity.work(&config).cast_pixels;
+    with_lost(&capacity, |mapper, report| {
+        assert_eq!(report.work.cast_pixels, bound, "each picture was needed");
+        let next = step(mapper, BEGAN + 1, None);
+        assert_eq!(next.work.cast_pixels, 0, "counted in the frame that took them");
+    });
+    config.mapper.egomotion = MotionSource::Icp;
+    assert_eq!(capacity.work(&config).cast_pixels, (WIDTH * HEIGHT) as u64);
+}

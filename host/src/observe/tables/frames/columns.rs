@@ -236,6 +236,9 @@ static WORK: &[FrameColumn] = &[
     column("work_circles", "", "circles of matches that closed, of both passes", |row| {
         row.report.work.circles.into()
     }),
+    column("work_cast_pixels", "", "pixels of pictures that the step took of the map", |row| {
+        row.report.work.cast_pixels.into()
+    }),
     column("work_block_requests", "", "blocks looked up because a ray ran through them", |row| {
         row.report.work.block_requests.into()
     }),
