@@ -15,6 +15,7 @@ pub mod fleet;
 pub mod flight;
 pub mod formats;
 pub mod input;
+pub mod live;
 pub mod observe;
 pub mod owned;
 pub mod report;
@@ -25,6 +26,7 @@ mod sentence;
 pub mod slab;
 pub mod sweep;
 pub mod synth;
+pub mod volume_copy;
 
 pub use request::Request;
 pub use sentence::sentence;

@@ -113,7 +113,7 @@ class Page {
   showMap(mapper) {
     if (!this.renderer) return;
     const { tiles, count } = mapper.tiles(), last = this.poses[this.poses.length - 1];
-    this.renderer.clearTiles();
+    this.renderer.removeTiles();
     for (const tile of tiles) this.renderer.addTile(tile.head, tile);
     this.renderer.setLine(this.path, this.poses.map((pose) => pose.slice(0, 3)));
     if (last && !this.isSteered) {

@@ -6,11 +6,14 @@ mod resume;
 
 pub use finish::{IncompleteRun, record, write};
 
+use crate::live::LiveView;
 use crate::owned::check_overlap;
 use crate::request::{Options, Plan, Request};
 use crate::run::{RunFolder, check_outputs};
 use crate::terminal::quoted;
+use anyhow::Context;
 use finish::{finish, print_header};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 /// Folder in which run folders are made unless `--out` says otherwise.
@@ -25,7 +28,8 @@ pub struct RunArgs {
     #[command(flatten)]
     target: TargetArgs,
     /// Resume the interrupted run to RUN_FOLDER from its last snapshot, with its settings and data
-    /// set; only --threads, --rss-limit-mib, --snapshot-every, --json and --quiet can be changed
+    /// set; only --threads, --rss-limit-mib, --snapshot-every, --json, --quiet and --live can
+    /// be changed
     #[arg(long, value_name = "RUN_FOLDER", conflicts_with_all = ["Options", "TargetArgs"], help_heading = "Results")]
     resume: Option<PathBuf>,
     /// Write the summary to standard output as JSON, and nothing else
@@ -34,6 +38,9 @@ pub struct RunArgs {
     /// Show no progress
     #[arg(long, help_heading = "Results")]
     quiet: bool,
+    /// Show the run in a browser while it drives: map, pictures, figures. For this machine only
+    #[arg(long, help_heading = "Results")]
+    live: bool,
 }
 
 /// Options that do not change the result, and may be others when a run is resumed.
@@ -112,6 +119,20 @@ impl ChangeableArgs {
     }
 }
 
+/// The live view of a run that is asked for one. Without a browser the address is there to open.
+fn live_view(args: &RunArgs) -> anyhow::Result<Option<LiveView>> {
+    if !args.live {
+        return Ok(None);
+    }
+    let live = LiveView::begin().context("the live view cannot be served: run without --live")?;
+    errln!("live view: {}", live.url());
+    if std::io::stderr().is_terminal() && !args.silent() {
+        // The address is printed: no browser is no failure of the run.
+        let _ = open::that_detached(live.url());
+    }
+    Ok(Some(live))
+}
+
 /// Folder of a run without `--out`: below the current one, or beside the recording where the
 /// current one lies within it.
 fn default_target(plan: &Plan) -> PathBuf {
@@ -133,6 +154,7 @@ pub fn run(args: &RunArgs) -> anyhow::Result<()> {
     }
     let mut plan = args.request()?.resolve_with(&stop)?;
     plan.progress = !args.silent();
+    plan.live = live_view(args)?;
     let target = args.target.out.clone().unwrap_or_else(|| default_target(&plan));
     check_outputs(&plan, &target)?;
     check_overlap(&target, args.options.config.as_slice())?;

@@ -15,6 +15,7 @@ mod health;
 mod inertial;
 mod instances;
 mod keyframes;
+mod live;
 mod map_disparity;
 mod mavlink;
 mod objects;
@@ -30,7 +31,6 @@ pub mod tables;
 mod thumbnail;
 mod tracks;
 mod trajectory;
-mod volume_copy;
 mod written_file;
 
 pub use block_history::BlockHistoryObserver;
@@ -47,6 +47,7 @@ pub use health::{HealthObserver, HealthSection};
 pub use inertial::InertialObserver;
 pub use instances::{InstancesObserver, MOTION_FOLDER};
 pub use keyframes::{Keyframe, KeyframesObserver, KeyframesSection};
+pub use live::LiveObserver;
 pub use map_disparity::MapDisparityObserver;
 pub use mavlink::{MavlinkObserver, MavlinkSection};
 pub use objects::{ObjectsObserver, ObjectsSection, ReconstructedObject};
@@ -62,13 +63,13 @@ pub use tracks::{TrackRecord, TrackRow, TrackSpan, TracksObserver, TracksSection
 pub use trajectory::{
     ThinnedPath, TrackingFailures, TrajectoryObserver, TrajectorySection, from_first,
 };
-pub use volume_copy::VolumeCopy;
 pub use written_file::WrittenFile;
 
 use crate::evaluate::inertial::UnitFindings;
 use crate::formats::Mesh;
 use crate::input::{InputError, StereoImages};
 use crate::request::Plan;
+use crate::volume_copy::VolumeCopy;
 use dynvox_core::Mapper;
 use dynvox_core::memory::Region;
 use dynvox_core::objects::ObjectSummary;
@@ -270,6 +271,7 @@ pub struct Observers {
     mavlink: MavlinkObserver,
     inertial: InertialObserver,
     scene_export: SceneExportObserver,
+    live: LiveObserver,
 }
 
 /// Findings of all observers.
@@ -352,7 +354,8 @@ impl Observer for Observers {
         self.mavlink.frame(run, frame)?;
         self.inertial.frame(run, frame)?;
         self.planning.frame(run, frame)?;
-        self.scene_export.frame(run, frame)
+        self.scene_export.frame(run, frame)?;
+        self.live.frame(run, frame)
     }
 
     fn end(
@@ -378,6 +381,7 @@ impl Observer for Observers {
         self.planning.finish(run, finished)?;
         self.scene_export.finish(run, finished)?;
         self.block_history.finish(run, finished)?;
+        self.live.finish(run, finished)?;
         Ok(Sections {
             trajectory: self.trajectory.finish(run, finished)?,
             keyframes: self.keyframes.finish(run, finished)?,

@@ -2,6 +2,7 @@
 
 use super::{Request, RequestError, check_bounds};
 use crate::input::{FrameSource, StopRequest};
+use crate::live::LiveView;
 use crate::request::FrameNumbers;
 use dynvox_core::geometry::Transform;
 use dynvox_core::{Capacity, Config, MotionSource};
@@ -34,6 +35,8 @@ pub struct Plan {
     pub stop: StopRequest,
     /// Show progress on standard error.
     pub progress: bool,
+    /// Page that shows the run while it drives, if one does.
+    pub live: Option<LiveView>,
 }
 
 impl Plan {

@@ -82,6 +82,7 @@ impl Request {
             warnings,
             stop: stop.clone(),
             progress: false,
+            live: None,
             dataset,
         })
     }

@@ -1,6 +1,7 @@
 //! Objects that leave the mapper.
 
-use crate::observe::{RetiredVolume, VolumeCopy};
+use crate::observe::RetiredVolume;
+use crate::volume_copy::VolumeCopy;
 use dynvox_core::objects::{ObjectSink, RetiredObject};
 
 /// Copies the objects that leave during a step.

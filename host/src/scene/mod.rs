@@ -11,6 +11,7 @@ mod read;
 mod simplify;
 mod surface_errors;
 mod tables;
+pub mod tiles;
 
 pub use block_history::BlockHistory;
 pub use mesh::IndexedMesh;

@@ -29,6 +29,7 @@ pub fn run(args: &RunArgs, target: &Path, stop: &StopRequest) -> anyhow::Result<
     manifest.require(&plan)?;
     folder.check_target(manifest.overwrites())?;
     plan.progress = !args.silent();
+    plan.live = super::live_view(args)?;
     if plan.progress {
         print_header(&plan);
         errln!(

@@ -1,7 +1,9 @@
 //! Points as a layer of their own: planes of their positions (16 bits of the cloud's box) and
-//! colours, as in [`super::tiles`], deflated.
+//! colours, as in [`crate::scene::tiles`], deflated.
 
-use super::planes::{longest_side, morton, push_byte_differences, push_word_differences};
+use crate::scene::tiles::planes::{
+    longest_side, morton, push_byte_differences, push_word_differences,
+};
 use crate::scene::{IndexedMesh, PlanningCell, PlanningWindow, Scene};
 use flate2::{Compression, write::ZlibEncoder};
 use serde::Serialize;

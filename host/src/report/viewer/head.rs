@@ -1,8 +1,8 @@
 //! Head of the viewer: what the page's script knows besides meshes and pictures.
 
 use super::clouds::CloudHead;
-use super::tiles::TileHead;
-use super::values::{VALUES, ValueHead};
+use super::values::ValueHead;
+use crate::scene::tiles::{TileHead, VALUES};
 use crate::scene::{Scene, SceneFrame, TrackColumns};
 use dynvox_core::geometry::Transform;
 use serde::Serialize;

@@ -7,13 +7,11 @@
 
 mod clouds;
 mod head;
-mod planes;
-mod tiles;
 mod values;
 
 use crate::formats::bounds::MAX_DECODE_BYTES;
 use crate::formats::{FormatError, read_bytes_within};
-use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene};
+use crate::scene::{OVERVIEW, PICTURES_FOLDER, PictureKind, Scene, tiles};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
 use head::ViewerIndex;

@@ -62,14 +62,14 @@ class Renderer {
     this.tiles.push({ head, array, buffers, whole: [0, indices.length], coarse: [indices.length, coarse.length], corners });
   }
 
-  // Removes all tiles: a map that grows is drawn from new ones.
-  clearTiles() {
-    const { gl } = this;
-    for (const { array, buffers } of this.tiles) {
+  // Removes the tiles whose heads are gone, or all: a map that grows is drawn from new ones.
+  removeTiles(isGone = () => true) {
+    const { gl } = this, gone = this.tiles.filter(({ head }) => isGone(head));
+    for (const { array, buffers } of gone) {
       gl.deleteVertexArray(array);
       buffers.forEach((buffer) => gl.deleteBuffer(buffer));
     }
-    this.tiles = [];
+    this.tiles = this.tiles.filter((tile) => !gone.includes(tile));
   }
 
   addCloud(head, bytes) {

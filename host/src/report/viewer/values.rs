@@ -1,14 +1,9 @@
 //! Values that the surface can be coloured by besides its photo: a byte of each value for each
 //! vertex, and what the bytes mean.
 
+use crate::scene::tiles::{VALUES, ValueBytes};
 use crate::scene::{BlockHistory, IndexedMesh, Scene, SceneObject, SurfaceErrorMap};
 use serde::Serialize;
-
-/// Values of a vertex.
-pub const VALUES: usize = 3;
-/// A byte of each value: 0 where it is not known, otherwise 1 for the least to 255 for the
-/// greatest.
-pub type ValueBytes = [u8; VALUES];
 
 /// A value for the page's script.
 #[derive(Clone, Debug, Serialize)]

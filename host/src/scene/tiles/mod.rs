@@ -7,14 +7,19 @@
 //! vertices named so far less its own number, so that a vertex named for the first time is 0. Such
 //! planes deflate to about a third.
 
-use super::planes::{
-    longest_side, morton, push_byte_differences, push_word_differences, push_words,
-};
-use super::values::{VALUES, ValueBytes};
-use crate::scene::IndexedMesh;
+pub mod planes;
+
+use super::IndexedMesh;
 use flate2::{Compression, write::ZlibEncoder};
+use planes::{longest_side, morton, push_byte_differences, push_word_differences, push_words};
 use serde::Serialize;
 use std::io::{self, Write};
+
+/// Values of a vertex, by which the surface can be coloured besides its photo.
+pub const VALUES: usize = 3;
+/// A byte of each value: 0 where it is not known, otherwise 1 for the least to 255 for the
+/// greatest.
+pub type ValueBytes = [u8; VALUES];
 
 /// Triangles of a tile: it cannot have more vertices than 16 bits count.
 const TRIANGLES: usize = 16_384;

@@ -27,20 +27,22 @@ struct Block {
 impl VolumeCopy {
     /// Copies a volume.
     pub fn new(volume: &Volume<'_>) -> Self {
+        Self::of_blocks(volume, |_| true)
+    }
+
+    /// Copies the blocks of a volume that `is_wanted` picks.
+    pub fn of_blocks(volume: &Volume<'_>, is_wanted: impl Fn(BlockKey) -> bool) -> Self {
         let (pool, blocks) = (volume.pool(), volume.blocks());
-        let mut copy = Self {
-            config: *volume.config(),
-            colour: false,
-            blocks: Vec::with_capacity(pool.len()),
-        };
+        let mut copy = Self { config: *volume.config(), colour: false, blocks: Vec::new() };
         // Slots are not kept: the copy is for writing meshes, and knows blocks by their
         // coordinates.
         for slot in pool.live() {
             let colour = blocks.colour(slot);
-            copy.colour |= colour.is_some();
+            let key = blocks.key(slot).filter(|&key| is_wanted(key));
             if let (Some(key), Some(&sdf), Some(&weight)) =
-                (blocks.key(slot), blocks.sdf(slot), blocks.weight(slot))
+                (key, blocks.sdf(slot), blocks.weight(slot))
             {
+                copy.colour |= colour.is_some();
                 copy.blocks.push(Block {
                     key,
                     sdf,
@@ -68,6 +70,14 @@ impl VolumeCopy {
     ///
     /// No memory for a volume of as many blocks.
     pub fn triangles(&self, mesh: &MeshConfig, sink: &mut impl MeshSink) -> std::io::Result<u64> {
+        self.with_volume(|volume| volume.mesh(mesh, |_| true, sink))
+    }
+
+    /// Hands on a volume of these blocks.
+    ///
+    /// # Errors
+    /// No memory for a volume of as many blocks.
+    pub fn with_volume<T>(&self, consume: impl FnOnce(&Volume<'_>) -> T) -> std::io::Result<T> {
         // Only the pool counts: meshing needs no lists and no history.
         let capacity = Capacity {
             blocks: self.blocks.len(),
@@ -78,9 +88,8 @@ impl VolumeCopy {
         };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).ok_or(ErrorKind::OutOfMemory)?;
-        let misfit = |error| {
-            Error::other(format!("an object's blocks do not fit the copy's memory: {error:?}"))
-        };
+        let misfit =
+            |error| Error::other(format!("blocks do not fit the copy's memory: {error:?}"));
         let mut carver = Carver::new(slab.bytes_mut(), bytes).map_err(misfit)?;
         let mut volume = Volume::new_in(&capacity, &self.config, &mut carver);
         carver.check().map_err(misfit)?;
@@ -88,7 +97,7 @@ impl VolumeCopy {
         for block in &self.blocks {
             volume.load(block.key, &mut One(block));
         }
-        Ok(volume.mesh(mesh, |_| true, sink))
+        Ok(consume(&volume))
     }
 }
 
