@@ -128,3 +128,31 @@ fn too_few_frames_say_nothing() {
         assert_eq!((found.agreement, found.vertical, found.frames_without), (None, None, 0));
     }
 }
+
+#[dynvox_needs::clips("kitti-odometry/inertial/r1405.csv")]
+#[test]
+fn a_car_s_own_unit_agrees_with_its_odometry_over_gaps() {
+    let data = std::path::Path::new(dynvox_needs::data_folder!()).join("kitti-odometry");
+    let options = crate::input::OpenOptions {
+        inertial: crate::input::InertialChoice::File(data.join("inertial/r1405.csv")),
+        ..Default::default()
+    };
+    let source = crate::input::open(&data.join("sequences/r1405"), &options).unwrap();
+    let poses = crate::formats::read_poses(&data.join("poses/r1405.vo.txt")).unwrap().poses;
+    let frame = |(at, t_world_camera): (usize, &Transform)| FramePose {
+        time_ns: source.stamp_ns(at).unwrap() as i64,
+        segment: MapSegment::FIRST,
+        t_world_camera: *t_world_camera,
+        is_measured: true,
+    };
+    let frames: Vec<FramePose> = poses.iter().enumerate().map(frame).collect();
+    let found = UnitFindings::new(source.info().inertial.as_deref().unwrap(), &frames);
+    println!("{}", found.sentence());
+    let agreement = found.agreement.clone().unwrap();
+    assert_eq!(agreement.doubt, None, "{}", found.sentence());
+    assert!(agreement.intervals > 60 && found.frames_without > 0, "{}", found.sentence());
+    assert!(agreement.difference_deg < 0.2, "{}", found.sentence());
+    let vertical = found.vertical.unwrap();
+    // The camera is mounted upright on a car on a level street.
+    assert!(vertical.lean_deg() < 3.0 + vertical.sigma_deg, "{}", found.sentence());
+}
