@@ -199,10 +199,54 @@ impl Mapper<'_> {
         &mut self,
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<u32, LoadPlacesError<E>> {
+        self.take_up_places(source, true)
+    }
+
+    /// Loads the places of an old map, as [`Mapper::load_places`] does, into a mapper that goes on
+    /// with that map: where frames recognise a place, the camera goes on in the old map's segment
+    /// by its own motion, and keyframes are taken. The old map's blocks come from the store of
+    /// [`Mapper::step_with`]. Returns the number of keyframes loaded.
+    ///
+    /// # Errors
+    /// See [`LoadPlacesError`]. The mapper has no places then, and can be used.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let (capacity, config) =
+    ///     (Capacity { keyframes: 10, ..Capacity::TINY }, Config::for_rig(rig));
+    /// let [mut first, mut second] = [0, 1].map(|_| vec![0; capacity.bytes() + SLAB_ALIGN]);
+    /// let mut bytes = Vec::new();
+    /// Mapper::new(&capacity, &config, &mut first)?.save_places(&mut |piece: &[u8]| {
+    ///     bytes.extend_from_slice(piece);
+    ///     Ok::<(), std::io::Error>(())
+    /// })?;
+    /// let mut file = &bytes[..];
+    /// let mut mapper = Mapper::new(&capacity, &config, &mut second)?;
+    /// let keyframes = mapper.continue_places(&mut |piece: &mut [u8]| {
+    ///     std::io::Read::read_exact(&mut file, piece)
+    /// })?;
+    /// assert_eq!(keyframes, 0, "the old map has seen nothing");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn continue_places<E>(
+        &mut self,
+        source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+    ) -> Result<u32, LoadPlacesError<E>> {
+        self.take_up_places(source, false)
+    }
+
+    fn take_up_places<E>(
+        &mut self,
+        source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+        is_fixed: bool,
+    ) -> Result<u32, LoadPlacesError<E>> {
         if self.frame > 0 {
             return Err(LoadPlacesError::Started);
         }
-        let read = self.read_places(source);
+        let read = self.read_places(source, is_fixed);
         if read.is_err() {
             // Half a table must not place anyone.
             self.localization.places.clear();
@@ -213,6 +257,7 @@ impl Mapper<'_> {
     fn read_places<E>(
         &mut self,
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
+        is_fixed: bool,
     ) -> Result<u32, LoadPlacesError<E>> {
         let mut reader = Reader::new(source);
         let (mut magic, mut version, mut rig, mut keyframes) = ([0; 8], 0, [0.0; 4], 0);
@@ -242,7 +287,7 @@ impl Mapper<'_> {
         places.visit_keyframes(&mut reader);
         reader.finish()?;
         // The camera's own segment must not be one of theirs.
-        let last = places.fix();
+        let last = places.take_up(is_fixed);
         if last.is_some_and(|last| !self.localization.camera.begin_after(last)) {
             return Err(LoadPlacesError::Damaged);
         }

@@ -305,9 +305,9 @@ impl<'s> Places<'s> {
         self.table.visit_in_order(visitor);
     }
 
-    /// Makes keyframes that were read the places of an old map. Returns the last segment that one
-    /// of them lies in; `None` without keyframes.
-    pub(crate) fn fix(&mut self) -> Option<MapSegment> {
+    /// Makes keyframes that were read the places of an old map; with `is_fixed` none is added.
+    /// Returns the last segment that one of them lies in; `None` without keyframes.
+    pub(crate) fn take_up(&mut self, is_fixed: bool) -> Option<MapSegment> {
         let Self { table, index, .. } = self;
         index.clear();
         for slot in 0..table.len() {
@@ -315,7 +315,7 @@ impl<'s> Places<'s> {
                 index.insert(descriptor, Table::number(slot, point));
             }
         }
-        self.is_fixed = true;
+        self.is_fixed = is_fixed;
         table.poses().map(|pose| pose.segment).max()
     }
 

@@ -58,6 +58,7 @@ Examples:
   dynvox fixtures new pinned --from ~/my-rig --memory 32MiB   digests of your own rig, for your CI
   dynvox fleet plan recordings.toml --out fleet   jobs for many recordings, whose maps become one
   dynvox localize ~/new --in out/old            poses of a recording in the map of an old run
+  dynvox run ~/new --continue out/old           map a recording into a copy of an old map
   dynvox view out/street-001                    its map in the browser
   dynvox diff out/a out/b                       the first frame and stage in which two runs diverge
 

@@ -9,7 +9,7 @@ pub use finish::{IncompleteRun, record, write};
 use crate::live::LiveView;
 use crate::owned::check_overlap;
 use crate::request::{Options, Plan, Request};
-use crate::run::{RunFolder, check_outputs};
+use crate::run::{RunError, RunFolder, check_outputs, keyframes_in};
 use crate::terminal::quoted;
 use anyhow::Context;
 use finish::{finish, print_header};
@@ -73,6 +73,37 @@ struct TargetArgs {
     /// Replace the run folder that is there
     #[arg(long, help_heading = "Results")]
     overwrite: bool,
+    /// Go on with the map of an old run, made with --keyframes and --keep-blocks: once a place of
+    /// it is recognised, the recording is mapped into a copy of it. The old folder stays as it is
+    #[arg(
+        long = "continue",
+        value_name = "RUN_FOLDER",
+        conflicts_with_all = ["no_stream", "egomotion"],
+        help_heading = "Mapping"
+    )]
+    old: Option<PathBuf>,
+}
+
+/// Keyframes that a continued map may get on top of its own, unless `--keyframes` says otherwise.
+const MORE_KEYFRAMES: usize = 1_000;
+/// Most keyframes of a mapper.
+const MAX_KEYFRAMES: usize = 65_536;
+
+impl TargetArgs {
+    /// The request with the old map that is continued, if one is.
+    fn over(&self, mut request: Request) -> Result<Request, RunError> {
+        let Some(old) = &self.old else { return Ok(request) };
+        let keyframes = keyframes_in(old)? as usize;
+        let Request { bounds, storage, .. } = &mut request;
+        bounds.keyframes = if bounds.keyframes > 0 {
+            bounds.keyframes.max(keyframes)
+        } else {
+            (keyframes + MORE_KEYFRAMES).min(MAX_KEYFRAMES)
+        };
+        storage.continues = Some(old.clone());
+        storage.keep_blocks = true;
+        Ok(request)
+    }
 }
 
 /// The arguments of a run as a command line of their own.
@@ -93,14 +124,18 @@ impl RunArgs {
     pub fn of_demo(out: &Path, frames: Option<usize>) -> Self {
         Self {
             options: Options { frames, ..Options::default() },
-            target: TargetArgs { out: Some(out.to_path_buf()), overwrite: true },
+            target: TargetArgs {
+                out: Some(out.to_path_buf()),
+                overwrite: true,
+                ..TargetArgs::default()
+            },
             ..Self::default()
         }
     }
 
     /// Request of these arguments.
-    fn request(&self) -> Result<Request, crate::request::RequestError> {
-        Ok(self.changeable.over(self.options.request()?))
+    fn request(&self) -> Result<Request, RunError> {
+        self.target.over(self.changeable.over(self.options.request()?))
     }
 
     fn silent(&self) -> bool {

@@ -8,7 +8,7 @@ use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
 use crate::formats::{MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_TRAJECTORY_FILE};
 use crate::observe::{MavlinkSection, Sections};
-use crate::run::RunRecord;
+use crate::run::{Continued, RunRecord};
 use std::path::Path;
 
 /// Files of a run to open first, and where.
@@ -18,10 +18,26 @@ const FIRST_FILES: [(&str, &str); 3] = [
     (TIMED_TRAJECTORY_FILE, "in evo or a text editor: the camera's path"),
 ];
 
+/// Sentence on where a recording lies in the map that it goes on with.
+fn old_map(old: &Continued) -> String {
+    let own = old.own_segment.get();
+    match old.placed_from {
+        Some(frame) => format!(
+            "continued from frame {frame} on; frames before it are in segment {own} of the map"
+        ),
+        None => format!(
+            "WARNING: none of its {} places was recognised. This recording stands alone, in \
+             segment {own} of the map",
+            old.keyframes
+        ),
+    }
+}
+
 /// The figures of a run whose folder is `folder`, line by line.
 pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     let mut lines = vec![("frames", format!("{} at {:.1} fps", run.frames.len(), run.fps()))];
     lines.extend(ending_lines(run));
+    lines.extend(run.continued.map(|old| ("old map", old_map(&old))));
     let Sections { trajectory, reference, tracks, .. } = &run.sections;
     lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
     lines.extend(

@@ -12,7 +12,7 @@ use crate::evaluate::trajectory::WithoutBoresight;
 use crate::observe::{
     BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name,
 };
-use crate::run::{Incomplete, RunRecord, SkippedFrames, StageStatistics};
+use crate::run::{Continued, Incomplete, RunRecord, SkippedFrames, StageStatistics};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -29,6 +29,9 @@ pub struct Summary {
     /// Reason why the results are incomplete, if they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     incomplete: Option<Incomplete>,
+    /// Old map that the run went on with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    continued: Option<Continued>,
     slab_bytes: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     rss_peak_bytes: Option<u64>,
@@ -233,6 +236,7 @@ impl Summary {
             fps: run.fps(),
             digest: format!("{:016x}", run.digest()),
             incomplete: run.incomplete.clone(),
+            continued: run.continued,
             slab_bytes: run.plan.capacity.bytes(),
             rss_peak_bytes: run.rss_peak_bytes,
             stages: run

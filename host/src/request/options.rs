@@ -299,6 +299,7 @@ impl Options {
                 most_mib: self.stream_mib,
                 keep_blocks: self.keep_blocks,
                 snapshot_every: None,
+                continues: None,
             },
             evaluation: Evaluation {
                 reference: self.evaluate,

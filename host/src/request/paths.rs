@@ -37,7 +37,7 @@ impl Request {
     /// Every path that is read.
     fn inputs_mut(&mut self) -> Vec<&mut PathBuf> {
         // A path that is read is added here, and no output may contain it.
-        let Self { input, depth, masks, poses, exports: _, .. } = self;
+        let Self { input, depth, masks, poses, storage, exports: _, .. } = self;
         let mut paths: Vec<&mut PathBuf> =
             input.calibration.iter_mut().chain(&mut input.inertial_calibration).collect();
         if let InertialChoice::File(path) = &mut input.inertial {
@@ -47,6 +47,7 @@ impl Request {
             paths.push(path);
         }
         paths.extend(&mut input.ignore_mask);
+        paths.extend(&mut storage.continues);
         match depth {
             DepthChoice::Files(_, path) => paths.push(path),
             DepthChoice::Elas | DepthChoice::Exact => {}
@@ -82,10 +83,12 @@ mod tests {
         request.masks.source = "files:masks".parse().unwrap();
         request.poses = Poses::File("poses.txt".into());
         request.input.ignore_mask = Some("bonnet.png".into());
+        request.storage.continues = Some("old".into());
         request.exports.instances = Some("saved".into());
         let inputs = request.inputs();
         for name in [
             "recording",
+            "old",
             "left.yaml",
             "right.yaml",
             "imu.csv",

@@ -1,6 +1,7 @@
 //! Files that a run keeps while it lasts.
 
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 const MIB: u64 = 1 << 20;
 
@@ -17,6 +18,8 @@ pub struct Storage {
     pub keep_blocks: bool,
     /// Frames from one snapshot to the next, at least 1; none are written when absent.
     pub snapshot_every: Option<usize>,
+    /// Folder of an old run whose map is continued; its `map.blocks` and `map.places` are read.
+    pub continues: Option<PathBuf>,
 }
 
 /// Store of evicted blocks.

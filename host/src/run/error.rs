@@ -44,6 +44,17 @@ pub enum RunError {
         /// The reason.
         reason: String,
     },
+    /// Blocks of an old map that cannot be used.
+    #[error(
+        "{path} cannot be used: {reason}. Map the old recording with --keyframes 1000 \
+         --keep-blocks and name the folder of that run"
+    )]
+    OldBlocks {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        reason: String,
+    },
     /// No memory for the slab.
     #[error(
         "the slab of {profile} needs {bytes} bytes, and this machine does not have them. Give \

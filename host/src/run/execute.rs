@@ -83,6 +83,7 @@ pub fn run(
     state.timers.add_since(&mut since);
     Ok(RunRecord {
         frames: state.frames,
+        continued: state.continued,
         skipped: state.skipped,
         dropped: plan.dataset.stream().map_or(0, |stream| stream.dropped),
         incomplete,

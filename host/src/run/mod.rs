@@ -38,7 +38,7 @@ pub use folder::{
     write_whole,
 };
 pub use frames::{each_frame, with_mapper};
-pub use places::{Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
+pub use places::{Continued, Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, inertial_samples, read_ahead, stereo_frame};
 pub use record::{RunRecord, StageStatistics};

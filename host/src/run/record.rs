@@ -1,6 +1,6 @@
 //! A finished run: what was run, frame by frame, and the sections of its observers.
 
-use super::{Incomplete, SkippedFrames};
+use super::{Continued, Incomplete, SkippedFrames};
 pub use crate::observe::StageStatistics;
 use crate::observe::{FrameLog, Sections};
 use crate::request::Plan;
@@ -12,6 +12,8 @@ pub struct RunRecord {
     pub plan: Plan,
     /// The frames.
     pub frames: FrameLog,
+    /// Old map that the run went on with.
+    pub continued: Option<Continued>,
     /// Frames left out because they could not be read or mapped.
     pub skipped: SkippedFrames,
     /// Frames of a stream that came while the mapper was busy, and were dropped.

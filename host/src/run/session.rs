@@ -9,8 +9,8 @@ use super::retired::RetiredVolumes;
 use super::state::RunState;
 use super::view::LiveMap;
 use super::{
-    FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, inertial_samples, read_ahead,
-    resident_bytes, stereo_frame,
+    Continued, FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, inertial_samples,
+    read_ahead, resident_bytes, stereo_frame,
 };
 use crate::input::{InputError, InstanceMask, StereoImages};
 use crate::observe::{
@@ -64,11 +64,15 @@ impl<'p, 's> Session<'p, 's> {
         slab: &'s mut [u8],
     ) -> Result<Self, RunError> {
         let (since, plan) = (Instant::now(), observed.plan);
-        let mapper = Mapper::new(&plan.capacity, &plan.config, slab)
+        let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab)
             .map_err(|error| refused(&plan.profile, error))?;
+        let old = plan.request.storage.continues.as_ref();
+        let continued = old.map(|old| Continued::begin(&mut mapper, old, folder)).transpose()?;
+        // Blocks that were copied are in it.
         let store = DiskStore::begin(plan.request.storage.streaming(), folder, &plan.config)
             .map_err(RunError::Store)?;
-        Self::with(observed, folder, mapper, store, RunState::default(), since)
+        let state = RunState { continued, ..RunState::default() };
+        Self::with(observed, folder, mapper, store, state, since)
     }
 
     /// After the last frame of a checkpoint.
@@ -254,6 +258,9 @@ impl<'p, 's> Session<'p, 's> {
         let (mut row, retired, images) = self.step(read)?;
         self.state.timers.add_since(&mut self.since);
         self.state.taken = position + 1;
+        if let Some(continued) = &mut self.state.continued {
+            continued.add(index, row.report.segment);
+        }
         let RunState { frames, observers, timers, .. } = &mut self.state;
         let blocks = row.report.blocks;
         let fps = (frames.len() + 1) as f64 / timers.mapping().as_secs_f64();

@@ -1,6 +1,6 @@
 //! The state of a run next to its mapper, as plain data: all of it goes into a checkpoint.
 
-use super::SkippedFrames;
+use super::{Continued, SkippedFrames};
 use crate::observe::{FrameLog, GrowingFile, ObserveError, Observer, Observers};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -17,6 +17,8 @@ pub(super) struct RunState {
     pub timers: Timers,
     /// Time stamp of the frame before the last one, ns.
     pub before_last_ns: Option<u64>,
+    /// Old map that the run goes on with.
+    pub continued: Option<Continued>,
 }
 
 impl RunState {

@@ -72,9 +72,19 @@ fn a_raw_pair_is_mapped_as_the_rectified_pair_is() {
 }
 
 #[test]
-fn every_profile_has_regions_left_for_raw_pairs() {
+fn every_profile_has_regions_left_for_raw_pairs_planning_and_places() {
     for (name, profile) in Capacity::PROFILES {
-        let raw = Capacity { raw_width: 1_392, raw_height: 512, colour: true, ..profile };
+        let raw = Capacity {
+            raw_width: 1_392,
+            raw_height: 512,
+            colour: true,
+            planning_width: 40,
+            planning_length: 40,
+            planning_height: 8,
+            planning_distance_3d: true,
+            keyframes: 10,
+            ..profile
+        };
         assert_eq!(raw.footprint().bytes(), raw.bytes(), "{name}: a region is not in the list");
     }
 }

@@ -24,6 +24,9 @@ pub(super) fn all() -> Vec<(&'static str, Vec<String>)> {
                 RunError::Places { .. } => RunError::Places {
                     path: path("map.places"), reason: LoadPlacesError::<Error>::Rig.to_string()
                 },
+                RunError::OldBlocks { .. } => RunError::OldBlocks {
+                    path: path("map.blocks"), reason: io(ErrorKind::NotFound).to_string()
+                },
                 RunError::NoMemory { .. } => RunError::NoMemory {
                     bytes: 268_435_456, profile: text("onboard")
                 },
