@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 /// Most regions of one slab.
-const MAX_REGIONS: usize = 101;
+const MAX_REGIONS: usize = 108;
 
 /// One named region of the slab. All figures in bytes.
 ///
