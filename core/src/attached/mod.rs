@@ -122,7 +122,8 @@ impl<'s> AttachedCells<'s> {
         let count = if self.count > 0 { usize::MAX } else { 0 };
         all.take(count)
             .filter(|(_, cell)| cell.is_attached())
-            .map(move |(at, _)| [at % columns, at / columns])
+            .map(move |(at, _)| [at.checked_rem(columns), at.checked_div(columns)])
+            .map(|[column, row]| [column.unwrap_or_default(), row.unwrap_or_default()])
     }
 
     /// Counts the matches of a frame. `matches` are with the frame before, without those on objects
@@ -169,7 +170,7 @@ impl<'s> AttachedCells<'s> {
         if expected_px.iter().all(|&px| px < MOVED_PX) {
             return None;
         }
-        let [du, dv] = [0, 1].map(|axis| m.current_left[axis] - m.previous_left[axis]);
+        let [du, dv] = m.flow_px();
         let disparity_px = m.current_disparity_px();
         let change = disparity_px - m.previous_disparity_px();
         let is_still = [du, dv, change].iter().all(|px| px.abs() < STILL_PX);

@@ -27,6 +27,8 @@
 mod camera;
 mod car;
 mod car_paint;
+#[cfg(test)]
+mod carried_tests;
 mod config;
 mod facade;
 mod filter;
