@@ -40,9 +40,9 @@ pub fn of_kitti_raw(recording: &Path, cameras: &Path) -> Option<OwnUnit> {
 /// The unit of a folder of images, by the names of its files.
 pub fn beside_images(folder: &Path) -> Option<OwnUnit> {
     let there = |name: &&str| Some(folder.join(name)).filter(|file| file.is_file());
-    let samples = TABLES.iter().find_map(|name| there(name))?;
-    let mounting = MOUNTINGS.iter().find_map(|name| there(name));
-    let noise = mounting.as_ref().and_then(|_| NOISES.iter().find_map(|name| there(name)));
+    let samples = TABLES.iter().find_map(&there)?;
+    let mounting = MOUNTINGS.iter().find_map(&there);
+    let noise = mounting.as_ref().and_then(|_| NOISES.iter().find_map(there));
     let mut calibration: Vec<PathBuf> = mounting.into_iter().chain(noise).collect();
     let euroc = [folder.join("imu0"), folder.join("cam0")].map(|at| at.join("sensor.yaml"));
     if calibration.is_empty() && euroc.iter().all(|file| file.is_file()) {
