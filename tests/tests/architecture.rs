@@ -36,7 +36,6 @@ const CORE: Layers = &[
     ("geometry", &["image"]),
     ("state", &["digest", "geometry"]),
     ("random", &["state"]),
-    ("inertial", &["digest", "geometry", "settings", "state"]),
     (
         "rectify",
         &["digest", "geometry", "image", "memory", "parallel", "slices", "settings", "state"],
@@ -69,6 +68,7 @@ const CORE: Layers = &[
         &["digest", "geometry", "image", "memory", "settings", "random", "scene_flow", "state"],
     ),
     ("attached", &["geometry", "image", "memory", "scene_flow", "state"]),
+    ("inertial", &["digest", "egomotion", "geometry", "settings", "state"]),
     ("masks", &["digest", "image", "memory", "slices", "state"]),
     (
         "tracking",

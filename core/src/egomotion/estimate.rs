@@ -21,6 +21,10 @@ const REFINE_STEP_MIN: f64 = 1e-6;
 /// Rounds of choosing inliers anew and refining on them.
 const ROUNDS: usize = 3;
 
+/// Standard deviation of a turn without a covariance, and the least of any, rad.
+const TURN_SIGMA_UNKNOWN_RAD: f64 = 0.005;
+const TURN_SIGMA_MIN_RAD: f64 = 0.0005;
+
 /// Outcome of an estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -82,6 +86,14 @@ pub struct MotionEstimate {
 }
 
 impl MotionEstimate {
+    /// Standard deviation of the turn about one axis, rad: the largest of the three, and not below
+    /// what matches never resolve.
+    pub(crate) fn turn_sigma_rad(&self) -> f64 {
+        let sigmas =
+            self.covariance.map_or([TURN_SIGMA_UNKNOWN_RAD; 3], |c| c.rotation_sigma_rad());
+        sigmas.into_iter().fold(TURN_SIGMA_MIN_RAD, |most, one| if one > most { one } else { most })
+    }
+
     fn failed(status: MotionStatus, matches: usize, inliers: usize, samples: u32) -> Self {
         Self {
             status,

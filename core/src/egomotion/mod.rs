@@ -49,6 +49,7 @@ mod estimate;
 pub mod icp;
 mod normal_equations;
 mod points;
+mod predicted_turn;
 mod synchrony;
 mod track;
 mod weights;
@@ -56,6 +57,7 @@ mod weights;
 pub use config::EgomotionConfig;
 pub use covariance::MotionCovariance;
 pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};
+pub(crate) use predicted_turn::{AGREE_SIGMAS, PredictedTurn, Turned};
 pub use synchrony::RightAhead;
 pub use track::{Egomotion, MAX_REFERENCE_FRAMES, TimedMatches, WeakDirections};
 

@@ -7,7 +7,8 @@ use rivals::Contest;
 pub use weak::WeakDirections;
 
 use super::{
-    EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, RightAhead,
+    EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus, PredictedTurn,
+    RightAhead,
 };
 use crate::{
     geometry::{MapSegment, StereoRig, Transform},
@@ -15,6 +16,10 @@ use crate::{
     scene_flow::Match,
     state::{Hasher, Visitor},
 };
+
+mod turn;
+
+use turn::RefusedMotion;
 
 /// Seed of the camera's own draws.
 const SEED: u64 = 0x6361_6D65_7261;
@@ -68,6 +73,10 @@ pub struct Egomotion {
     segment: MapSegment,
     newest_segment: MapSegment,
     random: Random,
+    /// Turn that an inertial unit predicts for this frame.
+    predicted: Option<PredictedTurn>,
+    /// Motion since the reference that was refused because it contradicts that.
+    contradicting: Option<RefusedMotion>,
 }
 
 impl Default for Egomotion {
@@ -85,6 +94,8 @@ impl Default for Egomotion {
             segment: MapSegment::FIRST,
             newest_segment: MapSegment::FIRST,
             random: Random::new(SEED),
+            predicted: None,
+            contradicting: None,
         }
     }
 }
@@ -118,7 +129,10 @@ impl Egomotion {
             .t_current_previous
             .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
         // A motion that no camera can make is not taken, however many matches agree.
-        if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
+        self.contradicting = self.contradiction(&estimate);
+        let refused = self.contradicting.map(|_| MotionStatus::Implausible);
+        let doubt = || motion.and_then(|motion| self.doubt(config, &motion, &estimate));
+        if let Some(status) = refused.or_else(doubt) {
             estimate =
                 MotionEstimate { status, t_current_previous: None, covariance: None, ..estimate };
         }
@@ -142,7 +156,10 @@ impl Egomotion {
     pub fn advance(&mut self, t_current_previous: Option<Transform>) {
         match t_current_previous {
             Some(motion) => (self.t_current_previous, self.extrapolated) = (motion, 0),
-            None => self.extrapolated = self.extrapolated.saturating_add(1),
+            None => {
+                self.extrapolated = self.extrapolated.saturating_add(1);
+                self.t_current_previous = self.next_motion();
+            }
         }
         self.extrapolate();
         self.refer_to_last();
@@ -159,6 +176,7 @@ impl Egomotion {
     fn hold_from_reference(&mut self) {
         self.extrapolated = self.extrapolated.saturating_add(1);
         self.since_reference += 1;
+        self.t_current_previous = self.next_motion();
         self.extrapolate();
         if self.is_lost() {
             self.refer_to_last();
@@ -208,8 +226,8 @@ impl Egomotion {
     /// The motion to the next frame from the reference, if the camera moves on as before.
     fn expected(&self) -> Transform {
         match self.since_reference {
-            0 => self.t_current_previous,
-            _ => (self.t_current_previous * self.t_world_camera.inverse() * self.t_world_reference)
+            0 => self.next_motion(),
+            _ => (self.next_motion() * self.t_world_camera.inverse() * self.t_world_reference)
                 .normalized(),
         }
     }
@@ -359,6 +377,9 @@ impl Egomotion {
             segment,
             newest_segment,
             random,
+            // Belong to one frame.
+            predicted: _,
+            contradicting: _,
         } = self;
         // Two halves of one word.
         let mut segments = u32::from(newest_segment.get()) << 16 | u32::from(segment.get());

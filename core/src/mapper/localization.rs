@@ -7,7 +7,8 @@ use crate::{
         Egomotion, Estimator, MotionEstimate, TimedMatches,
         icp::{self, IcpReport},
     },
-    geometry::{StereoObservation, StereoRig, Transform},
+    geometry::{MapSegment, StereoObservation, StereoRig, Transform},
+    inertial::{InertialPrior, MeasuredMotion},
     memory::Carver,
     parallel::Executor,
     places::{FramePoints, PlaceCamera, PlaceView, Places, SegmentPose},
@@ -25,6 +26,8 @@ pub(super) struct Localization<'s> {
     pub estimator: Estimator<'s>,
     /// Keyframes of the places that the camera has been at.
     pub places: Places<'s>,
+    /// Inertial unit; `None` without one.
+    pub inertial: Option<InertialPrior>,
     /// True if the right image's rows are moved otherwise in the next frame than in this one: it
     /// then differs from this one's even where the camera stands.
     pub rows_moved: bool,
@@ -43,6 +46,14 @@ impl Located {
     pub fn estimated_motion(&self) -> Option<Transform> {
         self.camera.t_current_previous.filter(|_| self.found.origin == PoseOrigin::Estimated)
     }
+}
+
+/// The camera before a frame.
+struct LastPose {
+    t_world_camera: Transform,
+    segment: MapSegment,
+    /// True if the pose is a guess: matches are sought with an earlier frame.
+    over_several: bool,
 }
 
 /// Origin of a pose, and the report of the stage that found it.
@@ -96,6 +107,7 @@ impl<'s> Localization<'s> {
             self_calibration: SelfCalibration::new(&config.rig_settings),
             estimator: Estimator::new_in(capacity, carver),
             places: Places::new_in(capacity, carver),
+            inertial: config.inertial.as_ref().map(InertialPrior::new),
             rows_moved: false,
         }
     }
@@ -103,13 +115,17 @@ impl<'s> Localization<'s> {
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         // Estimates keep nothing.
-        let Self { camera, self_calibration, estimator: _, places, rows_moved } = self;
+        let Self { camera, self_calibration, estimator: _, places, inertial, rows_moved } = self;
         camera.visit(visitor);
         self_calibration.visit(visitor);
         let mut moved = u8::from(*rows_moved);
         visitor.u8(&mut moved);
         *rows_moved = moved != 0;
         places.visit(visitor);
+        // Without a unit the state is what it was before there was any.
+        if let Some(inertial) = inertial {
+            inertial.visit(visitor);
+        }
     }
 
     /// Sets the pose the frame brings, or estimates it.
@@ -123,6 +139,7 @@ impl<'s> Localization<'s> {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
         let segment = self.camera.segment();
+        self.expect_turn(seen);
         let mut found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
@@ -168,9 +185,50 @@ impl<'s> Localization<'s> {
             }
         };
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
+        let from = LastPose { t_world_camera: before, segment, over_several };
+        self.observe_turn(&found, &from);
         let camera =
             CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
         Located { camera, found, enters_segment }
+    }
+
+    /// Hands the frame's samples to the inertial unit, and its turn to the camera.
+    fn expect_turn(&mut self, seen: &MatchedFrame<'_, '_>) {
+        let since_reference = self.camera.since_reference();
+        let predicted = self.inertial.as_mut().and_then(|inertial| {
+            inertial.predict(seen.frame.time_ns, seen.frame.inertial, since_reference)
+        });
+        self.camera.expect_turn(predicted);
+    }
+
+    /// Tells the inertial unit how the camera moved, as far as images or the caller know.
+    #[inline(never)]
+    fn observe_turn(&mut self, found: &Found, from: &LastPose) {
+        let Some(inertial) = &mut self.inertial else { return };
+        let (refused, estimate) = (self.camera.contradicting(), found.egomotion.as_ref());
+        let estimated = estimate.and_then(|estimate| estimate.t_current_previous);
+        let motion = refused.map(|refused| refused.t_current_reference).or(estimated);
+        let sigma_rad = match (refused, estimate) {
+            (Some(refused), _) => refused.sigma_rad,
+            (None, Some(estimate)) => estimate.turn_sigma_rad(),
+            (None, None) => 0.0,
+        };
+        let is_known = |origin| {
+            matches!(origin, PoseOrigin::Estimated | PoseOrigin::Given | PoseOrigin::First)
+        };
+        let follows =
+            is_known(found.origin) && !from.over_several && from.segment == self.camera.segment();
+        inertial.observe(&MeasuredMotion {
+            t_reference_now: motion.map(|motion| motion.inverse()),
+            sigma_rad,
+            strong: estimate.is_some_and(|estimate| 2 * estimate.inliers >= estimate.matches),
+            over_several: from.over_several,
+            turned: found.origin == PoseOrigin::Extrapolated && self.camera.is_turned(),
+            refused: refused.is_some(),
+            t_world_before: follows.then_some(from.t_world_camera),
+            t_world_camera: *self.camera.t_world_camera(),
+            segment: self.camera.segment(),
+        });
     }
 
     /// Hands the frame to the places. Returns whether they say that the camera is in another

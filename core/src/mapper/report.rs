@@ -5,6 +5,7 @@ use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
     geometry::{MapSegment, Transform},
+    inertial::InertialReport,
     objects::ObjectsReport,
     rectify::RectifyReport,
     rectify::self_calibration::{CalibrationState, SelfCalibrationReport},
@@ -177,6 +178,8 @@ pub struct Report {
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
     pub self_calibration: SelfCalibrationReport,
+    /// Report of the inertial unit; `None` without one.
+    pub inertial: Option<InertialReport>,
     /// Counts of detections and tracks; [`crate::Mapper::tracks`] has the tracks one by one.
     pub tracking: TrackingReport,
     /// Counts of objects that were found by their motion.

@@ -14,6 +14,7 @@ use crate::{
     egomotion::MotionEstimate,
     geometry::GroundPlane,
     image::MaskedPair,
+    inertial::InertialPrior,
     invariants::Invariants,
     objects::{NoSink, ObjectSink},
     rectify::Pair,
@@ -306,6 +307,7 @@ impl Mapper<'_> {
             imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
+            inertial: self.localization.inertial.as_ref().map(InertialPrior::report),
             tracking: TrackingReport { matches_excluded: found.matches_excluded, ..tracking },
             segmentation,
             objects: self.objects.report(),
@@ -379,10 +381,13 @@ impl Mapper<'_> {
 
     /// Digest of the camera's motion and of what it says about the rig.
     fn egomotion_digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
-        let Localization { camera, self_calibration, .. } = &mut self.localization;
+        let Localization { camera, self_calibration, inertial, .. } = &mut self.localization;
         let mut digest = Digest::default();
         digest.u64(camera.digest(estimate));
         digest.u64(self_calibration.digest());
+        if let Some(inertial) = inertial {
+            digest.u64(inertial.digest());
+        }
         digest.finish()
     }
 

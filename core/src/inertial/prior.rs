@@ -1,0 +1,309 @@
+//! The unit from frame to frame: predicted turns, and what measured ones say of it.
+
+use super::{
+    INERTIAL_SAMPLES_PER_FRAME, InertialDoubt, InertialReport, InertialSample, InertialUnit,
+    agreement::{Agreement, TurnPair},
+    errors::{TurnError, UnitErrors},
+    integral::{Integral, Reading, integrate, rotation_vector},
+    recent::{RecentSamples, seconds_after},
+    turn::{MeasuredMotion, PendingTurn},
+    vertical::{UnitMotion, VerticalFilter},
+};
+use crate::{
+    egomotion::{PredictedTurn, Turned},
+    geometry::{MapSegment, Transform},
+    state::{Hasher, Visitor},
+};
+use nalgebra::Point3;
+
+/// Time between a frame and the nearest sample from which on they are on two clocks, s.
+const APART_S: f64 = 1.0;
+/// Least standard deviation of a turn, rad, and its part: scale and mounting are not perfect.
+const SIGMA_MIN_RAD: f64 = 0.0005;
+const SIGMA_PART: f64 = 0.01;
+
+/// An inertial unit over time.
+#[derive(Clone, Debug)]
+pub(crate) struct InertialPrior {
+    unit: InertialUnit,
+    recent: RecentSamples,
+    errors: UnitErrors,
+    agreement: Agreement,
+    vertical: VerticalFilter,
+    segment: MapSegment,
+    /// Times of the last frame and of the last sample, ns.
+    frame_ns: Option<u64>,
+    sample_ns: Option<u64>,
+    /// Measured turn of the interval before, to learn from once samples cover it.
+    pending: Option<PendingTurn>,
+    /// Turn since the frame that matches are sought with.
+    since_reference: Option<Turned>,
+    /// Integral of the frame's samples; `None` where they do not cover its interval.
+    integral: Option<Integral>,
+    span_s: f64,
+    report: InertialReport,
+}
+
+impl InertialPrior {
+    pub fn new(unit: &InertialUnit) -> Self {
+        Self {
+            unit: *unit,
+            recent: RecentSamples::new(),
+            errors: UnitErrors::new(unit),
+            agreement: Agreement::default(),
+            vertical: VerticalFilter::default(),
+            segment: MapSegment::FIRST,
+            frame_ns: None,
+            sample_ns: None,
+            pending: None,
+            since_reference: None,
+            integral: None,
+            span_s: 0.0,
+            report: InertialReport::default(),
+        }
+    }
+
+    /// Takes the samples of a frame. Returns the turn of the camera since the frame before, and
+    /// since the one that matches are sought with, if the unit is trusted and covers them.
+    /// `since_reference` is the number of frames between these two.
+    #[inline(never)]
+    pub fn predict(
+        &mut self,
+        time_ns: Option<u64>,
+        samples: &[InertialSample],
+        since_reference: u32,
+    ) -> Option<PredictedTurn> {
+        self.report = InertialReport { samples: samples.len() as u32, ..Default::default() };
+        let (read, beyond) =
+            samples.split_at_checked(INERTIAL_SAMPLES_PER_FRAME).unwrap_or((samples, &[]));
+        self.report.ignored = beyond.len() as u32;
+        // With the errors as they were, before this frame changes them.
+        self.learn(read);
+        let start_ns = core::mem::replace(&mut self.frame_ns, time_ns);
+        (self.integral, self.span_s) = (None, 0.0);
+        if let Some((start_ns, end_ns)) = start_ns.zip(time_ns) {
+            self.span_s = seconds_after(start_ns, end_ns);
+            self.errors.pass(&self.unit, self.span_s);
+            self.integral = self.integrate(read, start_ns, self.span_s);
+            self.check_clocks(read, start_ns);
+        }
+        // Kept after the integration, which would read them twice.
+        self.push(read);
+        self.predicted_turn(since_reference)
+    }
+
+    /// Readings of an interval from the recent samples and those of the frame.
+    fn integrate(&self, read: &[InertialSample], start_ns: u64, span_s: f64) -> Option<Integral> {
+        let offset_s = self.unit.clock_offset_s + self.errors.offset_s();
+        let new = read.iter().filter(|sample| sample.is_finite()).map(|sample| Reading {
+            at_s: seconds_after(start_ns, sample.time_ns) + offset_s,
+            turn_rate: sample.turn_rate.into(),
+            force: sample.force.into(),
+        });
+        let readings = self.recent.readings(start_ns, offset_s).chain(new);
+        integrate(readings, span_s, &self.errors.bias())
+    }
+
+    /// Learns from the turn that images measured in the interval before, which samples may cover
+    /// only now.
+    fn learn(&mut self, read: &[InertialSample]) {
+        let Some(pending) = self.pending.take() else { return };
+        let Some(integral) = self.integrate(read, pending.start_ns, pending.span_s) else { return };
+        let measured = Transform::new(pending.turn_rad, [0.0; 3]);
+        let error = rotation_vector(&(integral.t_start_end.inverse() * measured));
+        let noise = self.noise_rad(&measured, pending.span_s);
+        let sigma_rad = libm::sqrt(noise * noise + pending.sigma_rad * pending.sigma_rad);
+        self.errors.update(&TurnError {
+            error,
+            sigma_rad,
+            span_s: pending.span_s,
+            integral: &integral,
+        });
+        // An offset at its bound may be any larger one.
+        if self.errors.is_apart() {
+            self.agreement.lose_trust(InertialDoubt::ClocksApart);
+            self.errors = UnitErrors::new(&self.unit);
+        }
+    }
+
+    /// Standard deviation of an integrated turn by noise, scale and mounting, rad.
+    fn noise_rad(&self, turn: &Transform, span_s: f64) -> f64 {
+        let density = self.unit.turn_density;
+        let part = SIGMA_PART * turn.angle_rad();
+        libm::sqrt(density * density * span_s + part * part + SIGMA_MIN_RAD * SIGMA_MIN_RAD)
+    }
+
+    /// Doubts samples that lie far from the frame's interval.
+    fn check_clocks(&mut self, read: &[InertialSample], start_ns: u64) {
+        let offset_s = self.unit.clock_offset_s + self.errors.offset_s();
+        let is_near = |sample: &InertialSample| {
+            let at_s = seconds_after(start_ns, sample.time_ns) + offset_s;
+            at_s > -APART_S && at_s < self.span_s + APART_S
+        };
+        if !read.is_empty() && !read.iter().any(is_near) {
+            self.agreement.lose_trust(InertialDoubt::ClocksApart);
+        }
+    }
+
+    /// Keeps the frame's samples.
+    fn push(&mut self, read: &[InertialSample]) {
+        for sample in read {
+            let is_later = self.sample_ns.is_none_or(|last_ns| last_ns < sample.time_ns);
+            if !(is_later && sample.is_finite()) {
+                self.report.ignored = self.report.ignored.saturating_add(1);
+                continue;
+            }
+            self.sample_ns = Some(sample.time_ns);
+            self.agreement.note_sample(&self.unit, sample);
+            self.recent.push(sample);
+        }
+    }
+
+    /// The camera's turn of this frame, with its sigma.
+    fn predicted_turn(&mut self, since_reference: u32) -> Option<PredictedTurn> {
+        let before = self.since_reference.take().filter(|_| since_reference > 0);
+        let integral = self.integral?;
+        self.report.bridged = integral.bridged;
+        let (noise, unit) = (
+            self.noise_rad(&integral.t_start_end, self.span_s),
+            self.errors.turn_sigma_rad(&integral, self.span_s),
+        );
+        // Errors of noise and of what is learned are independent.
+        let last = Turned {
+            t_before_now: self.in_camera(&integral.t_start_end),
+            variance: noise * noise + unit * unit,
+        };
+        self.report.turn_rad =
+            Some(<[f64; 3]>::from(rotation_vector(&last.t_before_now)).map(|rad| rad as f32));
+        self.report.turn_sigma_rad = libm::sqrt(last.variance) as f32;
+        self.since_reference = match before {
+            None if since_reference > 0 => None,
+            None => Some(last),
+            Some(before) => Some(before.then(&last)),
+        };
+        let whole = self.since_reference;
+        self.agreement.is_trusted().then_some(PredictedTurn { last, whole })
+    }
+
+    /// A rotation of the unit in the camera's axes.
+    fn in_camera(&self, rotation: &Transform) -> Transform {
+        // A turn is felt alike anywhere on a rigid body: the lever arm has no part in it.
+        let mounting = Transform { translation_m: [0.0; 3], ..self.unit.t_camera_unit };
+        (mounting * *rotation * mounting.inverse()).normalized()
+    }
+
+    /// Compares the turn that images measured with the predicted one, and learns from it.
+    pub fn observe(&mut self, measured: &MeasuredMotion) {
+        self.report.turned = measured.turned;
+        self.report.refused = measured.refused;
+        self.observe_turn(measured);
+        self.observe_force(measured);
+    }
+
+    fn observe_turn(&mut self, measured: &MeasuredMotion) {
+        let (Some(motion), Some(predicted)) = (&measured.t_reference_now, self.since_reference)
+        else {
+            return;
+        };
+        let mounting = Transform { translation_m: [0.0; 3], ..self.unit.t_camera_unit };
+        let in_unit = |turn: &Transform| rotation_vector(&(mounting.inverse() * *turn * mounting));
+        let sigma_rad = measured.sigma_rad;
+        let turn_rad = in_unit(motion);
+        let predicted_rad = in_unit(&predicted.t_before_now);
+        let raw_rad = predicted_rad + self.errors.bias() * self.span_s;
+        let pair = TurnPair {
+            measured: turn_rad,
+            predicted: predicted_rad,
+            raw: (!measured.over_several).then_some(raw_rad),
+            sigma_rad: libm::sqrt(predicted.variance + sigma_rad * sigma_rad),
+            strong: measured.strong,
+        };
+        if self.agreement.compare(&pair) {
+            // The errors may have changed: they are to be found anew.
+            self.errors.widen(&self.unit);
+        }
+        // Turns over several frames are compared, but not learned from.
+        if !measured.over_several && measured.strong {
+            let start_ns =
+                self.frame_ns.map(|end_ns| end_ns.wrapping_sub((self.span_s * 1e9) as u64));
+            self.pending = start_ns.map(|start_ns| PendingTurn {
+                start_ns,
+                span_s: self.span_s,
+                turn_rad: turn_rad.into(),
+                sigma_rad,
+            });
+        }
+    }
+
+    fn observe_force(&mut self, measured: &MeasuredMotion) {
+        if self.segment != measured.segment {
+            (self.segment, self.vertical) = (measured.segment, VerticalFilter::default());
+        }
+        // A guess at either end says nothing of the acceleration.
+        let Some((before, integral)) = measured.t_world_before.as_ref().zip(self.integral) else {
+            self.vertical.interrupt();
+            return;
+        };
+        let unit_at = |camera: &Transform| *camera * self.unit.t_camera_unit;
+        let (from, to) = (unit_at(before), unit_at(&measured.t_world_camera));
+        self.vertical.add(&UnitMotion {
+            force_world: from.rotate(integral.mean_force),
+            from: Point3::from(from.translation_m),
+            to: Point3::from(to.translation_m),
+            span_s: self.span_s,
+        });
+    }
+
+    /// Report of the frame.
+    pub fn report(&self) -> InertialReport {
+        let bias: [f64; 3] = self.errors.bias().into();
+        InertialReport {
+            trusted: self.agreement.is_trusted(),
+            doubt: self.agreement.doubt(),
+            turn_bias: bias.map(|rate| rate as f32),
+            turn_bias_sigma: self.errors.bias_sigma() as f32,
+            clock_offset_s: (self.unit.clock_offset_s + self.errors.offset_s()) as f32,
+            clock_offset_sigma_s: self.errors.offset_sigma_s() as f32,
+            vertical: self.vertical.vertical(&self.unit),
+            ..self.report
+        }
+    }
+
+    /// Digest of all that later frames depend on.
+    pub fn digest(&mut self) -> u64 {
+        Hasher::digest(|hasher| self.visit(hasher))
+    }
+
+    /// Visits what lives from frame to frame.
+    pub fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self {
+            recent,
+            errors,
+            agreement,
+            vertical,
+            segment,
+            frame_ns,
+            sample_ns,
+            pending,
+            since_reference,
+            // Told by the caller.
+            unit: _,
+            // Belong to one frame.
+            integral: _,
+            span_s: _,
+            report: _,
+        } = self;
+        recent.visit(visitor);
+        errors.visit(visitor);
+        agreement.visit(visitor);
+        vertical.visit(visitor);
+        let mut number = u32::from(segment.get());
+        visitor.u32(&mut number);
+        *segment = MapSegment::new(number as u16);
+        for time_ns in [frame_ns, sample_ns] {
+            visitor.option(time_ns, || 0, |visitor, time_ns| visitor.u64(time_ns));
+        }
+        visitor.option(pending, PendingTurn::default, |visitor, pending| pending.visit(visitor));
+        visitor.option(since_reference, Turned::default, |visitor, turned| turned.visit(visitor));
+    }
+}
