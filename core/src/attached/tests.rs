@@ -62,8 +62,11 @@ impl<'s> Ride<'s> {
         for (at, pixel) in current.iter_mut().enumerate() {
             let (u, v) = (at % WIDTH, at / WIDTH);
             // A pattern that stays, or noise that does not.
-            *pixel =
-                if is_part(u, v) { (u * 37 ^ v * 101) as u8 } else { self.random.below(256) as u8 };
+            *pixel = if is_part(u, v) {
+                ((u * 37) ^ (v * 101)) as u8
+            } else {
+                self.random.below(256) as u8
+            };
         }
         let left = self.images.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
         let input = AttachedInput {

@@ -113,7 +113,7 @@ fn news_tell_what_is_new() {
 #[test]
 fn regions_together_are_the_whole_mesh() {
     with_wall(|volume| {
-        let mesh = MeshConfig { min_weight: 1, ..MeshConfig::default() };
+        let mesh = MeshConfig { min_weight: 1 };
         let whole = volume.triangles(&mesh, &mut |_: Triangle| ());
         let keys = || volume.pool().live().filter_map(|slot| volume.blocks().key(slot));
         let regions: HashSet<_> = keys().map(MapRegion::new).collect();
