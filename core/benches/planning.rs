@@ -125,7 +125,13 @@ fn windows(criterion: &mut Criterion) {
             |n: u32| Transform::new(Vector3::zeros(), Vector3::new(0.0, 0.0, 0.8 * f64::from(n)));
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
         let ground = GroundPlane::find(&RIG, disparity_q8);
-        let sight = |t_world_camera| DepthView { rig: &RIG, t_world_camera, disparity_q8, ground };
+        let sight = |t_world_camera| DepthView {
+            rig: &RIG,
+            t_world_camera,
+            disparity_q8,
+            ground,
+            within_m: f32::MAX,
+        };
         // Twelve views fill the window before anything is measured.
         let poses: Vec<Transform> = (0..12).map(pose).collect();
         for pose in &poses {

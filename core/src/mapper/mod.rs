@@ -37,7 +37,7 @@ pub use scale::{SCALED_SETTINGS, Scale};
 pub use set::SetError;
 pub use settings::{MapperConfig, MotionSource};
 pub use snapshot::RestoreError;
-pub use work::WorkUnits;
+pub use work::{DeferredWork, WorkUnits};
 
 use clock::Clock;
 use ignored::IgnoredPixels;

@@ -82,6 +82,7 @@ impl<'s> Mapper<'s> {
             t_world_camera,
             disparity_q8: self.stereo.disparity_q8(),
             ground,
+            within_m: self.static_map.fused_within_m(),
         });
     }
 

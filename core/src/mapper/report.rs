@@ -1,6 +1,6 @@
 //! Report of one step, as plain values.
 
-use super::{StageDigests, WorkUnits};
+use super::{DeferredWork, StageDigests, WorkUnits, static_map::MapWork};
 use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
@@ -199,6 +199,8 @@ pub struct Report {
     /// Work of the step, in units that are the same on every machine and for any number of threads.
     /// No digest depends on it.
     pub work: WorkUnits,
+    /// Work that the budget did not allow: `mapper.work_budget`.
+    pub deferred: DeferredWork,
     /// Contradictions in what the core itself keeps: always 0, or the core has a fault.
     pub internal_faults: u32,
     /// Digests of what went in and of what each stage made of it.
@@ -255,7 +257,7 @@ impl Report {
             Severity::MapAffected
         } else if self.pose == PoseOrigin::Relocalized
             || self.imprecise
-            || self.dropped_features() + self.prune.early > 0
+            || self.dropped_features() + self.prune.early + self.deferred.fused_blocks > 0
             || self.self_calibration.state() > CalibrationState::Sound
         {
             Severity::Recovered
@@ -275,9 +277,8 @@ impl Report {
         Self { digests: StageDigests { input, ..self.digests }, rectify, digest, ..self }
     }
 
-    /// The report with the units of work that its counts stand for. `fused` tells that the visible
-    /// blocks were updated; `cast_pixels` are of pictures that the step took of the map.
-    pub(super) fn with_work(self, fused: bool, cast_pixels: u64) -> Self {
+    /// The report with the units of work that its counts stand for, and those of the map.
+    pub(super) fn with_work(self, map: &MapWork) -> Self {
         let Self { stereo, scene_flow: flow, allocate, prune, .. } = &self;
         let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();
         let voxels = |blocks: u32| u64::from(blocks) * BLOCK_VOXELS as u64;
@@ -293,13 +294,17 @@ impl Report {
                 flow.right.sparse,
             ]),
             circles: sum(&[flow.sparse.closed, flow.dense.closed]),
-            cast_pixels,
+            cast_pixels: map.cast_pixels,
             block_requests: u64::from(allocate.requests),
             moved_blocks: sum(&[eviction.stored, eviction.lost, eviction.empty, eviction.loaded]),
-            fused_voxels: voxels(if fused { self.blocks.visible } else { 0 }),
+            fused_voxels: voxels(map.fused.map_or(0, |fused| fused.count)),
             pruned_voxels: voxels(prune.visited),
         };
-        Self { work, ..self }
+        let deferred = DeferredWork {
+            fused_blocks: map.fused.map_or(0, |fused| fused.deferred),
+            pruned_blocks: map.prune_deferred,
+        };
+        Self { work, deferred, ..self }
     }
 
     /// Features and matches beyond the capacity.

@@ -2,7 +2,7 @@
 
 use crate::settings::{
     Problems, Range, Rule, Setting,
-    Value::{Choice, U32},
+    Value::{Choice, F32, U32},
     check, choices, rules,
 };
 
@@ -43,7 +43,7 @@ choices! { MotionSource { "stereo" = Stereo, "icp" = Icp } }
 /// (config.mapper.egomotion, config.mapper.fuse_every) = (MotionSource::Icp, 2);
 /// assert!(config.validate().is_empty());
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
@@ -54,11 +54,14 @@ pub struct MapperConfig {
     pub egomotion: MotionSource,
     /// Frames from one that is fused to the next.
     pub fuse_every: u32,
+    /// Share of the bound on work ([`crate::Capacity::work`]) that fusion and pruning may do in a
+    /// frame.
+    pub work_budget: f32,
 }
 
 impl Default for MapperConfig {
     fn default() -> Self {
-        Self { egomotion: MotionSource::Stereo, fuse_every: 1 }
+        Self { egomotion: MotionSource::Stereo, fuse_every: 1, work_budget: 1.0 }
     }
 }
 
@@ -78,10 +81,23 @@ impl MapperConfig {
                  in every frame; maps grow in each `fuse_every`-th only, and pruning's lag counts \
                  those.",
             ),
+        Row::user("mapper.work_budget", "", |c| F32(&mut c.work_budget))
+            .range(Range::AboveTo(0.0, 1.0))
+            .text(
+                "Share of the bound on work (`dynvox budget --work`) that fusion and pruning may \
+                 do in a frame. Below 1 the nearest blocks are fused first; farther ones are left \
+                 out and counted, and planners learn nothing beyond them.",
+            ),
     ];
 
     pub(crate) const CHECKS: &'static [Rule<Self>] =
         &rules::<_, { Self::SETTINGS.len() }>(Self::SETTINGS);
+
+    /// Part of a bound that the budget allows.
+    pub(super) fn budget_of(&self, bound: usize) -> usize {
+        // Bounds are below 2^32, so that the product is exact to a unit; all of it stays all.
+        (bound as f64 * f64::from(self.work_budget)) as usize
+    }
 
     /// Notes everything wrong with the settings.
     pub fn validate(&self, problems: &mut Problems) {

@@ -1,6 +1,6 @@
 //! The static map: fusion of a frame into it, and its picture from a pose.
 
-use super::matched::MatchedFrame;
+use super::{Config, matched::MatchedFrame};
 use crate::{
     Capacity, Executor, Stage,
     egomotion::icp::{self, IcpConfig, IcpReport, MapPicture, MeasuredDepth},
@@ -12,11 +12,22 @@ use crate::{
     tracking::{CameraMotion, Tracked},
     view::{RaycastError, RaycastReport, Raycaster},
     volume::{
-        AllocationReport, BlockStore, DepthImage, NotedDepth, Observation, ObservedDepth,
-        Viewpoint, Volume,
+        AllocationReport, BLOCK_SIDE, BlockStore, DepthImage, FusedBlocks, NotedDepth, Observation,
+        ObservedDepth, PruneReport, Viewpoint, Volume,
     },
 };
 use bytemuck::TransparentWrapper;
+
+/// Work of a step on the map.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct MapWork {
+    /// Pixels of pictures taken of the map.
+    pub cast_pixels: u64,
+    /// Blocks the frame was fused into; `None` where it was not fused.
+    pub fused: Option<FusedBlocks>,
+    /// Blocks that pruning would have visited without a budget.
+    pub prune_deferred: u32,
+}
 
 /// Map of all that does not move, and the images in which a frame meets it.
 #[derive(Debug)]
@@ -26,8 +37,8 @@ pub(super) struct StaticMap<'s> {
     /// scratch for ICP's pyramid.
     depth_m: &'s mut [f32],
     pub raycaster: Raycaster<'s>,
-    /// Pixels of the pictures that this step took of the map so far.
-    cast_pixels: u64,
+    /// Work of this step so far.
+    work: MapWork,
 }
 
 impl<'s> StaticMap<'s> {
@@ -39,19 +50,19 @@ impl<'s> StaticMap<'s> {
     }
 
     /// Allocates an empty map.
-    pub fn new_in(capacity: &Capacity, config: &super::Config, carver: &mut Carver<'s>) -> Self {
+    pub fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
         Self {
             depth_m: carver.alloc("depth_m", capacity.pixels()),
             volume: Volume::new_in(capacity, &config.volume, carver),
             raycaster: Raycaster::new_in(capacity, &config.raycast, carver),
-            cast_pixels: 0,
+            work: MapWork::default(),
         }
     }
 
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        // Both images and the count belong to one frame.
-        let Self { volume, depth_m: _, raycaster: _, cast_pixels: _ } = self;
+        // Both images and the counts belong to one frame.
+        let Self { volume, depth_m: _, raycaster: _, work: _ } = self;
         volume.visit(visitor);
     }
 
@@ -116,7 +127,11 @@ impl<'s> StaticMap<'s> {
         let allocation = executor.stage(Stage::Allocate, || {
             self.volume.allocate(&view, observation.depth.depth_m(), store, executor)
         });
-        executor.stage(Stage::Fuse, || self.volume.fuse(&view, observation, executor));
+        // Nearest blocks first, where the budget does not suffice for all.
+        let most = seen.config.mapper.budget_of(self.volume.visible().capacity());
+        self.work.fused = executor.stage(Stage::Fuse, || {
+            Some(self.volume.fuse_nearest(&view, observation, most, executor))
+        });
         allocation
     }
 
@@ -128,13 +143,34 @@ impl<'s> StaticMap<'s> {
 
     /// Looks at the map from a pose; whether that could be done.
     pub fn cast<E: Executor>(&mut self, view: &Viewpoint, executor: &E) -> bool {
-        self.cast_pixels += (view.width * view.height) as u64;
+        self.work.cast_pixels += (view.width * view.height) as u64;
         self.raycaster.cast(&self.volume, view, executor).is_ok()
     }
 
-    /// Pixels cast by [`Self::cast`] since this was asked last.
-    pub fn take_cast_pixels(&mut self) -> u64 {
-        core::mem::take(&mut self.cast_pixels)
+    /// Prunes what is due, as far as the budget goes.
+    pub fn prune(&mut self, config: &Config) -> PruneReport {
+        let bound = config.volume.prune_blocks_per_frame.min(self.volume.pool().capacity() as u32);
+        let most = config.mapper.budget_of(bound as usize) as u32;
+        let report = self.volume.prune_within(most);
+        self.work.prune_deferred =
+            (report.carried_over + report.visited).min(bound) - report.visited;
+        report
+    }
+
+    /// Depth within which every visible block was fused in this step, m; the largest float where
+    /// nothing was left out.
+    pub fn fused_within_m(&self) -> f32 {
+        let block_m = self.volume.config().voxel_size_m * BLOCK_SIDE as f32;
+        match self.work.fused {
+            // A block reaches less than its side before its middle.
+            Some(fused) if fused.deferred > 0 => fused.within_m as f32 - block_m,
+            _ => f32::MAX,
+        }
+    }
+
+    /// Work since this was asked last.
+    pub fn take_work(&mut self) -> MapWork {
+        core::mem::take(&mut self.work)
     }
 
     /// Looks at a segment of the map from a pose in it.

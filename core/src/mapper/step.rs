@@ -2,8 +2,8 @@
 //! the next one takes.
 
 use super::{
-    BlockCount, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report, StageDigests, StepError,
-    StereoFrame, WorkUnits,
+    BlockCount, DeferredWork, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report,
+    StageDigests, StepError, StereoFrame, WorkUnits,
     localization::{Localization, Located},
     matched::MatchedFrame,
     segmentation::Segmentation,
@@ -205,7 +205,7 @@ impl Mapper<'_> {
         });
         let tracking = executor.stage(Stage::Tracking, || tracked.commit());
         // (F) Noise last observed a fixed lag ago is removed.
-        let prune = || executor.stage(Stage::Prune, || static_map.volume.prune());
+        let prune = || executor.stage(Stage::Prune, || static_map.prune(seen.config));
         let prune = fused.then(prune).unwrap_or_default();
         let prune = PruneReport { voxels_erased, ..prune };
         let outcome = Outcome {
@@ -220,8 +220,8 @@ impl Mapper<'_> {
             allocation,
             prune,
         };
-        let cast_pixels = self.static_map.take_cast_pixels();
-        self.finish_frame(outcome).with_work(fused, cast_pixels)
+        let report = self.finish_frame(outcome);
+        report.with_work(&self.static_map.take_work())
     }
 
     /// Depth from the pair, unless it is given, and matches over this pair and the last: neither
@@ -316,6 +316,7 @@ impl Mapper<'_> {
             prune,
             blocks: self.block_count(),
             work: WorkUnits::default(),
+            deferred: DeferredWork::default(),
             internal_faults: self.check_invariants(),
             digests,
             digest: digests.whole(self.frame),

@@ -60,6 +60,25 @@ pub struct WorkUnits {
     pub pruned_voxels: u64,
 }
 
+/// Work that a step left undone because of its budget, `mapper.work_budget`.
+///
+/// ```
+/// use dynvox_core::Report;
+///
+/// assert_eq!(Report::default().deferred.fused_blocks, 0);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct DeferredWork {
+    /// Visible blocks that the frame was not fused into, all of them farther than those it was.
+    /// Planners learn nothing of free space at their depth and beyond in this frame.
+    pub fused_blocks: u32,
+    /// Blocks that pruning leaves to a later frame.
+    pub pruned_blocks: u32,
+}
+
 impl WorkUnits {
     /// Number of units.
     pub const COUNT: usize = 10;

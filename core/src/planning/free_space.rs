@@ -21,7 +21,10 @@ use super::{
     pyramid::Pyramid,
 };
 use crate::{
-    geometry::{GroundPlane, StereoRig, Transform, scalar::floor_i32},
+    geometry::{
+        GroundPlane, StereoRig, Transform,
+        scalar::{floor_i32, min_f32},
+    },
     image::View,
 };
 
@@ -46,6 +49,8 @@ pub struct DepthView<'a> {
     /// The ground plane of the disparity image; `None` where it shows too little ground, or
     /// [`Planning::seeks_ground`](super::Planning::seeks_ground) says that it is not needed.
     pub ground: Option<GroundPlane>,
+    /// Depth up to which the map holds what the frame shows, m: farther cells count as not seen.
+    pub within_m: f32,
 }
 
 /// A frame's geometry, per cell.
@@ -113,7 +118,7 @@ impl<'a> Rays<'a> {
             steps: axes.map(|axis| axis.map(|c| c as f32)),
             first: first.map(|c| c as f32),
             near_m: config.near_m,
-            far_m: config.far_m,
+            far_m: min_f32(config.far_m, sight.within_m),
             half_m: HALF_DIAGONAL * cell_m as f32,
             margin_q8: MARGIN_PX * DISPARITY_ONE,
             focal_baseline_q8: sight.rig.focal_baseline_px_m() as f32 * DISPARITY_ONE,

@@ -50,7 +50,14 @@ pub(super) struct PruneRule {
 
 impl Volume<'_> {
     /// Remembers what is visible in this frame and prunes what was visible `prune_lag` frames ago.
+    #[cfg(test)]
     pub(crate) fn prune(&mut self) -> PruneReport {
+        self.prune_within(u32::MAX)
+    }
+
+    /// Remembers what is visible in this frame and prunes at most so many of the blocks that were
+    /// visible `prune_lag` frames ago.
+    pub(crate) fn prune_within(&mut self, most: u32) -> PruneReport {
         let mut report = PruneReport::default();
         if !self.config.prunes() {
             return report;
@@ -68,7 +75,7 @@ impl Volume<'_> {
         {
             self.history.expire();
         }
-        self.visit_due(self.config.prune_blocks_per_frame, self.rule(), &mut report);
+        self.visit_due(self.config.prune_blocks_per_frame.min(most), self.rule(), &mut report);
         report
     }
 

@@ -130,6 +130,11 @@ impl<'s> VisibleList<'s> {
         clipped(self.slots, ..self.len)
     }
 
+    /// The most entries a frame can have.
+    pub(crate) fn capacity(&self) -> usize {
+        self.slots.len()
+    }
+
     /// The most entries a frame ever had.
     pub(crate) fn peak(&self) -> usize {
         self.peak

@@ -1,7 +1,7 @@
 //! Work of steps on inputs made to cost the most, compared with its bound.
 
 use super::*;
-use crate::{image::View, random::Random};
+use crate::{Executor, image::View, parallel::TwoThreads, random::Random};
 
 const SIDES: [usize; 2] = [WIDTH, HEIGHT];
 const FRAMES: usize = 10;
@@ -56,6 +56,11 @@ impl Input {
 
 /// Work of each frame.
 fn run(input: Input, config: &Config) -> Vec<WorkUnits> {
+    reports(input, config, &Serial).iter().map(|report| report.work).collect()
+}
+
+/// Report of each frame.
+fn reports<E: Executor>(input: Input, config: &Config, executor: &E) -> Vec<Report> {
     let mut slab = vec![0u8; FULL.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&FULL, config, &mut slab).unwrap();
     let mut random = Random::new(7);
@@ -71,7 +76,7 @@ fn run(input: Input, config: &Config) -> Vec<WorkUnits> {
             )),
             ..StereoFrame::pair(view(&left), view(&right))
         };
-        mapper.step(&given, &Serial).unwrap().work
+        mapper.step(&given, executor).unwrap()
     };
     (0..FRAMES).map(&mut step).collect()
 }
@@ -108,4 +113,32 @@ fn a_frame_that_is_not_fused_moves_no_voxel() {
     let work = run(Input::Noise, &config);
     assert!(work[0].fused_voxels > 0 && work[1].fused_voxels == 0, "{:?}", &work[..2]);
     assert_eq!([work[1].block_requests, work[1].pruned_voxels], [0, 0]);
+}
+
+#[test]
+fn a_budget_holds_in_every_frame_and_gives_the_same_bits_on_two_threads() {
+    let mut config = Walk::config();
+    let bound = FULL.work(&config);
+    for share in [0.75, 0.5, 0.25] {
+        config.mapper.work_budget = share;
+        let within = |units: u64, bound: u64| units as f64 <= bound as f64 * f64::from(share);
+        let serial = reports(Input::Noise, &config, &Serial);
+        for Report { work, frame, .. } in &serial {
+            assert!(within(work.fused_voxels, bound.fused_voxels), "{share}, frame {frame}");
+            assert!(within(work.pruned_voxels, bound.pruned_voxels), "{share}, frame {frame}");
+        }
+        // The budget is felt, and something is mapped nevertheless.
+        assert!(serial.iter().any(|report| report.deferred.fused_blocks > 0), "{share}");
+        assert!(serial.iter().any(|report| report.work.fused_voxels > 0), "{share}");
+        let threads = reports(Input::Noise, &config, &TwoThreads);
+        let digests =
+            |reports: &[Report]| reports.iter().map(|report| report.digest).collect::<Vec<_>>();
+        assert_eq!(digests(&serial), digests(&threads), "{share}");
+    }
+    config.mapper.work_budget = 1.0;
+    let whole = reports(Input::Noise, &config, &Serial);
+    assert!(
+        whole.iter().all(|report| report.deferred == DeferredWork::default()),
+        "all of the bound"
+    );
 }

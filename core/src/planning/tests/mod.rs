@@ -61,6 +61,8 @@ pub(super) fn planning(capacity: &Capacity, config: &PlanningConfig) -> Planning
 pub(super) struct Scene {
     pub volume: Volume<'static>,
     pub planning: Planning<'static>,
+    /// Depth up to which the map holds what is observed, m.
+    pub within_m: f32,
 }
 
 impl Scene {
@@ -69,6 +71,7 @@ impl Scene {
         Self {
             volume: Volume::new_in(&CAPACITY, &VOLUME(), &mut carver),
             planning: planning(&CAPACITY, config),
+            within_m: f32::MAX,
         }
     }
 
@@ -113,6 +116,7 @@ impl Scene {
         let disparity_q8 = View::new(&disparity_q8, WIDTH, HEIGHT).unwrap();
         let ground = GroundPlane::find(&RIG, disparity_q8);
         self.planning.observe(&DepthView {
+            within_m: self.within_m,
             rig: &RIG,
             t_world_camera: &t_world_camera,
             disparity_q8,

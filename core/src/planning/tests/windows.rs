@@ -42,6 +42,18 @@ fn no_side_costs_no_byte_and_a_window_what_its_formula_says() {
 }
 
 #[test]
+fn nothing_is_free_beyond_the_depth_that_was_fused() {
+    let mut scene = Scene { within_m: 5.0, ..Scene::new(&CONFIG()) };
+    for n in 0..4 {
+        scene.observe(at(0.05 * f64::from(n), 0.0), wall_and_pole);
+    }
+    scene.planning.update(&scene.volume);
+    let state = |z: f64| scene.planning.cell(scene.cell_of([-1.0, 0.0, z])).0;
+    assert_eq!([state(2.0), state(4.0)], [CellState::Free; 2], "before it");
+    assert_eq!([state(5.5), state(7.0)], [CellState::Unknown; 2], "beyond it, before the wall");
+}
+
+#[test]
 fn sees_a_wall_a_thin_pole_free_space_before_them_and_nothing_behind() {
     let mut scene = Scene::new(&CONFIG());
     for n in 0..4 {

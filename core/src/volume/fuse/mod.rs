@@ -24,12 +24,16 @@ mod band;
 mod colour;
 mod horizon;
 mod layer;
+mod nearest;
 
 use self::{
     band::Band,
     horizon::Horizon,
     layer::{LayerAt, Scratch, Shares},
 };
+use nearest::BlockDepth;
+pub(crate) use nearest::FusedBlocks;
+
 use super::block::{Colour, Voxels, colour_layer_mut, least_weight};
 use super::{BLOCK_SIDE, BlockCoord, BlockKey, DepthImage, Viewpoint, Volume, VolumeConfig};
 use crate::{
@@ -76,6 +80,8 @@ struct Fusion<'a> {
     focal_px: f32,
     center_u_px: f32,
     center_v_px: f32,
+    /// Depth of blocks, and the greatest one of those that are fused, m; `None` fuses all.
+    nearest: Option<(BlockDepth, f64)>,
     shares: Shares,
     plain_weights: bool,
     /// The most that the past weighs against an observation, by its depth, 1/m.
@@ -121,6 +127,7 @@ impl<'a> Fusion<'a> {
             focal_px: view.rig.focal_px as f32,
             center_u_px: view.rig.center_u_px as f32,
             center_v_px: view.rig.center_v_px as f32,
+            nearest: None,
             shares: Shares::new(),
             plain_weights: config.observation_weight.most() == 1 && seen.class.is_none(),
             past_per_m: config.observation_weight.past_per_m(),
@@ -141,16 +148,36 @@ impl<'a> Fusion<'a> {
 impl Volume<'_> {
     /// Averages an observation from `view` into every visible block.
     pub fn fuse<E: Executor>(&mut self, view: &Viewpoint, seen: Observation<'_>, executor: &E) {
+        self.fuse_nearest(view, seen, usize::MAX, executor);
+    }
+
+    /// Averages an observation into at most so many visible blocks, the nearest ones.
+    pub(crate) fn fuse_nearest<E: Executor>(
+        &mut self,
+        view: &Viewpoint,
+        seen: Observation<'_>,
+        most: usize,
+        executor: &E,
+    ) -> FusedBlocks {
+        let within_m = self.nearest_m(view, most);
+        let visible = self.visible.slots().len() as u32;
         // The buffers of the block requests are free now.
         let horizon = Horizon::new(seen.depth.depth_m(), self.requested.scratch());
-        let fusion = Fusion::new(&self.config, view, seen, horizon);
+        let mut fusion = Fusion::new(&self.config, view, seen, horizon);
+        fusion.nearest =
+            (within_m < f64::MAX).then(|| (BlockDepth::new(&self.config, view), within_m));
         let (low, high) = Band::whole(self.visible.slots(), &mut self.blocks).halves();
         let ((a, b), (c, d)) = (low.halves(), high.halves());
         let changes = each(executor, [a, b, c, d], |band| {
             executor.vectors().run(FuseBand { fusion: &fusion, band })
         });
         // A wrapping sum: the order of the bands does not matter.
-        self.digest = changes.iter().fold(self.digest, |sum, change| sum.wrapping_add(*change));
+        let mut deferred = 0;
+        for (change, skipped) in changes {
+            self.digest = self.digest.wrapping_add(change);
+            deferred += skipped;
+        }
+        FusedBlocks { count: visible - deferred, deferred, within_m }
     }
 }
 
@@ -161,14 +188,14 @@ struct FuseBand<'a, 'b> {
 }
 
 impl Work for FuseBand<'_, '_> {
-    /// By how much the sum of block digests changes.
-    type Output = u64;
+    /// Difference of the sum of block digests, and blocks that were too far away to be fused.
+    type Output = (u64, u32);
 
     #[inline(always)]
-    fn run(self) -> u64 {
+    fn run(self) -> (u64, u32) {
         let Self { fusion, band } = self;
         // What the map's digest changes by.
-        let mut change = 0u64;
+        let (mut change, mut skipped) = (0u64, 0);
         let mut scratch = Scratch::new();
         for &slot in band.slots {
             let at = slot.index().wrapping_sub(band.first);
@@ -179,6 +206,10 @@ impl Work for FuseBand<'_, '_> {
             };
             let mut colour = band.colour.get_mut(at);
             let key = header.key();
+            if fusion.is_deferred(key.coord) {
+                skipped += 1;
+                continue;
+            }
             if fusion.block(key.coord, &mut scratch, voxels, colour.as_deref_mut()) {
                 let new = block_digest(key, voxels, colour.as_deref());
                 change = change.wrapping_add(new).wrapping_sub(header.digest);
@@ -186,11 +217,16 @@ impl Work for FuseBand<'_, '_> {
                 *least = least_weight(&voxels.weight);
             }
         }
-        change
+        (change, skipped)
     }
 }
 
 impl Fusion<'_> {
+    /// Returns true if the budget does not reach as far as a block.
+    fn is_deferred(&self, coord: BlockCoord) -> bool {
+        self.nearest.as_ref().is_some_and(|(depth, within_m)| depth.of_block(coord) > *within_m)
+    }
+
     /// Fuses one block. Whether any voxel changed.
     #[inline(always)]
     fn block(

@@ -254,4 +254,10 @@ static WORK: &[FrameColumn] = &[
     column("work_pruned_voxels", "", "voxels of the blocks that pruning visited", |row| {
         row.report.work.pruned_voxels.into()
     }),
+    column("deferred_fused_blocks", "", "visible blocks left out of fusion by the budget", |row| {
+        row.report.deferred.fused_blocks.into()
+    }),
+    column("deferred_pruned_blocks", "", "blocks left to a later frame by the budget", |row| {
+        row.report.deferred.pruned_blocks.into()
+    }),
 ];
