@@ -179,12 +179,22 @@ impl Agreement {
         false
     }
 
+    /// Ends the trust because only a clock offset beyond what is corrected would explain the turns,
+    /// unless they are explained by something else.
+    pub fn lose_trust_in_clock(&mut self) {
+        let reason = match self.reason_kept() {
+            InertialDoubt::Contradicts => InertialDoubt::ClocksApart,
+            other => other,
+        };
+        self.lose_trust(reason);
+    }
+
     /// Reason for turns that contradict: what the readings themselves showed, as long as the unit
     /// is doubted for it.
     fn reason_kept(&self) -> InertialDoubt {
-        use InertialDoubt::{ClocksApart, Saturated, Stuck};
+        use InertialDoubt::{Saturated, Stuck};
         match self.doubt {
-            Some(shown @ (Stuck | Saturated | ClocksApart)) => shown,
+            Some(shown @ (Stuck | Saturated)) => shown,
             _ => self.reason(),
         }
     }

@@ -121,7 +121,7 @@ impl InertialPrior {
         });
         // An offset at its bound may be any larger one.
         if self.errors.is_apart() {
-            self.agreement.lose_trust(InertialDoubt::ClocksApart);
+            self.agreement.lose_trust_in_clock();
             self.errors = UnitErrors::new(&self.unit);
         }
     }

@@ -2,6 +2,7 @@
 
 mod errors;
 mod ignored;
+mod inertial;
 mod lost;
 mod mutations;
 mod places;
