@@ -244,11 +244,11 @@ fn is_changed(images: &[View<'_, u8>; 2], [column, row]: [usize; 2]) -> bool {
     for v in (row * CELL_PX..(row + 1) * CELL_PX).step_by(2) {
         for u in (column * CELL_PX..(column + 1) * CELL_PX).step_by(2) {
             let grey = |image: &View<'_, u8>, u: usize| image.get(u, v);
-            if let (Some(before), Some(now), Some(aside)) =
-                (grey(previous, u), grey(current, u), grey(current, u + 3))
-            {
-                change += u32::from(now.abs_diff(before));
-                texture += u32::from(now.abs_diff(aside));
+            // Differences within an image: its brightness may change as a whole.
+            let slope = |image| Some(i32::from(grey(image, u)?) - i32::from(grey(image, u + 3)?));
+            if let (Some(before), Some(now)) = (slope(previous), slope(current)) {
+                change += now.abs_diff(before);
+                texture += now.unsigned_abs();
             }
         }
     }

@@ -47,7 +47,13 @@ impl<'s> Ride<'s> {
         let mut matches = Vec::new();
         for _ in 0..500 {
             let at = [self.uniform(0.0, WIDTH as f32), self.uniform(0.0, HEIGHT as f32)];
-            matches.push(if is_part(at[0] as usize, at[1] as usize) {
+            let is_here = is_part(at[0] as usize, at[1] as usize);
+            let cell = [at[0] as usize / CELL_PX, at[1] as usize / CELL_PX];
+            // Nothing is matched in an attached cell.
+            if self.cells.attached().any(|attached| attached == cell) {
+                continue;
+            }
+            matches.push(if is_here {
                 Self::matched(at, at, [disparity_px; 2])
             } else {
                 let before = [8.0, 8.0 - way_m as f32].map(|z| 90.0 / z);
@@ -116,6 +122,11 @@ fn a_bonnet_is_masked_after_thirty_frames_and_let_go_when_it_changes() {
     }
     let overlap = ride.overlap_with_bonnet();
     assert!(overlap > 0.8, "{overlap}");
+    for _ in 0..15 {
+        ride.frame(0.9, 40.0, is_bonnet);
+    }
+    let overlap = ride.overlap_with_bonnet();
+    assert!(overlap > 0.8, "it stays masked without a match: {overlap}");
     // The camera is taken to another car.
     for _ in 0..20 {
         ride.frame(0.9, 40.0, |_, _| false);
