@@ -28,6 +28,8 @@ pub(super) struct Reading {
 pub(super) struct Integral {
     /// Axes at the end to those at the start; no translation.
     pub t_start_end: Transform,
+    /// Sum of the rates times their time, rad: unlike the rotation it does not wrap at half a turn.
+    pub rate_sum: Vector3<f64>,
     /// Mean specific force in the axes at the start, m/s2.
     pub mean_force: Vector3<f64>,
     /// Turn rate at the end less that at the start, rad/s.
@@ -88,6 +90,7 @@ impl Integrator {
     fn new(span_s: f64) -> Self {
         let integral = Integral {
             t_start_end: Transform::IDENTITY,
+            rate_sum: Vector3::zeros(),
             mean_force: Vector3::zeros(),
             rate_change: Vector3::zeros(),
             unseen_rad: 0.0,
@@ -125,6 +128,7 @@ impl Integrator {
         // Forces of a piece are felt in the axes of its middle.
         let turn = |share: f64| Transform::new(rate * (piece_s * share), [0.0; 3]);
         let middle = self.integral.t_start_end * turn(0.5);
+        self.integral.rate_sum += rate * piece_s;
         self.force_s += middle.rotate(force) * piece_s;
         self.integral.t_start_end = (self.integral.t_start_end * turn(1.0)).normalized();
         self.first_rate.get_or_insert(start);

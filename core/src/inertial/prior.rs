@@ -210,11 +210,13 @@ impl InertialPrior {
         let sigma_rad = measured.sigma_rad;
         let turn_rad = in_unit(motion);
         let predicted_rad = in_unit(&predicted.t_before_now);
-        let raw_rad = predicted_rad + self.errors.bias() * self.span_s;
+        // Rates in degrees turn by more than half a turn.
+        let bias_rad = self.errors.bias() * self.span_s;
+        let raw_rad = self.integral.map(|integral| integral.rate_sum + bias_rad);
         let pair = TurnPair {
             measured: turn_rad,
             predicted: predicted_rad,
-            raw: (!measured.over_several).then_some(raw_rad),
+            raw: raw_rad.filter(|_| !measured.over_several),
             sigma_rad: libm::sqrt(predicted.variance + sigma_rad * sigma_rad),
             strong: measured.strong,
         };
