@@ -176,6 +176,19 @@ impl<'s> Estimator<'s> {
         config: &EgomotionConfig,
         rig: &StereoRig,
         matches: impl IntoIterator<Item = &'m Match>,
+        hypotheses: MotionHypotheses<'_>,
+    ) -> MotionEstimate {
+        let found = self.find(config, rig, matches, hypotheses);
+        self.with_covariance(config, rig, found)
+    }
+
+    /// Finds the motion like [`Self::estimate`], without its covariance.
+    #[inline(never)]
+    pub(super) fn find<'m>(
+        &mut self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        matches: impl IntoIterator<Item = &'m Match>,
         MotionHypotheses { random, initial }: MotionHypotheses<'_>,
     ) -> MotionEstimate {
         self.inlier_len = 0;
@@ -204,7 +217,21 @@ impl<'s> Estimator<'s> {
     ) -> MotionEstimate {
         self.inlier_len = 0;
         self.points.fill(matches, rig);
-        self.refine_best(config, rig, start, 0)
+        let found = self.refine_best(config, rig, start, 0);
+        self.with_covariance(config, rig, found)
+    }
+
+    /// Adds the covariance to a motion that was found. Apart from the search, whose stack must not
+    /// lie below it.
+    fn with_covariance(
+        &self,
+        config: &EgomotionConfig,
+        rig: &StereoRig,
+        found: MotionEstimate,
+    ) -> MotionEstimate {
+        let motion = found.t_current_previous.as_ref();
+        let covariance = motion.and_then(|motion| self.covariance(config, rig, motion));
+        MotionEstimate { covariance, ..found }
     }
 
     /// Refines a hypothesis on its inliers among the points, which are chosen anew in each round.
@@ -247,7 +274,6 @@ impl<'s> Estimator<'s> {
         MotionEstimate {
             status: MotionStatus::Estimated,
             t_current_previous: Some(motion),
-            covariance: self.covariance(config, rig, &motion),
             ..estimate
         }
     }

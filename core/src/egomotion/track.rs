@@ -121,7 +121,9 @@ impl Egomotion {
         let found = estimator.estimate(config, rig, matches.clone(), hypotheses);
         self.reference_s += f64::from(interval_s);
         let contest = Contest { camera: self, config, rig };
-        let found = self.hold_weak_directions(contest.choose(matches, estimator, found));
+        let winner = contest.choose(matches.clone(), estimator, &found);
+        let found = contest.settled(winner, matches, estimator, found);
+        let found = self.hold_weak_directions(found);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.
         let frames = self.since_reference + 1;

@@ -12,12 +12,15 @@ use super::{
 use crate::{
     egomotion::{PredictedTurn, Turned},
     geometry::{MapSegment, Transform},
+    memory::{Carver, region_bytes},
     state::{Hasher, Visitor},
 };
 use nalgebra::Point3;
 
 /// Time between a frame and the nearest sample from which on they are on two clocks, s.
 const APART_S: f64 = 1.0;
+/// Name of the region.
+const REGION: &str = "inertial";
 /// Least standard deviation of a turn, rad, and its part: scale and mounting are not perfect.
 const SIGMA_MIN_RAD: f64 = 0.0005;
 const SIGMA_PART: f64 = 0.01;
@@ -44,7 +47,33 @@ pub(crate) struct InertialPrior {
     report: InertialReport,
 }
 
+/// Bytes of the slab for a prior; the same on every target.
+const PRIOR_BYTES: usize = 3_584;
+const _: () = assert!(size_of::<InertialPrior>() <= PRIOR_BYTES);
+
 impl InertialPrior {
+    /// Bytes of the slab.
+    pub const fn bytes() -> usize {
+        region_bytes::<u8>(PRIOR_BYTES)
+    }
+
+    /// Makes a prior in the slab, if there is a unit. Its kilobytes must not lie in the mapper,
+    /// which is moved over the stack when it is made.
+    #[inline(never)]
+    pub fn new_in<'s>(
+        unit: Option<&InertialUnit>,
+        carver: &mut Carver<'s>,
+    ) -> Option<&'s mut Self> {
+        match unit {
+            Some(unit) => carver.alloc_value(REGION, PRIOR_BYTES, Self::new(unit)),
+            // The region is there with and without a unit: bytes depend on the capacity alone.
+            None => {
+                carver.alloc_as_found::<u8>(REGION, PRIOR_BYTES);
+                None
+            }
+        }
+    }
+
     pub fn new(unit: &InertialUnit) -> Self {
         Self {
             unit: *unit,

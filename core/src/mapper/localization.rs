@@ -27,7 +27,7 @@ pub(super) struct Localization<'s> {
     /// Keyframes of the places that the camera has been at.
     pub places: Places<'s>,
     /// Inertial unit; `None` without one.
-    pub inertial: Option<InertialPrior>,
+    pub inertial: Option<&'s mut InertialPrior>,
     /// True if the right image's rows are moved otherwise in the next frame than in this one: it
     /// then differs from this one's even where the camera stands.
     pub rows_moved: bool,
@@ -97,7 +97,7 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
 impl<'s> Localization<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        Estimator::bytes(capacity) + Places::bytes(capacity)
+        Estimator::bytes(capacity) + Places::bytes(capacity) + InertialPrior::bytes()
     }
 
     /// Places a camera that has not moved at the world's origin.
@@ -107,7 +107,7 @@ impl<'s> Localization<'s> {
             self_calibration: SelfCalibration::new(&config.rig_settings),
             estimator: Estimator::new_in(capacity, carver),
             places: Places::new_in(capacity, carver),
-            inertial: config.inertial.as_ref().map(InertialPrior::new),
+            inertial: None,
             rows_moved: false,
         }
     }

@@ -49,6 +49,7 @@ use crate::{
     attached::AttachedCells,
     geometry::{StereoRig, Transform},
     image::View,
+    inertial::InertialPrior,
     memory::{Carver, SlabError},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
@@ -141,7 +142,8 @@ impl Capacity {
         let mut carver = Carver::without_slab();
         // Regions depend on the capacity alone: any rig will do.
         let rig = StereoRig { focal_px: 1.0, center_u_px: 0.0, center_v_px: 0.0, baseline_m: 1.0 };
-        Mapper::new_in(self, &Config::for_rig(rig), &mut carver);
+        let config = Config::for_rig(rig);
+        Mapper::new_in(self, &config, &mut carver).alloc_inertial(&config, &mut carver);
         carver.into_footprint()
     }
 }
@@ -167,7 +169,7 @@ impl<'s> Mapper<'s> {
         Self::check(capacity, config, slab)?;
         let mut carver = Carver::new(slab, capacity.bytes())?;
         let mut mapper = Self::new_in(capacity, config, &mut carver);
-        mapper.prepare(config, &carver)?;
+        mapper.prepare(config, &mut carver)?;
         Ok(mapper)
     }
 
@@ -189,7 +191,7 @@ impl<'s> Mapper<'s> {
         Self::check(capacity, config, slab)?;
         let mut carver = Carver::new(slab, capacity.bytes())?;
         let mapper = slot.insert(Self::new_in(capacity, config, &mut carver));
-        let prepared = mapper.prepare(config, &carver);
+        let prepared = mapper.prepare(config, &mut carver);
         // `slot` must not hold a mapper that cannot rectify.
         if prepared.is_err() {
             *slot = None;
@@ -198,12 +200,19 @@ impl<'s> Mapper<'s> {
     }
 
     /// Fills what a new mapper needs, once all its regions were cut.
-    fn prepare(&mut self, config: &Config, carver: &Carver<'s>) -> Result<(), NewError> {
+    fn prepare(&mut self, config: &Config, carver: &mut Carver<'s>) -> Result<(), NewError> {
+        self.alloc_inertial(config, carver);
         carver.check()?;
         let rectification = config.rectification.as_ref();
         rectification
             .map_or(Ok(()), |raw| self.rectifier.prepare(raw, &config.rig))
             .map_err(NewError::Rectification)
+    }
+
+    /// Takes the region of the inertial unit, after all others: made with the mapper, its value
+    /// would lie on the stack beside it.
+    fn alloc_inertial(&mut self, config: &Config, carver: &mut Carver<'s>) {
+        self.localization.inertial = InertialPrior::new_in(config.inertial.as_ref(), carver);
     }
 
     /// Checks all that [`Mapper::new`] needs, without a write to the slab: for callers that keep

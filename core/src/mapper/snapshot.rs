@@ -203,7 +203,7 @@ impl<'s> Mapper<'s> {
         let carver = Carver::new(slab, capacity.bytes());
         let mut carver = carver.map_err(|error| RestoreError::New(error.into()))?;
         let mut mapper = Self::new_in(capacity, config, &mut carver);
-        mapper.prepare(config, &carver).map_err(RestoreError::New)?;
+        mapper.prepare(config, &mut carver).map_err(RestoreError::New)?;
         mapper.read(source)?;
         Ok(mapper)
     }

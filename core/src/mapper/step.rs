@@ -307,7 +307,7 @@ impl Mapper<'_> {
             imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
-            inertial: self.localization.inertial.as_ref().map(InertialPrior::report),
+            inertial: self.localization.inertial.as_deref().map(InertialPrior::report),
             tracking: TrackingReport { matches_excluded: found.matches_excluded, ..tracking },
             segmentation,
             objects: self.objects.report(),

@@ -95,6 +95,16 @@ impl Structure {
     }
 }
 
+/// Winner of a contest.
+pub(super) enum Winner {
+    /// The motion that was found first.
+    Found,
+    /// Another motion.
+    Rival(Transform),
+    /// None: the witnesses disagree.
+    Contested,
+}
+
 /// A camera whose motion is contested.
 pub(super) struct Contest<'a> {
     pub camera: &'a Egomotion,
@@ -103,19 +113,19 @@ pub(super) struct Contest<'a> {
 }
 
 impl Contest<'_> {
-    /// Chooses between the motion found and those of the matches that it does not explain. Returns
-    /// what was found where no other motion has enough matches.
+    /// Chooses between the motion found and those of the matches that it does not explain. It is
+    /// the one found where no other motion has enough matches.
     #[inline(never)]
     pub fn choose<'m>(
         &self,
         matches: impl Iterator<Item = &'m Match> + Clone,
         estimator: &mut Estimator<'_>,
-        found: MotionEstimate,
-    ) -> MotionEstimate {
+        found: &MotionEstimate,
+    ) -> Winner {
         let Self { camera, config, rig } = *self;
-        let Some(first) = found.t_current_previous else { return found };
+        let Some(first) = found.t_current_previous else { return Winner::Found };
         if found.inliers as f32 >= UNCONTESTED_SHARE * found.matches as f32 {
-            return found;
+            return Winner::Found;
         }
         let (mut champion, mut known) = (first, [first; MAX_RIVALS]);
         let mut contested = false;
@@ -128,7 +138,7 @@ impl Contest<'_> {
             };
             let hypotheses = MotionHypotheses { random: &mut random, initial: None };
             let rest = matches.clone().filter(is_left);
-            let rival = estimator.estimate(config, rig, rest, hypotheses);
+            let rival = estimator.find(config, rig, rest, hypotheses);
             let Some(motion) = rival.t_current_previous else { break };
             // A slot that is not filled yet repeats the first motion.
             known.iter_mut().skip(round).for_each(|slot| *slot = motion);
@@ -140,21 +150,38 @@ impl Contest<'_> {
             }
         }
         if contested {
-            return MotionEstimate {
+            Winner::Contested
+        } else if champion == first {
+            Winner::Found
+        } else {
+            Winner::Rival(champion)
+        }
+    }
+
+    /// The estimate of the motion that won. What the estimator holds belongs to another one by now.
+    pub fn settled<'m>(
+        &self,
+        winner: Winner,
+        matches: impl Iterator<Item = &'m Match> + Clone,
+        estimator: &mut Estimator<'_>,
+        found: MotionEstimate,
+    ) -> MotionEstimate {
+        match winner {
+            Winner::Found => found,
+            Winner::Contested => MotionEstimate {
                 status: MotionStatus::Contested,
                 t_current_previous: None,
                 covariance: None,
                 ..found
-            };
+            },
+            // Far matches agree with several motions, and hold the rotation: all of them count
+            // again.
+            Winner::Rival(motion) => {
+                let config = EgomotionConfig { inlier_share_min: RIVAL_SHARE_MIN, ..*self.config };
+                let estimate = estimator.estimate_near(&config, self.rig, matches, &motion);
+                MotionEstimate { samples: found.samples, ..estimate }
+            }
         }
-        if champion == first {
-            // What the estimator holds belongs to another motion by now.
-            return found;
-        }
-        // Far matches agree with several motions, and hold the rotation: all of them count again.
-        let config = EgomotionConfig { inlier_share_min: RIVAL_SHARE_MIN, ..*config };
-        let estimate = estimator.estimate_near(&config, rig, matches, &champion);
-        MotionEstimate { samples: found.samples, ..estimate }
     }
 
     /// Asks the witnesses about two motions.
