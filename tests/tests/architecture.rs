@@ -68,7 +68,7 @@ const CORE: Layers = &[
         &["digest", "geometry", "image", "memory", "settings", "random", "scene_flow", "state"],
     ),
     ("attached", &["geometry", "image", "memory", "scene_flow", "state"]),
-    ("inertial", &["digest", "egomotion", "geometry", "settings", "state"]),
+    ("inertial", &["digest", "egomotion", "geometry", "memory", "settings", "state"]),
     ("masks", &["digest", "image", "memory", "slices", "state"]),
     (
         "tracking",

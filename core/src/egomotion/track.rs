@@ -122,7 +122,7 @@ impl Egomotion {
         self.reference_s += f64::from(interval_s);
         let contest = Contest { camera: self, config, rig };
         let winner = contest.choose(matches.clone(), estimator, &found);
-        let found = contest.settled(winner, matches, estimator, found);
+        let found = contest.estimate(winner, matches, estimator, found);
         let found = self.hold_weak_directions(found);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.

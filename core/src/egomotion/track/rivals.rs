@@ -159,7 +159,7 @@ impl Contest<'_> {
     }
 
     /// The estimate of the motion that won. What the estimator holds belongs to another one by now.
-    pub fn settled<'m>(
+    pub fn estimate<'m>(
         &self,
         winner: Winner,
         matches: impl Iterator<Item = &'m Match> + Clone,
