@@ -101,7 +101,7 @@ mod tests {
             assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
         }
         // The folder of saved masks is an output.
-        assert_eq!(inputs.len(), 9, "{inputs:?}");
+        assert_eq!(inputs.len(), 10, "{inputs:?}");
         assert_eq!(request.saved_folders().count(), 1);
     }
 }

@@ -167,6 +167,8 @@ mod tests {
         let mut request = Request::default();
         request.bounds.memory = Memory::Profile("tiny".to_owned());
         request.bounds.keyframes = 30;
+        // All tests of the crate share one process, whose memory is theirs together.
+        request.limits.rss_mib = Some(8 << 10);
         request.frames.start = start;
         request.frames.most = Some(count);
         request.settings.volume.voxel_size_m = 0.1;
