@@ -65,13 +65,19 @@ impl InertialPrior {
         carver: &mut Carver<'s>,
     ) -> Option<&'s mut Self> {
         match unit {
-            Some(unit) => carver.alloc_value(REGION, PRIOR_BYTES, Self::new(unit)),
+            Some(unit) => Self::alloc(unit, carver),
             // The region is there with and without a unit: bytes depend on the capacity alone.
             None => {
                 carver.alloc_as_found::<u8>(REGION, PRIOR_BYTES);
                 None
             }
         }
+    }
+
+    // Never inlined: without a unit its stack is not taken.
+    #[inline(never)]
+    fn alloc<'s>(unit: &InertialUnit, carver: &mut Carver<'s>) -> Option<&'s mut Self> {
+        carver.alloc_value(REGION, PRIOR_BYTES, Self::new(unit))
     }
 
     pub fn new(unit: &InertialUnit) -> Self {

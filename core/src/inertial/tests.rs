@@ -91,7 +91,7 @@ impl Sim {
                 let mut rate = |axis: usize| {
                     let noise = if is_stuck { 0.0 } else { 0.002 * self.noise() };
                     let rate = turn[flaws.axes[axis]] * flaws.scale + flaws.bias[axis] + noise;
-                    rate.clamp(-flaws.range, flaws.range)
+                    if rate.abs() > flaws.range { flaws.range.copysign(rate) } else { rate }
                 };
                 InertialSample {
                     time_ns: ((10.0 + stamp_s) * 1e9).round() as u64,

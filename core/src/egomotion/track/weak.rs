@@ -1,14 +1,17 @@
 //! Directions in which matches do not hold the camera: far points alone say little of its way, a
 //! road without edges little of the way along it.
 //!
-//! The covariance of an estimate names them. Along such a direction the last motion goes on; the
-//! others, and the rotation, stay as estimated.
+//! The covariance of an estimate names them. Along such a direction the last motion goes on where
+//! the estimate does not contradict it; the others, and the rotation, stay as estimated.
 
 use super::{Egomotion, MotionEstimate};
 use core::fmt;
 
 /// Standard deviation of a motion's way along an axis from which on the axis is weak, m.
 const WEAK_M: f64 = 0.1;
+/// Deviations by which an estimate may differ from the last motion without contradicting it. After
+/// a jump the estimate is weak and right: the last motion would hide it.
+const AGREES_SIGMAS: f64 = 4.0;
 
 /// Axes of the current camera along which a motion is not determined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,14 +62,16 @@ impl Egomotion {
         else {
             return estimate;
         };
-        let [right, down, ahead] = covariance.translation_sigma_m().map(|sigma| sigma > WEAK_M);
+        let sigma_m = covariance.translation_sigma_m();
+        let [right, down, ahead] = sigma_m.map(|sigma| sigma > WEAK_M);
         estimate.weak = WeakDirections { right, down, ahead };
         // Several frames in one motion have no last motion to compare with.
         if self.motion_s > 0.0 && self.since_reference == 0 {
             let last = self.t_current_previous.translation() * (self.reference_s / self.motion_s);
-            let axes = motion.translation_m.iter_mut().zip(last.iter()).zip([right, down, ahead]);
-            for ((way, last), _) in axes.filter(|(_, weak)| *weak) {
-                *way = *last;
+            for ((way, last), sigma) in motion.translation_m.iter_mut().zip(&last).zip(sigma_m) {
+                if sigma > WEAK_M && (*last - *way).abs() <= AGREES_SIGMAS * sigma {
+                    *way = *last;
+                }
             }
         }
         estimate

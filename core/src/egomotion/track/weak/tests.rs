@@ -30,12 +30,12 @@ fn moving() -> Egomotion {
 
 #[test]
 fn the_last_motion_goes_on_along_a_weak_direction_only() {
-    let held = moving().hold_weak_directions(estimate([0.01, 0.01, 0.4]));
+    let held = moving().hold_weak_directions(estimate([0.01, 0.01, 0.6]));
     assert_eq!(held.weak.to_string(), "ahead");
     assert_eq!(held.t_current_previous.unwrap().translation_m, [0.2, 0.0, -1.0]);
     // Half a second after motions of a tenth it has gone five times as far.
     let late = Egomotion { reference_s: 0.5, ..moving() };
-    let held = late.hold_weak_directions(estimate([0.4, 0.01, 0.4]));
+    let held = late.hold_weak_directions(estimate([0.6, 0.01, 0.6]));
     assert_eq!(held.weak.to_string(), "right, ahead");
     assert_eq!(held.t_current_previous.unwrap().translation_m, [0.0, 0.0, -5.0]);
 }
@@ -44,6 +44,13 @@ fn the_last_motion_goes_on_along_a_weak_direction_only() {
 fn a_sound_estimate_and_a_first_one_stay_as_they_are() {
     let sound = estimate([0.02, 0.02, 0.02]);
     assert_eq!(moving().hold_weak_directions(sound), sound);
-    let first = Egomotion::default().hold_weak_directions(estimate([0.01, 0.01, 0.4]));
+    let first = Egomotion::default().hold_weak_directions(estimate([0.01, 0.01, 0.6]));
     assert!(first.weak.ahead && first.t_current_previous == sound.t_current_previous);
+}
+
+#[test]
+fn a_jump_is_not_hidden_by_the_last_motion() {
+    let jump = estimate([0.01, 0.01, 0.2]);
+    let held = moving().hold_weak_directions(jump);
+    assert!(held.weak.ahead && held.t_current_previous == jump.t_current_previous);
 }
