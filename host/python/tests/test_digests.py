@@ -92,7 +92,7 @@ def test_a_snapshot_continues_bit_for_bit_evicted_blocks_included(tmp_path):
         other.restore(snapshot)
     with pytest.raises(dynvox.Error, match="damaged|cannot be read"):
         other = dataset.mapper()
-        other.restore(snapshot[:1000] + b"\0" + snapshot[1001:])
+        other.restore(snapshot[:1000] + bytes([snapshot[1000] ^ 1]) + snapshot[1001:])
     lost = dynvox.Dataset(frames=2, memory="18MiB", threads=1, stream=False).mapper()
     with pytest.raises(dynvox.Error, match="stream=True"):
         lost.restore(snapshot)

@@ -65,7 +65,7 @@ def test_options_that_are_none_are_named():
 
 def test_every_option_of_a_run_has_a_name_in_python(binary):
     """What both lack are files and words of the command line."""
-    of_the_command_line = set("out overwrite json quiet resume snapshot-every rss-limit-mib threads live help help-all version".split())
+    of_the_command_line = set("out overwrite json quiet resume snapshot-every rss-limit-mib threads live continue help help-all version".split())
     with pytest.raises(dynvox.Error) as error:
         dynvox.Dataset(nonsense=1)
     named = set(str(error.value).split("Give one of ")[1].replace("_", "-").split(", ")) - {"path"}

@@ -255,8 +255,8 @@ class Mapper:
 
         Pictures are height x width, or height x width x 3 (red, green, blue): the left one is then fused in colour, and grey is computed.
         Nothing is copied whose pixels lie side by side in their rows; rows may lie apart, as in a part of a larger array. Other views, as `[..., ::-1]`, are
-        copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo matching: give them with every frame. A pose must be a rigid motion within
-        the map's bounds. No stage uses the pixels of `ignored`, height x width of the rectified left picture, that are not 0. `fused` in the report is true only if something was fused.
+        copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo matching: give them with every frame. No stage uses the pixels of
+        `ignored`, height x width of the rectified left picture, that are not 0. A pose must be a rigid motion within the map's bounds. `fused` in the report is true only if something was fused.
         """
 
     @property
