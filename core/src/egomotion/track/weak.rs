@@ -1,8 +1,8 @@
 //! Directions in which matches do not hold the camera: far points alone say little of its way, a
 //! road without edges little of the way along it.
 //!
-//! The covariance of an estimate names them. Along such a direction the last motion goes on where
-//! the estimate does not contradict it; the others, and the rotation, stay as estimated.
+//! The covariance of an estimate names them. Along such a direction the last motion is kept,
+//! unless the estimate contradicts it; the others, and the rotation, stay as estimated.
 
 use super::{Egomotion, MotionEstimate};
 use core::fmt;
