@@ -28,6 +28,10 @@ const SEED: u64 = 0x6361_6D65_7261;
 /// their share.
 const MAX_FEWER_INLIERS: u32 = 4;
 
+/// Times between frames of one motion, s: a nanosecond at least, and years at most.
+const TIMES_S: (f64, f64) = (1e-10, 1e9);
+/// Distance beyond all maps and motions, m.
+const FARTHEST_M: f64 = 1e9;
 /// Distance by which the estimate of one frame's motion may be wrong, m.
 const NOISE_M: f64 = 0.1;
 
@@ -397,6 +401,21 @@ impl Egomotion {
         *segment = MapSegment::new(segments as u16);
         *newest_segment = MapSegment::new((segments >> 16) as u16);
         random.visit(visitor);
+        if !self.is_possible() {
+            visitor.refuse();
+            *self = Self::default();
+        }
+    }
+
+    /// Returns true for a state that steps can lead to. A forged snapshot's may scale a motion
+    /// beyond all numbers.
+    fn is_possible(&self) -> bool {
+        let is_time = |seconds: f64| seconds == 0.0 || (TIMES_S.0..TIMES_S.1).contains(&seconds);
+        let poses = [self.t_world_camera, self.t_world_reference, self.t_current_previous];
+        let is_near = |pose: &Transform| pose.translation_m.iter().all(|m| m.abs() < FARTHEST_M);
+        is_time(self.reference_s)
+            && is_time(self.motion_s)
+            && poses.iter().all(|pose| pose.is_rotation() && is_near(pose))
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.
