@@ -4,6 +4,7 @@ use super::checkpoint::Checkpoint;
 use super::disk_store::MeshOutput;
 use super::ending::Incomplete;
 use super::error::RunError;
+use super::frames::slab_of;
 use super::places::{self, PLACES_FILE};
 use super::record::RunRecord;
 use super::saved::Saved;
@@ -15,7 +16,6 @@ use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferenceP
 use crate::owned::check_overlap;
 use crate::request::Plan;
 use crate::scene::PICTURES_FOLDER;
-use crate::slab::HostSlab;
 use dynvox_core::memory::Region;
 use dynvox_core::volume::PruneReport;
 use std::path::{Path, PathBuf};
@@ -34,9 +34,7 @@ pub fn run(
 ) -> Result<RunRecord, RunError> {
     plan.check()?;
     check_outputs(&plan, folder.target())?;
-    let slab_bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(slab_bytes)
-        .ok_or_else(|| RunError::NoMemory { bytes: slab_bytes, profile: plan.profile.clone() })?;
+    let mut slab = slab_of(&plan)?;
     let exports = &plan.request.exports;
     let instances = Saved::begin(exports.instances.as_deref(), "--save-instances")?;
     let map_disparity = Saved::begin(exports.map_disparity.as_deref(), "--save-map-disparity")?;

@@ -16,12 +16,16 @@ pub fn with_mapper<T>(
     consume: impl FnOnce(&mut Mapper<'_>) -> Result<T, RunError>,
 ) -> Result<T, RunError> {
     plan.check()?;
-    let bytes = plan.capacity.bytes();
-    let mut slab = HostSlab::map(bytes)
-        .ok_or_else(|| RunError::NoMemory { bytes, profile: plan.profile.clone() })?;
+    let mut slab = slab_of(plan)?;
     let mut mapper = Mapper::new(&plan.capacity, &plan.config, slab.bytes_mut())
         .map_err(|error| refused(&plan.profile, error))?;
     consume(&mut mapper)
+}
+
+/// Memory for the mapper of a plan.
+pub(super) fn slab_of(plan: &Plan) -> Result<HostSlab, RunError> {
+    let bytes = plan.capacity.bytes();
+    HostSlab::map(bytes).ok_or_else(|| RunError::NoMemory { bytes, profile: plan.profile.clone() })
 }
 
 /// Hands on each frame of a plan with its index in the data set, decoded ahead.
