@@ -100,6 +100,9 @@ pub struct Options {
         help_heading = "Input"
     )]
     pub swap: Option<Swap>,
+    /// Cameras stand one above the other: turn rectified images by a quarter
+    #[arg(long, help_heading = "Input")]
+    pub vertical: bool,
     /// Samples of an inertial unit: a table with the columns time,wx,wy,wz,ax,ay,az, EuRoC's
     /// imu0/data.csv, KITTI raw's oxts; none for no unit [default: the recording's own]
     #[arg(long, value_name = "FILE|none", help_heading = "Input")]
@@ -351,6 +354,7 @@ impl Options {
                 unit: self.calibration_unit,
                 lens_model: self.lens_model,
                 swap: self.swap,
+                vertical: self.vertical,
                 colour: false,
             },
             ignore_mask: self.ignore_mask.clone(),

@@ -124,3 +124,62 @@ fn opencvs_file_without_size_and_lens_maps_as_kalibrs_with_both() {
     assert!(explained.status.success() && text.contains("useful depth"), "{text}");
     assert!(text.contains("rectified_pair.png") && root.join("rectified_pair.png").is_file());
 }
+
+/// A street without distortion whose pictures are turned by a quarter, clockwise: the right camera
+/// is then the lower one.
+#[dynvox_needs::long]
+#[test]
+fn cameras_one_above_the_other_map_what_they_map_side_by_side() {
+    let root = TempDir::new().expect("a folder");
+    let root = root.path();
+    let street = ["--set", "street.width=256", "--set", "street.height=128"];
+    let synth =
+        dynvox(root, &[&["synth", "--out", "street", "--frames", "2"], &street[..]].concat());
+    assert!(synth.status.success(), "{}", output_text(&synth));
+    let calib = fs::read_to_string(root.join("street/sequences/00/calib.txt")).expect("a file");
+    let row = |name: &str| -> Vec<f64> {
+        let line = calib.lines().find(|line| line.starts_with(name)).expect("a projection");
+        line.split_whitespace().skip(1).map(|word| word.parse().expect("a number")).collect()
+    };
+    let (p0, p1) = (row("P0:"), row("P1:"));
+    let (focal, center, along_m) = (p0[0], [p0[2], p0[6]], p1[3] / p1[0]);
+    let matrix = |[u, v]: [f64; 2]| format!("[[{focal}, 0, {u}], [0, {focal}, {v}], [0, 0, 1]]");
+    let stereo = |center: [f64; 2], t: [f64; 3]| {
+        let (matrix, none) = (matrix(center), "[0, 0, 0, 0, 0]");
+        format!(
+            "K1: {matrix}\nD1: {none}\nK2: {matrix}\nD2: {none}\nR: [[1, 0, 0], [0, 1, 0], [0, 0, \
+             1]]\nT: {t:?}\n"
+        )
+    };
+    for folder in ["flat/left", "flat/right", "turned/left", "turned/right"] {
+        fs::create_dir_all(root.join(folder)).expect("a folder");
+    }
+    for (frame, side) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let from = root.join(format!("street/sequences/00/image_{side}/{frame:06}.png"));
+        let picture = image::open(&from).expect("a picture").to_luma8();
+        let name = format!("{}/{frame:06}.png", ["left", "right"][side]);
+        picture.save(root.join("flat").join(&name)).expect("a picture");
+        let turned = image::imageops::rotate90(&picture);
+        turned.save(root.join("turned").join(&name)).expect("a picture");
+    }
+    fs::write(root.join("flat.yml"), stereo(center, [along_m, 0.0, 0.0])).expect("a file");
+    let center = [127.0 - center[1], center[0]];
+    fs::write(root.join("turned.yml"), stereo(center, [0.0, along_m, 0.0])).expect("a file");
+
+    let coarse = ["--profile", "small", "--instances", "none", "--set", "volume.voxel_size_m=0.2"];
+    let run = |arguments: &[&str]| {
+        dynvox(root, &[&["run"], arguments, &["--json", "--force"], &coarse[..]].concat())
+    };
+    let refused = run(&["turned", "--calibration", "turned.yml", "--out", "a"]);
+    let message = output_text(&refused);
+    assert!(!refused.status.success(), "{message}");
+    assert!(message.contains("stands below the first. Give --vertical"), "{message}");
+    let digest = |arguments: &[&str]| {
+        let run = run(arguments);
+        assert!(run.status.success(), "{arguments:?}: {}", output_text(&run));
+        serde_json::from_slice::<serde_json::Value>(&run.stdout).expect("JSON")["digest"].clone()
+    };
+    let expected = digest(&["flat", "--calibration", "flat.yml", "--out", "b"]);
+    let found = digest(&["turned", "--calibration", "turned.yml", "--vertical", "--out", "c"]);
+    assert_eq!(found, expected, "turned back, the images are those of cameras side by side");
+}

@@ -124,6 +124,10 @@ pub struct CalibrationHints {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub swap: Option<Swap>,
+    /// Cameras stand one above the other: turn rectified images by a quarter
+    #[arg(long)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub vertical: bool,
     /// True for KITTI's colour pair, where a file has both.
     #[arg(skip)]
     #[serde(skip)]
@@ -145,7 +149,8 @@ impl CalibrationHints {
             Swap::Calibration => " --swap=calibration".to_owned(),
             Swap::Images => " --swap=images".to_owned(),
         });
-        [unit, lens, swap].into_iter().flatten().collect()
+        let vertical = self.vertical.then(|| " --vertical".to_owned());
+        [unit, lens, swap, vertical].into_iter().flatten().collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Checks that the cameras of every format pass, and questions that only a person can answer.
 
 use super::format::Cameras;
+use super::vertical::Quarter;
 use super::{Placement, RectifiedCameras, StereoCalibration};
 use crate::formats::FormatError;
 use crate::formats::calibration::hints::CalibrationHints;
@@ -20,9 +21,14 @@ const TRIED_PX: u32 = 4_096;
 const EXCHANGE: &str = "The first camera must be the left one: give --swap=calibration if only the \
                         calibration has them in this order, --swap if the images have it, too";
 /// Next action where one camera stands above the other.
-const TURN: &str = "Turn the rig by a quarter, so that its cameras stand side by side, and \
-                    calibrate with pictures turned alike; if they do stand side by side, check the \
-                    order of rotation and translation";
+pub const VERTICAL: &str = "Give --vertical: rectified images, and the map's axes, are then turned \
+                            by a quarter. If the cameras stand side by side, check the order of \
+                            rotation and translation";
+/// Next action where one camera stands behind the other.
+const BEHIND: &str = "Check the order of rotation and translation; cameras one behind the other \
+                      see no depth between them";
+/// Next action where cameras said to stand one above the other do not.
+const NOT_VERTICAL: &str = "Leave out --vertical, or check the order of rotation and translation";
 
 /// The cameras, if a pair can be mapped by them.
 ///
@@ -58,7 +64,7 @@ pub fn is_exchanged(cameras: &Cameras) -> bool {
         Cameras::Rectified(rectified) => rectified.rig.baseline_m < 0.0,
         Cameras::Raw(calibration) => match calibration.placement {
             Placement::Rectified { rig, .. } => rig.baseline_m < 0.0,
-            Placement::Motion { .. } => {
+            Placement::Motion { .. } | Placement::Vertical { .. } => {
                 calibration.rectify(TRIED) == Err(RectifyProblem::Exchanged)
             }
         },
@@ -121,6 +127,12 @@ fn check_rectified(cameras: &RectifiedCameras, path: &Path) -> Result<(), Format
 
 fn check_raw(calibration: &StereoCalibration, path: &Path) -> Result<(), FormatError> {
     let refuse = |reason: &str, action: &str| Err(FormatError::content(path, reason, action));
+    let quarter = match calibration.placement {
+        Placement::Motion { r_right_left, t_right_left_m } => {
+            Quarter::new(&r_right_left, &t_right_left_m)
+        }
+        _ => None,
+    };
     let problem = match calibration.placement {
         Placement::Rectified { rig, .. } if rig.baseline_m < 0.0 => Some(RectifyProblem::Exchanged),
         Placement::Rectified { rig, .. } if rig.baseline_m == 0.0 => {
@@ -130,7 +142,7 @@ fn check_raw(calibration: &StereoCalibration, path: &Path) -> Result<(), FormatE
             super::super::checked(rig, path)?;
             calibration.rectify(TRIED).err()
         }
-        Placement::Motion { .. } => calibration.rectify(TRIED).err(),
+        Placement::Motion { .. } | Placement::Vertical { .. } => calibration.rectify(TRIED).err(),
     };
     let Some(problem) = problem else { return Ok(()) };
     let action = match problem {
@@ -140,7 +152,16 @@ fn check_raw(calibration: &StereoCalibration, path: &Path) -> Result<(), FormatE
         }
         RectifyProblem::NoBaseline => "Give the translation between the cameras in metres",
         RectifyProblem::Exchanged => EXCHANGE,
-        RectifyProblem::NotSideBySide => TURN,
+        RectifyProblem::NotSideBySide => {
+            if let Some(quarter) = quarter {
+                let position = quarter.second_stands();
+                return refuse(&format!("the second camera stands {position} the first"), VERTICAL);
+            }
+            if matches!(calibration.placement, Placement::Vertical { .. }) {
+                return refuse("the cameras do not stand one above the other", NOT_VERTICAL);
+            }
+            BEHIND
+        }
         RectifyProblem::Diverging => {
             "Check the rotation between the cameras, and which way it maps"
         }

@@ -114,6 +114,11 @@ impl<'f> Files<'f> {
         self.hints.colour
     }
 
+    /// Tells whether a person says that the cameras stand one above the other.
+    pub fn are_vertical(&self) -> bool {
+        self.hints.vertical
+    }
+
     /// Lens that a person says.
     pub fn lens_family(&self) -> Option<LensFamily> {
         self.hints.lens_model

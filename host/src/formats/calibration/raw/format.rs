@@ -51,6 +51,14 @@ impl Cameras {
         }
     }
 
+    /// The cameras as ones that stand one above the other.
+    pub(super) fn vertical(self) -> Self {
+        match self {
+            Self::Raw(calibration) => Self::Raw(calibration.vertical()),
+            rectified => rectified,
+        }
+    }
+
     /// The second camera first.
     pub(super) fn exchanged(self) -> Self {
         match self {

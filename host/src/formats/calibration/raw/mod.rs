@@ -33,6 +33,7 @@ mod tests;
 mod tree;
 mod unit;
 mod unit_kitti;
+mod vertical;
 mod vins;
 mod zed;
 
@@ -94,6 +95,13 @@ pub enum Placement {
         /// The left camera's centre in right camera coordinates, m.
         t_right_left_m: Vector3<f64>,
     },
+    /// The motion between cameras one above the other: rectified images are turned by a quarter.
+    Vertical {
+        /// Rotation of the first camera's coordinates to the second's.
+        r_right_left: Matrix3<f64>,
+        /// The first camera's centre in the second's coordinates, m.
+        t_right_left_m: Vector3<f64>,
+    },
     /// A rectification that the calibration gives.
     Rectified {
         /// Rotation of raw left camera coordinates to rectified ones.
@@ -134,7 +142,8 @@ impl StereoCalibration {
     /// Distance of the cameras, m.
     pub fn baseline_m(&self) -> f64 {
         match &self.placement {
-            Placement::Motion { t_right_left_m, .. } => t_right_left_m.norm(),
+            Placement::Motion { t_right_left_m, .. }
+            | Placement::Vertical { t_right_left_m, .. } => t_right_left_m.norm(),
             Placement::Rectified { rig, .. } => rig.baseline_m,
         }
     }
@@ -142,7 +151,9 @@ impl StereoCalibration {
     /// Angle between the cameras, degrees.
     pub fn angle_deg(&self) -> f64 {
         let r = match &self.placement {
-            Placement::Motion { r_right_left, .. } => *r_right_left,
+            Placement::Motion { r_right_left, .. } | Placement::Vertical { r_right_left, .. } => {
+                *r_right_left
+            }
             Placement::Rectified { r_rectified_left, r_rectified_right, .. } => {
                 r_rectified_right.transpose() * r_rectified_left
             }
@@ -171,6 +182,7 @@ impl StereoCalibration {
                 let right = TurnedCamera { raw: self.right, r_rectified_raw: r_rectified_right };
                 Ok((Rectification::given(left, right, size)?, rig))
             }
+            (Placement::Vertical { .. }, _) => vertical::rectify(&self.raw_rig(), sizing),
             _ => Rectification::new(&self.raw_rig(), sizing),
         }
     }
@@ -178,7 +190,10 @@ impl StereoCalibration {
     /// The cameras and the motion between them.
     fn raw_rig(&self) -> RawRig {
         let (r_right_left, t_right_left_m) = match self.placement {
-            Placement::Motion { r_right_left, t_right_left_m } => (r_right_left, t_right_left_m),
+            Placement::Motion { r_right_left, t_right_left_m }
+            | Placement::Vertical { r_right_left, t_right_left_m } => {
+                (r_right_left, t_right_left_m)
+            }
             Placement::Rectified { r_rectified_left, r_rectified_right, rig, .. } => {
                 let back = r_rectified_right.transpose();
                 (back * r_rectified_left, back * Vector3::new(-rig.baseline_m, 0.0, 0.0))
@@ -190,7 +205,8 @@ impl StereoCalibration {
     /// The calibration with lengths multiplied.
     fn scaled(mut self, factor: f64) -> Self {
         match &mut self.placement {
-            Placement::Motion { t_right_left_m, .. } => *t_right_left_m *= factor,
+            Placement::Motion { t_right_left_m, .. }
+            | Placement::Vertical { t_right_left_m, .. } => *t_right_left_m *= factor,
             Placement::Rectified { rig, .. } => rig.baseline_m *= factor,
         }
         self
@@ -199,7 +215,8 @@ impl StereoCalibration {
     /// The second camera first.
     fn exchanged(self) -> Self {
         let placement = match self.placement {
-            Placement::Motion { r_right_left, t_right_left_m } => {
+            Placement::Motion { r_right_left, t_right_left_m }
+            | Placement::Vertical { r_right_left, t_right_left_m } => {
                 let back = r_right_left.transpose();
                 Placement::Motion { r_right_left: back, t_right_left_m: -(back * t_right_left_m) }
             }
@@ -213,6 +230,14 @@ impl StereoCalibration {
             }
         };
         Self { left: self.right, right: self.left, placement, ..self }
+    }
+
+    /// Takes a motion between the cameras as that of one above the other.
+    fn vertical(mut self) -> Self {
+        if let Placement::Motion { r_right_left, t_right_left_m } = self.placement {
+            self.placement = Placement::Vertical { r_right_left, t_right_left_m };
+        }
+        self
     }
 
     /// Cameras of rectified images whose principal points differ: the right images move.

@@ -155,7 +155,8 @@ fn read(text: &str, path: &Path) -> Result<StereoCalibration, FormatError> {
 /// The calibration as a file of our own.
 pub fn to_toml(calibration: &StereoCalibration) -> String {
     let (motion, rectified) = match &calibration.placement {
-        Placement::Motion { r_right_left, t_right_left_m } => (
+        Placement::Motion { r_right_left, t_right_left_m }
+        | Placement::Vertical { r_right_left, t_right_left_m } => (
             Some(Motion { rotation: rows(r_right_left), translation_m: (*t_right_left_m).into() }),
             None,
         ),

@@ -133,6 +133,9 @@ impl CalibrationFiles {
             files.guess("the right camera's file comes first: exchanged".to_owned());
             cameras = cameras.exchanged();
         }
+        if self.hints.vertical {
+            cameras = cameras.vertical();
+        }
         check::checked(cameras, files.path(), &self.hints)
             .map(|cameras| (simplified(cameras), format.name))
     }

@@ -1,14 +1,15 @@
 //! ROS `CameraInfo` as `camera_calibration` writes it: one YAML file a camera, with the
 //! rectification and its projection.
 
+use super::check::VERTICAL;
 use super::files::Files;
 use super::format::{CalibrationFormat, Cameras};
 use super::{Placement, RectifiedCameras, StereoCalibration, euroc, lens, tree::Node};
 use crate::formats::FormatError;
 use crate::formats::calibration::hints::LengthUnit;
 use dynvox_core::geometry::StereoRig;
-use dynvox_core::rectify::RawCamera;
-use nalgebra::Matrix3;
+use dynvox_core::rectify::{LensModel, RawCamera};
+use nalgebra::{Matrix3, Vector3};
 
 /// ROS's files.
 pub static FORMAT: CalibrationFormat = CalibrationFormat {
@@ -59,14 +60,64 @@ fn read(files: &Files<'_>) -> Result<StereoCalibration, FormatError> {
             &node.need("rectification_matrix")?.array::<9>()?,
         ))
     };
+    let (r_rectified_left, r_rectified_right) = (rotation(left)?, rotation(right)?);
+    let placement = match below_m(files, left, right)? {
+        Some(below_m) => {
+            let back = r_rectified_right.transpose();
+            Placement::Vertical {
+                r_right_left: back * r_rectified_left,
+                t_right_left_m: back * Vector3::new(0.0, -below_m, 0.0),
+            }
+        }
+        None => Placement::Rectified {
+            r_rectified_left,
+            r_rectified_right,
+            rig: rig_of(left, right)?.rig,
+            size: size(left)?,
+        },
+    };
     Ok(StereoCalibration {
         left: camera(left)?,
         right: camera(right)?,
-        placement: Placement::Rectified {
-            r_rectified_left: rotation(left)?,
-            r_rectified_right: rotation(right)?,
-            rig: rig_of(left, right)?.rig,
-            size: size(left)?,
+        placement,
+        format: FORMAT.name,
+    })
+}
+
+/// Distance by which the second camera stands below the first, m, if a person says that they stand
+/// so; `None` if they stand side by side.
+fn below_m(files: &Files<'_>, left: Node<'_>, right: Node<'_>) -> Result<Option<f64>, FormatError> {
+    let p_left = left.need("projection_matrix")?.array::<12>()?;
+    let at = right.need("projection_matrix")?;
+    let p_right = at.array::<12>()?;
+    let [along, below] = apart(&p_left, &p_right);
+    if below.abs() <= along.abs() {
+        return Ok(None);
+    }
+    if files.are_vertical() {
+        return Ok(Some(below / p_left[5]));
+    }
+    let position = if below > 0.0 { "below" } else { "above" };
+    Err(at.refuse(&format!("the second camera stands {position} the first"), VERTICAL))
+}
+
+/// Rectified cameras one above the other: their images are turned as raw ones are.
+fn vertical(
+    left: Node<'_>,
+    right: Node<'_>,
+    below_m: f64,
+) -> Result<StereoCalibration, FormatError> {
+    let camera = |node: Node<'_>| {
+        let at = node.need("projection_matrix")?;
+        let [fx, _, cx, _, _, fy, cy, ..] = at.array::<12>()?;
+        lens::camera(at, [fx, fy, cx, cy], LensModel::IDEAL, size(node)?)
+    };
+    Ok(StereoCalibration {
+        left: camera(left)?,
+        right: camera(right)?,
+        placement: Placement::Vertical {
+            r_right_left: Matrix3::identity(),
+            t_right_left_m: Vector3::new(0.0, -below_m, 0.0),
         },
         format: FORMAT.name,
     })
@@ -76,6 +127,9 @@ fn read(files: &Files<'_>) -> Result<StereoCalibration, FormatError> {
 /// differ are a question: recorders rectify with zero disparity at infinity.
 pub fn read_rectified(files: &Files<'_>) -> Result<Cameras, FormatError> {
     let [left, right] = sides(files)?;
+    if let Some(below_m) = below_m(files, left, right)? {
+        return vertical(left, right, below_m).map(Cameras::Raw);
+    }
     let cameras = rig_of(left, right)?;
     if cameras.offset_px != 0.0 {
         let line = |node: Node<'_>| -> Result<String, FormatError> {
@@ -127,6 +181,13 @@ fn rig_of(left: Node<'_>, right: Node<'_>) -> Result<RectifiedCameras, FormatErr
     rectified_rig(p_right, &p_left, &p_right.array()?)
 }
 
+/// Distances of the second of two projections' cameras from the first to the right and down, times
+/// the focal length.
+fn apart(p_left: &[f64; 12], p_right: &[f64; 12]) -> [f64; 2] {
+    let down = |p: &[f64; 12]| p[7] - p[6] * p[11];
+    [p_left[3] - p_right[3], down(p_left) - down(p_right)]
+}
+
 /// The cameras of two projection matrices with one focal length and height of the centre.
 pub fn rectified_rig(
     at: Node<'_>,
@@ -134,8 +195,7 @@ pub fn rectified_rig(
     p_right: &[f64; 12],
 ) -> Result<RectifiedCameras, FormatError> {
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-3 * (1.0 + a.abs());
-    let down = |p: &[f64; 12]| p[7] - p[6] * p[11];
-    let (along, below) = (p_left[3] - p_right[3], down(p_left) - down(p_right));
+    let [along, below] = apart(p_left, p_right);
     if below.abs() > along.abs() {
         let reason = format!(
             "the second camera stands {} the first",
@@ -143,8 +203,7 @@ pub fn rectified_rig(
         );
         return Err(at.refuse(
             &reason,
-            "Turn the rig by a quarter, so that its cameras stand side by side, and calibrate with \
-             pictures turned alike",
+            "Give lenses, rotation and translation in another of the formats, and --vertical",
         ));
     }
     let square = near(p_left[0], p_left[5]);

@@ -3,6 +3,7 @@
 mod others;
 mod units;
 mod variants;
+mod vertical;
 
 use super::*;
 use crate::formats::calibration::{CalibrationHints, CameraGeometry, RectifiedSize};

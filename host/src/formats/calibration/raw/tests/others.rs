@@ -64,7 +64,7 @@ const FOUND: &[Row] = &[
     (&["basalt/t265_kb4_calib.json"], [848, 800], Baseline(0.0632)),
     (&["kitti_raw/calib_cam_to_cam.txt"], [1392, 512], Baseline(0.5371)),
     (&["kitti_raw/calib_cam_to_cam.txt"], [1242, 375], Baseline(0.5371)),
-    (&[IPHONE[0]], VGA, Refused(&["side by side", "Turn the rig"])),
+    (&[IPHONE[0]], VGA, Refused(&["stands below the first", "Give --vertical"])),
     (&[IPHONE[1], IPHONE[2]], VGA,
      Refused(&["R or rotation is missing"])),
     (&["opencv_sample/intrinsics.yml", "opencv_sample/extrinsics.yml"], VGA,

@@ -237,7 +237,8 @@ fn cameras_one_above_the_other_are_told_apart_from_others() {
     let down =
         pair(["M1", "M2"], ["D1", "D2"], BENT).replace("[[-0.11], [0], [0]]", "[0, -0.11, 0]");
     let message = plain(&down).unwrap_err().to_string();
-    assert!(message.contains("side by side") && message.contains("Turn the rig"), "{message}");
+    let named = "the second camera stands below the first";
+    assert!(message.contains(named) && message.contains("--vertical"), "{message}");
 }
 
 #[test]
