@@ -35,6 +35,9 @@ pub(crate) enum Level {
     /// 128 bits: every x86-64 has them, but some kernels of operating systems must not use them.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Sse2,
+    /// Four bytes in a register, of Arm's DSP extension.
+    #[cfg(dynvox_dsp)]
+    Dsp,
     /// 256 bits.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
     Avx2,
@@ -53,7 +56,11 @@ impl Vectors {
     #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
     pub const BASELINE: Self = Self(Level::Neon);
     /// Vectors that every machine of the target has.
+    #[cfg(dynvox_dsp)]
+    pub const BASELINE: Self = Self(Level::Dsp);
+    /// Vectors that every machine of the target has.
     #[cfg(not(any(
+        dynvox_dsp,
         all(target_arch = "x86_64", target_feature = "sse2"),
         all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")
     )))]
@@ -106,6 +113,8 @@ impl Vectors {
     pub const fn name(self) -> &'static str {
         match self.0 {
             Level::Plain => "plain",
+            #[cfg(dynvox_dsp)]
+            Level::Dsp => "DSP",
             #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
             Level::Sse2 => "SSE2",
             #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]

@@ -24,11 +24,11 @@ impl Comparison for Equal {
     fn run(self, kernels: &impl Kernels) {
         // The base is in the result's upper bits, and must not disturb the comparison.
         for base in [0, 7, 65_280 << 8 | 255] {
-            assert_eq!(self.least(base, kernels), self.least(base, &Plain));
+            assert_eq!(self.least(base, kernels), self.least(base, &PLAIN));
         }
         let Self { a, b, most } = self;
-        assert_eq!(kernels.sums(&a, &b), Plain.sums(&a, &b));
-        assert_eq!(kernels.sums_of(&a, b.each_ref()), Plain.sums(&a, &b));
+        assert_eq!(kernels.sums(&a, &b), PLAIN.sums(&a, &b));
+        assert_eq!(kernels.sums_of(&a, b.each_ref()), PLAIN.sums(&a, &b));
         // Each lane with operands of its own, so that a swapped lane shows.
         let twos = [
             [b[3], a[1]],
@@ -41,13 +41,13 @@ impl Comparison for Equal {
             [a[3], a[5]],
         ];
         let two = kernels.sums_of_two(&a, twos.each_ref());
-        assert_eq!(two, Plain.sums_of_two(&a, twos.each_ref()));
-        assert_eq!(two, [0, 1].map(|step| Plain.sums(&a, &twos.map(|two| two[step]))));
+        assert_eq!(two, PLAIN.sums_of_two(&a, twos.each_ref()));
+        assert_eq!(two, [0, 1].map(|step| PLAIN.sums(&a, &twos.map(|two| two[step]))));
         // The largest of both signs, small ones, and one from the random bits.
         let dividends = [126_480, -126_480, 0, 31, -31, 30, -1, most as i32 >> 7];
         let divisors = [4_080, 4_080, 1, 31, 32, 7, 1, 1 + (most as i32 >> 19)];
         let quotients = kernels.quotients(dividends, divisors);
-        assert_eq!(quotients, Plain.quotients(dividends, divisors));
+        assert_eq!(quotients, PLAIN.quotients(dividends, divisors));
         assert!((0..LANES).all(|lane| quotients[lane] == dividends[lane] / divisors[lane]));
         let (sought, others) = ([a[5], b[2]], bytemuck::cast([a, b]));
         // On the borders of the spans below, just beyond them, and at the ends of 16 bits.
@@ -68,7 +68,7 @@ impl Comparison for Equal {
                 let best = [NO_FEATURE.min(most); LANES];
                 assert_eq!(
                     kernels.least_inside(best, &sought, &others, &inside),
-                    Plain.least_inside(best, &sought, &others, &inside)
+                    PLAIN.least_inside(best, &sought, &others, &inside)
                 );
             }
         }
@@ -76,7 +76,7 @@ impl Comparison for Equal {
             ([a[0], a[3], b[5], b[7]], [&[a, b, b][..], &[b, a, a], &[b, b, a], &[a, b]]);
         let [mut costs, mut twin] = [[[-1; LANES]; 3]; 2];
         kernels.costs(&point, columns, &mut costs);
-        Plain.costs(&point, columns, &mut twin);
+        PLAIN.costs(&point, columns, &mut twin);
         assert_eq!(costs, twin);
         // The fourth column has two entries, and the shortest decides.
         assert_eq!(costs[2], [-1; LANES], "one of the four has two");

@@ -92,7 +92,8 @@ fn run() -> u8 {
     match (done, wrong + missing) {
         (Err(_), _) => 2,
         (Ok(()), 1..) => 1,
-        (Ok(()), 0) if most > STACK => 3,
+        // Counting takes stack of its own.
+        (Ok(()), 0) if most > STACK && !cfg!(feature = "instructions") => 3,
         (Ok(()), 0) => 0,
     }
 }
