@@ -1,7 +1,11 @@
 //! `dynvox bench`.
 
+mod report;
+
 use crate::run::{self, Bench};
 use dynvox_core::parallel::Vectors;
+use report::BoardReport;
+use std::path::PathBuf;
 
 /// Arguments of `dynvox bench`.
 #[derive(Debug, clap::Args)]
@@ -12,6 +16,10 @@ pub struct BenchArgs {
     /// Leave out the kernels for vector instructions that not every machine of this kind has
     #[arg(long)]
     baseline: bool,
+    /// Run once for each kind of vector instructions, compare the digests, and write machine,
+    /// digests and times to this file as JSON, for others to compare with theirs
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["json", "baseline"])]
+    report: Option<PathBuf>,
     /// Data set and options, as of `dynvox run`; the synthetic street without one
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "RUN OPTIONS")]
     run: Vec<String>,
@@ -19,6 +27,13 @@ pub struct BenchArgs {
 
 pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
     let plan = super::run::request_of(&args.run)?.resolve()?;
+    if let Some(path) = &args.report {
+        let report = BoardReport::new(&plan, &args.run)?;
+        report.write(path)?;
+        report.print();
+        outln!("\nwritten to {}", path.display());
+        return report.check_digests();
+    }
     let bench =
         run::bench(&plan, if args.baseline { Vectors::BASELINE } else { Vectors::detect() })?;
     if args.json {
@@ -29,6 +44,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Prints the costs of the stages and of the units of work.
 fn print(bench: &Bench) {
     outln!("CPU time, ms, medians of {} frames, {} kernels", bench.frames, bench.vectors);
     outln!(
@@ -45,6 +61,30 @@ fn print(bench: &Bench) {
             stage.work_ms,
             stage.two_threads_ms,
             stage.span_ms
+        );
+    }
+    if bench.units.is_empty() {
+        return;
+    }
+    outln!("\nTime of a unit of work, by half of the frames; its error in the other half");
+    outln!(
+        "{:<13}{:<20}{:>9}{:>12}{:>9}{:>15}",
+        "stage",
+        "unit",
+        "ns",
+        "error, %",
+        "worst",
+        "at bound, ms"
+    );
+    for unit in &bench.units {
+        outln!(
+            "{:<13}{:<20}{:>9.1}{:>12.0}{:>9.0}{:>15.1}",
+            unit.stage,
+            unit.unit,
+            unit.ns,
+            100.0 * unit.error,
+            100.0 * unit.error_max,
+            unit.bound_ms
         );
     }
 }

@@ -1,9 +1,10 @@
-//! What a step costs, stage by stage: work, span, and the bound on two threads, over the frames of
-//! a plan.
+//! Costs of a step, stage by stage: work, span, and the bound on two threads, over the frames of a
+//! plan; and the time of a unit of work.
 
 use super::error::{RunError, failed_step};
 use super::frames::{each_frame, with_mapper};
 use super::spans::{Cost, Spans};
+use super::unit_times::{FrameWork, UnitTime, fit};
 use crate::evaluate::quantile::median;
 use crate::request::Plan;
 use dynvox_core::Stage;
@@ -31,8 +32,12 @@ pub struct Bench {
     pub frames: usize,
     /// Vector instructions that kernels used.
     pub vectors: &'static str,
+    /// Digest of the last frame, 16 hexadecimal digits: the same on every machine.
+    pub digest: String,
     /// Each stage that took time, then the step, then a raycast of the map from each frame's pose.
     pub stages: Vec<StageBench>,
+    /// Time of a unit of work, for the stages that count any; empty with fewer than five frames.
+    pub units: Vec<UnitTime>,
 }
 
 /// Steps through the frames of a plan, without results of any kind, and takes the costs. The first
@@ -42,11 +47,14 @@ pub struct Bench {
 /// The plan cannot be run, or a frame cannot be read or mapped.
 pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
     let spans = Spans::new(vectors);
-    let mut costs = Vec::new();
+    let (mut costs, mut work, mut digest) = (Vec::new(), Vec::new(), 0);
     with_mapper(plan, |mapper| {
         each_frame(plan, |index, frame| {
             let (report, step, mut stages) = spans.measure(|| mapper.step(frame, &spans));
             let report = report.map_err(|error| failed_step(index, error))?;
+            let stages_ms = stages.map(|cost| cost.work.as_secs_f64() * 1e3);
+            work.push(FrameWork { work: report.work, stages_ms });
+            digest = report.digest;
             let pose = report.t_world_camera;
             let (_, _, raycast) = spans.measure(|| mapper.raycast(&pose, &spans).is_ok());
             stages[Stage::Raycast as usize] = raycast[Stage::Raycast as usize];
@@ -63,7 +71,10 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
         before.into_iter().map(of_stage).filter(|stage| stage.work_ms > 0.0).collect();
     stages.push(medians("step", counted.iter().map(|(step, _)| *step)));
     stages.push(of_stage(raycast));
-    Ok(Bench { frames: costs.len(), vectors: vectors.name(), stages })
+    // The first frame does half of the work that its units would tell.
+    let units = fit(work.get(1..).unwrap_or_default(), &plan.capacity.work(&plan.config));
+    let digest = format!("{digest:016x}");
+    Ok(Bench { frames: costs.len(), vectors: vectors.name(), digest, stages, units })
 }
 
 fn medians(name: &'static str, costs: impl Iterator<Item = Cost> + Clone) -> StageBench {

@@ -9,6 +9,7 @@ mod error;
 mod execute;
 mod folder;
 mod frames;
+mod machine;
 mod map_objects;
 mod mask_effect;
 mod places;
@@ -24,6 +25,7 @@ mod spans;
 mod state;
 pub mod store;
 mod threads;
+mod unit_times;
 mod version;
 mod view;
 
@@ -38,6 +40,7 @@ pub use folder::{
     write_whole,
 };
 pub use frames::{each_frame, with_mapper};
+pub use machine::Machine;
 pub use places::{Continued, Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, inertial_samples, read_ahead, stereo_frame};
@@ -45,4 +48,5 @@ pub use record::{RunRecord, StageStatistics};
 pub use resident::resident_bytes;
 pub use spans::{Cost, Spans};
 pub use threads::Threads;
+pub use unit_times::UnitTime;
 pub use version::program;
