@@ -20,6 +20,7 @@ fn main() {
     println!("cargo:rustc-check-cfg=cfg(dynvox_dsp)");
     let get = |key: &str| env::var(key).unwrap_or_default();
     let (target, flags) = (get("TARGET"), get("CARGO_ENCODED_RUSTFLAGS"));
+    // Other targets of ARMv8-M are compiled for processors without it.
     let is_chosen =
         target.starts_with("thumbv8m.main") && FLAGS.iter().any(|flag| flags.contains(flag));
     if target.starts_with("thumbv7em") || is_chosen {

@@ -29,6 +29,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
     let plan = super::run::request_of(&args.run)?.resolve()?;
     if let Some(path) = &args.report {
         let report = BoardReport::new(&plan, &args.run)?;
+        // Written first: figures of levels that differ are what a developer needs.
         report.write(path)?;
         report.print();
         outln!("\nwritten to {}", path.display());
@@ -63,6 +64,7 @@ fn print(bench: &Bench) {
             stage.span_ms
         );
     }
+    // A few frames tell nothing of a prediction's error.
     if bench.units.is_empty() {
         return;
     }

@@ -39,6 +39,7 @@ impl Machine {
             let text = String::from_utf8_lossy(&bytes).trim_matches(['\0', '\n', ' ']).to_owned();
             (!text.is_empty()).then_some(text)
         };
+        // Virtual machines have no such files.
         let clock = |file: &str| text(&format!("sys/devices/system/cpu/cpu0/cpufreq/{file}"));
         let kernel = text("proc/sys/kernel/osrelease").map(|release| format!(" {release}"));
         Self {
@@ -68,6 +69,7 @@ fn processor(info: &str) -> Option<String> {
     if let Some(name) = field(info, "model name") {
         return Some(name.to_owned());
     }
+    // Processors of other makers number their parts anew.
     let (implementer, part) = (field(info, "CPU implementer")?, field(info, "CPU part")?);
     let name = ARM_PARTS.iter().find(|(number, _)| implementer == "0x41" && part == *number);
     Some(name.map_or_else(

@@ -66,6 +66,7 @@ fn fit_stage(
     let samples = |unit: &str, half: usize| -> Vec<[f64; 2]> {
         let half = frames.iter().skip(half).step_by(2);
         half.map(|frame| [count(&frame.work, unit) as f64, frame.stages_ms[stage as usize]])
+            // A stage that did nothing in a frame tells nothing of its units.
             .filter(|[units, ms]| *units > 0.0 && *ms > 0.0)
             .collect()
     };
@@ -80,6 +81,7 @@ fn fit_stage(
         }
     }
     let (_, unit, ms) = best?;
+    // Errors of the frames that set it would be too kind.
     let errors = errors(&samples(unit, 1), ms);
     let bound_units = count(bound, unit);
     Some(UnitTime {

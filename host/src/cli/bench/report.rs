@@ -28,6 +28,7 @@ pub struct BoardReport {
 impl BoardReport {
     /// Runs a plan at each level.
     pub fn new(plan: &Plan, arguments: &[String]) -> anyhow::Result<Self> {
+        // From the least to the most, so that the last one is what `dynvox run` takes.
         let levels: Result<_, _> =
             Vectors::available().map(|vectors| run::bench(plan, vectors)).collect();
         Ok(Self {
@@ -52,6 +53,7 @@ impl BoardReport {
     pub fn print(&self) {
         let machine = &self.machine;
         outln!("{}", self.program);
+        // Not every system tells the names of board and processor.
         let named = [machine.board.as_deref(), machine.processor.as_deref()];
         let named: Vec<_> = named.into_iter().flatten().collect();
         outln!(
@@ -80,6 +82,7 @@ impl BoardReport {
     /// Refuses levels that differ.
     pub fn check_digests(&self) -> anyhow::Result<()> {
         let Some((first, others)) = self.levels.split_first() else { return Ok(()) };
+        // Ordinary code is what all others must equal.
         match others.iter().find(|level| level.digest != first.digest) {
             None => Ok(()),
             Some(other) => bail!(
