@@ -6,6 +6,7 @@
 //! | [`sectors`] | the nearest obstacle in each of 72 directions | MAVLink's `OBSTACLE_DISTANCE` |
 //! | [`points`] | the nearest obstacles as points | MAVLink's `OBSTACLE_DISTANCE_3D` |
 //! | [`costs`] | a cost for each column | costmaps of Nav2 |
+//! | [`heights`] | the height of the ground in each column | height maps |
 //! | [`mavlink`] | bytes of the messages | a serial line or a socket |
 //!
 //! A direction is free only where every cell of the vehicle's height, out to the range asked for,
@@ -68,6 +69,6 @@ pub mod mavlink;
 mod sector;
 mod vehicle;
 
-pub use costmap::{COST_FREE, COST_LETHAL, COST_UNKNOWN, Costmap, costs};
+pub use costmap::{COST_FREE, COST_LETHAL, COST_UNKNOWN, Costmap, costs, heights};
 pub use sector::{Band, Direction, SECTOR_DEG, SECTORS, Sectors, points, sectors};
 pub use vehicle::Vehicle;

@@ -16,7 +16,7 @@ use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};
 use dynvox_onboard::mavlink::{Sender, obstacle_distance, obstacle_distance_3d};
 use dynvox_onboard::{
     Band, COST_FREE, COST_LETHAL, COST_UNKNOWN, Direction, SECTORS, Sectors, Vehicle, costs,
-    points, sectors,
+    heights, points, sectors,
 };
 use mavlink::dialects::ardupilotmega::MavMessage;
 
@@ -239,6 +239,79 @@ fn costs_are_free_only_where_every_cell_was_seen_free() {
         assert!(lost.iter().all(|cost| *cost == COST_UNKNOWN));
     });
     assert!(counts.iter().all(|count| *count > 1_000), "{counts:?}");
+}
+
+#[test]
+fn heights_are_those_of_the_ground_or_unknown() {
+    let mut known = 0;
+    each_window(100, |planning, pose, _| {
+        let mut height = vec![7.0; 60 * 60];
+        heights(planning, &Vehicle::new(pose, true), &mut height).unwrap();
+        let above_m = -pose.translation_m[1] as f32;
+        let [x0, y0, _] = planning.origin();
+        for (at, &height_m) in height.iter().enumerate() {
+            let column = [x0 + (at % 60) as i32, y0 + (at / 60) as i32, 0];
+            match planning.column(column).unwrap().ground_m() {
+                Some(ground_m) => assert!((height_m - (ground_m - above_m)).abs() < 1e-5),
+                None => assert!(height_m.is_nan(), "{height_m}"),
+            }
+            known += usize::from(!height_m.is_nan());
+        }
+        assert_eq!(heights(planning, &Vehicle::new(pose, true), &mut [0.0; 9]), None);
+        heights(planning, &Vehicle::new(pose, false), &mut height).unwrap();
+        assert!(height.iter().all(|height_m| height_m.is_nan()), "the pose is a guess");
+    });
+    assert!(known > 1_000, "{known}");
+}
+
+#[test]
+fn a_road_lies_as_far_below_the_vehicle_as_the_camera_stands_above_it() {
+    // A level road 1.2 m below the camera, and a kerb of 0.2 m from 1 m to the right on.
+    let disparity_q8: Vec<u16> = (0..HEIGHT * WIDTH)
+        .map(|at| {
+            let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
+            let depth_m = |below_m: f64| RIG.focal_px * below_m / (v - RIG.center_v_px);
+            let is_kerb = |depth_m: f64| (u - RIG.center_u_px) * depth_m / RIG.focal_px > 1.0;
+            let depth_m = if is_kerb(depth_m(1.0)) { depth_m(1.0) } else { depth_m(1.2) };
+            if (0.5..12.0).contains(&depth_m) {
+                (RIG.focal_px * RIG.baseline_m / depth_m * 256.0).round() as u16
+            } else {
+                0
+            }
+        })
+        .collect();
+    let mut config = Config::for_rig(RIG);
+    config.volume.voxel_size_m = 0.1;
+    config.planning.cell_voxels = 2;
+    config.planning.near_m = 0.5;
+    config.planning.below_m = 1.8;
+    config.planning.camera_height_m = 1.2;
+    let mut slab = vec![0; CAPACITY.bytes() + SLAB_ALIGN];
+    let mut mapper = Mapper::new(&CAPACITY, &config, &mut slab).unwrap();
+    let grey = vec![90; WIDTH * HEIGHT];
+    let view = View::new(&grey, WIDTH, HEIGHT).unwrap();
+    for _ in 0..5 {
+        let frame = StereoFrame {
+            disparity_q8: View::new(&disparity_q8, WIDTH, HEIGHT),
+            t_world_camera: Some(Transform::IDENTITY),
+            ..StereoFrame::pair(view, view)
+        };
+        mapper.step(&frame, &Serial).unwrap();
+    }
+    mapper.update_planning_maps(0.0);
+    let mut height = vec![0.0; 60 * 60];
+    let vehicle = Vehicle::new(&Transform::IDENTITY, true);
+    let map = heights(mapper.planning(), &vehicle, &mut height).unwrap();
+    let at = |right_m: f64, ahead_m: f64| {
+        let [x, y] = [right_m - map.origin_m[0], ahead_m - map.origin_m[1]]
+            .map(|m| (m / map.resolution_m) as usize);
+        height[y * map.width + x]
+    };
+    for ahead_m in [4.1, 4.5, 4.9] {
+        assert!((at(-0.5, ahead_m) + 1.2).abs() < 0.06, "{}", at(-0.5, ahead_m));
+        assert!((at(1.7, ahead_m) + 1.0).abs() < 0.06, "{}", at(1.7, ahead_m));
+        assert!(at(0.0, -ahead_m).is_nan(), "nothing was seen behind");
+    }
 }
 
 fn parsed(bytes: &[u8]) -> MavMessage {
