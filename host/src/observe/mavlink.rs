@@ -3,8 +3,8 @@
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
 use crate::request::searched_from_m;
 use dynvox_core::{Config, PoseOrigin};
-use dynvox_onboard::mavlink::{Sender, obstacle_distance};
-use dynvox_onboard::{Band, Vehicle, sectors};
+use dynvox_onboard::mavlink::{Sender, obstacle_distance, obstacle_distance_3d};
+use dynvox_onboard::{Band, Vehicle, points, sectors};
 use serde::{Deserialize, Serialize};
 use std::net::{SocketAddr, UdpSocket};
 
@@ -28,7 +28,8 @@ pub struct MavlinkSection {
     pub failed: u64,
 }
 
-/// Sends `OBSTACLE_DISTANCE` after every frame, where a run is asked to.
+/// Sends `OBSTACLE_DISTANCE` after every frame, where a run is asked to; where it is asked for
+/// points, one `OBSTACLE_DISTANCE_3D` for each direction that ends at an obstacle as well.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct MavlinkObserver {
     sent: u64,
@@ -54,6 +55,13 @@ fn band(config: &Config, size_cells: [usize; 3], cell_m: f64) -> Band {
 }
 
 impl MavlinkObserver {
+    /// The sender of the next message.
+    fn sender(&self) -> Sender {
+        // Eight bits, which wrap around.
+        let sequence = (self.sent + self.failed) as u8;
+        Sender { system: SYSTEM, component: COMPONENT, sequence }
+    }
+
     /// Sends bytes, and counts them.
     fn send(&mut self, bytes: &[u8], to: SocketAddr) {
         if self.socket.is_none() {
@@ -89,14 +97,17 @@ impl Observer for MavlinkObserver {
         let vehicle = Vehicle::new(&report.t_world_camera, is_placed);
         let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
         let around = sectors(planning, &vehicle, &band);
-        let sender = Sender {
-            system: SYSTEM,
-            component: COMPONENT,
-            // Eight bits, which wrap around.
-            sequence: (self.sent + self.failed) as u8,
-        };
-        let message = obstacle_distance(&around, frame.row.time_ns() / 1_000, sender);
+        let time_ns = frame.row.time_ns();
+        let message = obstacle_distance(&around, time_ns / 1_000, self.sender());
         self.send(message.bytes(), address.0);
+        if run.plan.request.exports.mavlink_points {
+            // All points of a frame have one time, by which readers tell frames apart.
+            let time_ms = (time_ns / 1_000_000) as u32;
+            for point_m in points(&around) {
+                let message = obstacle_distance_3d(point_m, &around, time_ms, self.sender());
+                self.send(message.bytes(), address.0);
+            }
+        }
         Ok(())
     }
 

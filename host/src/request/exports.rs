@@ -25,6 +25,8 @@ pub struct Exports {
     pub map_disparity: Option<PathBuf>,
     /// Address that obstacle messages are sent to after every frame.
     pub mavlink: Option<UdpAddress>,
+    /// Send the obstacles as points, too.
+    pub mavlink_points: bool,
     /// Scene for programs of photogrammetry.
     pub scene: Option<SceneExport>,
 }

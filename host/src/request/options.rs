@@ -278,6 +278,10 @@ pub struct Options {
     #[arg(long, value_name = "udp:HOST:PORT", requires = "planning", help_heading = "Results")]
     #[serde(deserialize_with = "words::parsed")]
     pub mavlink: Option<UdpAddress>,
+    /// With --mavlink, send the nearest obstacle of each direction as a point as well
+    /// (OBSTACLE_DISTANCE_3D)
+    #[arg(long, requires = "mavlink", help_heading = "Results")]
+    pub mavlink_points: bool,
 }
 
 impl Options {
@@ -315,6 +319,7 @@ impl Options {
                 instances: self.save_instances.clone(),
                 map_disparity: self.save_map_disparity.clone(),
                 mavlink: self.mavlink,
+                mavlink_points: self.mavlink_points,
                 scene: SceneExport::from_words(&self.export).map_err(RequestError::Invalid)?,
             },
             limits: Limits { strict: self.strict, ..Limits::default() },

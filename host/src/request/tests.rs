@@ -19,7 +19,8 @@ fn unlike_the_default() -> Request {
         "set": { "volume.voxel_size_m": 0.1, "street.seed": 7, "volume.observation_weight": "depth" },
         "dynamic": false, "fuse_every": 2, "stream_mib": 9, "keep_blocks": true,
         "evaluate": "lidar", "evaluation_delay": 5, "map_objects": "all", "axes": "enu",
-        "mcap": true, "mavlink": "udp:127.0.0.1:14550", "save_map_disparity": "shown", "strict": true,
+        "mcap": true, "mavlink": "udp:127.0.0.1:14550", "mavlink_points": true,
+        "save_map_disparity": "shown", "strict": true,
     }))
     .unwrap();
     let limits = Limits { threads: Some(3), rss_mib: Some(700), strict: true };

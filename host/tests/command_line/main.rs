@@ -23,6 +23,7 @@ mod fleet;
 mod inertial;
 mod layouts;
 mod masks;
+mod mavlink;
 mod networks;
 mod ownership;
 mod requests;
