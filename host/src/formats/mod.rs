@@ -57,4 +57,5 @@ pub use run_files::{
     TIMED_TRAJECTORY_FILE, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
 };
 pub use segments::{SEGMENT_GAP_M, ShownSegment, shown_pose};
+pub(crate) use times::parse_date;
 pub use times::{TimeTable, TimeUnit, parse_seconds, read_stamped_names, read_times};

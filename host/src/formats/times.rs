@@ -174,7 +174,7 @@ pub(super) fn parse_signed_nano(text: &str) -> Option<i128> {
 }
 
 /// `2011-09-26 13:02:25.964389445` as ns since 1970.
-pub(super) fn parse_date(text: &str) -> Option<u64> {
+pub(crate) fn parse_date(text: &str) -> Option<u64> {
     let (date, time) = text.split_once([' ', 'T'])?;
     let [year, month, day] = numbers(date, '-')?;
     let mut parts = time.splitn(3, ':');

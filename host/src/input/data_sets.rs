@@ -2,7 +2,9 @@
 
 use super::bags;
 use super::data_set::{Layout, OpenOptions};
-use super::layouts::{cityscapes, euroc, folder, kitti, kitti_raw, spring, vkitti};
+use super::layouts::{
+    argoverse, cityscapes, driving_stereo, euroc, folder, kitti, kitti_raw, spring, vkitti,
+};
 use super::source::{FrameSource, InputError};
 use clap::builder::PossibleValue;
 use serde::Deserialize;
@@ -20,6 +22,8 @@ pub static DATA_SETS: &[Layout] = &[
     kitti::TRACKING,
     vkitti::DATA_SET,
     spring::DATA_SET,
+    driving_stereo::DATA_SET,
+    argoverse::DATA_SET,
     folder::DATA_SET,
 ];
 

@@ -49,8 +49,9 @@ impl KittiCalibration {
                     rectifying = numbers(line);
                     continue;
                 }
-                "P0" | "P_rect_00" => 0,
-                "P1" | "P_rect_01" => 1,
+                // DrivingStereo numbers its two cameras 101 and 103.
+                "P0" | "P_rect_00" | "P_rect_101" => 0,
+                "P1" | "P_rect_01" | "P_rect_103" => 1,
                 "P2" | "P_rect_02" => 2,
                 "P3" | "P_rect_03" => 3,
                 other if other.parse::<f64>().is_ok() => {

@@ -1,9 +1,11 @@
 //! Recordings, by how they lie on the disk: KITTI odometry, tracking and raw, KITTI-360,
-//! Cityscapes, EuRoC and TUM VI, Virtual KITTI 2, Spring, any folders of images; and the synthetic
-//! street.
+//! Cityscapes, EuRoC and TUM VI, Virtual KITTI 2, Spring, DrivingStereo, Argoverse 2, any folders
+//! of images; and the synthetic street.
 
+pub(super) mod argoverse;
 mod camera_folders;
 pub(super) mod cityscapes;
+pub(super) mod driving_stereo;
 pub(super) mod euroc;
 pub(super) mod folder;
 pub(super) mod kitti;

@@ -108,8 +108,8 @@ pub fn varying_parts(stems: &[String]) -> Vec<String> {
     stems.iter().map(part).collect()
 }
 
-/// The time stamp a name holds, ns: 19 digits are nanoseconds, 16 microseconds, 13 milliseconds
-/// since 1970, `1403636579.763555` seconds. Shorter numbers count frames.
+/// The time stamp a name holds, ns: 19 or 18 digits are nanoseconds, 16 microseconds, 13
+/// milliseconds since 1970, `1403636579.763555` seconds. Shorter numbers count frames.
 pub fn stamp_in_name(stem: &str) -> Option<u64> {
     if let Some((seconds, fraction)) = stem.split_once('.')
         && seconds.len() >= 9
@@ -119,7 +119,8 @@ pub fn stamp_in_name(stem: &str) -> Option<u64> {
     }
     let run = stem.split(|c: char| !c.is_ascii_digit()).max_by_key(|run| run.len())?;
     let unit = match run.len() {
-        19 => 1,
+        // Clocks of satellites count from 1980, and some from their own start.
+        18 | 19 => 1,
         16 => 1_000,
         13 => 1_000_000,
         _ => return None,
@@ -185,6 +186,7 @@ mod tests {
     fn long_numbers_are_times_and_short_ones_are_not() {
         assert_eq!(stamp_in_name("1403636579763555584"), Some(1_403_636_579_763_555_584));
         assert_eq!(stamp_in_name("left_1403636579763555"), Some(1_403_636_579_763_555_000));
+        assert_eq!(stamp_in_name("315966265259836000"), Some(315_966_265_259_836_000));
         assert_eq!(stamp_in_name("1403636579763"), Some(1_403_636_579_763_000_000));
         assert_eq!(stamp_in_name("1403636579.763555"), Some(1_403_636_579_763_555_000));
         assert_eq!([stamp_in_name("000123"), stamp_in_name("a.b"), stamp_in_name("")], [None; 3]);

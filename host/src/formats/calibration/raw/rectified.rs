@@ -52,7 +52,8 @@ fn has_projections(text: &str) -> bool {
     let number = |word: &str| word.parse::<f64>().is_ok();
     let named = |line: &str| {
         let Some((label, values)) = line.trim_start().split_once(':') else { return false };
-        let known = ["P0", "P1", "P2", "P3"].contains(&label) || label.starts_with("P_rect_0");
+        let known = ["P0", "P1", "P2", "P3"].contains(&label)
+            || ["P_rect_0", "P_rect_1"].iter().any(|start| label.starts_with(start));
         known && values.split_whitespace().next().is_some_and(number)
     };
     let bare = |line: &str| {
