@@ -360,17 +360,7 @@ const CIRCLES_LEFT: &[(&str, &[&str])] = &[
     ("host/src", &["observe/tables/tracks.rs", "observe/tracks.rs"]),
     ("host/src", &["sweep/figures.rs", "sweep/page.rs", "sweep/store.rs", "sweep/table.rs"]),
     ("host/src", &["synth/car_paint.rs", "synth/paint.rs", "synth/window_paint.rs"]),
-    (
-        "host/src",
-        &[
-            "synth/layout.rs",
-            "synth/scene.rs",
-            "synth/segment.rs",
-            "synth/shadow.rs",
-            "synth/traffic.rs",
-        ],
-    ),
-    ("host/src", &["synth/raw.rs", "synth/street.rs"]),
+    ("host/src", &["synth/layout.rs", "synth/segment.rs", "synth/traffic.rs"]),
 ];
 
 #[test]

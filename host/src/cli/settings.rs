@@ -2,8 +2,8 @@
 //! the program itself goes by.
 
 use crate::formats::calibration::RectifiedSize;
-use crate::request::{Settings, leaves};
-use crate::synth::StreetConfig;
+use crate::request::{Settings, Worlds, leaves};
+use crate::synth::{RoomConfig, StreetConfig};
 use anyhow::bail;
 use clap::Args;
 use dynvox_core::Config;
@@ -82,13 +82,14 @@ pub fn run(args: &SettingsArgs) -> anyhow::Result<()> {
 
 /// All rows in the order of the page.
 fn rows() -> anyhow::Result<Vec<Row>> {
-    let text = Settings::resolve(None, &[])?.to_toml(true)?;
+    let text = Settings::resolve(None, &[])?.to_toml(Worlds::ALL)?;
     let defaults: BTreeMap<_, _> = leaves("", &text.parse()?).into_iter().collect();
     let (rig, others): (Vec<_>, _) =
         Config::settings().partition(|about| about.key.starts_with("rig."));
     let rectify = RectifiedSize::SETTINGS.iter().map(Setting::about);
     let street = StreetConfig::SETTINGS.iter().map(Setting::about);
-    let all = rig.into_iter().chain(rectify).chain(others).chain(street);
+    let room = RoomConfig::SETTINGS.iter().map(Setting::about);
+    let all = rig.into_iter().chain(rectify).chain(others).chain(street).chain(room);
     Ok(all.map(|about| Row { default: default(defaults.get(about.key)), about }).collect())
 }
 
@@ -231,7 +232,7 @@ mod tests {
     #[test]
     fn every_key_of_a_file_has_one_row_whose_range_has_its_default() {
         let (rows, text) = (rows().unwrap(), Settings::resolve(None, &[]).unwrap());
-        let table = text.to_toml(true).unwrap().parse().unwrap();
+        let table = text.to_toml(Worlds::ALL).unwrap().parse().unwrap();
         for (key, value) in leaves("", &table) {
             let found = rows.iter().filter(|row| row.about.key == key).count();
             assert_eq!(found, 1, "{key} = {value} has a row");

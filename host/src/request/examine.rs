@@ -1,6 +1,6 @@
 //! Doubts about a recording's images, before the first is mapped.
 
-use super::{FrameNumbers, Request, RequestError, Source, frame_interval_s};
+use super::{FrameNumbers, Request, RequestError, frame_interval_s};
 use crate::input::FrameSource;
 use crate::input::diagnosis::{self, Finding, RefusedInput};
 
@@ -28,7 +28,7 @@ fn warnings(
     dataset: &dyn FrameSource,
     frames: &FrameNumbers,
 ) -> Result<Vec<String>, RequestError> {
-    if request.input.source == Source::Street {
+    if request.input.source.is_synthetic() {
         // The synthetic street knows what it renders.
         return Ok(Vec::new());
     }

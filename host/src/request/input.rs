@@ -1,5 +1,7 @@
 //! Source of the images.
 
+use super::source::Source;
+use super::world::{Change, SyntheticWorld};
 use super::{Request, RequestError, stream};
 use crate::formats::BayerPattern;
 use crate::formats::calibration::CalibrationHints;
@@ -51,19 +53,6 @@ pub struct Input {
     pub faults: Option<Faults>,
 }
 
-/// A source of images.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Source {
-    /// The synthetic street, as the settings below `street` say.
-    #[default]
-    Street,
-    /// PGM or PPM images on standard input, left and right in turn.
-    Stream,
-    /// A recording: a folder, or a file of ROS.
-    Recording(PathBuf),
-}
-
 /// Opens the source with its depth, scaled, without masks and faults.
 pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource>, RequestError> {
     let Input { source, layout, sequence, rate_hz, when_late, .. } = &request.input;
@@ -85,17 +74,16 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
     let dataset: Box<dyn FrameSource> = match source {
         Source::Stream => stream::open(request, stop)?,
         Source::Recording(path) => input::open(path, &options(request))?,
-        Source::Street if layout.is_some() || sequence.is_some() => {
+        _ if layout.is_some() || sequence.is_some() => {
             return Err(RequestError::invalid(
                 "--dataset and --sequence need a data set. Give its path: `dynvox run PATH`",
             ));
         }
-        Source::Street => {
-            let mut street = request.settings.street();
-            if request.input.inertial == InertialChoice::None {
-                street.inertial = None;
-            }
-            Box::new(StreetFrames::new(street)?)
+        Source::Street | Source::Room | Source::Yard => {
+            let world = SyntheticWorld::of_source(source).unwrap_or_default();
+            let without_unit = request.input.inertial == InertialChoice::None;
+            let change = Change { without_unit, ..Change::default() };
+            Box::new(StreetFrames::from_world(world.build(&request.settings, &change)?))
         }
     };
     let dataset = depth::attach(dataset, &request.depth, request.depth_scale.as_ref())?;

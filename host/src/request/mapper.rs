@@ -2,7 +2,7 @@
 
 use super::resolve::file_of;
 use super::{Evaluation, Exports, Storage};
-use super::{Frames, Input, Limits, Masks, Poses, Request, RequestError, check_bounds};
+use super::{Frames, Input, Limits, Masks, Poses, Request, RequestError, Worlds, check_bounds};
 use crate::formats::calibration::FittedGeometry;
 use crate::input::depth::DepthChoice;
 use dynvox_core::{Capacity, Config};
@@ -49,7 +49,7 @@ impl Request {
         }
         let config = settings.config(cameras.rig, cameras.rectification.as_ref());
         check_bounds(cameras.size, (&profile, &capacity), &config)?;
-        let config_toml = file_of(&settings, false)?;
+        let config_toml = file_of(&settings, Worlds::NONE)?;
         Ok(MapperPlan { profile, capacity, config, config_toml, threads })
     }
 

@@ -31,11 +31,13 @@ mod scale;
 mod scene_export;
 mod settings;
 mod sizes;
+mod source;
 mod storage;
 mod stream;
 #[cfg(test)]
 mod tests;
 mod words;
+mod world;
 
 pub use bounds::{Bounds, Memory, PlanningWindow, profile, solve};
 pub use checks::{check_bounds, resident_limit_bytes};
@@ -43,7 +45,7 @@ pub use error::RequestError;
 pub use evaluation::{Evaluation, Reference};
 pub use exports::{Exports, MapObjects, UdpAddress};
 pub use frames::{FrameNumbers, Frames, frame_interval_s};
-pub use input::{Input, Source};
+pub use input::Input;
 pub use limits::Limits;
 pub use mapper::MapperPlan;
 pub use masks::Masks;
@@ -52,10 +54,12 @@ pub use plan::Plan;
 pub use poses::Poses;
 pub use scale::{ScaleWord, SceneScale, searched_from_m, sentence as scale_sentence};
 pub use scene_export::{SceneExport, SceneFormat};
-pub use settings::Settings;
 pub(crate) use settings::leaves;
+pub use settings::{Settings, Worlds};
 pub use sizes::{Bytes, ImageSize, WindowSize};
+pub use source::Source;
 pub use storage::{Storage, Streaming};
+pub use world::{Change, SyntheticWorld};
 
 use crate::input::depth::{DepthChoice, DepthScale};
 use serde::{Deserialize, Serialize};

@@ -5,7 +5,7 @@
 //! and fuses nothing. A correction found while mapping comes too late for the first frames: they
 //! are in the map already, at the wrong depth.
 
-use super::{Request, Settings, Source};
+use super::{Request, Settings};
 use crate::input::FrameSource;
 use crate::input::diagnosis::RectifiedSource;
 use dynvox_core::geometry::{RowCorrection, StereoRig};
@@ -38,7 +38,7 @@ pub(super) fn find(
         || settings.rig.row_correction != RowCorrection::default();
     let is_estimated = settings.mapper.egomotion == MotionSource::Stereo
         && matches!(request.poses, super::Poses::Estimated);
-    if is_start_given || !is_estimated || request.input.source == Source::Street {
+    if is_start_given || !is_estimated || request.input.source.is_synthetic() {
         return None;
     }
     let found = search(settings, source, frames)?;
@@ -129,6 +129,7 @@ fn bounds(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::request::Source;
     use std::fs;
     use std::path::Path;
 

@@ -4,7 +4,7 @@ use super::poses::Egomotion;
 use super::{
     Bounds, Bytes, Evaluation, Exports, Frames, ImageSize, Input, Limits, MapObjects, Masks,
     Memory, PlanningWindow, Poses, Reference, Request, RequestError, ScaleWord, SceneExport,
-    SceneScale, Settings, Source, Storage, UdpAddress, WindowSize, words,
+    SceneScale, Settings, Source, Storage, SyntheticWorld, UdpAddress, WindowSize, words,
 };
 use crate::formats::calibration::{CalibrationHints, LengthUnit, LensFamily, RectifiedSize, Swap};
 use crate::formats::{Axes, BayerPattern};
@@ -40,6 +40,9 @@ pub struct Options {
     /// Data set to map; - for a stream of PGM or PPM images from standard input, left and right in
     /// turn; the synthetic street without one
     pub path: Option<PathBuf>,
+    /// Synthetic world to map instead of a data set [default: street]
+    #[arg(long, value_enum, conflicts_with = "path", help_heading = "Input")]
+    pub world: Option<SyntheticWorld>,
     /// Sequence within the data set: 06, 0003
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub sequence: Option<String>,
@@ -337,7 +340,7 @@ impl Options {
         // A path of `-` is standard input, as with other tools.
         Ok(Input {
             source: match &self.path {
-                None => Source::Street,
+                None => self.world.map_or(Source::Street, SyntheticWorld::source),
                 Some(path) if path == Path::new("-") => Source::Stream,
                 Some(path) => Source::Recording(path.clone()),
             },

@@ -1,8 +1,8 @@
 //! Settings in a stored request: those that differ from the defaults or that somebody set to
 //! them, in their sections.
 
-use super::Settings;
 use super::settings::{insert, leaves};
+use super::{Settings, Worlds};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 use toml::{Table, Value};
 
@@ -20,7 +20,7 @@ pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Settings, D::Er
 /// The settings that differ from the defaults.
 fn changed(settings: &Settings) -> anyhow::Result<Table> {
     // By way of text, in which an f32 has as few digits as tell it from its neighbours.
-    let table = |of: &Settings| Ok::<Table, anyhow::Error>(of.to_toml(true)?.parse()?);
+    let table = |of: &Settings| Ok::<Table, anyhow::Error>(of.to_toml(Worlds::ALL)?.parse()?);
     let all = table(settings)?;
     let mut changed = difference(&all, &table(&Settings::default())?);
     for (key, value) in leaves("", &all) {

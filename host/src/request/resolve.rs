@@ -3,7 +3,7 @@
 use super::examine::{Examined, examine};
 use super::opening;
 use super::resident_limit_bytes;
-use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Source, input};
+use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Worlds, input};
 use crate::input::{InertialUnitData, StopRequest, read_given_poses};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{Capacity, Config, Scale};
@@ -69,7 +69,7 @@ impl Request {
                 inertial: unit.map(InertialUnitData::config),
                 ..settings.config(dataset.rig(), dataset.rectification())
             },
-            config_toml: file_of(&settings, self.input.source == Source::Street)?,
+            config_toml: file_of(&settings, self.input.source.worlds())?,
             rss_limit_bytes: match self.limits.rss_mib {
                 Some(mib) => mib.saturating_mul(MIB),
                 None => resident_limit_bytes(&capacity, dataset.size()),
@@ -176,6 +176,6 @@ impl Request {
 }
 
 /// The settings as a file.
-pub(super) fn file_of(settings: &Settings, with_street: bool) -> Result<String, RequestError> {
-    settings.to_toml(with_street).map_err(|error| RequestError::Invalid(format!("{error:#}")))
+pub(super) fn file_of(settings: &Settings, worlds: Worlds) -> Result<String, RequestError> {
+    settings.to_toml(worlds).map_err(|error| RequestError::Invalid(format!("{error:#}")))
 }

@@ -4,7 +4,7 @@
 use crate::formats::bounds::SETTINGS_TEXT;
 use crate::formats::calibration::RectifiedSize;
 use crate::formats::read_text_within;
-use crate::synth::StreetConfig;
+use crate::synth::{RoomConfig, StreetConfig};
 use anyhow::{Context, bail};
 use dynvox_core::MapperConfig;
 use dynvox_core::egomotion::EgomotionConfig;
@@ -63,6 +63,9 @@ pub struct Settings {
     /// data.
     #[serde(skip_serializing_if = "Option::is_none")]
     street: Option<StreetConfig>,
+    /// The synthetic room or yard, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    room: Option<RoomConfig>,
     /// Keys that somebody set to their defaults: what follows from the rig does not replace them.
     /// Other values tell by themselves that somebody set them.
     #[serde(skip)]
@@ -138,6 +141,7 @@ impl Settings {
             mesh,
             planning,
             street: _,
+            room: _,
             asked: _,
         } = self;
         Config {
@@ -203,11 +207,41 @@ impl Settings {
         self.street.get_or_insert_default()
     }
 
-    /// All settings as a file that `--config` takes.
-    pub fn to_toml(&self, with_street: bool) -> anyhow::Result<String> {
-        let street = with_street.then(|| self.street());
-        Ok(toml::to_string(&Self { street, ..self.clone() })?)
+    /// The configuration of the synthetic room or yard.
+    pub fn room(&self) -> RoomConfig {
+        self.room.clone().unwrap_or_default()
     }
+
+    /// The configuration of the synthetic room or yard, to be changed.
+    pub fn room_mut(&mut self) -> &mut RoomConfig {
+        self.room.get_or_insert_default()
+    }
+
+    /// All settings as a file that `--config` takes, those of the worlds that are shown among
+    /// them.
+    pub fn to_toml(&self, worlds: Worlds) -> anyhow::Result<String> {
+        let street = worlds.street.then(|| self.street());
+        let room = worlds.room.then(|| self.room());
+        Ok(toml::to_string(&Self { street, room, ..self.clone() })?)
+    }
+}
+
+/// Synthetic worlds whose settings a file shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Worlds {
+    street: bool,
+    room: bool,
+}
+
+impl Worlds {
+    /// None.
+    pub const NONE: Self = Self { street: false, room: false };
+    /// The street.
+    pub const STREET: Self = Self { street: true, room: false };
+    /// The room or yard.
+    pub const ROOM: Self = Self { street: false, room: true };
+    /// All.
+    pub const ALL: Self = Self { street: true, room: true };
 }
 
 /// Settings under construction: as a table and as values.
@@ -218,21 +252,23 @@ struct Layers {
 }
 
 impl Layers {
-    /// The defaults, those of the street among them.
+    /// The defaults, those of the synthetic worlds among them.
     fn defaults() -> anyhow::Result<Self> {
-        Self::over(Settings { street: Some(StreetConfig::default()), ..Settings::default() })
+        let (street, room) = (Some(StreetConfig::default()), Some(RoomConfig::default()));
+        Self::over(Settings { street, room, ..Settings::default() })
     }
 
     /// Layers over settings that are there.
     fn over(settings: Settings) -> anyhow::Result<Self> {
-        let street = Some(StreetConfig::default());
-        let defaults = Table::try_from(Settings { street, ..Settings::default() })?;
+        let (street, room) = (Some(StreetConfig::default()), Some(RoomConfig::default()));
+        let defaults = Table::try_from(Settings { street, room, ..Settings::default() })?;
         Ok(Self { table: Table::try_from(&settings)?, settings, defaults })
     }
 
     /// The settings; equal ones are equal values.
     fn finish(mut self) -> Settings {
         self.settings.street.take_if(|street| *street == StreetConfig::default());
+        self.settings.room.take_if(|room| *room == RoomConfig::default());
         self.settings
     }
 
@@ -375,7 +411,7 @@ mod tests {
         let file = folder.path().join("c.toml");
         let text = sets(&["volume.voxel_size_m=0.1", "volume.observation_weight=depth"])
             .unwrap()
-            .to_toml(true)
+            .to_toml(Worlds::ALL)
             .unwrap();
         assert!(
             // Exact decimal numbers, and names instead of numbers of a variant.
@@ -384,7 +420,10 @@ mod tests {
             "{text}"
         );
         std::fs::write(&file, &text).unwrap();
-        assert_eq!(Settings::resolve(Some(&file), &[]).unwrap().to_toml(true).unwrap(), text);
+        assert_eq!(
+            Settings::resolve(Some(&file), &[]).unwrap().to_toml(Worlds::ALL).unwrap(),
+            text
+        );
     }
 
     #[test]
@@ -402,7 +441,7 @@ mod tests {
             "tracking.tracks.overlap=box",
         ];
         let given = sets(&other).unwrap();
-        let table: Table = given.to_toml(false).unwrap().parse().unwrap();
+        let table: Table = given.to_toml(Worlds::NONE).unwrap().parse().unwrap();
         let mut config = dynvox_core::Config::for_rig(any_rig());
         for (key, value) in leaves("", &table) {
             let text = value.to_string();

@@ -5,9 +5,9 @@ use dynvox_core::geometry::{StereoRig, Transform};
 use nalgebra::Vector3;
 
 use super::config::StreetConfig;
+use super::optics::Optics;
 use super::path::RoadSpan;
 use super::random::Rng;
-use super::raster::Pinhole;
 
 /// Amplitude and frequency of each small motion, two waves each.
 const PITCH: [(f64, f64); 2] = [(0.0040, 0.53), (0.0018, 1.37)];
@@ -60,7 +60,7 @@ fn sway_rad(config: &StreetConfig, time_s: f64) -> f64 {
 }
 
 /// The rig of a configured street: KITTI's proportions.
-pub fn rig(config: &StreetConfig) -> StereoRig {
+fn rig(config: &StreetConfig) -> StereoRig {
     StereoRig {
         focal_px: config.focal_px(),
         center_u_px: 0.5 * (f64::from(config.width) - 1.0),
@@ -69,13 +69,16 @@ pub fn rig(config: &StreetConfig) -> StereoRig {
     }
 }
 
-/// The rig's cameras for the rasteriser.
-pub fn pinhole(config: &StreetConfig) -> Pinhole {
-    let rig = rig(config);
-    Pinhole {
-        width: config.width as usize,
-        height: config.height as usize,
-        focal_px: rig.focal_px,
-        center_px: (rig.center_u_px, rig.center_v_px),
+/// Cameras of a configured street.
+pub fn optics(config: &StreetConfig) -> Optics {
+    Optics {
+        section: "street",
+        seed: config.seed,
+        size: [config.width, config.height],
+        rig: rig(config),
+        lens: config.lens.clone(),
+        rig_error: config.rig_error,
+        noise_sigma: config.noise_sigma,
+        gain_difference: config.gain_difference,
     }
 }

@@ -1,7 +1,8 @@
 //! A car's shell, painted by position: glass, lamps, grille, plates, joints.
 
 use super::car::Shape;
-use super::paint::{Painted, Painter, SurfacePoint, above, blend, stripes, times, within};
+use super::paint::Painter;
+use super::pattern::{Painted, SurfacePoint, above, blend, stripes, times, within};
 use super::random::cell;
 use super::surface::{Surface, Tone};
 use super::texture::floor;

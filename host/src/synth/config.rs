@@ -96,7 +96,7 @@ impl StreetConfig {
     pub fn problem(&self) -> Option<String> {
         let mut problems = Problems::new();
         check(Self::CHECKS, self, &mut problems);
-        let unit = || self.inertial.and_then(|unit| unit.problem());
+        let unit = || self.inertial.and_then(|unit| unit.problem("street"));
         problems.first().map(ToString::to_string).or_else(unit).or_else(|| self.traffic.problem())
     }
 }

@@ -54,9 +54,9 @@ fn track(from: &[u8], to: &[u8], width: usize, [u, v]: [usize; 2]) -> Option<[f6
 }
 
 /// Shares of the true motion that the tracker finds in windows of one depth, sorted.
-fn shares(street: &Street, frames: [u32; 2]) -> Vec<f64> {
-    let [from, to] = frames.map(|index| street.frame(index));
-    let (width, rig) = (from.width, street.rig());
+fn shares(world: &dyn World, frames: [u32; 2]) -> Vec<f64> {
+    let [from, to] = frames.map(|index| world.frame(index));
+    let (width, rig) = (from.width, world.rig());
     let t_to_from = to.t_world_camera.inverse() * from.t_world_camera;
     let mut shares = Vec::new();
     for v in (HALF_PX + 2..from.height - HALF_PX - 2).step_by(2) {
@@ -114,5 +114,29 @@ fn a_tracker_finds_motion_of_a_tenth_of_a_pixel() {
         // The tracker's own bilinear picture makes it find a tenth too much.
         assert!((0.9..1.2).contains(&middle), "half of the windows find less than {middle}");
         assert!(high - low < 0.3, "a quarter finds less than {low}, another more than {high}");
+    }
+}
+
+#[test]
+fn a_tracker_finds_as_little_motion_in_rooms_and_yards() {
+    for kind in [RoomKind::Room, RoomKind::Yard] {
+        let config = RoomConfig {
+            width: 320,
+            height: 200,
+            rate_hz: 300.0,
+            turn_deg_s: 0.0,
+            people: 0,
+            noise_sigma: 0.0,
+            bare_walls: 0.0,
+            ..RoomConfig::default()
+        };
+        let room = Room::new(kind, config).unwrap();
+        // A walk's turn and way in a three hundredth of a second are some tenths of a pixel.
+        let shares = shares(&room, [0, 1]);
+        let [low, middle, high] = [1, 2, 3].map(|part| shares[part * shares.len() / 4]);
+        println!("{kind:?}, {} windows: {low:.2}, {middle:.2}, {high:.2}", shares.len());
+        assert!(shares.len() > 100, "{kind:?}: {} windows", shares.len());
+        assert!((0.9..1.1).contains(&middle), "{kind:?}: half of the windows find {middle}");
+        assert!(high - low < 0.3, "{kind:?}: quarters find {low} and {high}");
     }
 }

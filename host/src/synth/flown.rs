@@ -69,7 +69,7 @@ impl FlownView<'_> {
         let point = Point::from(point_m);
         let mut least = reach_m;
         for object in &self.around.scene.objects {
-            let mesh = object.mesh(self.street.bodies());
+            let mesh = &object.mesh;
             if (object.to_camera.point(mesh.middle_m) - point).norm() - mesh.radius_m > least {
                 continue;
             }

@@ -35,6 +35,18 @@ pub fn t_camera_unit() -> Transform {
     Transform::from_rotation_matrix(&R_CAMERA_UNIT, LEVER_M).normalized()
 }
 
+/// A camera that carries a unit.
+pub struct Carried<'a> {
+    /// The unit.
+    pub unit: &'a StreetUnit,
+    /// Chooses the noise.
+    pub seed: u64,
+    /// Time of the last frame, s.
+    pub last_s: f64,
+    /// Pose of the camera at a time, in a world whose y axis points down.
+    pub pose: &'a dyn Fn(f64) -> Transform,
+}
+
 impl Street {
     /// Samples of the unit from a second before the first frame to the last, in order of their
     /// times, which count from frame 0; none where the street has no unit.
@@ -43,7 +55,20 @@ impl Street {
         let Some(unit) = config.inertial.filter(|unit| unit.rate_hz > 0.0) else {
             return Vec::new();
         };
-        let last_s = self.time_s(config.frames.saturating_sub(1));
+        Carried {
+            unit: &unit,
+            seed: config.seed,
+            last_s: self.time_s(config.frames.saturating_sub(1)),
+            pose: &|time_s| self.t_street_camera(time_s),
+        }
+        .readings()
+    }
+}
+
+impl Carried<'_> {
+    /// Samples from a second before the first frame to the last, in order of their times.
+    pub fn readings(&self) -> Vec<TimedReading> {
+        let Self { unit, last_s, .. } = self;
         let count = libm::ceil((last_s + BEFORE_S) * unit.rate_hz) as u64 + 1;
         let samples = (0..count).map(|at| (at, at as f64 / unit.rate_hz - BEFORE_S));
         samples
@@ -51,12 +76,13 @@ impl Street {
                 let since_gap_s = time_s - GAP_EVERY_S * libm::floor(time_s / GAP_EVERY_S);
                 since_gap_s >= unit.gap_s || *time_s < 0.0
             })
-            .map(|(at, time_s)| self.reading(&unit, at, time_s))
+            .map(|(at, time_s)| self.reading(at, time_s))
             .collect()
     }
 
     /// Sample `at`, of a time.
-    fn reading(&self, unit: &StreetUnit, at: u64, time_s: f64) -> TimedReading {
+    fn reading(&self, at: u64, time_s: f64) -> TimedReading {
+        let unit = self.unit;
         let shown_s = match unit.fault {
             UnitFault::Stuck if time_s > STUCK_FROM_S => STUCK_FROM_S,
             _ => time_s,
@@ -65,7 +91,7 @@ impl Street {
         let noise = |density: f64| density * unit.rate_hz.sqrt();
         // A stuck unit's noise is stuck, too.
         let number = if shown_s == time_s { at as i64 } else { -1 };
-        let mut rng = Rng::new(self.config().seed, 0x01_3E27, number);
+        let mut rng = Rng::new(self.seed, 0x01_3E27, number);
         for axis in 0..3 {
             turn_rate[axis] += unit.turn_bias_rad_s + noise(unit.turn_noise) * gaussian(&mut rng);
             force[axis] += unit.force_bias_m_s2 + noise(unit.force_noise) * gaussian(&mut rng);
@@ -87,7 +113,7 @@ impl Street {
 
     /// Turn rate and force at a time, in the unit's axes.
     fn exact_reading(&self, time_s: f64) -> ([f64; 3], [f64; 3]) {
-        let pose = |time_s: f64| self.t_street_camera(time_s) * t_camera_unit();
+        let pose = |time_s: f64| (self.pose)(time_s) * t_camera_unit();
         let (before, after) = (pose(time_s - TURN_HALF_S), pose(time_s + TURN_HALF_S));
         let turned = (before.inverse() * after).normalized();
         // Rotations this small are their quaternion's vector, to a part in 10^9.

@@ -25,8 +25,9 @@ pub struct StreetUnit {
 }
 
 impl StreetUnit {
-    /// The first problem of the figures, in one sentence.
-    pub fn problem(&self) -> Option<String> {
+    /// The first problem of the figures, in one sentence; the keys are those of a section of the
+    /// settings.
+    pub fn problem(&self, section: &str) -> Option<String> {
         let figures = [
             ("rate_hz", self.rate_hz, 0.0, 2_000.0),
             ("turn_noise", self.turn_noise, 0.0, 1.0),
@@ -38,7 +39,7 @@ impl StreetUnit {
         ];
         figures.into_iter().find(|(_, value, low, high)| !(low..=high).contains(&value)).map(
             |(name, value, low, high)| {
-                format!("street.inertial.{name} is {value}; it must be {low} to {high}")
+                format!("{section}.inertial.{name} is {value}; it must be {low} to {high}")
             },
         )
     }

@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::mesh::Point;
-use super::paint::SurfacePoint;
+use super::paint::Painter;
+use super::pattern::SurfacePoint;
 use super::scene::Scene;
 use super::street::Street;
 
@@ -35,24 +36,43 @@ struct Face {
     beams: (usize, usize),
 }
 
+/// Sensor to left camera.
+pub fn t_camera_lidar() -> Transform {
+    Transform::from_rotation_matrix(
+        &[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
+        POSITION_M,
+    )
+}
+
 impl Street {
     /// Sensor to left camera.
     pub fn t_camera_lidar(&self) -> Transform {
-        Transform::from_rotation_matrix(
-            &[[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]],
-            POSITION_M,
-        )
+        t_camera_lidar()
     }
 
     /// One scan at frame `index`: x forward, y left, z up in metres, and reflectance 0 to 1; beam
     /// by beam from the top, each from behind over the right side, the front and the left side.
     pub fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
-        let around = self.surroundings(index);
-        let scene = &around.scene;
+        Scanner { scene: &self.surroundings(index).scene, painter: self.painter() }.scan()
+    }
+}
+
+/// A scanner in a scene.
+pub struct Scanner<'a> {
+    /// Everything around it.
+    pub scene: &'a Scene,
+    /// Painter, for reflectances.
+    pub painter: &'a Painter,
+}
+
+impl Scanner<'_> {
+    /// One revolution, as [`Street::lidar`] gives it.
+    pub fn scan(&self) -> Vec<[f32; 4]> {
+        let scene = self.scene;
         // Faces in the sensor's frame, those beyond its range left out.
         let faces: Vec<Face> = (0..scene.objects.len())
             .into_par_iter()
-            .flat_map_iter(|number| self.faces(scene, number))
+            .flat_map_iter(|number| self.faces(number))
             .collect();
         // Sectors are independent; joined in order, they do not depend on the number of threads.
         let sectors: Vec<Vec<(f64, u32)>> =
@@ -65,7 +85,6 @@ impl Street {
                 // Echoes too near or too far are not reported.
                 if nearness > 1.0 / RANGE_M.1 && nearness < 1.0 / RANGE_M.0 {
                     points.push(self.echo(
-                        scene,
                         &faces[face as usize],
                         Shot { beam, direction },
                         1.0 / nearness,
@@ -76,9 +95,9 @@ impl Street {
         points
     }
 
-    fn faces(&self, scene: &Scene, number: usize) -> Vec<Face> {
-        let object = &scene.objects[number];
-        let mesh = object.mesh(self.bodies());
+    fn faces(&self, number: usize) -> Vec<Face> {
+        let object = &self.scene.objects[number];
+        let mesh = &*object.mesh;
         let to_sensor = |point: Point| {
             let camera = object.to_camera.point(point) - Vector3::from(POSITION_M);
             Point::new(camera.z, -camera.x, -camera.y)
@@ -112,10 +131,10 @@ impl Street {
         mesh.triangles.iter().enumerate().filter_map(face).collect()
     }
 
-    fn echo(&self, scene: &Scene, face: &Face, shot: Shot, range_m: f64) -> [f32; 4] {
+    fn echo(&self, face: &Face, shot: Shot, range_m: f64) -> [f32; 4] {
         let ray = ray(shot.beam, shot.direction);
-        let object = &scene.objects[face.object as usize];
-        let mesh = object.mesh(self.bodies());
+        let object = &self.scene.objects[face.object as usize];
+        let mesh = &*object.mesh;
         let triangle = &mesh.triangles[face.triangle as usize];
         // The shares of the corners at the echo, for texture and normal.
         let shares = face.planes.map(|plane| (plane.dot(&ray) * range_m) as f32);
@@ -130,7 +149,7 @@ impl Street {
             footprint_m: [spread; 3],
             own_normal: mix(|vertex| vertex.normal),
         };
-        let painted = self.painter().paint(
+        let painted = self.painter.paint(
             &mesh.surfaces[triangle.surface as usize],
             &surface_point,
             object.coat,

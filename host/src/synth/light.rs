@@ -2,22 +2,25 @@
 
 use nalgebra::Vector3;
 
-use super::paint::{Painted, above};
+use super::pattern::{Painted, above};
 use super::surface::Tone;
 use super::texture::Ripmap;
 
 type Direction = Vector3<f32>;
 
-const SUN: Tone = [3.05, 2.76, 2.34];
-const SKY: Tone = [0.40, 0.49, 0.64];
-const BOUNCE: Tone = [0.22, 0.20, 0.17];
+/// Sun, sky and light thrown back by the ground.
+const DAY: [Tone; 3] = [[3.05, 2.76, 2.34], [0.40, 0.49, 0.64], [0.22, 0.20, 0.17]];
+/// Lamps, and light thrown back by ceiling and floor.
+const LAMPS: [Tone; 3] = [[0.62, 0.58, 0.52], [0.66, 0.63, 0.58], [0.50, 0.46, 0.40]];
 const HAZE: Tone = [0.74, 0.80, 0.86];
 const HAZE_M: f32 = 800.0;
 
-/// Sky, clouds and ground mirrored or seen.
+/// Light of a world: where it comes from, and how much.
 pub struct Light {
-    /// Direction to the sun in the street's frame.
+    /// Direction to the sun, or to the lamps, in the world's frame.
     pub to_sun: Direction,
+    /// Light from there, from above, and from below.
+    tones: [Tone; 3],
 }
 
 /// Exposure of a point of a surface to eye, sun and sky.
@@ -35,6 +38,16 @@ pub struct Exposure {
 }
 
 impl Light {
+    /// A day in the open.
+    pub fn day(to_sun: Direction) -> Self {
+        Self { to_sun, tones: DAY }
+    }
+
+    /// A room with lamps.
+    pub fn lamps(to_lamps: Direction) -> Self {
+        Self { to_sun: to_lamps, tones: LAMPS }
+    }
+
     /// Light that leaves a surface towards the eye.
     pub fn shade(&self, painted: &Painted, exposure: &Exposure) -> Tone {
         let &Exposure { normal, to_eye, sunlit, open, thin } = exposure;
@@ -44,10 +57,11 @@ impl Light {
         // Upward faces see the sky, downward ones the road's light.
         let up = 0.5 - 0.5 * normal.y;
         let open = open * painted.open;
+        let [sun, sky, bounce] = &self.tones;
         let mut light = [0.0; 3];
         for (k, out) in light.iter_mut().enumerate() {
-            let around = SKY[k] * (0.25 + 0.75 * up) + BOUNCE[k] * (1.0 - up);
-            *out = painted.tone[k] * (SUN[k] * direct * sunlit + around * open);
+            let around = sky[k] * (0.25 + 0.75 * up) + bounce[k] * (1.0 - up);
+            *out = painted.tone[k] * (sun[k] * direct * sunlit + around * open);
         }
         // Glossy paint mirrors sky, walls and road, and the sun as a spark.
         if painted.gloss > 0.03 {

@@ -30,6 +30,7 @@ mod car_paint;
 #[cfg(test)]
 mod carried_tests;
 mod config;
+mod error;
 mod facade;
 mod filter;
 #[cfg(test)]
@@ -43,36 +44,47 @@ mod layout;
 mod lens;
 mod lidar;
 mod light;
+mod matrix_pose;
 mod mesh;
+mod optics;
 mod paint;
 mod path;
+mod pattern;
 mod random;
 mod raster;
 mod raw;
 #[cfg(test)]
 mod raw_tests;
 mod render;
+mod room;
+mod room_paint;
 mod scene;
 mod segment;
 mod sensor;
 mod settings;
 mod shadow;
 mod street;
+mod street_scene;
+mod studio;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod texture;
 mod traffic;
 mod window_paint;
+mod world;
 mod writer;
 
 pub use camera::CAMERA_HEIGHT_M;
 pub use config::{CarKind, Lane, MovingTraffic, ScriptedCar, SpeedProfile, StreetConfig, Traffic};
+pub use error::SynthError;
 pub use flown::{FlownView, StreetPose};
 pub use frame::{ObjectTruth, SynthFrame};
 pub use inertial::t_camera_unit;
 pub use inertial_unit::{StreetUnit, UnitFault};
 pub use lens::{RigError, StreetLens};
 pub use path::SEGMENT_M;
-pub use street::{Street, SynthError};
+pub use room::{Room, RoomConfig, RoomKind, RoomPath};
+pub use street::Street;
+pub use world::World;
 pub use writer::write_kitti;

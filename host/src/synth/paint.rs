@@ -4,94 +4,19 @@
 use super::car::{Shape, shape};
 use super::config::CarKind;
 use super::layout;
+use super::pattern::{
+    Painted, SurfacePoint, above, blend, shifted, stripes, survives, times, within,
+};
 use super::random::{cell, unit};
 use super::surface::{Kind, Surface, Tone};
 use super::texture::{Textures, floor};
-use super::{car_paint, window_paint};
-
-/// A point on a surface and the size of a pixel there.
-pub struct SurfacePoint {
-    /// Surface coordinates, m.
-    pub surface_m: [f32; 3],
-    /// Extent of a pixel along each of them, lens included, m: twice the kernel's deviation.
-    pub footprint_m: [f32; 3],
-    /// Normal in the object's own frame.
-    pub own_normal: [f32; 3],
-}
-
-/// Colour and brightness of a painted point.
-#[derive(Clone, Copy)]
-pub struct Painted {
-    /// Linear reflectance.
-    pub tone: Tone,
-    /// Share of light mirrored at grazing view.
-    pub gloss: f32,
-    /// Share of the sky the surface's own relief leaves open.
-    pub open: f32,
-}
-
-impl Painted {
-    /// A dull surface.
-    pub fn dull(tone: Tone) -> Self {
-        Self { tone, gloss: 0.0, open: 1.0 }
-    }
-}
+use super::{car_paint, room_paint, window_paint};
 
 /// Everything painting needs besides the position.
 pub struct Painter {
     /// Noise.
     pub textures: Textures,
     shapes: [Shape; 5],
-}
-
-/// Width of the kernel over a footprint: a parabola so wide has a deviation of half of it.
-const KERNEL_PX: f32 = 2.236;
-
-/// Share of a pixel's light from above an edge.
-#[inline]
-pub fn above(edge: f32, x: f32, footprint: f32) -> f32 {
-    let at = ((x - edge) / (KERNEL_PX * footprint + 1e-4) + 0.5).clamp(0.0, 1.0);
-    at * at * (3.0 - 2.0 * at)
-}
-
-/// Share of a pixel's light from between two edges.
-#[inline]
-pub fn within(from: f32, to: f32, x: f32, footprint: f32) -> f32 {
-    (above(from, x, footprint) - above(to, x, footprint)).max(0.0)
-}
-
-/// Share of a pixel's light from the stripes 0..width of every period.
-#[inline]
-pub fn stripes(x: f32, period: f32, width: f32, footprint: f32) -> f32 {
-    let half = 0.5 * (footprint + 1e-4);
-    let per = 1.0 / period;
-    let sum = |x: f32| {
-        let count = x * per;
-        let periods = floor(count) as f32;
-        periods * width + ((count - periods) * period).min(width)
-    };
-    // Three boxes as wide as the footprint, half of it apart, have the kernel's deviation.
-    let (near, far) = (sum(x + half) - sum(x - half), sum(x + 2.0 * half) - sum(x - 2.0 * half));
-    (near + far) / (6.0 * half)
-}
-
-/// One tone blended towards another.
-#[inline]
-pub fn blend(a: Tone, b: Tone, share: f32) -> Tone {
-    [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share, a[2] + (b[2] - a[2]) * share]
-}
-
-/// A tone under a factor, never below nothing.
-#[inline]
-pub fn times(tone: Tone, factor: f32) -> Tone {
-    let factor = factor.max(0.02);
-    [tone[0] * factor, tone[1] * factor, tone[2] * factor]
-}
-
-/// Returns the share of a detail's contrast that survives a footprint.
-#[inline]
-pub fn survives(size: f32, footprint: f32) -> f32 {
-    (1.5 - footprint / size).clamp(0.0, 1.0)
 }
 
 impl Painter {
@@ -127,6 +52,9 @@ impl Painter {
                 coat,
             ),
             Kind::Wheel => car_paint::wheel(surface, surface_point),
+            Kind::Indoor(indoor) => {
+                room_paint::paint(&self.textures, indoor, surface, surface_point)
+            }
         }
     }
 
@@ -350,13 +278,6 @@ impl Painter {
         tone[0] *= 1.0 + 0.12 * leaf;
         Painted { tone, gloss: 0.02, open: 1.0 }
     }
-}
-
-fn shifted(seed: u32, surface_point: &SurfacePoint, tile_m: f32) -> (f32, f32) {
-    (
-        surface_point.surface_m[0] + unit(seed.wrapping_mul(0x9E37_79B1)) * tile_m,
-        surface_point.surface_m[1] + unit(seed.wrapping_mul(0x85EB_CA77)) * tile_m,
-    )
 }
 
 /// Running bond of stones, m.

@@ -1,7 +1,7 @@
 //! Images through a lens, or of a rig that is off: sampled from a rendering of the ideal pinhole
 //! that is twice as fine and as large as the image needs.
 //!
-//! The two ideal pinholes of [`super::camera::rig`] stay what depth, masks and poses are of:
+//! The two ideal pinholes of [`Optics::rig`] stay what depth, masks and poses are of:
 //! rectifying the raw images by the calibration gives their images. Each raw camera is rotated
 //! against its pinhole by a fixed small angle, so that rectification has to rotate.
 //!
@@ -12,12 +12,11 @@ use dynvox_core::rectify::{Lens, RawCamera, Rectification, TurnedCamera};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::config::StreetConfig;
+use super::error::SynthError;
 use super::lens::RigError;
+use super::optics::Optics;
 use super::raster::Pinhole;
-use super::render::Picture;
 use super::sensor::Sensor;
-use super::street::SynthError;
 use crate::formats::calibration::{Placement, StereoCalibration};
 
 /// Rotations of the raw cameras against the ideal ones, rad: pitch, yaw, roll.
@@ -37,14 +36,12 @@ const RIM_PX: f64 = 2.0;
 /// Points along a side by which the size of raw images is found.
 const SIDE_POINTS: u32 = 64;
 
-/// The calibration of a street's raw cameras; `None` where images come rectified.
-pub fn calibration(
-    config: &StreetConfig,
-    rig: &StereoRig,
-) -> Result<Option<StereoCalibration>, SynthError> {
-    let Some(model) = config.lens.model() else { return Ok(None) };
+/// The calibration of a world's raw cameras; `None` where images come rectified.
+pub fn calibration(optics: &Optics) -> Result<Option<StereoCalibration>, SynthError> {
+    let Some(model) = optics.lens.model() else { return Ok(None) };
+    let (rig, section) = (&optics.rig, optics.section);
     let refused =
-        |reason: String| SynthError::Config(format!("street.lens cannot be used: {reason}"));
+        |reason: String| SynthError::Config(format!("{section}.lens cannot be used: {reason}"));
     let lens = |focal_px: f64, center_px: [f64; 2]| {
         Lens::new([focal_px, ASPECT * focal_px], center_px, model)
             .map_err(|problem| refused(problem.to_string()))
@@ -55,13 +52,12 @@ pub fn calibration(
     let focal_px = rig.focal_px * rig.focal_px / middle_focal_px(&plain);
     let plain = lens(focal_px, [0.0; 2])?;
     let rotations = ROTATIONS_RAD.map(rotation);
-    let extents = rotations.map(|r| extent(&plain, &r, config, rig));
+    let extents = rotations.map(|r| extent(&plain, &r, optics));
     let [Some(left), Some(right)] = extents else {
-        return Err(refused(
+        return Err(refused(format!(
             "it does not show all of the ideal image. Choose other parameters, or a \
-                            longer street.focal_px"
-                .to_owned(),
-        ));
+                     longer {section}.focal_px"
+        )));
     };
     // One size for both cameras: the larger extent, with a rim.
     let side = |axis: usize| {
@@ -87,9 +83,9 @@ pub fn calibration(
             r_rectified_left,
             r_rectified_right,
             rig: *rig,
-            size: [config.width, config.height],
+            size: optics.size,
         },
-        format: "the street",
+        format: "the synthetic world",
     }))
 }
 
@@ -111,20 +107,16 @@ fn rotation(rotation_rad: [f64; 3]) -> Matrix3<f64> {
 
 /// Raw pixels that the ideal image's border shows: smallest and largest; `None` where the lens does
 /// not show all of it.
-fn extent(
-    lens: &Lens,
-    r_rectified_raw: &Matrix3<f64>,
-    config: &StreetConfig,
-    rig: &StereoRig,
-) -> Option<[[f64; 2]; 2]> {
-    let last = [f64::from(config.width) - 1.0, f64::from(config.height) - 1.0];
+fn extent(lens: &Lens, r_rectified_raw: &Matrix3<f64>, optics: &Optics) -> Option<[[f64; 2]; 2]> {
+    let last = optics.size.map(|side| f64::from(side) - 1.0);
     let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
     // The border bounds the image: lenses are monotonic.
     for step in 0..=SIDE_POINTS {
         let share = f64::from(step) / f64::from(SIDE_POINTS);
         let [u, v] = [last[0] * share, last[1] * share];
         for [u, v] in [[u, 0.0], [u, last[1]], [0.0, v], [last[0], v]] {
-            let pixel = lens.project((r_rectified_raw.transpose() * ray(rig, [u, v])).into())?;
+            let pixel =
+                lens.project((r_rectified_raw.transpose() * ray(&optics.rig, [u, v])).into())?;
             for axis in 0..2 {
                 low[axis] = low[axis].min(pixel[axis]);
                 high[axis] = high[axis].max(pixel[axis]);
@@ -144,18 +136,14 @@ pub struct CameraView {
     samples_px: Vec<[[f32; 2]; 4]>,
 }
 
-/// Both views of a street that is not taken by an ideal rig; `None` where it is.
-pub fn views(
-    config: &StreetConfig,
-    rig: &StereoRig,
-    calibration: Option<&StereoCalibration>,
-) -> Option<[CameraView; 2]> {
-    if calibration.is_none() && config.rig_error.is_none() {
+/// Both views of a world that is not taken by an ideal rig; `None` where it is.
+pub fn views(optics: &Optics, calibration: Option<&StereoCalibration>) -> Option<[CameraView; 2]> {
+    if calibration.is_none() && optics.rig_error.is_none() {
         return None;
     }
     // Both cameras as the rectification turns them.
     let rectification = calibration.and_then(rectification);
-    let ideal = [config.width, config.height];
+    let (rig, ideal) = (&optics.rig, optics.size);
     let left = CameraView::new(
         rig,
         ideal,
@@ -168,7 +156,7 @@ pub fn views(
             rig,
             ideal,
             rectification.as_ref().map(|both| &both.right),
-            &config.rig_error,
+            &optics.rig_error,
         ),
     ])
 }
@@ -239,7 +227,7 @@ impl CameraView {
     }
 
     /// The image as the sensor reads it.
-    pub fn image(&self, rendering: &Picture, sensor: &Sensor) -> Vec<[u8; 3]> {
+    pub fn image(&self, rendering: &[[u8; 3]], sensor: &Sensor) -> Vec<[u8; 3]> {
         let read = |(pixel, samples): (usize, &[[f32; 2]; 4])| {
             let mut levels = [0.0; 3];
             for &sample in samples {
@@ -252,7 +240,7 @@ impl CameraView {
     }
 }
 
-fn bilinear(picture: &Picture, width: usize, [u, v]: [f32; 2]) -> Option<[f32; 3]> {
+fn bilinear(picture: &[[u8; 3]], width: usize, [u, v]: [f32; 2]) -> Option<[f32; 3]> {
     // False for NaN as well.
     if !(u >= 0.0 && v >= 0.0) {
         return None;
@@ -260,7 +248,7 @@ fn bilinear(picture: &Picture, width: usize, [u, v]: [f32; 2]) -> Option<[f32; 3
     let (column, row) = (u as usize, v as usize);
     let (right, down) = (u - column as f32, v - row as f32);
     let at = row * width + column;
-    let [a, b, c, d] = [at, at + 1, at + width, at + width + 1].map(|at| picture.rgb.get(at));
+    let [a, b, c, d] = [at, at + 1, at + width, at + width + 1].map(|at| picture.get(at));
     let (a, b, c, d) = (a?, b?, c?, d?);
     let mix = |channel: usize| {
         let [a, b, c, d] = [a, b, c, d].map(|pixel| f32::from(pixel[channel]));

@@ -176,7 +176,7 @@ fn both_written_calibrations_tell_of_the_same_cameras() {
             |name: &str| StereoCalibration::read(&[&folder.join("sequences/00").join(name)], None);
         let own = read("calibration.toml").unwrap();
         assert_eq!(
-            StereoCalibration { format: "the street", ..own },
+            StereoCalibration { format: "the synthetic world", ..own },
             *street.calibration().unwrap()
         );
         let Ok(kalibr) = read("camchain.yaml") else {

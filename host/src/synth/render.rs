@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::filter::{Covers, Groups, Kernel, MARGIN_PX, SPREAD};
 use super::light::{Exposure, Light, develop};
 use super::mesh::{Mesh, Point, Triangle, Vertex};
-use super::paint::{Painter, SurfacePoint};
+use super::paint::Painter;
+use super::pattern::SurfacePoint;
 use super::raster::{Band, Pinhole, SKY, Setup};
 use super::scene::{Scene, SceneObject};
 use super::sensor::Sensor;
@@ -29,25 +30,45 @@ pub struct Renderer<'a> {
     pub painter: &'a Painter,
     /// Sun and sky.
     pub light: &'a Light,
-    /// Car bodies.
-    pub bodies: &'a [Mesh; 5],
     /// Camera.
     pub pinhole: Pinhole,
 }
 
 /// One camera's picture.
 pub struct Picture {
-    /// Colour, row by row.
-    pub rgb: Vec<[u8; 3]>,
+    /// Light let in, row by row.
+    pub light: Vec<Tone>,
     /// Depth of the centre's ray, m; 0 for the sky.
     pub depth_m: Vec<f32>,
     /// Instance at the centre, 0 for none.
     pub instances: Vec<u8>,
 }
 
+impl Picture {
+    /// Adds the light of another picture of the same size.
+    pub fn add(&mut self, other: &Self) {
+        for (sum, part) in self.light.iter_mut().zip(&other.light) {
+            *sum = [0, 1, 2].map(|channel| sum[channel] + part[channel]);
+        }
+    }
+
+    /// Lets a share of the light in.
+    pub fn scale(&mut self, share: f32) {
+        if share != 1.0 {
+            self.light.iter_mut().for_each(|light| *light = light.map(|value| value * share));
+        }
+    }
+
+    /// The picture as a sensor reads it: light to grey levels.
+    pub fn develop(&self, sensor: &Sensor) -> Vec<[u8; 3]> {
+        let read = |(pixel, light): (usize, &Tone)| sensor.read(pixel, light.map(develop));
+        self.light.par_iter().enumerate().map(read).collect()
+    }
+}
+
 impl Renderer<'_> {
     /// Draws the scene `offset_m` to the right of the left camera, with so much light let in.
-    pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32, sensor: &Sensor) -> Picture {
+    pub fn picture(&self, scene: &Scene, offset_m: f64, gain: f32) -> Picture {
         let (width, height) = (self.pinhole.width, self.pinhole.height);
         // The kernel reaches beyond the border: all below draws a picture with a margin.
         let margin = MARGIN_PX as f64;
@@ -67,15 +88,8 @@ impl Renderer<'_> {
             .collect();
         let setups: Vec<Setup> = parts.into_iter().flatten().collect();
         let kernel = Kernel::new();
-        let shading = Shading {
-            renderer: &wider,
-            scene,
-            setups: &setups,
-            kernel: &kernel,
-            offset_m,
-            gain,
-            sensor,
-        };
+        let shading =
+            Shading { renderer: &wider, scene, setups: &setups, kernel: &kernel, offset_m, gain };
         let lists = lists(&setups, height);
         let bands: Vec<Picture> = lists
             .par_iter()
@@ -91,9 +105,9 @@ impl Renderer<'_> {
             })
             .collect();
         // Bands come back in order.
-        let mut picture = Picture { rgb: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
+        let mut picture = Picture { light: Vec::new(), depth_m: Vec::new(), instances: Vec::new() };
         for part in bands {
-            picture.rgb.extend(part.rgb);
+            picture.light.extend(part.light);
             picture.depth_m.extend(part.depth_m);
             picture.instances.extend(part.instances);
         }
@@ -101,7 +115,7 @@ impl Renderer<'_> {
     }
 
     fn set_up(&self, object: &SceneObject, number: u32, offset_m: f64) -> Vec<Setup> {
-        let mesh = object.mesh(self.bodies);
+        let mesh = &*object.mesh;
         let shift = Point::new(offset_m, 0.0, 0.0);
         let middle = object.to_camera.point(mesh.middle_m) - shift;
         if self.out_of_sight(middle, mesh.radius_m) {
@@ -196,7 +210,6 @@ struct Shading<'a> {
     kernel: &'a Kernel,
     offset_m: f64,
     gain: f32,
-    sensor: &'a Sensor,
 }
 
 impl Shading<'_> {
@@ -210,7 +223,7 @@ impl Shading<'_> {
         let (rows, width) = (band.rows - 2 * MARGIN_PX, wide - 2 * MARGIN_PX);
         let count = rows * width;
         let mut picture = Picture {
-            rgb: Vec::with_capacity(count),
+            light: Vec::with_capacity(count),
             depth_m: Vec::with_capacity(count),
             instances: Vec::with_capacity(count),
         };
@@ -218,7 +231,6 @@ impl Shading<'_> {
         for row in MARGIN_PX..rows + MARGIN_PX {
             let centres = band.row(0, row);
             let v = (band.first_row + row) as f64;
-            let first = (band.first_row + row - MARGIN_PX) * width;
             for (column, &centre) in
                 centres.iter().enumerate().take(width + MARGIN_PX).skip(MARGIN_PX)
             {
@@ -228,9 +240,7 @@ impl Shading<'_> {
                 } else {
                     (self.edge(u, v, &groups.covers(row, column)), self.depth_m(u, v, centre))
                 };
-                // The exposure: light to grey levels.
-                let levels = light.map(|value| develop(value * self.gain));
-                picture.rgb.push(self.sensor.read(first + column - MARGIN_PX, levels));
+                picture.light.push(light.map(|value| value * self.gain));
                 picture.depth_m.push(depth_m);
                 picture.instances.push(if centre == SKY {
                     0
@@ -296,7 +306,7 @@ impl Shading<'_> {
         }
         let setup = &self.setups[seen as usize];
         let object = &self.scene.objects[setup.object as usize];
-        let mesh = object.mesh(self.renderer.bodies);
+        let mesh = &*object.mesh;
         let triangle = &mesh.triangles[setup.triangle as usize];
         let surface = &mesh.surfaces[triangle.surface as usize];
         let corners = triangle.corners.map(|corner| &mesh.vertices[corner as usize]);
@@ -318,7 +328,7 @@ impl Shading<'_> {
         let open = self.openness(surface.kind, position);
         // A face turned away from the sun needs no look-up.
         let sunlit = if thin || normal.dot(&self.renderer.light.to_sun) > 0.0 {
-            self.scene.shadow.light(position, normal)
+            self.scene.sunlight.as_ref().map_or(1.0, |sun| sun.shadow.light(position, normal))
         } else {
             0.0
         };
@@ -331,7 +341,10 @@ impl Shading<'_> {
     /// Share of the sky a point sees: little under cars, less at the foot of what stands.
     fn openness(&self, kind: Kind, position: Vector3<f32>) -> f32 {
         let height = -position.y;
-        let ground = if height < 0.5 { self.scene.ground.open(position) } else { 1.0 };
+        let ground = match &self.scene.sunlight {
+            Some(sun) if height < 0.5 => sun.ground.open(position),
+            _ => 1.0,
+        };
         match kind {
             Kind::Road | Kind::Pavement | Kind::Kerb | Kind::Yard => ground,
             Kind::Car | Kind::Wheel => (0.35 + 0.8 * height).min(1.0),

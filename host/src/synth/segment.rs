@@ -1,15 +1,17 @@
 //! One segment of street, generated from the seed and its number: ground, houses, furniture, parked
 //! cars.
 
+use std::sync::Arc;
+
 use dynvox_core::geometry::Transform;
 use nalgebra::Vector3;
 
 use super::config::{CarKind, StreetConfig};
 use super::furniture;
+use super::matrix_pose::MatrixPose;
 use super::mesh::{Mesh, Point};
 use super::path::{Centerline, SEGMENT_M};
 use super::random::Rng;
-use super::scene::MatrixPose;
 use super::shadow::{ShadowTile, SunAxes};
 use super::surface::{Kind, Surface, Tone, tone};
 use super::{facade, layout};
@@ -17,7 +19,7 @@ use super::{facade, layout};
 /// Part of the street that is generated together and kept while the camera is near.
 pub struct Segment {
     /// Static meshes, in the street's frame moved to the segment's start.
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// The segment's start: x right of, z along the street there.
     pub t_street_segment: Transform,
     /// Parked cars.
@@ -87,7 +89,7 @@ pub fn segment(
     // The ground, first of the meshes, shades nothing.
     let shadow = ShadowTile::new(sun, meshes.iter().skip(1).map(|mesh| (mesh, pose)));
     Segment {
-        meshes,
+        meshes: meshes.into_iter().map(Arc::new).collect(),
         t_street_segment: builder.t_street_segment,
         parked: builder.parked(),
         shadow,

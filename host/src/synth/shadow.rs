@@ -4,8 +4,8 @@
 
 use nalgebra::Vector3;
 
+use super::matrix_pose::MatrixPose;
 use super::mesh::{Mesh, Point};
-use super::scene::MatrixPose;
 
 const SIDE: usize = 1024;
 const TEXEL_M: f64 = 0.10;

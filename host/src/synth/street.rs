@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use super::camera;
 use super::car;
 use super::config::{CarKind, StreetConfig};
+use super::error::SynthError;
 use super::frame::{ObjectTruth, SynthFrame};
 use super::layout;
 use super::light::Light;
@@ -17,13 +18,12 @@ use super::mesh::Mesh;
 use super::paint::Painter;
 use super::path::{Centerline, RoadSpan, SEGMENT_M};
 use super::random::Rng;
-use super::raster::Pinhole;
-use super::raw::{self, CameraView};
-use super::render::{Picture, Renderer};
-use super::scene::{Scene, StreetView};
+use super::scene::Scene;
 use super::segment::{Segment, segment};
-use super::sensor::{Sensor, luma};
+use super::sensor::luma;
 use super::shadow::SunAxes;
+use super::street_scene::{StreetView, street_scene};
+use super::studio::{Exposing, Shots, Studio};
 use super::surface::Tone;
 use super::traffic::{self, Road};
 use crate::formats::calibration::StereoCalibration;
@@ -35,38 +35,15 @@ const CACHED_SEGMENTS: usize = 16;
 /// Slower than this a car stands, m/s.
 const STANDS_M_S: f64 = 1e-9;
 
-/// Reason why a street or its files cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum SynthError {
-    /// A figure of the configuration is out of range.
-    #[error("{0}")]
-    Config(String),
-    /// The target folder holds something already.
-    #[error("{0} exists and is not empty. Name another folder, or remove it")]
-    NotEmpty(std::path::PathBuf),
-    /// A file could not be written.
-    #[error("{path} cannot be written: {source}. Check the disk and the permissions")]
-    Write {
-        /// Path of the file.
-        path: std::path::PathBuf,
-        /// Error of the file system.
-        source: std::io::Error,
-    },
-}
-
 /// A synthetic street.
 pub struct Street {
     config: StreetConfig,
     centerline: Centerline,
-    painter: Painter,
-    light: Light,
+    studio: Studio,
     sun: SunAxes,
-    bodies: [Mesh; 5],
+    bodies: [Arc<Mesh>; 5],
     segments: Mutex<VecDeque<(i64, Arc<Segment>)>>,
     t_camera0_street: Transform,
-    calibration: Option<StereoCalibration>,
-    /// Sampling of both images, if the rig is not ideal.
-    views: Option<[CameraView; 2]>,
 }
 
 /// A car near the camera at one frame.
@@ -107,16 +84,12 @@ impl Street {
         let to_sun =
             Vector3::new(flat * libm::sin(side), -libm::sin(height), -flat * libm::cos(side));
         let t_street_camera = camera::t_street_camera(&config, &centerline.span(0, 0), 0.0);
-        let rig = camera::rig(&config);
-        let calibration = raw::calibration(&config, &rig)?;
+        let light = Light::day(to_sun.map(|value| value as f32));
         Ok(Self {
-            views: raw::views(&config, &rig, calibration.as_ref()),
-            calibration,
+            studio: Studio::new(camera::optics(&config), light)?,
             centerline,
-            painter: Painter::new(),
-            light: Light { to_sun: to_sun.map(|value| value as f32) },
             sun: SunAxes::new(to_sun),
-            bodies: CarKind::ALL.map(car::body),
+            bodies: CarKind::ALL.map(|kind| Arc::new(car::body(kind))),
             segments: Mutex::new(VecDeque::new()),
             t_camera0_street: t_street_camera.inverse(),
             config,
@@ -130,18 +103,18 @@ impl Street {
 
     /// The stereo rig.
     pub fn rig(&self) -> StereoRig {
-        camera::rig(&self.config)
+        self.studio.optics.rig
     }
 
     /// The calibration of raw images; `None` where they come rectified.
     pub fn calibration(&self) -> Option<&StereoCalibration> {
-        self.calibration.as_ref()
+        self.studio.calibration()
     }
 
     /// Returns the rectification of raw images to the ideal rig; `None` if images are rendered
     /// rectified.
     pub fn rectification(&self) -> Option<Rectification> {
-        self.calibration.as_ref().and_then(raw::rectification)
+        self.studio.rectification()
     }
 
     /// Time of frame `index` since frame 0, s.
@@ -188,30 +161,16 @@ impl Street {
         around: &Surroundings,
         t_world_camera: Transform,
     ) -> SynthFrame {
-        // The scene is built once and rendered twice.
-        let ideal = camera::pinhole(&self.config);
-        let (left, right) = rayon::join(
-            || self.view(&around.scene, index, 0),
-            || self.view(&around.scene, index, 1),
-        );
-        // What an ideal rig sees holds depth and masks as well; through a lens they are rendered
-        // for themselves.
-        let noiseless = Sensor::new(0, 0, 0, 0.0);
-        let truth = self.views.as_ref().map(|_| self.render(&around.scene, ideal, 0, &noiseless));
-        let Picture { rgb: left_rgb, depth_m, instances } = left;
-        let (depth_m, instances) =
-            truth.map_or((depth_m, instances), |truth| (truth.depth_m, truth.instances));
-        let right_rgb = right.rgb;
+        let scene = core::slice::from_ref(&around.scene);
+        let Shots { image_size, left_rgb, right_rgb, depth_m, instances } =
+            self.studio.shots(scene, Exposing { index, gain: 1.0 });
         let objects = around.cars.iter().map(|car| self.truth(car)).collect();
         SynthFrame {
             index,
             time_s: self.time_s(index),
             width: self.config.width as usize,
             height: self.config.height as usize,
-            image_size: self
-                .views
-                .as_ref()
-                .map_or([ideal.width, ideal.height], |[left, _]| left.size),
+            image_size,
             left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
             right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
             left_rgb,
@@ -221,36 +180,6 @@ impl Street {
             t_world_camera,
             objects,
         }
-    }
-
-    /// One camera's image, 0 left or 1 right; with depth and masks where the rig is ideal.
-    fn view(&self, scene: &Scene, index: u32, camera: u32) -> Picture {
-        let sensor = Sensor::new(self.config.seed, index, camera, self.config.noise_sigma);
-        match self.views.as_ref().and_then(|views| views.get(camera as usize)) {
-            // The ideal rig renders what its camera sees.
-            None => self.render(scene, camera::pinhole(&self.config), camera, &sensor),
-            Some(view) => {
-                let rendering =
-                    // Without noise: the sensor comes after the lens.
-                    self.render(scene, view.pinhole, camera, &Sensor::new(0, 0, 0, 0.0));
-                Picture {
-                    rgb: view.image(&rendering, &sensor),
-                    depth_m: Vec::new(),
-                    instances: Vec::new(),
-                }
-            }
-        }
-    }
-
-    fn render(&self, scene: &Scene, pinhole: Pinhole, camera: u32, sensor: &Sensor) -> Picture {
-        let renderer =
-            Renderer { painter: &self.painter, light: &self.light, bodies: &self.bodies, pinhole };
-        let (offset_m, gain) = if camera == 0 {
-            (0.0, 1.0)
-        } else {
-            (self.config.baseline_m, 1.0 + self.config.gain_difference)
-        };
-        renderer.picture(scene, offset_m, gain as f32, sensor)
     }
 
     fn truth(&self, car: &Present) -> ObjectTruth {
@@ -296,7 +225,7 @@ impl Street {
         let posed_cars: Vec<_> =
             cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
         let view = StreetView { t_street_camera: &t_street_camera, anchor, sun: self.sun };
-        let scene = Scene::new(&self.bodies, &segments, &posed_cars, view);
+        let scene = street_scene(&self.bodies, &segments, &posed_cars, view);
         Surroundings { scene, t_street_camera, cars }
     }
 
@@ -328,14 +257,9 @@ impl Street {
         made
     }
 
-    /// Car bodies, for the LiDAR.
-    pub(super) fn bodies(&self) -> &[Mesh; 5] {
-        &self.bodies
-    }
-
     /// Painter, for the LiDAR.
     pub(super) fn painter(&self) -> &Painter {
-        &self.painter
+        &self.studio.painter
     }
 }
 

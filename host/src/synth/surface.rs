@@ -57,6 +57,29 @@ pub enum Kind {
     Car,
     /// A wheel's side: first coordinate is the distance from the hub as a share of the radius.
     Wheel,
+    /// Paint of rooms, their furniture and people.
+    Indoor(Indoor),
+}
+
+/// Paint of what is found in rooms; people's clothes among it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Indoor {
+    /// A painted wall; the first of `size_m` is its contrast, 1 of rough plaster, 0 of none.
+    Wall,
+    /// Printed paper.
+    Wallpaper,
+    /// Boards of a floor, along the first coordinate.
+    Boards,
+    /// A woven rug.
+    Rug,
+    /// Wood with its grain along the first coordinate.
+    Wood,
+    /// Backs of folders, side by side along the first coordinate.
+    Folders,
+    /// A framed picture; `size_m` is its size.
+    Picture,
+    /// Cloth with a pattern.
+    Cloth,
 }
 
 /// A material.

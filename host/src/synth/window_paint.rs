@@ -1,8 +1,7 @@
 //! Panes, shop fronts, doors and boards.
 
-use super::paint::{
-    Painted, Painter, SurfacePoint, above, blend, stripes, survives, times, within,
-};
+use super::paint::Painter;
+use super::pattern::{Painted, SurfacePoint, above, blend, stripes, survives, times, within};
 use super::random::{cell, unit};
 use super::surface::{Surface, Tone};
 use super::texture::floor;

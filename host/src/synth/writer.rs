@@ -1,4 +1,4 @@
-//! The street as a KITTI odometry folder with all its truth beside it.
+//! A synthetic world as a KITTI odometry folder with all its truth beside it.
 //!
 //! Everything goes into a sibling folder first, which takes the asked-for name when it is complete:
 //! what stands under that name is whole.
@@ -13,8 +13,9 @@ use image::ImageEncoder;
 use image::codecs::png::PngEncoder;
 use rayon::prelude::*;
 
+use super::error::SynthError;
 use super::frame::SynthFrame;
-use super::street::{Street, SynthError};
+use super::world::World;
 use crate::formats::calibration::{to_kalibr, to_toml};
 use crate::owned::{self, DraftFolder, create_folder};
 
@@ -43,7 +44,7 @@ const CALIBRATION_FILE: &str = "calibration.toml";
 /// `folder` exists and is not empty, or a file cannot be written; nothing half-written stays
 /// behind.
 pub fn write_kitti(
-    street: &Street,
+    world: &dyn World,
     folder: &Path,
     mut progress: impl FnMut(u32, u32),
 ) -> Result<(), SynthError> {
@@ -51,7 +52,7 @@ pub fn write_kitti(
         return Err(SynthError::NotEmpty(folder.to_path_buf()));
     }
     let draft = DraftFolder::begin(folder).map_err(at(folder))?;
-    write_all(street, draft.path(), &mut progress)?;
+    write_all(world, draft.path(), &mut progress)?;
     draft.rename(folder).map_err(at(folder))
 }
 
@@ -61,7 +62,7 @@ fn at(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
 }
 
 fn write_all(
-    street: &Street,
+    world: &dyn World,
     folder: &Path,
     progress: &mut impl FnMut(u32, u32),
 ) -> Result<(), SynthError> {
@@ -73,7 +74,7 @@ fn write_all(
         create_folder(&path).map_err(at(&path))?;
     }
     create_folder(&folder.join("poses")).map_err(at(folder))?;
-    let count = street.config().frames;
+    let count = world.frames();
     // Tables are collected and written last: an interrupted run leaves no table that looks
     // complete.
     let (mut times, mut poses) = (String::new(), String::new());
@@ -84,8 +85,8 @@ fn write_all(
     objects.push_str(",width_m,height_m,length_m,moving,speed_m_s\n");
     for index in 0..count {
         // Images and scan of one frame at the same time.
-        let (frame, scan) = rayon::join(|| street.frame(index), || street.lidar(index));
-        write_frame(street, &sequence, &frame, &scan)?;
+        let (frame, scan) = rayon::join(|| world.frame(index), || world.lidar(index));
+        write_frame(world, &sequence, &frame, &scan)?;
         // Writing to a String cannot fail.
         let _ = writeln!(times, "{:.6e}", frame.time_s);
         let _ = writeln!(poses, "{}", row(&frame.t_world_camera, " "));
@@ -104,9 +105,9 @@ fn write_all(
     }
     write(&sequence.join("times.txt"), times.as_bytes())?;
     write(&sequence.join("objects.csv"), objects.as_bytes())?;
-    write(&sequence.join("calib.txt"), calibration(street).as_bytes())?;
+    write(&sequence.join("calib.txt"), calibration(world).as_bytes())?;
     // Raw cameras come with their calibration, in this program's format and in Kalibr's.
-    if let Some(calibration) = street.calibration() {
+    if let Some(calibration) = world.calibration() {
         write(&sequence.join(CALIBRATION_FILE), to_toml(calibration).as_bytes())?;
         if let Some(text) = to_kalibr(calibration) {
             write(&sequence.join("camchain.yaml"), text.as_bytes())?;
@@ -126,8 +127,8 @@ fn row(motion: &Transform, separator: &str) -> String {
     texts.join(separator)
 }
 
-fn calibration(street: &Street) -> String {
-    let rig = street.rig();
+fn calibration(world: &dyn World) -> String {
+    let rig = world.rig();
     let mut text = String::new();
     for (name, shift) in [("P0", 0.0), ("P1", 1.0), ("P2", 0.0), ("P3", 1.0)] {
         let (f, u, v) = (rig.focal_px, rig.center_u_px, rig.center_v_px);
@@ -136,17 +137,17 @@ fn calibration(street: &Street) -> String {
             .map(|value| format!("{value:.12e}"));
         let _ = writeln!(text, "{name}: {}", values.join(" "));
     }
-    let _ = writeln!(text, "Tr: {}", row(&street.t_camera_lidar(), " "));
+    let _ = writeln!(text, "Tr: {}", row(&world.t_camera_lidar(), " "));
     text
 }
 
 fn write_frame(
-    street: &Street,
+    world: &dyn World,
     sequence: &Path,
     frame: &SynthFrame,
     scan: &[[f32; 4]],
 ) -> Result<(), SynthError> {
-    let focal_baseline = street.rig().focal_baseline_px_m() as f32;
+    let focal_baseline = world.rig().focal_baseline_px_m() as f32;
     // KITTI's convention: 256ths, 0 for nothing, so that 256 m and more do not fit.
     let fixed = |value: f32| {
         if value > 0.0 && value * 256.0 < 65_535.0 { (value * 256.0 + 0.5) as u16 } else { 0 }

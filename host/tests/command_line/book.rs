@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 21] = [
+const PAGES: [&str; 22] = [
     "README.md",
     "docs/bits.md",
     "docs/fleet.md",
@@ -26,6 +26,7 @@ const PAGES: [&str; 21] = [
     "docs/run_folder.md",
     "docs/rust.md",
     "docs/scale.md",
+    "docs/synthetic_worlds.md",
     "docs/work.md",
 ];
 

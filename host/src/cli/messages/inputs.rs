@@ -53,7 +53,7 @@ pub(super) fn all() -> Vec<(&'static str, Vec<String>)> {
             ),
         ),
         (
-            "The synthetic street cannot be written",
+            "A synthetic world cannot be written",
             sentences!(SynthError; hands_on [];
                 SynthError::Config(_) => SynthError::Config(
                     text("street.rate_hz must be a positive number")

@@ -1,4 +1,4 @@
-//! The synthetic street as a source of frames.
+//! The synthetic worlds as sources of frames: the street, a room, a yard.
 
 use crate::formats::calibration::UnitNoise;
 use crate::formats::{Image, TimedReading};
@@ -6,39 +6,44 @@ use crate::input::source::{
     AvailableMasks, ExactFrame, FrameInfo, FrameMasks, FrameSource, InertialUnitData, InputError,
     LidarScan, ObjectsTruth, SourceInfo, StereoImages, StreamState, TrueObject,
 };
-use crate::synth::{Street, StreetConfig, StreetUnit, SynthFrame, t_camera_unit};
+use crate::synth::{Street, StreetConfig, StreetUnit, SynthFrame, World, t_camera_unit};
 use dynvox_core::masks::PixelBox;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Frames of a street.
+/// Frames of a street, or of another synthetic world.
 pub struct StreetFrames {
-    street: Street,
+    world: Box<dyn World>,
     info: SourceInfo,
 }
 
 impl StreetFrames {
     /// The street of a configuration, `frames` of it.
     pub fn new(config: StreetConfig) -> Result<Self, InputError> {
-        let frames = config.frames;
         let street = Street::new(config)
             .map_err(|error| InputError::Street { reason: error.to_string() })?;
-        let size = (street.config().width as usize, street.config().height as usize);
+        Ok(Self::from_world(Box::new(street)))
+    }
+
+    /// The frames of a world.
+    pub fn from_world(world: Box<dyn World>) -> Self {
+        let (frames, [width, height]) = (world.frames(), world.size());
+        let size = (width, height);
         let info = SourceInfo {
-            name: "street".to_owned(),
+            name: world.name().to_owned(),
             frames: frames as usize,
             size,
             full_size: size,
-            rig: street.rig(),
-            rectification: street.rectification(),
+            rig: world.rig(),
+            rectification: world.rectification(),
             masks: AvailableMasks::Exact,
-            truth: Some((0..frames).map(|index| street.t_world_camera(index)).collect()),
+            truth: Some((0..frames).map(|index| world.t_world_camera(index)).collect()),
             own_unit: None,
-            inertial: unit(&street).map(Arc::new),
+            inertial: unit(world.as_ref()).map(Arc::new),
             notes: Vec::new(),
             ignored: None,
         };
-        Ok(Self { street, info })
+        Self { world, info }
     }
 }
 
@@ -48,7 +53,7 @@ impl FrameSource for StreetFrames {
     }
 
     fn frame_info(&self, index: usize) -> FrameInfo {
-        let time_s = self.street.time_s(index as u32);
+        let time_s = self.world.time_s(index as u32);
         FrameInfo { stem: None, stamp_ns: Some((time_s * 1e9).round() as u64), time_s }
     }
     fn stream(&self) -> Option<StreamState> {
@@ -56,7 +61,7 @@ impl FrameSource for StreetFrames {
     }
 
     fn frame(&self, index: usize) -> Result<StereoImages, InputError> {
-        let frame = self.street.frame(index as u32);
+        let frame = self.world.frame(index as u32);
         let ((width, height), [image_width, image_height]) =
             ((frame.width, frame.height), frame.image_size);
         let failed = || InputError::Street { reason: format!("frame {index} has no pixels") };
@@ -87,22 +92,22 @@ impl FrameSource for StreetFrames {
     }
 
     fn lidar(&self, index: usize) -> Result<Option<LidarScan>, InputError> {
-        let t_camera_lidar = self.street.t_camera_lidar();
+        let t_camera_lidar = self.world.t_camera_lidar();
         let point =
             |&[x, y, z, _]: &[f32; 4]| t_camera_lidar.transform_point([x, y, z].map(f64::from));
-        let points_m = self.street.lidar(index as u32).iter().map(point).collect();
-        Ok((index < self.info.frames).then(|| LidarScan::of_rig(points_m, &self.street.rig())))
+        let points_m = self.world.lidar(index as u32).iter().map(point).collect();
+        Ok((index < self.info.frames).then(|| LidarScan::of_rig(points_m, &self.world.rig())))
     }
 }
 
-/// The inertial unit of a street that has one.
-fn unit(street: &Street) -> Option<InertialUnitData> {
-    let readings = street.inertial();
-    let StreetUnit { rate_hz, turn_noise, force_noise, gap_s, .. } = street.config().inertial?;
-    let last_ns = (street.time_s(street.config().frames.saturating_sub(1)) * 1e9).round() as i64;
+/// The inertial unit of a world that has one.
+fn unit(world: &dyn World) -> Option<InertialUnitData> {
+    let readings = world.inertial();
+    let StreetUnit { rate_hz, turn_noise, force_noise, gap_s, .. } = world.unit()?;
+    let last_ns = (world.time_s(world.frames().saturating_sub(1)) * 1e9).round() as i64;
     let within = |reading: &&TimedReading| (0..=last_ns).contains(&reading.time_ns);
     (!readings.is_empty()).then(|| InertialUnitData {
-        path: PathBuf::from("street"),
+        path: PathBuf::from(world.name()),
         within_frames: readings.iter().filter(within).count(),
         samples: InertialUnitData::samples_of(&readings),
         readings,
@@ -118,7 +123,7 @@ fn unit(street: &Street) -> Option<InertialUnitData> {
     })
 }
 
-/// The truth of a frame: the cars with a pixel in the left image.
+/// The truth of a frame: the objects with a pixel in the left image.
 fn objects_truth(frame: &SynthFrame) -> ObjectsTruth {
     let mut boxes = vec![None::<[i32; 4]>; frame.objects.len()];
     for (pixel, &instance) in

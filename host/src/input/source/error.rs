@@ -221,10 +221,10 @@ pub enum InputError {
         /// Frames in all.
         frames: usize,
     },
-    /// The synthetic street refuses its configuration.
+    /// A synthetic world refuses its configuration.
     #[error(
-        "the synthetic street cannot be built: {reason}. Change its keys with --set \
-         street.<key>=<value>"
+        "the synthetic world cannot be built: {reason}. Change its keys with --set \
+         <key>=<value>"
     )]
     Street {
         /// Reason, as it completes the message's sentence.
