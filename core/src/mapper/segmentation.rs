@@ -5,11 +5,14 @@ use crate::{
     geometry::GroundPlane,
     segmentation::{MotionSegmenter, SegmentationInput, SegmentationReport},
     tracking::{Assigned, CameraMotion},
+    volume::Volume,
 };
 
 /// The parts of a mapper that segment a frame by motion.
 pub(super) struct Segmentation<'m, 's> {
     pub segmenter: &'m mut MotionSegmenter<'s>,
+    /// The static map of the frames before.
+    pub map: &'m Volume<'s>,
     /// True if the planner needs the ground of this frame.
     pub plans: bool,
 }
@@ -23,7 +26,7 @@ impl Segmentation<'_, '_> {
         camera: &CameraMotion,
         assigned: &mut Assigned<'_, '_, '_>,
     ) -> (Option<GroundPlane>, SegmentationReport) {
-        let Self { segmenter, plans } = self;
+        let Self { segmenter, map, plans } = self;
         let (config, disparity_q8) = (seen.config, seen.disparity_q8);
         let (rig, motion) = (config.scaled_rig(), &config.tracking.motion);
         // Without the camera's motion nothing can be said to move on its own.
@@ -39,6 +42,7 @@ impl Segmentation<'_, '_> {
             camera,
             disparity_q8,
             ground,
+            map: Some(map),
             search: seen.search(),
             bias_px: [motion.bias_px, motion.lens_px].map(f64::from),
         };

@@ -183,7 +183,7 @@ impl Mapper<'_> {
         let (rig, camera) = (seen.config.scaled_rig(), located.camera);
         let fused = located.found.origin != PoseOrigin::Extrapolated && seen.is_due();
         let plans = fused && planning.seeks_ground();
-        let segmentation = Segmentation { segmenter, plans };
+        let segmentation = Segmentation { segmenter, map: &static_map.volume, plans };
         let (ground, segmentation) =
             executor.stage(Stage::Segmentation, || segmentation.run(&seen, &camera, &mut assigned));
         let estimator = &mut localization.estimator;

@@ -2,7 +2,7 @@
 
 mod growth;
 
-use super::extent::Extent;
+use super::{extent::Extent, known::KnownSurfaces};
 use crate::{
     geometry::{GroundPlane, StereoRig, scalar::max_f64},
     image::{DISPARITY_ONE_PX, View},
@@ -48,6 +48,7 @@ pub(super) struct Lattice<'a> {
     rig: &'a StereoRig,
     disparity_q8: View<'a, u16>,
     ground: Option<GroundPlane>,
+    known: Option<KnownSurfaces<'a>>,
     columns: usize,
     rows: usize,
 }
@@ -60,7 +61,12 @@ impl<'a> Lattice<'a> {
     ) -> Self {
         let (columns, rows) =
             (disparity_q8.width().div_ceil(CELL_PX), disparity_q8.height().div_ceil(CELL_PX));
-        Self { rig, disparity_q8, ground, columns, rows }
+        Self { rig, disparity_q8, ground, known: None, columns, rows }
+    }
+
+    /// The lattice with surfaces that belong to no object: those of the map.
+    pub fn with_known(self, known: Option<KnownSurfaces<'a>>) -> Self {
+        Self { known, ..self }
     }
 
     /// The ground under the image, if it shows any.
@@ -71,6 +77,11 @@ impl<'a> Lattice<'a> {
     /// Returns true if a point of the camera's frame is clear of the ground.
     fn is_above_ground(&self, point: [f64; 3]) -> bool {
         self.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
+    }
+
+    /// Returns true if a point of the camera's frame lies on a surface that stood there before.
+    fn is_known(&self, point: [f64; 3]) -> bool {
+        self.known.is_some_and(|known| known.hold(point))
     }
 
     /// The pixel of a cell: its middle, within the image.

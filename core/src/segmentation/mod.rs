@@ -21,7 +21,8 @@
 //!    without one (`hypotheses`);
 //! 6. what it left in the static map before that is erased (`trail`);
 //! 7. its mask grows from its extent over the disparity image, above the ground, but not over
-//!    matches that do not move (`lattice`); the ground plane is lent by the mapper.
+//!    matches that do not move (`lattice`), nor over surfaces that the map held before (`known`);
+//!    the ground plane is lent by the mapper.
 //!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
@@ -45,6 +46,7 @@ mod groups;
 mod hypotheses;
 mod hypothesis;
 mod joint;
+mod known;
 mod lattice;
 mod observe;
 mod patches;
@@ -64,6 +66,7 @@ use crate::{
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
     tracking::{Added, Assigned, CameraMotion, GuidedMatching},
+    volume::Volume,
 };
 use candidate::Candidate;
 use collect::{Owned, SPARSE_VARIANCE};
@@ -71,6 +74,7 @@ use groups::MAX_CANDIDATES;
 use hypotheses::{Hypotheses, MAX_HYPOTHESES};
 use hypothesis::Hypothesis;
 use joint::{FarMatch, MAX_JOINT};
+use known::KnownSurfaces;
 use lattice::{CELL_PX, Lattice};
 use observe::Contradictions;
 use patches::{MAX_PATCHES, PatchSearch};
@@ -91,6 +95,9 @@ pub(crate) struct SegmentationInput<'a, 's> {
     pub disparity_q8: View<'a, u16>,
     /// The ground plane of the disparity image; `None` where it shows too little ground.
     pub ground: Option<GroundPlane>,
+    /// The static map of the frames before: an object's mask does not grow over what stood there
+    /// already. `None` where there is none.
+    pub map: Option<&'a Volume<'a>>,
     /// Images in which more matches are searched for on objects that have few.
     pub search: Option<GuidedMatching<'a, 's>>,
     /// Largest error that all disparities have in common, px: everywhere, and at the left and right
@@ -210,7 +217,10 @@ impl<'s> MotionSegmenter<'s> {
             return SegmentationReport::default();
         };
         let model = StaticModel::new(config, input.rig, &t_current_previous, input.bias_px);
-        let lattice = Lattice::new(input.rig, input.disparity_q8, input.ground);
+        let known = input
+            .map
+            .map(|volume| KnownSurfaces { volume, t_world_camera: &camera.t_world_camera });
+        let lattice = Lattice::new(input.rig, input.disparity_q8, input.ground).with_known(known);
         let search =
             input.search.map(|search| PatchSearch::new(search, &t_current_previous, &lattice));
         let (matches, [refined, sparse]) = (assigned.matches(), assigned.match_owners());

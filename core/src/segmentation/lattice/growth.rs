@@ -18,7 +18,7 @@ impl Growth<'_, '_> {
             return false;
         }
         let point = lattice.point(column, row).filter(|point| within.contains(&(*point).into()));
-        point.is_some_and(|point| lattice.is_above_ground(point))
+        point.is_some_and(|point| lattice.is_above_ground(point) && !lattice.is_known(point))
     }
 
     /// Marks and queues all cells within an extent that can be the object's. Returns how many;

@@ -189,6 +189,7 @@ impl World {
                     camera: &camera,
                     disparity_q8,
                     ground: GroundPlane::find(&RIG, disparity_q8),
+                    map: None,
                     search,
                     bias_px: [config.motion.bias_px, config.motion.lens_px].map(f64::from),
                 };
