@@ -1,105 +1,111 @@
-// Opens the page in a browser without a window: node test.mjs BROWSER PAGE.html FOLDER. Every digest must be equal, the console without an error; leaves screenshots in the folder.
-import { spawn } from "node:child_process";
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join, resolve } from "node:path";
+// Opens the page in browsers without windows: node test.mjs PAGE.html FOLDER BROWSER... In each every
+// digest must be equal, the console without an error, and the page usable by all. Leaves screenshots in
+// the folder, from whose modules it takes the library that drives browsers and the rules of axe.
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { basename, join, resolve } from "node:path";
+import { pathToFileURL } from "node:url";
 
-const [browser, page, folder] = process.argv.slice(2);
+const [page, folder, ...browsers] = process.argv.slice(2);
+const modules = createRequire(join(resolve(folder), "any.js"));
+const { default: puppeteer } = await import(pathToFileURL(modules.resolve("puppeteer-core")));
+const axe = readFileSync(modules.resolve("axe-core/axe.min.js"), "utf8");
 // The longest that a page may take, on a machine that does other work too, ms.
 const PATIENCE_MS = 240000;
-const ARGUMENTS = ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--remote-debugging-pipe"];
+const CHROMIUM = [
+  "--no-sandbox", "--disable-quic", "--disable-background-networking", "--disable-component-update",
+  "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+  "--hide-scrollbars",
+];
 const fail = (reason) => { throw new Error(reason); };
 
-// A page over the browser's debugging protocol: messages on two pipes, each with a zero behind it.
-class Tab {
-  static async open([input, output], url) {
-    const tab = Object.assign(new Tab(), { input, waiting: new Map(), errors: [], last: 0 });
-    let rest = "";
-    output.setEncoding("utf8").on("data", (data) => {
-      const messages = (rest + data).split("\0");
-      rest = messages.pop();
-      messages.forEach((message) => tab.take(JSON.parse(message)));
-    });
-    const { targetInfos } = await tab.send("Target.getTargets"), { targetId } = targetInfos.find(({ type }) => type === "page");
-    tab.sessionId = (await tab.send("Target.attachToTarget", { targetId, flatten: true })).sessionId;
-    for (const domain of ["Page", "Runtime", "Log", "Network"]) await tab.send(`${domain}.enable`);
-    await tab.send("Page.navigate", { url });
-    return tab;
-  }
-
-  take({ id, result, method, params }) {
-    if (id) { this.waiting.get(id)?.(result); this.waiting.delete(id); }
-    if (method === "Runtime.exceptionThrown") this.errors.push(params.exceptionDetails.exception?.description ?? params.exceptionDetails.text);
-    if (method === "Runtime.consoleAPICalled" && params.type === "error") this.errors.push(JSON.stringify(params.args));
-    if (method === "Log.entryAdded" && params.entry.level === "error") this.errors.push(params.entry.text);
-    if (method === "Network.requestWillBeSent" && /^https?:/.test(params.request.url)) this.errors.push(`the page asks for ${params.request.url}`);
-  }
-
-  send(method, params = {}) {
-    const id = ++this.last, { sessionId } = this;
-    this.input.write(`${JSON.stringify({ id, method, params, sessionId })}\0`);
-    return new Promise((done) => { this.waiting.set(id, done); });
-  }
-
-  async value(expression) {
-    return (await this.send("Runtime.evaluate", { expression, returnByValue: true, awaitPromise: true })).result.value;
-  }
-
-  async done() {
-    const end = Date.now() + PATIENCE_MS;
-    for (;;) {
-      const data = await this.value(`({ ...document.getElementById("dynvox-viewer")?.dataset })`);
-      if (data?.done === "true") return data;
-      if (this.errors.length) fail(this.errors.join("\n"));
-      if (Date.now() > end) fail(`the page is not done in time: ${JSON.stringify(data)}`);
-      await new Promise((resolve) => setTimeout(resolve, 300));
-    }
-  }
-
-  async screenshot(name, [width, height]) {
-    await this.send("Emulation.setDeviceMetricsOverride", { width, height, deviceScaleFactor: 1, mobile: false });
-    await new Promise((resolve) => setTimeout(resolve, 500));
-    const { data } = await this.send("Page.captureScreenshot", { captureBeyondViewport: true });
-    writeFileSync(join(folder, name), Buffer.from(data, "base64"));
-    return this.value("document.documentElement.scrollWidth - innerWidth");
+// A browser that never answers must not hang the check.
+setTimeout(() => {
+  console.error("FAILED: a browser does not answer in time");
+  process.exit(1);
+}, 4 * PATIENCE_MS * browsers.length).unref();
+for (const browser of browsers) {
+  const name = basename(browser);
+  const isFirefox = name.includes("firefox");
+  const running = await puppeteer.launch({
+    browser: isFirefox ? "firefox" : "chrome",
+    // Firefox draws maps on a screen only: one in memory will do (xvfb-run).
+    headless: !(isFirefox && process.env.DISPLAY),
+    executablePath: browser,
+    args: isFirefox ? [] : CHROMIUM,
+    // Without a graphics card the map is drawn by software.
+    extraPrefsFirefox: { "webgl.force-enabled": true },
+    protocolTimeout: 2 * PATIENCE_MS,
+  });
+  try {
+    console.log(`${name}: ${await check(await running.newPage(), name)}`);
+  } catch (error) {
+    console.error(`FAILED: ${name}: ${error.message}`);
+    process.exitCode = 1;
+  } finally {
+    await running.close();
   }
 }
 
-const profile = mkdtempSync(join(tmpdir(), "dynvox-web-"));
-const running = spawn(browser, [...ARGUMENTS, `--user-data-dir=${profile}`, "about:blank"], { stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"] });
-// A browser that never answers must not hang the check.
-setTimeout(() => { console.error("FAILED: the browser does not answer in time"); running.kill(); process.exit(1); }, 4 * PATIENCE_MS).unref();
-try {
-  const tab = await Tab.open([running.stdio[3], running.stdio[4]], `file://${resolve(page)}`);
-  const data = await tab.done(), expected = await tab.value(`document.querySelectorAll(".digests tbody tr").length`);
-  if (data.equal !== data.frames || Number(data.frames) !== expected || expected < 1) fail(`${data.equal} of ${data.frames} digests are equal`);
+// Maps the clip, breaks a digest, maps pairs of one's own; a line with what was measured.
+async function check(tab, name) {
+  const errors = [];
+  tab.on("pageerror", (error) => errors.push(error.message));
+  tab.on("console", (message) => { if (message.type() === "error") errors.push(message.text()); });
+  tab.on("request", (request) => {
+    if (/^https?:/.test(request.url())) errors.push(`the page asks for ${request.url()}`);
+  });
+  await tab.goto(pathToFileURL(resolve(page)).href);
+  const data = await done(tab, errors);
+  const expected = await tab.evaluate(`document.querySelectorAll(".digests tbody tr").length`);
+  if (data.equal !== data.frames || Number(data.frames) !== expected || expected < 1) {
+    fail(`${data.equal} of ${data.frames} digests are equal`);
+  }
   if (!(Number(data.triangles) > 1000)) fail(`the map has ${data.triangles} triangles`);
+  await isUsable(tab);
   // Nothing overflows, on a desk and on a phone.
-  for (const [name, size] of [["desk.png", [1280, 1000]], ["phone.png", [390, 844]]]) {
-    const over = await tab.screenshot(name, size);
-    if (over > 0) fail(`at ${size[0]} px the page is ${over} px too wide`);
+  for (const [kind, width, height] of [["desk", 1280, 1000], ["phone", 390, 844]]) {
+    await tab.setViewport({ width, height });
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    await tab.screenshot({ path: join(folder, `${name}-${kind}.png`), fullPage: true });
+    const over = await tab.evaluate("document.documentElement.scrollWidth - innerWidth");
+    if (over > 0) fail(`at ${width} px the page is ${over} px too wide`);
   }
   // A wrong digest must show: the check is one that can fail.
-  await tab.value(`dynvoxPage.expected[0] = "0", dynvoxPage.mapClip()`);
-  const other = await tab.done();
+  await tab.evaluate(`dynvoxPage.expected[0] = "0", void dynvoxPage.mapClip()`);
+  const other = await done(tab, errors);
   if (Number(other.equal) !== expected - 1) fail("a digest that differs is not noticed");
   // Pairs of one's own: the same clip's pictures as files.
-  const own = await tab.value(await ownPairs());
+  const own = await tab.evaluate(ownPairs());
   if (!/^Done: 3 frames/.test(own)) fail(`pairs of one's own: ${own}`);
-  if (tab.errors.length) fail(tab.errors.join("\n"));
-  console.log(`${data.equal} digests equal, ${data.rate} frames a second, first frame after ${data.firstMs} ms, ${data.triangles} triangles`);
-} catch (error) {
-  console.error(`FAILED: ${error.message}`);
-  process.exitCode = 1;
-} finally {
-  running.kill();
-  await new Promise((resolve) => setTimeout(resolve, 300));
-  rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
-  process.exit();
+  if (errors.length) fail(errors.join("\n"));
+  return `${data.equal} digests equal, ${data.rate} frames a second, first frame after `
+    + `${data.firstMs} ms, ${data.triangles} triangles`;
+}
+
+// What the viewer says once the mapper has ended.
+async function done(tab, errors) {
+  const end = Date.now() + PATIENCE_MS;
+  for (;;) {
+    const data = await tab.evaluate(`({ ...document.getElementById("dynvox-viewer")?.dataset })`);
+    if (data.done === "true") return data;
+    if (errors.length) fail(errors.join("\n"));
+    if (Date.now() > end) fail(`the page is not done in time: ${JSON.stringify(data)}`);
+    await new Promise((resolve) => setTimeout(resolve, 300));
+  }
+}
+
+// Fails with the rules of axe that the page breaks seriously.
+async function isUsable(tab) {
+  await tab.evaluate(axe);
+  const broken = await tab.evaluate(`axe.run().then(({ violations }) => violations
+    .filter(({ impact }) => impact === "serious" || impact === "critical")
+    .map(({ id, help, nodes }) => id + ": " + help + ": " + nodes.map(({ html }) => html).join(" ")))`);
+  if (broken.length) fail(broken.join("\n"));
 }
 
 // Drops three pairs of a textured wall; the text that the page ends with.
-async function ownPairs() {
+function ownPairs() {
   return `(async () => {
     const files = [];
     for (const [side, shift] of [["left", 0], ["right", 8]]) for (let at = 0; at < 3; at++) {

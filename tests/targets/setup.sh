@@ -21,8 +21,11 @@ need() {
   shift
   command -v apt-get >/dev/null || skip "$wanted is missing and there is no apt-get to install $* with"
   [ "$(id -u)" = 0 ] || root=(sudo -n)
+  # One at a time: targets are checked side by side.
+  exec {installing}<"$targets" && flock "$installing"
   { "${root[@]}" apt-get update -qq && DEBIAN_FRONTEND=noninteractive "${root[@]}" apt-get install -y -qq --no-install-recommends "$@"; } \
     >"$build/apt.log" 2>&1 || skip "$wanted is missing and $* cannot be installed: $(tail -n 1 "$build/apt.log")"
+  exec {installing}<&-
 }
 
 # A compiler that has its library's source beside it, to build the library for targets without a shipped one: the toolchain in
