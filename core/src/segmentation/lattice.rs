@@ -24,6 +24,11 @@ const MARGIN_PER_DEPTH: f64 = 0.02;
 const MARGIN_MIN_M: f64 = 0.45;
 /// Least length of an object along the depth, m: members on an oncoming car are on its front.
 const LENGTH_M: f64 = 4.5;
+/// Least height of what stands upright, m, how many times its width that is at least, and its
+/// greatest length along the depth, m: between its members' 5th and 95th percentiles.
+const UPRIGHT_HEIGHT_M: f64 = 0.7;
+const UPRIGHT_SHAPE: f64 = 1.5;
+const UPRIGHT_LENGTH_M: f64 = 1.5;
 /// An object further to the side than this share of its depth shows its side, and its members may
 /// be on either end of it.
 const BESIDE: f64 = 0.25;
@@ -329,27 +334,38 @@ impl Bounds {
 
 /// An extent with its margins.
 fn widened(extent: &Extent) -> Extent {
+    if is_upright(extent) {
+        return with_margins(extent, [(MARGIN_MIN_M, MARGIN_MIN_M); 3]);
+    }
     let depth_m = extent.center().z;
     let length_m = extent.high[2] - extent.low[2];
     let is_beside = libm::fabs(extent.center().x) > BESIDE * depth_m;
+    let side_m = |margin_m: f64| max_f64(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M);
+    // Depth is uncertain with its square.
+    let [across_m, up_m, along_m] = MARGIN_M;
+    let along_m = along_m + DEPTH_MARGIN * depth_m * depth_m;
+    // Seen from one end, an object shows less than its length.
+    let behind_m = if length_m + along_m < LENGTH_M { LENGTH_M - length_m } else { along_m };
+    // Beside the camera, the near end may be out of view as well.
+    let before_m = if is_beside { behind_m } else { along_m };
+    let [across_m, up_m] = [side_m(across_m), side_m(up_m)];
+    with_margins(extent, [(across_m, across_m), (up_m, up_m), (before_m, behind_m)])
+}
+
+/// Returns true for the shape of a person who stands, walks or rides along the line of sight: what
+/// is around the members is not the rest of a car.
+fn is_upright(extent: &Extent) -> bool {
+    let ([left, top, near], [right, bottom, far]) = (extent.low, extent.high);
+    let [width_m, height_m, length_m] = [right - left, bottom - top, far - near];
+    height_m > UPRIGHT_HEIGHT_M && height_m > UPRIGHT_SHAPE * width_m && length_m < UPRIGHT_LENGTH_M
+}
+
+/// An extent with so much before and behind on each axis, m.
+fn with_margins(extent: &Extent, margins_m: [(f64, f64); 3]) -> Extent {
     let mut reach = *extent;
-    for (axis, ((low, high), margin_m)) in
-        reach.low.iter_mut().zip(&mut reach.high).zip(MARGIN_M).enumerate()
+    for ((low, high), (before_m, behind_m)) in
+        reach.low.iter_mut().zip(&mut reach.high).zip(margins_m)
     {
-        // Depth is uncertain with its square.
-        let margin_m = if axis == 2 {
-            margin_m + DEPTH_MARGIN * depth_m * depth_m
-        } else {
-            max_f64(margin_m - MARGIN_PER_DEPTH * depth_m, MARGIN_MIN_M)
-        };
-        // Seen from one end, an object shows less than its length.
-        let behind_m = if axis == 2 && length_m + margin_m < LENGTH_M {
-            LENGTH_M - length_m
-        } else {
-            margin_m
-        };
-        // Beside the camera, the near end may be out of view as well.
-        let before_m = if is_beside { behind_m } else { margin_m };
         (*low, *high) = (*low - before_m, *high + behind_m);
     }
     reach
