@@ -1,5 +1,6 @@
 //! Moving objects among static points, with closed answers.
 
+mod near_a_wall;
 mod patches;
 mod world;
 
