@@ -88,20 +88,6 @@ const CORE: Layers = &[
         ],
     ),
     (
-        "segmentation",
-        &[
-            "geometry",
-            "image",
-            "masks",
-            "memory",
-            "slices",
-            "settings",
-            "scene_flow",
-            "state",
-            "tracking",
-        ],
-    ),
-    (
         "volume",
         &[
             "bits",
@@ -115,6 +101,21 @@ const CORE: Layers = &[
             "slices",
             "settings",
             "state",
+        ],
+    ),
+    (
+        "segmentation",
+        &[
+            "geometry",
+            "image",
+            "masks",
+            "memory",
+            "slices",
+            "settings",
+            "scene_flow",
+            "state",
+            "tracking",
+            "volume",
         ],
     ),
     (

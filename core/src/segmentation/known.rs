@@ -12,7 +12,7 @@ const OBSERVED_MIN: u8 = 3;
 /// on top, m for each m^2 of squared depth.
 const AGREES_M: f64 = 0.1;
 const AGREES_PER_SQUARED_DEPTH: f64 = 0.0012;
-/// The same as a share of the truncation, at most: beyond it distances are clamped.
+/// Most of that distance, as a share of the truncation: beyond it distances are clamped.
 const AGREES_MAX: f64 = 0.5;
 
 /// The map as it was before this frame, and where the camera stands in it.

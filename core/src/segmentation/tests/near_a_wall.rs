@@ -19,7 +19,7 @@ fn disparity(wall_m: f64) -> Vec<u16> {
         .collect()
 }
 
-/// Whether the mask of members within `extent` holds the person, and the wall 0.7 m beside.
+/// Grows a mask from members within `extent`: if it holds the person, and the wall 0.7 m beside.
 fn grown(lattice: &Lattice<'_>, extent: extent::Extent) -> [bool; 2] {
     let (mut cells, mut queue) = (vec![0; cells(&CAPACITY)], vec![0; cells(&CAPACITY)]);
     lattice.grow(&extent, &[], &mut cells, &mut queue).unwrap();
