@@ -96,7 +96,7 @@ pub(crate) struct SegmentationInput<'a, 's> {
     /// The ground plane of the disparity image; `None` where it shows too little ground.
     pub ground: Option<GroundPlane>,
     /// The static map of the frames before: an object's mask does not grow over what stood there
-    /// already. `None` where there is none.
+    /// already. `None` without a map.
     pub map: Option<&'a Volume<'a>>,
     /// Images in which more matches are searched for on objects that have few.
     pub search: Option<GuidedMatching<'a, 's>>,
