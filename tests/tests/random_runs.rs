@@ -156,7 +156,8 @@ fn keys() -> Vec<&'static str> {
     let rows = include_str!("../../docs/settings.md")
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split('`').next());
-    rows.filter(|key| !key.starts_with("street.") && key.contains('.')).collect()
+    rows.filter(|key| !key.starts_with("street.") && !key.starts_with("room.") && key.contains('.'))
+        .collect()
 }
 
 fn config(street: &Street, keys: &[&str], random: &mut Random) -> Config {

@@ -6,7 +6,7 @@ use crate::fleet::{Job, Manifest};
 use crate::input::depth::DepthChoice;
 use crate::input::{self, OpenOptions};
 use crate::owned::check_overlap;
-use crate::request::{Memory, Reference, Request, Settings, Source};
+use crate::request::{Memory, Reference, Request, Settings};
 use crate::sweep::{Data, Kind, Plan, Results, RunResult, SweepFolder, SweepRequest, merge};
 use anyhow::{Context, bail};
 use serde_json::json;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct SweepArgs {
-    /// Data sets: street, PATH or PATH:SEQUENCE [default: street]
+    /// Data sets: street, room, yard, PATH or PATH:SEQUENCE [default: street]
     data: Vec<Data>,
     /// Settings to vary
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale])]
@@ -28,7 +28,7 @@ pub struct SweepArgs {
     /// Sizes of the images, percent
     #[arg(long, value_delimiter = ',', default_values_t = [100, 75, 50, 25], value_name = "PERCENT,...")]
     scales: Vec<u32>,
-    /// Sources of depth, as `dynvox run --depth` takes them; exact is for the street only
+    /// Sources of depth, as `dynvox run --depth` takes them; exact is for synthetic worlds only
     #[arg(long, value_delimiter = ',', default_values_t = ["elas".to_owned(), "exact".to_owned()], value_name = "SOURCE,...")]
     depths: Vec<String>,
     /// Pruning lag of the first two sweeps, frames
@@ -73,11 +73,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         let page = folder.draw(&plan, &results)?;
         return print_result(args, &plan, &results, &page);
     }
-    let data = if args.data.is_empty() {
-        vec![Data { path: None, sequence: None }]
-    } else {
-        args.data.clone()
-    };
+    let data = if args.data.is_empty() { vec![Data::default()] } else { args.data.clone() };
     let labels: Vec<String> = data.iter().map(Data::label).collect();
     if let Some(twice) = labels
         .iter()
@@ -87,7 +83,8 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         bail!("two data sets have the name {twice}. Sweep them into two folders");
     }
     let plan = args.plan_of(&data)?;
-    let inputs: Vec<PathBuf> = data.iter().filter_map(|data| data.path.clone()).collect();
+    let inputs: Vec<PathBuf> =
+        data.iter().filter_map(|data| data.path().map(Path::to_path_buf)).collect();
     check_overlap(&args.out, &inputs)?;
     let folder = SweepFolder::open(&args.out, &plan)?;
     let keys = plan.keys();
@@ -150,9 +147,7 @@ impl SweepArgs {
     /// Request of one run on this machine.
     fn request(&self, data: &Data, asked: &Request) -> anyhow::Result<Request> {
         let mut request = asked.clone();
-        if let Some(path) = &data.path {
-            request.input.source = Source::Recording(path.clone());
-        }
+        request.input.source = data.source.clone();
         request.input.sequence = data.sequence.clone();
         request.limits.threads = self.threads;
         Ok(request.absolute()?)
@@ -166,7 +161,7 @@ fn depth(name: &str) -> anyhow::Result<DepthChoice> {
 
 /// The reference that a data set has.
 fn reference(data: &Data) -> anyhow::Result<Option<Reference>> {
-    let Some(path) = &data.path else { return Ok(Some(Reference::Exact)) };
+    let Some(path) = data.path() else { return Ok(Some(Reference::Exact)) };
     let dataset = input::open(
         path,
         &OpenOptions { sequence: data.sequence.clone(), ..OpenOptions::default() },

@@ -337,6 +337,12 @@ impl Options {
         if self.bits.is_some_and(|bits| !(8..=16).contains(&bits)) {
             return Err(RequestError::invalid("--bits must be 8 to 16. Give another number"));
         }
+        if let (Some(path), Some(_)) = (&self.path, self.world) {
+            return Err(RequestError::Invalid(format!(
+                "--world is rendered, and {} is a recording. Leave one of them out",
+                path.display()
+            )));
+        }
         // A path of `-` is standard input, as with other tools.
         Ok(Input {
             source: match &self.path {

@@ -3,14 +3,14 @@
 
 use crate::input::depth::DepthChoice;
 use crate::input::masks::MaskChoice;
-use crate::request::{Reference, Request};
+use crate::request::{Reference, Request, Source};
 use crate::run::program;
 use dynvox_core::MotionSource;
 use dynvox_core::digest::Digest;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::str::FromStr;
 
 /// Setting that a sweep varies.
@@ -53,11 +53,11 @@ impl Kind {
     }
 }
 
-/// One data set: `street`, `PATH` or `PATH:SEQUENCE`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// One data set: a synthetic world, `PATH` or `PATH:SEQUENCE`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Data {
-    /// Folder of the data set; the synthetic street if absent.
-    pub path: Option<PathBuf>,
+    /// Source of its images.
+    pub source: Source,
     /// Sequence within it.
     pub sequence: Option<String>,
 }
@@ -67,10 +67,16 @@ impl FromStr for Data {
 
     fn from_str(text: &str) -> Result<Self, String> {
         if text.is_empty() {
-            return Err("give street, PATH or PATH:SEQUENCE".to_owned());
+            return Err("give street, room, yard, PATH or PATH:SEQUENCE".to_owned());
         }
-        if text == "street" {
-            return Ok(Self { path: None, sequence: None });
+        let world = match text {
+            "street" => Some(Source::Street),
+            "room" => Some(Source::Room),
+            "yard" => Some(Source::Yard),
+            _ => None,
+        };
+        if let Some(source) = world {
+            return Ok(Self { source, sequence: None });
         }
         // The colon of a Windows drive does not separate a sequence.
         let split = text.rsplit_once(':').filter(|(path, name)| {
@@ -78,9 +84,9 @@ impl FromStr for Data {
         });
         Ok(match split {
             Some((path, sequence)) => {
-                Self { path: Some(path.into()), sequence: Some(sequence.to_owned()) }
+                Self { source: Source::Recording(path.into()), sequence: Some(sequence.to_owned()) }
             }
-            None => Self { path: Some(text.into()), sequence: None },
+            None => Self { source: Source::Recording(text.into()), sequence: None },
         })
     }
 }
@@ -92,10 +98,21 @@ impl Data {
             path.file_name()
                 .map_or_else(|| "data".to_owned(), |name| name.to_string_lossy().into_owned())
         };
-        match (&self.path, &self.sequence) {
-            (None, _) => "street".to_owned(),
-            (Some(_), Some(sequence)) => sequence.clone(),
-            (Some(path), None) => name(path),
+        match (&self.source, &self.sequence) {
+            (Source::Street, _) => "street".to_owned(),
+            (Source::Room, _) => "room".to_owned(),
+            (Source::Yard, _) => "yard".to_owned(),
+            (Source::Stream, _) => "stream".to_owned(),
+            (Source::Recording(_), Some(sequence)) => sequence.clone(),
+            (Source::Recording(path), None) => name(path),
+        }
+    }
+
+    /// Path of a recording; `None` for a synthetic world.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.source {
+            Source::Recording(path) => Some(path),
+            _ => None,
         }
     }
 }
@@ -215,7 +232,7 @@ impl Plan {
 
 /// Values of one sweep on one data set: as shown, and what their runs ask for.
 fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Request)> {
-    let is_street = data.path.is_none();
+    let is_street = data.source.is_synthetic();
     let mut base = request.common.clone();
     // The street knows its masks: detections would only add their own errors.
     if is_street {

@@ -64,10 +64,16 @@ fn results(plan: &Plan) -> Results {
 #[test]
 fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
     let data = |text: &str| text.parse::<Data>().unwrap();
-    assert_eq!(data("street").label(), "street");
+    for world in ["street", "room", "yard"] {
+        assert_eq!(data(world).label(), world);
+        assert!(data(world).path().is_none());
+    }
     assert_eq!(
         data("a/kitti:06"),
-        Data { path: Some("a/kitti".into()), sequence: Some("06".to_owned()) }
+        Data {
+            source: crate::request::Source::Recording("a/kitti".into()),
+            sequence: Some("06".to_owned())
+        }
     );
     assert_eq!(
         (data("a/kitti:06").label(), data("a/rig").label()),

@@ -334,6 +334,7 @@ class Dataset:
         path: str | PathLike[str] | None = None,
         *,
         stream: bool | str | PathLike[str] | None = None,
+        world: str | None = None,
         sequence: str | None = None,
         dataset: str | None = None,
         images: str | None = None,
