@@ -65,27 +65,6 @@ fn the_program_of_the_page_about_c_maps_a_pair() {
     assert!(ran.status.success() && output.starts_with("frame 2:"), "{output}");
 }
 
-#[test]
-fn the_part_of_the_ros_node_that_needs_no_ros_maps_a_pair() {
-    let capi = Path::new(env!("CARGO_MANIFEST_DIR")).join("../core/capi");
-    let (node, folder) = (capi.join("examples/ros2"), tempfile::TempDir::new().expect("a folder"));
-    let program = folder.path().join("map_pair");
-    let built = Command::new(std::env::var_os("CXX").unwrap_or_else(|| "c++".into()))
-        .args(["-std=c++17", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
-        .arg(capi.join("include"))
-        .arg("-I")
-        .arg(node.join("include"))
-        .arg(node.join("test/map_pair.cpp"))
-        .arg(library())
-        .args(["-lm", "-lpthread", "-ldl", "-o"])
-        .arg(&program)
-        .output()
-        .expect("there is a C++ compiler: install c++, or name one in CXX");
-    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
-    let ran = Command::new(&program).output().expect("the program can be run");
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-}
-
 /// Numbers and digests of the frames that the C example gives for a fixture.
 fn mapped_by_c(fixture: &Path, bytes: usize, settings: &[String]) -> String {
     let folder = tempfile::TempDir::new().expect("a folder");

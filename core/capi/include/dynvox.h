@@ -96,6 +96,20 @@ typedef enum {
   DYNVOX_SEVERITY_MAP_AFFECTED,
 } DynvoxSeverity;
 
+// Origin of a frame's pose.
+typedef enum {
+  // The first frame: the camera is the world, or where it is said to be.
+  DYNVOX_POSE_ORIGIN_FIRST = 0,
+  // Estimated from this frame.
+  DYNVOX_POSE_ORIGIN_ESTIMATED,
+  // A guess: the estimate failed, and the motion before was continued.
+  DYNVOX_POSE_ORIGIN_EXTRAPOLATED,
+  // Given with the frame.
+  DYNVOX_POSE_ORIGIN_GIVEN,
+  // Found in the map after the camera was lost.
+  DYNVOX_POSE_ORIGIN_RELOCALIZED,
+} DynvoxPoseOrigin;
+
 // Motion state of a track.
 typedef enum {
   // Not known yet.
@@ -370,6 +384,11 @@ typedef struct {
   DynvoxSeverity severity;
   // Pose of the left camera in the world, which is that of its segment of the map.
   DynvoxPose t_world_camera;
+  // Origin of the pose.
+  DynvoxPoseOrigin pose_origin;
+  // Covariance of the motion since the frame it was matched with, row by row: rotation vector
+  // (rad), then translation (m), in this camera's axes. All 0 where no motion was estimated.
+  double motion_covariance[36];
   // True if something of the frame was fused into the map: its pose is known, and it shows
   // depth.
   bool fused;

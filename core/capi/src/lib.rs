@@ -59,5 +59,6 @@ pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step, dynvox_step_with};
 pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
 pub use types::{
-    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxReport, DynvoxSeverity,
+    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxPoseOrigin, DynvoxReport,
+    DynvoxSeverity,
 };

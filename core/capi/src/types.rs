@@ -1,7 +1,7 @@
 //! Plain values of the interface.
 
 use crate::DynvoxStatus;
-use dynvox_core::{Report, Severity, geometry::Transform};
+use dynvox_core::{PoseOrigin, Report, Severity, geometry::Transform};
 
 /// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
 /// Camera axes: x right, y down, z forward.
@@ -104,6 +104,22 @@ pub enum DynvoxSeverity {
     MapAffected,
 }
 
+/// Origin of a frame's pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub enum DynvoxPoseOrigin {
+    /// The first frame: the camera is the world, or where it is said to be.
+    First = 0,
+    /// Estimated from this frame.
+    Estimated,
+    /// A guess: the estimate failed, and the motion before was continued.
+    Extrapolated,
+    /// Given with the frame.
+    Given,
+    /// Found in the map after the camera was lost.
+    Relocalized,
+}
+
 /// Report of one step.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
@@ -114,6 +130,11 @@ pub struct DynvoxReport {
     pub severity: DynvoxSeverity,
     /// Pose of the left camera in the world, which is that of its segment of the map.
     pub t_world_camera: DynvoxPose,
+    /// Origin of the pose.
+    pub pose_origin: DynvoxPoseOrigin,
+    /// Covariance of the motion since the frame it was matched with, row by row: rotation vector
+    /// (rad), then translation (m), in this camera's axes. All 0 where no motion was estimated.
+    pub motion_covariance: [f64; 36],
     /// True if something of the frame was fused into the map: its pose is known, and it shows
     /// depth.
     pub fused: bool,
@@ -156,6 +177,14 @@ impl From<&Report> for DynvoxReport {
                 Severity::MapAffected => DynvoxSeverity::MapAffected,
             },
             t_world_camera: (&report.t_world_camera).into(),
+            pose_origin: match report.pose {
+                PoseOrigin::First => DynvoxPoseOrigin::First,
+                PoseOrigin::Estimated => DynvoxPoseOrigin::Estimated,
+                PoseOrigin::Extrapolated => DynvoxPoseOrigin::Extrapolated,
+                PoseOrigin::Given => DynvoxPoseOrigin::Given,
+                PoseOrigin::Relocalized => DynvoxPoseOrigin::Relocalized,
+            },
+            motion_covariance: motion_covariance(report),
             fused: report.fused,
             segment: report.segment.get(),
             disparities: report.stereo.valid,
@@ -172,4 +201,15 @@ impl From<&Report> for DynvoxReport {
             digest: report.digest,
         }
     }
+}
+
+/// The covariance of a report's motion, row by row; 0 without one.
+fn motion_covariance(report: &Report) -> [f64; 36] {
+    let covariance = report.egomotion.and_then(|egomotion| egomotion.covariance);
+    let mut rows = [0.0; 36];
+    if let Some(covariance) = covariance {
+        let matrix = covariance.matrix();
+        rows.iter_mut().zip(matrix.iter().flatten()).for_each(|(to, from)| *to = *from);
+    }
+    rows
 }

@@ -1,4 +1,5 @@
-// The mapper for C++, without ROS: what the node and its test share. One buffer for each mapper; errors are exceptions with the library's sentences.
+// The mapper for C++: one buffer for each mapper; errors are exceptions with the library's
+// sentences.
 #pragma once
 
 #include "dynvox.h"
@@ -6,6 +7,8 @@
 #include <array>
 #include <cstdlib>
 #include <memory>
+#include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -14,68 +17,78 @@
 namespace dynvox_ros2 {
 
 inline void check(DynvoxStatus status, const std::string &what) {
-  if (status != DYNVOX_STATUS_OK) throw std::runtime_error(what + ": " + dynvox_status_text(status));
+  if (status == DYNVOX_STATUS_OK) return;
+  throw std::runtime_error(what + ": " + dynvox_status_text(status));
 }
 
-// The rig of two rectified cameras by their projection matrices, as CameraInfo has them: p[3] of the right one is -focal length times baseline.
-inline DynvoxRig rig_of(const std::array<double, 12> &left, const std::array<double, 12> &right) {
-  const DynvoxRig rig{left[0], left[2], left[6], (left[3] - right[3]) / left[0]};
-  if (!(rig.focal_px > 0.0) || !(rig.baseline_m > 0.0))
-    throw std::runtime_error("the projection matrices are not those of a rectified pair: check both camera_info topics, left and right");
-  return rig;
-}
+// Cameras and the size of their images, px. Pairs are raw where `raw` is there.
+struct Cameras {
+  DynvoxRig rig;
+  size_t width, height;
+  std::optional<DynvoxRawRig> raw;
+};
 
-// Grey of three bytes a pixel, by ITU-R BT.601 in integers as the readers of dynvox compute it. `red` is 0 for RGB and 2 for BGR.
-inline std::vector<uint8_t> grey_of(const uint8_t *pixels, size_t width, size_t height, size_t step_bytes, size_t red) {
-  std::vector<uint8_t> grey(width * height);
-  for (size_t v = 0; v < height; ++v)
-    for (size_t u = 0; u < width; ++u) {
-      const uint8_t *pixel = pixels + v * step_bytes + 3 * u;
-      grey[v * width + u] = static_cast<uint8_t>((77u * pixel[red] + 150u * pixel[1] + 29u * pixel[2 - red] + 128u) >> 8);
-    }
-  return grey;
-}
+struct MapperOptions {
+  // Bytes of memory, divided for the images' size.
+  size_t bytes = size_t{256} << 20;
+  // The planner's window: columns to the right and ahead, cells upwards. 0: none.
+  std::array<size_t, 3> window{};
+  // Key and value, as in a run's config.toml.
+  std::vector<std::pair<std::string, std::string>> settings;
+};
 
+// A point of the map in the camera's axes, m.
 struct Point {
   float x, y, z;
   std::array<uint8_t, 3> colour;
 };
 
+// The planner's window: rows from the nearest ahead, in each from left to right; 0 unknown, 1 free,
+// 2 occupied.
+struct Window {
+  DynvoxWindow place{};
+  std::vector<uint8_t> state;
+};
+
 class Mapper {
  public:
-  // Divides `bytes` of memory for images of a size. Settings are key and value, as in a run's config.toml.
-  Mapper(const DynvoxRig &rig, size_t width, size_t height, size_t bytes, const std::vector<std::pair<std::string, std::string>> &settings) {
+  Mapper(const Cameras &cameras, const MapperOptions &options) {
     DynvoxConfig config;
-    check(dynvox_config_default(&rig, &config), "the rig cannot be used");
+    if (cameras.raw) {
+      check(dynvox_config_raw(&*cameras.raw, &config), "the calibration cannot be used");
+    } else {
+      check(dynvox_config_default(&cameras.rig, &config), "the rig cannot be used");
+    }
+    rig_ = config.rig;
     // No detector is needed: what moves is found by its motion, unless a setting says otherwise.
     check(dynvox_config_set(&config, "segmentation.enabled", "true"), "motion segmentation");
-    for (const auto &[key, value] : settings) check(dynvox_config_set(&config, key.c_str(), value.c_str()), key + "=" + value);
+    for (const auto &[key, value] : options.settings)
+      check(dynvox_config_set(&config, key.c_str(), value.c_str()), key + "=" + value);
     std::array<char, 200> problem{};
     check(dynvox_config_problem(&config, problem.data(), problem.size()), "the settings");
-    if (problem[0] != '\0') throw std::runtime_error(std::string("the settings cannot be used: ") + problem.data());
-    DynvoxBudget budget{};
-    budget.bytes = bytes;
-    budget.width = width;
-    budget.height = height;
-    DynvoxCapacity capacity;
-    size_t least = 0;
-    const DynvoxStatus divided = dynvox_capacity_for_budget(&budget, &capacity, &least);
-    if (divided == DYNVOX_STATUS_TOO_SMALL) throw std::runtime_error("too few bytes of memory: at least " + std::to_string(least) + " are needed");
-    check(divided, "the memory cannot be divided");
-    const size_t alignment = dynvox_alignment();
-    const size_t size = (bytes + alignment - 1) / alignment * alignment;
-    memory_.reset(static_cast<uint8_t *>(std::aligned_alloc(alignment, size)));
-    if (!memory_) throw std::bad_alloc();
+    if (problem[0] != '\0')
+      throw std::runtime_error(std::string("the settings cannot be used: ") + problem.data());
+    const DynvoxCapacity capacity = capacity_of(cameras, options);
     // A window of pruning is as long as the memory remembers.
     if (capacity.history_frames < 40)
-      check(dynvox_config_set(&config, "volume.prune_lag", std::to_string(capacity.history_frames).c_str()), "the pruning window");
+      check(dynvox_config_set(&config, "volume.prune_lag",
+                              std::to_string(capacity.history_frames).c_str()),
+            "the pruning window");
+    const size_t alignment = dynvox_alignment();
+    const size_t size = (options.bytes + alignment - 1) / alignment * alignment;
+    memory_.reset(static_cast<uint8_t *>(std::aligned_alloc(alignment, size)));
+    if (!memory_) throw std::bad_alloc();
     check(dynvox_create(&capacity, &config, memory_.get(), size, &mapper_), "no mapper");
-    picture_pixels_ = width * height;
+    pixels_ = cameras.width * cameras.height;
+    columns_ = capacity.planning_width * capacity.planning_length;
   }
 
   Mapper(const Mapper &) = delete;
   Mapper &operator=(const Mapper &) = delete;
   ~Mapper() { dynvox_destroy(mapper_); }
+
+  // The rectified cameras.
+  const DynvoxRig &rig() const { return rig_; }
 
   DynvoxReport step(const DynvoxFrame &frame) {
     DynvoxReport report;
@@ -83,23 +96,26 @@ class Mapper {
     return report;
   }
 
-  // Points of the static map that the camera sees, every `stride`-th column and row, in the camera's axes.
-  std::vector<Point> seen(const DynvoxPose &t_world_camera, const DynvoxRig &rig, size_t stride) {
-    std::vector<float> depth_m(picture_pixels_);
-    std::vector<uint8_t> colour(3 * picture_pixels_);
+  // Points of the static map that the camera sees, every `stride`-th column and row.
+  std::vector<Point> seen(const DynvoxPose &t_world_camera, size_t stride) {
+    std::vector<float> depth_m(pixels_);
+    std::vector<uint8_t> colour(3 * pixels_);
     DynvoxPicture picture{};
-    picture.capacity = picture_pixels_;
+    picture.capacity = pixels_;
     picture.depth_m = depth_m.data();
     picture.colour = colour.data();
     check(dynvox_raycast(mapper_, &t_world_camera, &picture), "no view of the map");
+    const auto side = [this](float z, size_t px, double center_px) {
+      return static_cast<float>((static_cast<double>(px) - center_px) / rig_.focal_px) * z;
+    };
     std::vector<Point> points;
     for (size_t v = 0; v < picture.height; v += stride)
       for (size_t u = 0; u < picture.width; u += stride) {
         const size_t at = v * picture.width + u;
         const float z = depth_m[at];
         if (z <= 0.0f) continue;
-        const auto side = [z, &rig](size_t px, double center_px) { return static_cast<float>((static_cast<double>(px) - center_px) / rig.focal_px) * z; };
-        points.push_back({side(u, rig.center_u_px), side(v, rig.center_v_px), z, {colour[3 * at], colour[3 * at + 1], colour[3 * at + 2]}});
+        points.push_back({side(z, u, rig_.center_u_px), side(z, v, rig_.center_v_px), z,
+                          {colour[3 * at], colour[3 * at + 1], colour[3 * at + 2]}});
       }
     return points;
   }
@@ -112,13 +128,78 @@ class Mapper {
     return tracks;
   }
 
+  // The window around the camera, as it is now.
+  Window window() {
+    Window window;
+    window.state.resize(columns_);
+    window.place.columns_capacity = columns_;
+    window.place.state = window.state.data();
+    check(dynvox_update_planning_maps(mapper_, 0.0f, &window.place), "no window");
+    return window;
+  }
+
+  // The moving objects of the last window.
+  std::vector<DynvoxMovingBox> moving_boxes() {
+    std::vector<DynvoxMovingBox> boxes(64);
+    size_t count = 0;
+    check(dynvox_moving_boxes(mapper_, boxes.data(), boxes.size(), &count), "no boxes");
+    boxes.resize(count < boxes.size() ? count : boxes.size());
+    return boxes;
+  }
+
  private:
+  // Bounds that the bytes are enough for, the window's among them.
+  static DynvoxCapacity capacity_of(const Cameras &cameras, const MapperOptions &options) {
+    DynvoxBudget budget{};
+    budget.bytes = options.bytes;
+    budget.width = cameras.width;
+    budget.height = cameras.height;
+    if (cameras.raw) {
+      budget.raw_width = cameras.raw->left.width;
+      budget.raw_height = cameras.raw->left.height;
+    }
+    const DynvoxCapacity whole = divided(budget);
+    const DynvoxCapacity with_window = widened(whole, options);
+    const size_t taken = bytes_of(with_window) - bytes_of(whole);
+    if (taken == 0) return whole;
+    if (taken >= budget.bytes)
+      throw std::runtime_error("too few bytes of memory: the window alone takes " +
+                               std::to_string(taken));
+    budget.bytes -= taken;
+    return widened(divided(budget), options);
+  }
+
+  static DynvoxCapacity divided(const DynvoxBudget &budget) {
+    DynvoxCapacity capacity;
+    size_t least = 0;
+    const DynvoxStatus status = dynvox_capacity_for_budget(&budget, &capacity, &least);
+    if (status == DYNVOX_STATUS_TOO_SMALL)
+      throw std::runtime_error("too few bytes of memory: at least " + std::to_string(least) +
+                               " are needed");
+    check(status, "the memory cannot be divided");
+    return capacity;
+  }
+
+  static DynvoxCapacity widened(DynvoxCapacity capacity, const MapperOptions &options) {
+    capacity.planning_width = options.window[0];
+    capacity.planning_length = options.window[1];
+    capacity.planning_height = options.window[2];
+    return capacity;
+  }
+
+  static size_t bytes_of(const DynvoxCapacity &capacity) {
+    size_t bytes = 0;
+    check(dynvox_bytes(&capacity, &bytes), "the bounds");
+    return bytes;
+  }
+
   struct Free {
     void operator()(uint8_t *memory) const { std::free(memory); }
   };
   std::unique_ptr<uint8_t, Free> memory_;
   DynvoxMapper *mapper_ = nullptr;
-  size_t picture_pixels_ = 0;
+  DynvoxRig rig_{};
+  size_t pixels_ = 0, columns_ = 0;
 };
 
 }  // namespace dynvox_ros2
