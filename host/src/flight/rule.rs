@@ -11,7 +11,8 @@ use dynvox_onboard::{Direction, SECTOR_DEG, SECTORS};
 pub struct Limits {
     /// Distance kept to obstacles, m (`CP_DIST`).
     pub keep_m: f64,
-    /// Age of a distance when it takes effect, and the reaction to it, s (`CP_DELAY`).
+    /// Age of a distance when it takes effect, and the time that the vehicle is behind a speed it
+    /// is told, s (`CP_DELAY`).
     pub delay_s: f64,
     /// Deceleration counted on, m/s² (`MPC_ACC_HOR`).
     pub deceleration_m_s2: f64,
@@ -66,6 +67,7 @@ impl Limits {
 
 #[cfg(test)]
 mod tests {
+    use super::super::vehicle::{FOLLOWS_S, Multirotor};
     use super::*;
 
     const LIMITS: Limits =
@@ -87,6 +89,30 @@ mod tests {
             assert!((-0.05..0.35).contains(&left), "{distance_m}: {left}");
         }
         assert_eq!(LIMITS.speed_m_s(2.0), 0.0);
+    }
+
+    #[test]
+    fn a_vehicle_among_gusts_stops_before_a_wall_that_is_told_late() {
+        // Distances are as old as one frame of 10 Hz; some frames tell nothing.
+        let limits = Limits {
+            keep_m: 1.5,
+            delay_s: 0.2 + FOLLOWS_S,
+            deceleration_m_s2: 2.5,
+            jerk_m_s3: 15.0,
+        };
+        for seed in 0..60 {
+            let mut vehicle = Multirotor::hovering(0.3, seed);
+            let mut told_m_s = 0.0;
+            for frame in 0..150 {
+                let left_m = 20.0 - vehicle.position_m[1];
+                let is_told = (frame * 7 + seed) % 10 > 0;
+                let next_m_s = if is_told { limits.speed_m_s(left_m).min(4.0) } else { 0.0 };
+                (0..5).for_each(|_| vehicle.fly([0.0, told_m_s], 0.02));
+                told_m_s = next_m_s;
+                assert!(20.0 - vehicle.position_m[1] > 0.7, "seed {seed}, frame {frame}");
+            }
+            assert!(20.0 - vehicle.position_m[1] < 2.5, "seed {seed} came near the wall");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! autopilot's rule lets the vehicle go as fast as the directions allow.
 
 use super::rule::Limits;
-use super::vehicle::Multirotor;
+use super::vehicle::{FOLLOWS_S, Multirotor};
 use crate::synth::{
     FlownView, MovingTraffic, Street, StreetConfig, StreetPose, SynthError, SynthFrame, Traffic,
 };
@@ -31,9 +31,16 @@ const GUSTS_M_S2: f64 = 0.3;
 const NEEDLESS_S: f64 = 1.0;
 /// Frames before the vehicle is let go: the mapper sees where it stands.
 const READY_FRAMES: u32 = 5;
-/// Limits that the autopilot counts on; the delay is that of a picture and a message.
-const LIMITS: Limits =
-    Limits { keep_m: 1.5, delay_s: 0.4, deceleration_m_s2: 2.5, jerk_m_s3: 15.0 };
+/// Age of a distance when the next one replaces it, s: a message takes one frame, and lasts one.
+const TOLD_S: f64 = 2.0 / RATE_HZ;
+/// Limits that the autopilot counts on. The delay is that of a message and of the vehicle, which
+/// follows a speed late: PX4's guide asks for both in `CP_DELAY`.
+const LIMITS: Limits = Limits {
+    keep_m: 1.5,
+    delay_s: TOLD_S + FOLLOWS_S,
+    deceleration_m_s2: 2.5,
+    jerk_m_s3: 15.0,
+};
 /// Farthest surface that is looked for, m.
 const REACH_M: f64 = 5.0;
 /// Room on both sides of a course that is clear, m.

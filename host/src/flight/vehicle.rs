@@ -1,4 +1,5 @@
-//! A multirotor as a point that is accelerated: bounded, delayed, and blown about.
+//! A multirotor as a point that is accelerated: bounded, delayed, and blown about. Where it is told
+//! to stand it holds its place, as an autopilot's position mode does.
 
 use dynvox_core::random::Random;
 
@@ -8,6 +9,12 @@ const ACCELERATION_M_S2: f64 = 4.0;
 const GAIN_HZ: f64 = 2.5;
 /// Time in which the acceleration goes two thirds of the way to what is wanted, s.
 const LAG_S: f64 = 0.15;
+/// Time that the vehicle is behind a speed it is told, s.
+pub const FOLLOWS_S: f64 = 1.0 / GAIN_HZ + LAG_S;
+/// Speed back to the place that is held, for each metre off it, 1/s (`MPC_XY_P`).
+const HOLD_HZ: f64 = 0.95;
+/// Below this speed the vehicle has stopped and its place is held, m/s.
+const STOPPED_M_S: f64 = 0.3;
 /// Time over which a gust lasts, s.
 const GUST_S: f64 = 1.5;
 
@@ -21,6 +28,8 @@ pub struct Multirotor {
     acceleration_m_s2: [f64; 2],
     gust_m_s2: [f64; 2],
     gusts_m_s2: f64,
+    /// Place that is held along an axis with no speed wanted, m.
+    held_m: [Option<f64>; 2],
     random: Random,
 }
 
@@ -33,6 +42,7 @@ impl Multirotor {
             acceleration_m_s2: [0.0; 2],
             gust_m_s2: [0.0; 2],
             gusts_m_s2,
+            held_m: [None; 2],
             random: Random::new(seed),
         }
     }
@@ -45,6 +55,7 @@ impl Multirotor {
 
     /// Flies for a short time towards a velocity.
     pub fn fly(&mut self, wanted_m_s: [f64; 2], step_s: f64) {
+        let wanted_m_s = [0, 1].map(|axis| self.with_hold(axis, wanted_m_s[axis]));
         let error = [0, 1].map(|axis| GAIN_HZ * (wanted_m_s[axis] - self.velocity_m_s[axis]));
         let length = error[0].hypot(error[1]);
         let scale = if length > ACCELERATION_M_S2 { ACCELERATION_M_S2 / length } else { 1.0 };
@@ -60,6 +71,17 @@ impl Multirotor {
                 step_s * (self.acceleration_m_s2[axis] + self.gust_m_s2[axis]);
             self.position_m[axis] += step_s * self.velocity_m_s[axis];
         }
+    }
+
+    /// The velocity along an axis: the wanted one, or that back to where the vehicle stopped.
+    fn with_hold(&mut self, axis: usize, wanted_m_s: f64) -> f64 {
+        let (at_m, held_m) = (self.position_m[axis], &mut self.held_m[axis]);
+        if wanted_m_s != 0.0 {
+            *held_m = None;
+        } else if held_m.is_none() && self.velocity_m_s[axis].abs() < STOPPED_M_S {
+            *held_m = Some(at_m);
+        }
+        held_m.map_or(wanted_m_s, |held_m| HOLD_HZ * (held_m - at_m))
     }
 
     /// A sum of twelve uniform numbers: close to normal, with sigma 1.
@@ -87,6 +109,18 @@ mod tests {
             assert!(off < 0.01 + 2.0 * gusts_m_s2, "{off}");
             assert!(gusts_m_s2 == 0.0 || off > 0.05, "gusts are felt: {off}");
         }
+    }
+
+    #[test]
+    fn a_vehicle_that_stands_is_not_blown_away() {
+        let mut vehicle = Multirotor::hovering(0.5, 7);
+        let mut off_m: f64 = 0.0;
+        for _ in 0..3_000 {
+            vehicle.fly([0.0; 2], 0.02);
+            off_m = vehicle.position_m.iter().fold(off_m, |off_m, m| off_m.max(m.abs()));
+        }
+        // Without a place to hold a minute of such gusts takes it some metres away.
+        assert!((0.05..1.0).contains(&off_m), "{off_m}");
     }
 
     #[test]
