@@ -123,7 +123,7 @@ fn a_tracker_finds_as_little_motion_in_rooms_and_yards() {
         let config = RoomConfig {
             width: 320,
             height: 200,
-            rate_hz: 300.0,
+            rate_hz: 600.0,
             turn_deg_s: 0.0,
             people: 0,
             noise_sigma: 0.0,
@@ -131,12 +131,12 @@ fn a_tracker_finds_as_little_motion_in_rooms_and_yards() {
             ..RoomConfig::default()
         };
         let room = Room::new(kind, config).unwrap();
-        // A walk's turn and way in a three hundredth of a second are some tenths of a pixel.
+        // A walk's turn and way in a six hundredth of a second are some tenths of a pixel.
         let shares = shares(&room, [0, 1]);
         let [low, middle, high] = [1, 2, 3].map(|part| shares[part * shares.len() / 4]);
         println!("{kind:?}, {} windows: {low:.2}, {middle:.2}, {high:.2}", shares.len());
         assert!(shares.len() > 100, "{kind:?}: {} windows", shares.len());
-        assert!((0.9..1.1).contains(&middle), "{kind:?}: half of the windows find {middle}");
+        assert!((0.9..1.2).contains(&middle), "{kind:?}: half of the windows find {middle}");
         assert!(high - low < 0.3, "{kind:?}: quarters find {low} and {high}");
     }
 }

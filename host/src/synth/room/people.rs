@@ -103,8 +103,8 @@ impl Person {
                 is_straight: false,
             }
         } else if is_ahead {
-            // On the camera's own round, a quarter or more ahead.
-            let start = 0.27 + 0.22 * others;
+            // On the camera's own round, a sixth of it or more ahead.
+            let start = 0.17 + 0.22 * others;
             Round { half_m: extent.round_m, hz: round_hz, start, is_straight: false }
         } else {
             // Inside it, the other way round.

@@ -160,7 +160,7 @@ fn an_open_shutter_blurs_what_moves_and_nothing_that_stands() {
         // At frame 0 the turn is fastest.
         let frame = room.frame(0);
         let pairs = frame.left_grey.windows(2);
-        pairs.map(|pair| f64::from(pair[0].abs_diff(pair[1]))).sum::<f64>()
+        pairs.map(|pair| f64::from(pair[0].abs_diff(pair[1])).powi(2)).sum::<f64>()
     };
     let [sharp, blurred] = [0.0, 0.02].map(|open| contrast(RoomPath::Turn, open));
     assert!(blurred < 0.7 * sharp, "{blurred} {sharp}");
