@@ -10,10 +10,11 @@
 //! column weigh less: what rectification leaves of the lenses' errors grows steeply there.
 //!
 //! [`Estimator`] owns the scratch memory and estimates any set of matches; [`Egomotion`] tracks the
-//! camera and repeats its last motion where the estimate fails. [`icp`] estimates motion from depth
+//! camera and repeats its last motion where the estimate fails; a camera that moves slowly is also
+//! compared with an older frame (`anchor`). [`icp`] estimates motion from depth
 //! only.
 //!
-//! **Memory.** 36 bytes per match.
+//! **Memory.** 36 bytes per match, and 140 per point of the anchor.
 //!
 //! **Time.** Hypotheses times matches, in single precision and without branches; the rest is small
 //! compared with it.
@@ -43,6 +44,7 @@
 //! assert!(estimate.t_current_previous.is_none());
 //! ```
 
+mod anchor;
 mod config;
 mod covariance;
 mod estimate;
@@ -54,6 +56,7 @@ mod synchrony;
 mod track;
 mod weights;
 
+pub(crate) use anchor::{Anchor, SlowFrame};
 pub use config::EgomotionConfig;
 pub use covariance::MotionCovariance;
 pub use estimate::{Estimator, MotionEstimate, MotionHypotheses, MotionStatus};

@@ -1,6 +1,7 @@
 mod camera;
 mod clip;
 mod rivals;
+mod slow;
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MAX_REFERENCE_FRAMES, MotionEstimate, MotionHypotheses,

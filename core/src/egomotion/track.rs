@@ -200,6 +200,18 @@ impl Egomotion {
         self.refer_to_last();
     }
 
+    /// Corrects the pose that the last motion led to, and with it that motion.
+    pub(super) fn correct_pose(&mut self, t_world_camera: &Transform) {
+        self.t_current_previous = (t_world_camera.inverse() * self.t_world_previous()).normalized();
+        self.t_world_camera = *t_world_camera;
+        self.refer_to_last();
+    }
+
+    /// Pose of the frame before the last one, from which the last motion led.
+    pub(super) fn t_world_previous(&self) -> Transform {
+        (self.t_world_camera * self.t_current_previous).normalized()
+    }
+
     /// Leads the camera into another segment, in which its pose is known now; its motion stays.
     pub fn join_segment(&mut self, segment: MapSegment, t_world_camera: &Transform) {
         self.segment = segment;
@@ -412,10 +424,14 @@ impl Egomotion {
     fn is_possible(&self) -> bool {
         let is_time = |seconds: f64| seconds == 0.0 || (TIMES_S.0..TIMES_S.1).contains(&seconds);
         let poses = [self.t_world_camera, self.t_world_reference, self.t_current_previous];
-        let is_near = |pose: &Transform| pose.translation_m.iter().all(|m| m.abs() < FARTHEST_M);
         is_time(self.reference_s)
             && is_time(self.motion_s)
-            && poses.iter().all(|pose| pose.is_rotation() && is_near(pose))
+            && poses.iter().all(Self::is_possible_pose)
+    }
+
+    /// Returns true for a pose or motion that steps can lead to.
+    pub(super) fn is_possible_pose(pose: &Transform) -> bool {
+        pose.is_rotation() && pose.translation_m.iter().all(|m| m.abs() < FARTHEST_M)
     }
 
     /// Maps camera coordinates to world coordinates, which are the first camera's.

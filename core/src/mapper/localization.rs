@@ -4,7 +4,7 @@ use super::{Config, MotionSource, PoseOrigin, matched::MatchedFrame, static_map:
 use crate::{
     Capacity,
     egomotion::{
-        Egomotion, Estimator, MotionEstimate, TimedMatches,
+        Anchor, Egomotion, Estimator, MotionEstimate, SlowFrame, TimedMatches,
         icp::{self, IcpReport},
     },
     geometry::{MapSegment, StereoObservation, StereoRig, Transform},
@@ -24,6 +24,8 @@ pub(super) struct Localization<'s> {
     pub camera: Egomotion,
     pub self_calibration: SelfCalibration,
     pub estimator: Estimator<'s>,
+    /// Older frame that a camera which moves slowly is compared with.
+    pub anchor: Anchor<'s>,
     /// Keyframes of the places that the camera has been at.
     pub places: Places<'s>,
     /// Inertial unit; `None` without one.
@@ -97,7 +99,10 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
 impl<'s> Localization<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        Estimator::bytes(capacity) + Places::bytes(capacity) + InertialPrior::bytes()
+        Estimator::bytes(capacity)
+            + Anchor::bytes(capacity)
+            + Places::bytes(capacity)
+            + InertialPrior::bytes()
     }
 
     /// Places a camera that has not moved at the world's origin.
@@ -106,6 +111,7 @@ impl<'s> Localization<'s> {
             camera: Egomotion::default(),
             self_calibration: SelfCalibration::new(&config.rig_settings),
             estimator: Estimator::new_in(capacity, carver),
+            anchor: Anchor::new_in(capacity, carver),
             places: Places::new_in(capacity, carver),
             inertial: None,
             rows_moved: false,
@@ -115,8 +121,10 @@ impl<'s> Localization<'s> {
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         // Estimates keep nothing.
-        let Self { camera, self_calibration, estimator: _, places, inertial, rows_moved } = self;
+        let Self { camera, self_calibration, estimator: _, anchor, places, inertial, rows_moved } =
+            self;
         camera.visit(visitor);
+        anchor.visit(visitor);
         self_calibration.visit(visitor);
         let mut moved = u8::from(*rows_moved);
         visitor.u8(&mut moved);
@@ -138,7 +146,7 @@ impl<'s> Localization<'s> {
     ) -> Located {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
-        let segment = self.camera.segment();
+        let (segment, was_lost) = (self.camera.segment(), self.camera.is_lost());
         self.expect_turn(seen);
         let mut found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
@@ -165,8 +173,15 @@ impl<'s> Localization<'s> {
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
         };
+        // An older frame says more of a slow camera, if estimates alone lead from it to this one.
+        if over_several || was_lost {
+            self.anchor.clear();
+        } else {
+            self.correct_slow(seen, mask, &mut found);
+        }
         if self.recognise(seen, mask, &found) {
             found.origin = PoseOrigin::Relocalized;
+            self.anchor.clear();
         }
         let enters_segment = self.camera.segment() != segment;
         // A guess says nothing of how the camera moved, nor does a pose given in another segment:
@@ -321,6 +336,35 @@ impl<'s> Localization<'s> {
             matches_excluded: excluded as u32,
             ..Found::new(if is_found { PoseOrigin::Relocalized } else { self.origin(true) })
         }
+    }
+
+    /// Corrects the pose that an estimate led to by an older frame where the camera is slow.
+    #[inline(never)]
+    fn correct_slow(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        mask: &EgomotionMask<'_, '_>,
+        found: &mut Found,
+    ) {
+        // Along a weak direction the last motion went on, and says nothing of an older frame.
+        let is_estimated = found.origin == PoseOrigin::Estimated && !self.rows_moved;
+        let Some(estimate) =
+            found.egomotion.as_mut().filter(|estimate| is_estimated && !estimate.weak.any())
+        else {
+            self.anchor.clear();
+            return;
+        };
+        let rig = seen.config.scaled_rig();
+        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
+        let included = selection.iter().filter(|&&index| mask.includes(index));
+        let frame = SlowFrame {
+            config: &seen.config.egomotion,
+            rig: &rig,
+            matcher: seen.scene_flow,
+            matches: included.filter_map(|&index| refined.get(index as usize)),
+        };
+        self.anchor.step(&frame, &mut self.camera, &mut self.estimator);
+        estimate.t_current_previous = Some(*self.camera.t_current_previous());
     }
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture

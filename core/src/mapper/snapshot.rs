@@ -17,7 +17,7 @@
 //! | 4, 4 | ignored pixels, attached ones, and their bits if there are any |
 //! | 4, 4, 4 | columns, rows and number of attached cells, and the score of each cell |
 //! | 4, 4 | image width and height, px (0 before the first frame) |
-//! | | last pair, camera, self-calibration, tracks, masks, objects, static map, planner's window |
+//! | | pair, camera, anchor, self-calibration, tracks, masks, objects, static map, planner's map |
 //! | 8 | checksum of everything before: a flipped bit anywhere is found |
 //!
 //! Memory: none but the mapper's. Bytes: about those of the blocks in use, and of what waits to be
@@ -35,7 +35,7 @@ use core::fmt::{self, Write};
 /// First bytes of a snapshot.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 8;
+pub const VERSION: u32 = 9;
 
 /// Reason that a mapper cannot be restored. There is no mapper then; the slab may be used again.
 ///

@@ -382,10 +382,15 @@ impl Mapper<'_> {
 
     /// Digest of the camera's motion and of what it says about the rig.
     fn egomotion_digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
-        let Localization { camera, self_calibration, inertial, .. } = &mut self.localization;
+        let Localization { camera, self_calibration, anchor, inertial, .. } =
+            &mut self.localization;
         let mut digest = Digest::default();
         digest.u64(camera.digest(estimate));
         digest.u64(self_calibration.digest());
+        // Without one the digest is what it was before there was any.
+        if !anchor.is_empty() {
+            digest.u64(anchor.digest());
+        }
         if let Some(inertial) = inertial {
             digest.u64(inertial.digest());
         }

@@ -1,6 +1,9 @@
 //! The scene flow of a running stereo camera.
 
+mod anchored;
 mod passes;
+
+pub(crate) use anchored::AnchorPoint;
 
 use super::{
     SceneFlowConfig,

@@ -53,6 +53,7 @@ mod suppression;
 pub use camera::FeatureCount;
 pub(crate) use config::MAX_FEATURES;
 pub use config::SceneFlowConfig;
+pub(crate) use matcher::AnchorPoint;
 pub use matcher::FlowMatcher;
 pub use matches::Match;
 pub use report::{FlowReport, FlowStatus, PassCount};

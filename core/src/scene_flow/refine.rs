@@ -172,19 +172,19 @@ impl Template {
         None
     }
 
-    /// The middles of the patch in three other images; `None` where it is lost in one, or what is
-    /// found there is not accepted.
+    /// The middle of the patch near a position in another image, found with the shortest last step;
+    /// `None` where it is lost, or what is found is not alike.
+    #[inline(never)]
+    pub(super) fn find_alike(&self, image: Pixels<'_>, at: [f32; 2]) -> Option<[f32; 2]> {
+        self.find(image, at, GUESSED_STEP_PX).filter(|&at| self.is_alike(image, at)).map(middle)
+    }
+
+    /// The middles of the patch in three other images; `None` where it is lost in one.
     #[inline(always)]
-    fn find_all(
-        &self,
-        sought: [(Pixels<'_>, [f32; 2]); 3],
-        small_step_px: f64,
-        is_accepted: impl Fn(Pixels<'_>, [f32; 2]) -> bool,
-    ) -> Option<[[f32; 2]; 3]> {
+    fn find_all(&self, sought: [(Pixels<'_>, [f32; 2]); 3]) -> Option<[[f32; 2]; 3]> {
         let mut found = [[0.0; 2]; 3];
         for (found, (image, at)) in found.iter_mut().zip(sought) {
-            *found =
-                middle(self.find(image, at, small_step_px).filter(|&at| is_accepted(image, at))?);
+            *found = middle(self.find(image, at, SMALL_STEP_PX)?);
         }
         Some(found)
     }
@@ -263,18 +263,12 @@ impl Template {
 pub(super) fn find_back(m: &Match, images: Images<'_>) -> Option<Match> {
     let [u, v] = m.current_left.map(|x| x as usize);
     let template = Template::extract(images.current_left, u, v)?;
-    let sought = [
-        (images.previous_left, m.previous_left),
-        (images.previous_right, m.previous_right),
-        (images.current_right, m.current_right),
-    ];
-    let [previous_left, previous_right, current_right] =
-        template.find_all(sought, GUESSED_STEP_PX, |image, at| template.is_alike(image, at))?;
+    let find = |image, at| template.find_alike(image, at);
     let found = Match {
-        previous_left,
-        previous_right,
+        previous_left: find(images.previous_left, m.previous_left)?,
+        previous_right: find(images.previous_right, m.previous_right)?,
         current_left: middle(m.current_left),
-        current_right,
+        current_right: find(images.current_right, m.current_right)?,
     };
     // Without a positive disparity the point would lie at infinity or behind the camera.
     let valid = found.previous_disparity_px() > 0.0 && found.current_disparity_px() > 0.0;
@@ -330,8 +324,7 @@ pub(super) fn refine(m: &Match, images: Images<'_>) -> Option<(Match, f32)> {
         (images.current_left, m.current_left),
         (images.current_right, m.current_right),
     ];
-    let [previous_right, current_left, current_right] =
-        template.find_all(sought, SMALL_STEP_PX, |_, _| true)?;
+    let [previous_right, current_left, current_right] = template.find_all(sought)?;
     let refined = Match {
         previous_left: middle(m.previous_left),
         previous_right,
