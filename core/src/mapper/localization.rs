@@ -105,6 +105,11 @@ impl<'s> Localization<'s> {
             + InertialPrior::bytes()
     }
 
+    /// Bytes of it that belong in large memory.
+    pub const fn cold_bytes(capacity: &Capacity) -> usize {
+        Places::bytes(capacity)
+    }
+
     /// Places a camera that has not moved at the world's origin.
     pub fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
         Self {

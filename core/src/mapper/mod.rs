@@ -24,6 +24,7 @@ mod static_map;
 mod step;
 #[cfg(test)]
 mod tests;
+mod two_slabs;
 mod work;
 
 pub use budget::{BudgetError, BudgetOptions, CapacityProblem, MAX_SIDE};
@@ -232,6 +233,12 @@ impl<'s> Mapper<'s> {
     /// ```
     #[inline(never)]
     pub fn check(capacity: &Capacity, config: &Config, slab: &[u8]) -> Result<(), NewError> {
+        Self::check_bounds(capacity, config)?;
+        Ok(Carver::check_fit(slab, capacity.bytes()).map(|_| ())?)
+    }
+
+    /// Checks configuration and capacity by themselves.
+    fn check_bounds(capacity: &Capacity, config: &Config) -> Result<(), NewError> {
         if let Some(problem) = config.validate().first() {
             return Err(NewError::Config(*problem));
         }
@@ -239,7 +246,6 @@ impl<'s> Mapper<'s> {
         if !capacity.is_countable(usize::MAX as u64) {
             return Err(NewError::Slab(SlabError::TooSmall { missing: usize::MAX }));
         }
-        Carver::check_fit(slab, capacity.bytes())?;
         let rectification = config.rectification.as_ref();
         rectification.map_or(Ok(()), |raw| raw.check_fit(capacity)).map_err(NewError::Rectification)
     }

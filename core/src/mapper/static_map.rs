@@ -49,6 +49,11 @@ impl<'s> StaticMap<'s> {
             + Raycaster::bytes(capacity)
     }
 
+    /// Bytes of it that belong in large memory.
+    pub const fn cold_bytes(capacity: &Capacity) -> usize {
+        Volume::cold_bytes(capacity) + Raycaster::bytes(capacity)
+    }
+
     /// Allocates an empty map.
     pub fn new_in(capacity: &Capacity, config: &Config, carver: &mut Carver<'s>) -> Self {
         Self {

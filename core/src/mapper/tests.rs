@@ -13,6 +13,7 @@ mod resume;
 mod rows;
 mod self_calibration;
 mod set;
+mod two_slabs;
 mod views;
 mod work;
 

@@ -1,5 +1,6 @@
 //! Use of the slab: bytes of each region, and how much of it is used now and at most.
 
+use super::Placement;
 use heapless::Vec;
 
 /// Most regions of one slab.
@@ -24,6 +25,13 @@ pub struct Region {
     pub used: usize,
     /// The most bytes ever in use at once.
     pub peak: usize,
+}
+
+impl Region {
+    /// Kind of memory that the region belongs in, where a machine has a fast and a large one.
+    pub fn placement(&self) -> Placement {
+        Placement::from_name(self.name)
+    }
 }
 
 /// The list of all regions, in slab order.

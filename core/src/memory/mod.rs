@@ -7,9 +7,11 @@
 mod capacity;
 mod footprint;
 mod one_shot;
+mod placement;
 mod slab;
 
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
 pub(crate) use one_shot::OneShot;
-pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, region_bytes};
+pub use placement::Placement;
+pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, TwoSlabs, region_bytes};

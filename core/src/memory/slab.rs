@@ -1,6 +1,6 @@
 //! The slab a caller hands over, and the carver that turns it into typed regions.
 
-use super::{Footprint, OneShot};
+use super::{Footprint, OneShot, Placement};
 use allocator_api2::boxed::Box;
 use bytemuck::Pod;
 use core::{
@@ -100,6 +100,15 @@ pub const fn region_bytes<T>(count: usize) -> usize {
     (count * size_of::<T>()).next_multiple_of(SLAB_ALIGN)
 }
 
+/// Memory of two kinds for one mapper: see [`Mapper::new_in_two`](crate::Mapper::new_in_two).
+#[derive(Debug)]
+pub struct TwoSlabs<'s> {
+    /// Fast memory, at least [`Capacity::hot_bytes`](crate::Capacity::hot_bytes).
+    pub hot: &'s mut [u8],
+    /// Large memory, at least [`Capacity::cold_bytes`](crate::Capacity::cold_bytes).
+    pub cold: &'s mut [u8],
+}
+
 /// Allocates typed, zeroed regions from a slab, front to back, and records each by name.
 ///
 /// A single allocation returns no error: from the first failure on every region is empty, and
@@ -122,6 +131,8 @@ pub const fn region_bytes<T>(count: usize) -> usize {
 pub struct Carver<'s> {
     /// Bytes that are not allocated yet; `None` without a slab.
     rest: Option<&'s mut [u8]>,
+    /// Bytes for cold regions, where they have memory of their own.
+    cold: Option<&'s mut [u8]>,
     footprint: Footprint,
     /// Replaces the names of regions while a group is allocated.
     name: Option<&'static str>,
@@ -144,6 +155,18 @@ impl<'s> Carver<'s> {
     pub fn new(slab: &'s mut [u8], needed: usize) -> Result<Self, SlabError> {
         let skipped = Self::check_fit(slab, needed)?;
         Ok(Self { rest: slab.get_mut(skipped..), ..Self::without_slab() })
+    }
+
+    /// Starts like [`Carver::new`] with a slab for hot regions and one for cold ones, and the bytes
+    /// needed of each.
+    ///
+    /// # Errors
+    /// [`SlabError::TooSmall`]: the first of them that is too small, the hot one first.
+    pub fn new_in_two(slabs: TwoSlabs<'s>, needed: [usize; 2]) -> Result<Self, SlabError> {
+        let TwoSlabs { hot, cold } = slabs;
+        let skipped = Self::check_fit(cold, needed[1]);
+        let carver = Self::new(hot, needed[0])?;
+        Ok(Self { cold: cold.get_mut(skipped?..), ..carver })
     }
 
     /// Returns the number of bytes of `slab` before its first aligned one, if `needed` bytes follow.
@@ -170,7 +193,13 @@ impl<'s> Carver<'s> {
     /// assert_eq!(carver.footprint().bytes(), StereoMatcher::bytes(&Capacity::TINY));
     /// ```
     pub fn without_slab() -> Self {
-        Self { rest: None, footprint: Footprint::default(), name: None, failure: None }
+        Self {
+            rest: None,
+            cold: None,
+            footprint: Footprint::default(),
+            name: None,
+            failure: None,
+        }
     }
 
     /// Allocates `count` zeroed items of `T` and records them under `name`.
@@ -227,7 +256,9 @@ impl<'s> Carver<'s> {
         if self.failure.is_some() {
             return &mut [];
         }
-        let region = match &mut self.rest {
+        let name = self.name.unwrap_or(name);
+        let is_cold = self.cold.is_some() && Placement::from_name(name) == Placement::Cold;
+        let region = match if is_cold { &mut self.cold } else { &mut self.rest } {
             Some(rest) if rest.len() < bytes => {
                 self.failure = Some(SlabError::TooSmall { missing: bytes - rest.len() });
                 return &mut [];
@@ -236,7 +267,7 @@ impl<'s> Carver<'s> {
             // A footprint is counted without memory behind it.
             None => &mut [],
         };
-        if !self.footprint.record(self.name.unwrap_or(name), bytes) {
+        if !self.footprint.record(name, bytes) {
             self.failure = Some(SlabError::TooManyRegions);
         }
         region
@@ -297,96 +328,4 @@ impl<'s> Carver<'s> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::string::ToString;
-
-    #[test]
-    fn allocates_aligned_zeroed_regions_and_records_them() {
-        let mut slab = std::boxed::Box::new(Slab([7u8; 256]));
-        let mut carver = Carver::new(&mut slab.0, 256).unwrap();
-        let a = carver.alloc::<u16>("a", 5);
-        let b = carver.alloc::<u64>("b", 16);
-        assert_eq!(a, [0; 5]);
-        assert_eq!(b, [0; 16]);
-        assert_eq!(b.as_ptr() as usize % SLAB_ALIGN, 0);
-        assert_eq!(carver.alloc_as_found::<u8>("c", 2), [7; 2]);
-        let footprint = carver.footprint();
-        assert_eq!(footprint.bytes(), 256);
-        assert_eq!(footprint.region("b").unwrap().bytes, 128);
-        assert_eq!(carver.check(), Ok(()));
-    }
-
-    #[test]
-    fn after_the_first_failure_allocates_nothing_and_returns_that_failure() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
-        let mut carver = Carver::new(&mut slab.0, 192).unwrap();
-        assert_eq!(carver.alloc::<u8>("a", 64).len(), 64);
-        assert_eq!(carver.alloc::<u8>("b", 200).len(), 0);
-        assert_eq!(carver.alloc::<u8>("c", 1_000).len(), 0);
-        // A failed carver gives out nothing more: no caller may go on with half of its regions.
-        assert_eq!(carver.alloc::<u8>("d", 1).len(), 0, "although it would fit");
-        assert_eq!(carver.check(), Err(SlabError::TooSmall { missing: 256 - 128 }));
-        assert_eq!(carver.footprint().bytes(), 64);
-    }
-
-    #[test]
-    fn records_a_group_or_one_name_in_a_row_as_one_region() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; 512]));
-        let mut carver = Carver::new(&mut slab.0, 512).unwrap();
-        carver.alloc::<u8>("a", 1);
-        // A second region of the same name follows: both are one, of three cache lines.
-        carver.alloc::<u8>("a", 65);
-        for _ in 0..2 {
-            carver.group("both", |carver| {
-                (carver.alloc::<u8>("b", 1).len(), carver.alloc::<u8>("c", 1).len())
-            });
-        }
-        carver.alloc::<u8>("a", 1);
-        let regions: std::vec::Vec<_> =
-            carver.footprint().regions().iter().map(|region| (region.name, region.bytes)).collect();
-        assert_eq!(regions, [("a", 192), ("both", 256), ("a", 64)]);
-    }
-
-    #[test]
-    fn more_regions_than_have_names_are_a_failure() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; 64 * 128]));
-        let mut carver = Carver::new(&mut slab.0, 0).unwrap();
-        for name in ["a", "b"].into_iter().cycle().take(120) {
-            carver.alloc::<u8>(name, 1);
-        }
-        assert_eq!(carver.check(), Err(SlabError::TooManyRegions));
-    }
-
-    #[test]
-    fn names_the_bytes_it_lacks() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; 128]));
-        assert_eq!(Carver::new(&mut slab, 200).unwrap_err(), SlabError::TooSmall { missing: 72 });
-        assert_eq!(
-            SlabError::TooSmall { missing: 72 }.to_string(),
-            "the slab is 72 bytes too small"
-        );
-    }
-
-    #[test]
-    fn skips_to_the_first_aligned_byte() {
-        let mut slab = std::boxed::Box::new(Slab([0u8; 192]));
-        // A slab that begins at any byte has its first aligned one up to 63 bytes further.
-        for offset in 1..=64 {
-            let needed = 128;
-            let mut carver = Carver::new(&mut slab[offset..], needed).unwrap();
-            assert_eq!(carver.alloc::<u64>("a", 16).as_ptr().align_offset(SLAB_ALIGN), 0);
-            assert_eq!(carver.check(), Ok(()));
-            let short = Carver::new(&mut slab[offset..], needed + 1).unwrap_err();
-            assert_eq!(
-                short,
-                SlabError::TooSmall { missing: 1 },
-                "{offset} bytes behind an aligned one"
-            );
-        }
-        assert_eq!(
-            Carver::new(&mut slab[1..3], 0).unwrap_err(),
-            SlabError::TooSmall { missing: 61 }
-        );
-    }
-}
+mod tests;

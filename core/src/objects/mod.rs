@@ -47,6 +47,11 @@ impl<'s> Objects<'s> {
         Crops::bytes(capacity) + ObjectVolumes::bytes(capacity)
     }
 
+    /// Bytes of it that belong in large memory.
+    pub(crate) const fn cold_bytes(capacity: &Capacity) -> usize {
+        ObjectVolumes::cold_bytes(capacity)
+    }
+
     /// Allocates its regions.
     pub(crate) fn new_in(
         capacity: &Capacity,

@@ -182,9 +182,14 @@ impl<'s> ObjectVolumes<'s> {
         if capacity.objects < MAX_OBJECTS { capacity.objects } else { MAX_OBJECTS }
     }
 
-    pub const fn bytes(capacity: &Capacity) -> usize {
+    /// Bytes of the volumes, which belong in large memory.
+    pub const fn cold_bytes(capacity: &Capacity) -> usize {
         Self::volumes(capacity)
             * (Volume::bytes(&bounds(capacity)) + region_bytes::<u8>(OBJECT_BYTES))
+    }
+
+    pub const fn bytes(capacity: &Capacity) -> usize {
+        Self::cold_bytes(capacity)
             + region_bytes::<f32>(capacity.pixels())
             + region_bytes::<u16>(capacity.pixels())
     }

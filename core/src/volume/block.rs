@@ -153,8 +153,12 @@ impl<'s> Blocks<'s> {
     pub(crate) const fn bytes(blocks: usize, colour: bool) -> usize {
         region_bytes::<Header>(blocks)
             + region_bytes::<u8>(blocks)
-            + region_bytes::<Voxels>(blocks)
-            + if colour { region_bytes::<Colour>(blocks) } else { 0 }
+            + Self::voxel_bytes(blocks, colour)
+    }
+
+    /// Bytes of voxels and their colour.
+    pub(crate) const fn voxel_bytes(blocks: usize, colour: bool) -> usize {
+        region_bytes::<Voxels>(blocks) + if colour { region_bytes::<Colour>(blocks) } else { 0 }
     }
 
     /// Cuts the memory of `capacity.blocks` blocks.

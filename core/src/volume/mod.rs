@@ -86,6 +86,11 @@ impl<'s> Volume<'s> {
             + LruList::bytes(capacity.blocks)
     }
 
+    /// Bytes of it that belong in large memory: voxels and their colour.
+    pub(crate) const fn cold_bytes(capacity: &Capacity) -> usize {
+        Blocks::voxel_bytes(capacity.blocks, capacity.colour)
+    }
+
     /// Cuts an empty map.
     pub fn new_in(capacity: &Capacity, config: &VolumeConfig, carver: &mut Carver<'s>) -> Self {
         Self {

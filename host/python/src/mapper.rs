@@ -362,6 +362,7 @@ impl Mapper {
             parts.set_item("bytes", region.bytes)?;
             parts.set_item("used", region.used)?;
             parts.set_item("peak", region.peak)?;
+            parts.set_item("placement", region.placement().name())?;
             Ok(parts)
         });
         PyList::new(py, regions.collect::<PyResult<Vec<_>>>()?)

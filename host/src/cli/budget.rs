@@ -6,6 +6,7 @@ mod work;
 use crate::formats::CapacityFile;
 use crate::report::text::grouped;
 use crate::request::{self, Bytes, ImageSize};
+use dynvox_core::memory::Placement;
 use dynvox_core::volume::{BLOCK_SIDE, VolumeConfig};
 use dynvox_core::{BudgetOptions, Capacity};
 use std::fmt::Write;
@@ -224,30 +225,38 @@ fn regions(name: &str, capacity: &Capacity, json: bool) -> anyhow::Result<()> {
         let regions: Vec<_> = footprint
             .regions()
             .iter()
-            .map(|region| serde_json::json!({ "name": region.name, "bytes": region.bytes }))
+            .map(|region| {
+                serde_json::json!({
+                    "name": region.name,
+                    "bytes": region.bytes,
+                    "placement": region.placement().name()
+                })
+            })
             .collect();
         outln!(
             "{}",
-            serde_json::to_string_pretty(
-                &serde_json::json!({ "profile": name, "bytes": bytes, "regions": regions })
-            )?
+            serde_json::to_string_pretty(&serde_json::json!({
+                "profile": name,
+                "bytes": bytes,
+                "hot_bytes": capacity.hot_bytes(),
+                "cold_bytes": capacity.cold_bytes(),
+                "regions": regions
+            }))?
         );
         return Ok(());
     }
-    outln!("{:<34}{:>16}{:>10}", format!("region of {name}"), "bytes", "share");
+    outln!("{:<34}{:>16}{:>10}  memory", format!("region of {name}"), "bytes", "share");
+    let row = |name: &str, region_bytes: usize, placement: &str| {
+        let share = 100.0 * region_bytes as f64 / bytes as f64;
+        let row =
+            format!("{name:<34}{:>16}{share:>8.1} %  {placement}", grouped(region_bytes as u64));
+        outln!("{}", row.trim_end());
+    };
     for region in footprint.regions() {
-        outln!(
-            "{:<34}{:>16}{:>8.1} %",
-            region.name,
-            grouped(region.bytes as u64),
-            100.0 * region.bytes as f64 / bytes as f64
-        );
+        row(region.name, region.bytes, region.placement().name());
     }
-    outln!(
-        "{:<34}{:>16}{:>8.1} %",
-        "slab",
-        grouped(footprint.bytes() as u64),
-        100.0 * footprint.bytes() as f64 / bytes as f64
-    );
+    row("slab", footprint.bytes(), "");
+    row("of it in fast memory", capacity.hot_bytes(), Placement::Hot.name());
+    row("in large memory", capacity.cold_bytes(), Placement::Cold.name());
     Ok(())
 }

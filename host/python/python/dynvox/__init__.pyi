@@ -63,6 +63,8 @@ class Region(TypedDict):
     bytes: int
     used: int
     peak: int
+    placement: str
+    """`hot` or `cold`: the kind of memory it belongs in, where a machine has a fast and a large one."""
 
 class Raycast(TypedDict):
     """The map as a camera sees it, height x width each."""
