@@ -72,16 +72,9 @@ fn a_perfect_map_is_right_and_complete_and_a_shifted_one_is_not() {
         let exact_q8 = disparity_q8(&street, &frame);
         let view = |pixels| View::new(pixels, 640, 192).unwrap();
         let stereo = StereoFrame {
-            ignored: None,
-            inertial: &[],
-            left: view(&frame.left_grey),
-            right: view(&frame.right_grey),
-            colour: None,
-            class: None,
             disparity_q8: View::new(&exact_q8, 640, 192),
             t_world_camera: Some(frame.t_world_camera),
-            time_ns: None,
-            detections: &[],
+            ..StereoFrame::pair(view(&frame.left_grey), view(&frame.right_grey))
         };
         mapper.step(&stereo, &Serial).unwrap();
         // The sensor sees its points by the true depth; each compared with map and input.

@@ -120,6 +120,8 @@ impl From<StepError> for DynvoxStatus {
             StepError::SizeChanged => Self::SizeChanged,
             StepError::SizesDiffer
             | StepError::RawSizeDiffers { .. }
+            | StepError::PackedNotRectified
+            | StepError::PackedTooShort { .. }
             | StepError::TooLarge { .. }
             | StepError::TooSmall { .. } => Self::Size,
             StepError::TimeNotLater => Self::Time,

@@ -10,7 +10,7 @@ use crate::{
 use core::{ops::Range, ptr};
 use dynvox_core::{
     Serial, StereoFrame,
-    image::View,
+    image::{SampleLayout, View},
     tracking::{Class, Detection, MAX_DETECTIONS},
 };
 
@@ -61,6 +61,7 @@ pub unsafe extern "C" fn dynvox_step_with(
                 left: image(&frame, frame.left, buffer)?.ok_or(DynvoxStatus::Null)?,
                 right: image(&frame, frame.right, buffer)?.ok_or(DynvoxStatus::Null)?,
                 colour: image(&frame, frame.colour, buffer)?,
+                layout: SampleLayout::Bytes,
                 class: None,
                 detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: disparity(&frame, buffer)?,

@@ -2,8 +2,10 @@
 
 mod coverage;
 mod disparity;
+mod layout;
 mod view;
 
 pub(crate) use coverage::{InvalidPair, InvalidPixels, MaskedPair};
 pub use disparity::{DISPARITY_ONE_PX, DisparityQ8};
+pub use layout::SampleLayout;
 pub use view::{View, ViewMut};

@@ -94,6 +94,13 @@ pub enum StepError {
         /// Height of the left raw image, px.
         height: usize,
     },
+    /// The samples of the frame are packed, and the mapper does not rectify.
+    PackedNotRectified,
+    /// The rows of a frame whose samples are packed are too short.
+    PackedTooShort {
+        /// Bytes of a row of the left image.
+        row_bytes: usize,
+    },
     /// The frame's pose is not made of finite numbers.
     PoseNotFinite,
     /// The quaternion of the frame's pose does not have length 1.
@@ -127,6 +134,12 @@ impl fmt::Display for StepError {
                     f,
                     "the frame is not of {width} x {height} px, the size the calibration is for"
                 )
+            }
+            Self::PackedNotRectified => f.write_str(
+                "the samples of the frame are packed, which only a mapper that rectifies can read",
+            ),
+            Self::PackedTooShort { row_bytes } => {
+                write!(f, "the frame has fewer than {row_bytes} bytes a row of packed samples")
             }
             Self::PoseNotFinite => {
                 f.write_str("the pose of the frame is not made of finite numbers")

@@ -1,9 +1,10 @@
 //! Input of the mapper, frame by frame.
 
+use super::StepError;
 use crate::{
     digest::Digest,
     geometry::Transform,
-    image::{DISPARITY_ONE_PX, View},
+    image::{DISPARITY_ONE_PX, SampleLayout, View},
     inertial::InertialSample,
     tracking::Detection,
 };
@@ -29,6 +30,9 @@ pub struct StereoFrame<'a> {
     pub left: View<'a, u8>,
     /// Right grey image.
     pub right: View<'a, u8>,
+    /// Arrangement of the samples of both grey images: others than bytes need a mapper that
+    /// rectifies, and views whose stride is that of the memory, in bytes.
+    pub layout: SampleLayout,
     /// Left image in colour, for fusion; grey is fused where it is absent.
     pub colour: Option<View<'a, [u8; 3]>>,
     /// Semantic class of each left pixel, an index into `VolumeConfig::class_weight`; all weights
@@ -64,6 +68,7 @@ impl<'a> StereoFrame<'a> {
         Self {
             left,
             right,
+            layout: SampleLayout::Bytes,
             colour: None,
             class: None,
             disparity_q8: None,
@@ -72,6 +77,23 @@ impl<'a> StereoFrame<'a> {
             time_ns: None,
             detections: &[],
             inertial: &[],
+        }
+    }
+
+    /// Checks that the grey samples can be read, by a mapper that rectifies or does not.
+    pub(super) fn check_layout(&self, rectifies: bool) -> Result<(), StepError> {
+        let layout = self.layout;
+        if layout == SampleLayout::Bytes {
+            return Ok(());
+        }
+        // The stages read bytes: only the rectifier finds them among packed samples.
+        if !rectifies {
+            return Err(StepError::PackedNotRectified);
+        }
+        if layout.fits(&self.left) && layout.fits(&self.right) {
+            Ok(())
+        } else {
+            Err(StepError::PackedTooShort { row_bytes: layout.row_bytes(self.left.width()) })
         }
     }
 
@@ -89,7 +111,8 @@ impl<'a> StereoFrame<'a> {
     /// ```
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::default();
-        self.left.rows().chain(self.right.rows()).for_each(|row| digest.bytes(row));
+        let images = [&self.left, &self.right].into_iter();
+        images.flat_map(|image| self.layout.rows(image)).for_each(|row| digest.bytes(row));
         self.colour.iter().flat_map(View::rows).for_each(|row| digest.bytes(row.as_flattened()));
         self.class.iter().flat_map(View::rows).for_each(|row| digest.bytes(row));
         if let Some(disparity) = &self.disparity_q8 {

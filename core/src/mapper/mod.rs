@@ -295,6 +295,7 @@ impl<'s> Mapper<'s> {
         if given != left {
             return Err(StepError::RawSizeDiffers { width: left[0], height: left[1] });
         }
+        frame.check_layout(self.rectifier.rectification().is_some())?;
         let same = |width: usize, height: usize| size == [width, height];
         // Colour and left image come from one camera; the images of classes, disparities and
         // ignored pixels are rectified.

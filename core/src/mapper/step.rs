@@ -121,8 +121,9 @@ impl Mapper<'_> {
         // they change the mapper.
         let mut images = core::mem::take(&mut self.rectified);
         let raw = Pair { left: frame.left, right: frame.right, colour: frame.colour };
-        let rectified =
-            executor.stage(Stage::Rectify, || self.rectifier.rectify(&raw, &mut images, executor));
+        let rectified = executor.stage(Stage::Rectify, || {
+            self.rectifier.rectify_from(frame.layout, &raw, &mut images, executor)
+        });
         let Pair { left, right, colour } = rectified.unwrap_or(raw);
         let rectification = self.rectifier.report(&Pair { left, right, colour });
         // The self-calibration may ask for shifted rows of the right image.

@@ -8,6 +8,7 @@ use super::{MAX_RAW_SIDE, RawCamera, TurnedCamera};
 use crate::{
     geometry::StereoRig,
     image::{InvalidPixels, View},
+    slices::clipped,
 };
 
 /// The entry of a pixel that no raw pixel covers.
@@ -63,7 +64,7 @@ impl Packing {
 
     /// Column, row and weights of their right and lower neighbours.
     #[inline(always)]
-    fn unpack(&self, entry: u32) -> ([usize; 2], [u32; 2]) {
+    pub(super) fn unpack(&self, entry: u32) -> ([usize; 2], [u32; 2]) {
         let (u, v) = (entry >> self.row_bits, entry & ((1 << self.row_bits) - 1));
         let weights = [u & ((1 << self.fraction_u) - 1), v & ((1 << self.fraction_v) - 1)];
         ([(u >> self.fraction_u) as usize, (v >> self.fraction_v) as usize], weights)
@@ -127,6 +128,8 @@ pub(super) fn remap<T: Sample>(map: &[u32], camera: &RawCamera, raw: &View<'_, T
     }
     let packing = Packing::new(camera);
     let (data, stride) = raw.strided();
+    // The memory may go on below the image, as where two pictures lie one above the other.
+    let data = clipped(data, ..(raw.height() - 1) * stride + raw.width());
     // From a pixel to its right lower neighbour, both included.
     let span = stride + 2;
     for (out, &entry) in out.iter_mut().zip(map) {

@@ -42,6 +42,7 @@ mod lens;
 mod map;
 mod models;
 mod monotonic;
+mod packed;
 mod rectification;
 mod rectifier;
 pub mod self_calibration;

@@ -3,13 +3,14 @@
 use super::{
     MAX_RAW_SIDE, Rectification, RectifyReport, TurnedCamera,
     map::{self, Sample},
+    packed::remap_packed,
 };
 use core::fmt;
 
 use crate::{
     digest::Digest,
     geometry::StereoRig,
-    image::{InvalidPair, InvalidPixels, View},
+    image::{InvalidPair, InvalidPixels, SampleLayout, View},
     memory::{Capacity, Carver, region_bytes},
     parallel::{Bands, Executor, each, zip2},
     slices::clipped_mut,
@@ -108,6 +109,8 @@ pub struct Pair<'a> {
 struct RawImage<'a, T> {
     camera: &'a TurnedCamera,
     image: View<'a, T>,
+    /// Arrangement of grey samples.
+    layout: SampleLayout,
 }
 
 /// One camera's regions.
@@ -130,6 +133,26 @@ impl Camera<'_> {
         let bands = Bands::new(height);
         let jobs = zip2(bands.split(self.map, width), bands.split_mut(out, width));
         each(executor, jobs, |(map, out)| map::remap(map, &raw.camera.raw, &raw.image, out));
+        View::new(out, width, height)
+    }
+
+    /// Fills a rectified grey image from samples of any layout.
+    fn remap_grey<'a, E: Executor>(
+        &self,
+        raw: RawImage<'_, u8>,
+        size: [usize; 2],
+        out: &'a mut [u8],
+        executor: &E,
+    ) -> Option<View<'a, u8>> {
+        if raw.layout == SampleLayout::Bytes {
+            return self.remap(raw, size, out, executor);
+        }
+        let [width, height] = size;
+        let bands = Bands::new(height);
+        let jobs = zip2(bands.split(self.map, width), bands.split_mut(out, width));
+        each(executor, jobs, |(map, out)| {
+            remap_packed(map, &raw.camera.raw, &raw.image, raw.layout, out);
+        });
         View::new(out, width, height)
     }
 }
@@ -260,19 +283,31 @@ impl<'s> Rectifier<'s> {
         images: &'a mut RectifiedImages<'_>,
         executor: &E,
     ) -> Option<Pair<'a>> {
+        self.rectify_from(SampleLayout::Bytes, raw, images, executor)
+    }
+
+    /// Rectifies a pair like [`Rectifier::rectify`], whose grey samples are arranged otherwise.
+    pub fn rectify_from<'a, E: Executor>(
+        &self,
+        layout: SampleLayout,
+        raw: &Pair<'_>,
+        images: &'a mut RectifiedImages<'_>,
+        executor: &E,
+    ) -> Option<Pair<'a>> {
         let Rectification { left, right, width, height } = self.rectification.as_ref()?;
         let [width, height] = [*width as usize, *height as usize];
         let (size, out) = ([width, height], images);
-        let raw_left = RawImage { camera: left, image: raw.left };
-        let raw_right = RawImage { camera: right, image: raw.right };
+        let raw_left = RawImage { camera: left, image: raw.left, layout };
+        let raw_right = RawImage { camera: right, image: raw.right, layout };
         // The two images are independent and remapped at the same time.
         let (left_image, right_image) = executor.join(
-            || self.left.remap(raw_left, size, out.left, executor),
-            || self.right.remap(raw_right, size, out.right, executor),
+            || self.left.remap_grey(raw_left, size, out.left, executor),
+            || self.right.remap_grey(raw_right, size, out.right, executor),
         );
         // The colour image is the left camera's and shares its map.
         let colour = raw.colour.filter(|_| !out.colour.is_empty()).and_then(|image| {
-            self.left.remap(RawImage { camera: left, image }, size, out.colour, executor)
+            let raw = RawImage { camera: left, image, layout: SampleLayout::Bytes };
+            self.left.remap(raw, size, out.colour, executor)
         });
         Some(Pair { left: left_image?, right: right_image?, colour })
     }

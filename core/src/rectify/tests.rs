@@ -306,6 +306,25 @@ fn pixels_no_raw_pixel_covers_are_invalid_with_a_margin() {
 }
 
 #[test]
+fn memory_below_an_image_is_not_read() {
+    // Half of the rectified pixels lie beyond the raw image, and one picture above another.
+    let mut raw = raw_rig(lenses()[1]);
+    (raw.left.height, raw.right.height) = (256, 256);
+    let sizing = Sizing::Given { width: 400, height: 300, focal_px: Some(100.0) };
+    let (rectification, rig) = Rectification::new(&raw, sizing).unwrap();
+    let memory = vec![255u8; 2 * 640 * 256];
+    let [whole, exact] =
+        [&memory[..], &memory[..640 * 256]].map(|data| View::new(data, 640, 256).unwrap());
+    with_rectifier(&rectification, &rig, |rectifier, images| {
+        let one = rectifier.rectify(&pair(whole, whole), images, &Serial).unwrap();
+        let one = rectifier.report(&one).unwrap();
+        let other = rectifier.rectify(&pair(exact, exact), images, &Serial).unwrap();
+        assert!(one.invalid_left > 10_000);
+        assert_eq!(one, rectifier.report(&other).unwrap());
+    });
+}
+
+#[test]
 fn threads_change_nothing_and_rows_may_be_padded() {
     let raw = raw_rig(lenses()[3]);
     let (rectification, rig) =

@@ -37,6 +37,8 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
         StepError::PoseNotRotation,
         StepError::PoseBeyondMap,
         StepError::TimeNotLater,
+        StepError::PackedNotRectified,
+        StepError::PackedTooShort { row_bytes: 800 },
     ]);
     assert!(
         texts[1].contains("at most 641 x 193 px")
@@ -48,6 +50,8 @@ fn a_refused_frame_is_told_what_is_wrong_with_it() {
             && texts[6].contains("length 1")
             && texts[7].contains("beyond the map")
             && texts[8].contains("time")
+            && texts[9].contains("rectifies")
+            && texts[10].contains("800 bytes a row")
     );
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     Digested,
-    image::InvalidPixels,
+    image::{InvalidPixels, SampleLayout},
     rectify::{Lens, LensModel, RawCamera, RawRig, Rectification, RectifierError, Sizing},
 };
 use nalgebra::Matrix3;
@@ -35,6 +35,63 @@ fn config(focal_px: Option<f64>) -> Config {
 fn with_raw_mapper<R>(config: &Config, test: impl FnOnce(&mut Mapper<'_>) -> R) -> R {
     let mut slab = vec![0u8; RAW.bytes() + SLAB_ALIGN];
     test(&mut Mapper::new(&RAW, config, &mut slab).unwrap())
+}
+
+/// Rows of packed samples, `stride` apart, whose upper bits are those of the image and whose lower
+/// ones mean nothing.
+fn packed(image: &[u8], layout: SampleLayout, stride: usize) -> Vec<u8> {
+    let mut memory = vec![0xA5; stride * HEIGHT];
+    for (row, samples) in memory.chunks_exact_mut(stride).zip(image.chunks_exact(WIDTH)) {
+        // Four samples, then their eight lower bits; or two.
+        let group = if layout == SampleLayout::Packed10 { 4 } else { 2 };
+        for (bytes, samples) in row.chunks_mut(group + 1).zip(samples.chunks(group)) {
+            bytes[..samples.len()].copy_from_slice(samples);
+        }
+    }
+    memory
+}
+
+#[test]
+fn packed_samples_give_the_bits_of_their_upper_eight() {
+    let (walk, config) = (Walk::new(4), config(None));
+    let digests = |layout: SampleLayout, stride: usize| -> Vec<u64> {
+        with_raw_mapper(&config, |mapper| {
+            let step = |[left, right]: &[Vec<u8>; 2]| {
+                let memory = [left, right].map(|image| match layout {
+                    SampleLayout::Bytes => image.clone(),
+                    _ => packed(image, layout, stride),
+                });
+                let [left, right] = memory
+                    .each_ref()
+                    .map(|bytes| View::with_stride(bytes, WIDTH, HEIGHT, stride).unwrap());
+                let frame = StereoFrame { layout, ..StereoFrame::pair(left, right) };
+                mapper.step(&frame, &Serial).unwrap().digest
+            };
+            walk.pairs.iter().map(step).collect()
+        })
+    };
+    let bytes = digests(SampleLayout::Bytes, WIDTH);
+    for (layout, padding) in
+        [(SampleLayout::Packed10, 0), (SampleLayout::Packed10, 24), (SampleLayout::Packed12, 7)]
+    {
+        assert_eq!(digests(layout, layout.row_bytes(WIDTH) + padding), bytes, "{layout:?}");
+    }
+}
+
+#[test]
+fn packed_samples_that_cannot_be_read_are_refused() {
+    let memory = vec![0u8; SampleLayout::Packed10.row_bytes(WIDTH) * HEIGHT];
+    let tight = View::new(&memory, WIDTH, HEIGHT).unwrap();
+    let frame = StereoFrame { layout: SampleLayout::Packed10, ..StereoFrame::pair(tight, tight) };
+    let row_bytes = SampleLayout::Packed10.row_bytes(WIDTH);
+    with_raw_mapper(&config(None), |mapper| {
+        let refusal = mapper.step(&frame, &Serial).unwrap_err();
+        assert_eq!(refusal, StepError::PackedTooShort { row_bytes });
+    });
+    let rectified = Config { rectification: None, ..config(None) };
+    with_raw_mapper(&rectified, |mapper| {
+        assert_eq!(mapper.step(&frame, &Serial).unwrap_err(), StepError::PackedNotRectified);
+    });
 }
 
 #[test]

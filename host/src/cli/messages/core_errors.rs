@@ -36,6 +36,8 @@ pub(super) fn all() -> Vec<(&'static str, Vec<String>)> {
                 &StepError::TooSmall { width: 64, height: 32 },
                 &StepError::SizeChanged,
                 &StepError::RawSizeDiffers { width: 752, height: 480 },
+                &StepError::PackedNotRectified,
+                &StepError::PackedTooShort { row_bytes: 800 },
                 &StepError::PoseNotFinite,
                 &StepError::PoseNotRotation,
                 &StepError::PoseBeyondMap,
