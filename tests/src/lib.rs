@@ -11,6 +11,9 @@ pub mod rust_page {}
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/pin_your_rig.md")]
 pub mod pin_your_rig_page {}
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/boards.md")]
+pub mod boards_page {}
 
 pub mod fuzz;
 pub mod source;

@@ -57,8 +57,9 @@ impl<'s> Mapper<'s> {
     ///
     /// const TINY: Capacity = Capacity::TINY;
     /// // #[link_section = ".axisram"] and ".psram" on a chip.
-    /// static HOT: ConstStaticCell<Slab<{ TINY.hot_bytes() }>> = ConstStaticCell::new(Slab::ZERO);
-    /// static COLD: ConstStaticCell<Slab<{ TINY.cold_bytes() }>> = ConstStaticCell::new(Slab::ZERO);
+    /// type Cell<const BYTES: usize> = ConstStaticCell<Slab<BYTES>>;
+    /// static HOT: Cell<{ TINY.hot_bytes() }> = Cell::new(Slab::ZERO);
+    /// static COLD: Cell<{ TINY.cold_bytes() }> = Cell::new(Slab::ZERO);
     ///
     /// let rig =
     ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };

@@ -3,8 +3,8 @@
 /// Regions, and stages all of whose regions, are read now and then or in whole blocks.
 ///
 /// Voxels and objects' volumes are the bulk of a slab, and a frame touches those of visible blocks
-/// only, front to back. Pictures of the map are made on demand or after a loss. Places and planners'
-/// maps are asked once a frame at most.
+/// only, front to back. Pictures of the map are made on demand or after a loss. Places and
+/// planners' maps are asked once a frame at most.
 const COLD: [&str; 6] =
     ["objects.volumes", "places", "planning", "raycast", "volume.colour", "volume.voxels"];
 

@@ -5,9 +5,10 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const PAGES: [&str; 22] = [
+const PAGES: [&str; 23] = [
     "README.md",
     "docs/bits.md",
+    "docs/boards.md",
     "docs/fleet.md",
     "docs/inertial.md",
     "docs/inputs.md",
@@ -61,7 +62,12 @@ fn commands(line: &str) -> Vec<Vec<String>> {
     commands
         .filter(|words| words.first().is_some_and(|word| word == "dynvox"))
         .map(|words| match words[1].as_str() {
-            "bench" => ["run".to_owned()].into_iter().chain(words[2..].to_vec()).collect(),
+            "bench" => {
+                // Only the report is an option of `bench` itself.
+                let own =
+                    if words[2..].first().is_some_and(|word| word == "--report") { 4 } else { 2 };
+                ["run".to_owned()].into_iter().chain(words[own..].to_vec()).collect()
+            }
             _ => words[1..].to_vec(),
         })
         .collect()
