@@ -96,3 +96,46 @@ impl BoardReport {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ARGUMENTS: [&str; 8] = [
+        "--profile",
+        "tiny",
+        "--frames",
+        "6",
+        "--set",
+        "street.width=96",
+        "--set",
+        "street.height=64",
+    ];
+
+    #[test]
+    fn a_report_has_machine_and_equal_digests_of_every_level() {
+        let arguments = ARGUMENTS.map(str::to_owned);
+        let plan = crate::cli::run::request_of(&arguments).unwrap().resolve().unwrap();
+        let mut report = BoardReport::new(&plan, &arguments).unwrap();
+        report.check_digests().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("board.json");
+        // Over an older one.
+        std::fs::write(&path, "{}").unwrap();
+        report.write(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["machine"]["architecture"], std::env::consts::ARCH);
+        assert_eq!(json["arguments"][1], "tiny");
+        let levels = json["levels"].as_array().unwrap();
+        assert_eq!(levels.len(), Vectors::available().count());
+        assert!(levels.iter().all(|level| level["digest"] == levels[0]["digest"]));
+        assert!(levels.iter().all(|level| level["units"][0]["ns"].as_f64() > Some(0.0)));
+        // A level with another digest is named, and what to do.
+        if let [_, .., last] = &mut report.levels[..] {
+            last.digest = "0123456789abcdef".to_owned();
+            let refusal = report.check_digests().unwrap_err().to_string();
+            assert!(refusal.contains("0123456789abcdef") && refusal.contains("send the report"));
+        }
+    }
+}
