@@ -133,9 +133,17 @@ impl Route {
     }
 }
 
-/// Bounds of a small mapper with a vehicle's window: 12 m to each side, 4 m high.
-const CAPACITY: Capacity =
-    Capacity { planning_width: 120, planning_length: 120, planning_height: 20, ..Capacity::TINY };
+/// Bounds of a small mapper with a vehicle's window: 12 m to each side, 4 m high. The map must hold
+/// all that the window shows: a block that leaves a full map takes its obstacle along, and the
+/// vehicle flies into it.
+const CAPACITY: Capacity = Capacity {
+    planning_width: 120,
+    planning_length: 120,
+    planning_height: 20,
+    blocks: 20_000,
+    visible_blocks: 8_000,
+    ..Capacity::TINY
+};
 
 /// Space that the vehicle looks at: as far as it needs to stop, and a second more.
 fn band(speed_m_s: f64) -> Band {
