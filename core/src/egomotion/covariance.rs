@@ -9,7 +9,11 @@ use super::{
     normal_equations::{NormalEquations, PointRows, RotationMatrix},
     points::Point,
 };
-use crate::geometry::{StereoRig, Transform};
+use crate::{
+    geometry::{StereoRig, Transform},
+    state::Visitor,
+};
+use bytemuck::{Pod, Zeroable};
 
 const N: usize = 6;
 /// Entries of the lower half of a matrix of six rows.
@@ -25,7 +29,8 @@ const SCALE_SHARE: f64 = 0.005;
 
 /// Covariance of a rotation (rad) and a translation (m), in the current camera's frame: x to the
 /// right, y down, z ahead.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionCovariance {
@@ -82,6 +87,16 @@ impl MotionCovariance {
     /// Symmetric matrix: rotation vector (rad), then translation (m).
     pub fn matrix(&self) -> [[f64; N]; N] {
         core::array::from_fn(|row| core::array::from_fn(|column| self.entry(row, column)))
+    }
+
+    /// Lower half of the matrix, row by row.
+    pub(crate) fn lower(&self) -> [f64; ENTRIES] {
+        self.lower
+    }
+
+    /// Visits the entries.
+    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
+        visitor.f64s(&mut self.lower);
     }
 
     /// Standard deviations of the rotation about the current camera's axes, rad.

@@ -271,11 +271,14 @@ impl<'s> Localization<'s> {
             PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
         );
         let camera = PlaceCamera {
+            frame: seen.number,
             pose: SegmentPose {
                 segment: self.camera.segment(),
                 t_world_camera: *self.camera.t_world_camera(),
             },
             t_current_previous: is_measured.then(|| *self.camera.t_current_previous()),
+            covariance: found.egomotion.as_ref().and_then(|motion| motion.covariance.as_ref()),
+            is_given: found.origin == PoseOrigin::Given,
         };
         let points = FramePoints { all: refined.iter(), still };
         let joined = self.places.observe(&view, &camera, points, &mut self.estimator);

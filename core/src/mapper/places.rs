@@ -3,6 +3,7 @@
 use super::Mapper;
 use crate::{
     geometry::{MapSegment, StereoRig},
+    places::{LoopCounts, SettledKeyframe},
     state::{ReadError, Reader, Visitor, Writer},
 };
 use core::fmt;
@@ -141,6 +142,39 @@ impl Mapper<'_> {
     /// ```
     pub fn keyframes(&self) -> u32 {
         self.localization.places.len() as u32
+    }
+
+    /// Keyframes of this run after all loops closed so far, oldest first. Where no loop was closed
+    /// they are where the camera was.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+    /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+    /// assert_eq!(mapper.settled_keyframes().count(), 0);
+    /// # Ok::<(), dynvox_core::NewError>(())
+    /// ```
+    pub fn settled_keyframes(&self) -> impl Iterator<Item = SettledKeyframe> {
+        self.localization.places.settled()
+    }
+
+    /// Counts of the loops closed so far.
+    ///
+    /// ```
+    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+    /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+    /// assert_eq!(mapper.loops().closures, 0);
+    /// # Ok::<(), dynvox_core::NewError>(())
+    /// ```
+    pub fn loops(&self) -> LoopCounts {
+        self.localization.places.loops()
     }
 
     /// Writes the keyframes to `sink`, piece by piece, with the rig that saw them and a checksum.

@@ -312,6 +312,7 @@ impl Mapper<'_> {
             tracking: TrackingReport { matches_excluded: found.matches_excluded, ..tracking },
             segmentation,
             objects: self.objects.report(),
+            world_moved: self.localization.places.has_moved(),
             fused: fused && shows_depth,
             allocate: allocation,
             prune,

@@ -3,6 +3,7 @@
 mod errors;
 mod ignored;
 mod inertial;
+mod loops;
 mod lost;
 mod mutations;
 mod places;

@@ -10,7 +10,7 @@
 //! All of it is integers but the motion, which is the camera's own estimator's. There is no trained
 //! vocabulary: `index` looks up parts of descriptors, in lists of bounded length.
 //!
-//! **Memory.** 11.2 KiB for each of `Capacity::keyframes`, and 46 KiB; nothing where it is 0, and
+//! **Memory.** 11.8 KiB for each of `Capacity::keyframes`, and 210 KiB; nothing where it is 0, and
 //! then nothing is computed either.
 //!
 //! **Time.** 1,024 descriptors, as many look-ups, and at most six keyframes compared: only in
@@ -22,10 +22,13 @@
 //! goes on in its own segment.
 
 mod descriptor;
+mod graph;
 mod index;
 mod keypoint;
+mod pending;
 mod query;
 mod recognition;
+mod saved;
 mod table;
 
 pub use table::{KEYFRAME_POINTS, SegmentPose};
@@ -33,19 +36,22 @@ pub use table::{KEYFRAME_POINTS, SegmentPose};
 /// Most keyframes of a mapper.
 pub const MAX_KEYFRAMES: usize = 1 << 16;
 
+pub use graph::LoopCounts;
+
+use graph::{Graph, Measured, Recognized};
 use index::Index;
+use pending::Pending;
 use query::Query;
-use recognition::{Candidate, Recognition, agree};
+use recognition::{Candidate, Recognition};
 use table::Table;
 
 use crate::{
-    egomotion::{EgomotionConfig, Estimator},
+    egomotion::{EgomotionConfig, Estimator, MotionCovariance},
     geometry::{MapSegment, StereoRig, Transform},
     image::View,
     memory::{Capacity, Carver},
     random::Random,
     scene_flow::Match,
-    state::Visitor,
 };
 
 /// Seed of the draws of motions from keyframes.
@@ -55,10 +61,13 @@ const SPACING_DEPTH_SHARE: f64 = 0.06;
 const SPACING_RAD: f64 = 0.16;
 /// Fewest points of a keyframe.
 const POINTS_MIN: usize = 40;
-/// Frames that must recognise one place.
-const CONSISTENT: u32 = 3;
-/// Frames in a row without a place after which the ones before are forgotten.
-const MISSES_MAX: u32 = 5;
+/// Way after which a keyframe is a place that the camera has left, in depths of the scene; a turn
+/// of a radian counts as one. What is nearer is seen all the time.
+const LOOP_DEPTHS: f64 = 3.0;
+/// Least way from one closure to the next, and between keyframes where there are older ones.
+const LOOP_SPACING_DEPTHS: f64 = 0.5;
+/// Depth of the scene before the first keyframe, m.
+const DEPTH_UNKNOWN_M: f64 = 10.0;
 /// First frames of a segment, all compared, and the interval of those compared afterwards.
 const FIRST_FRAMES: u32 = 30;
 const INTERVAL: u32 = 4;
@@ -73,60 +82,25 @@ pub(crate) struct PlaceView<'a> {
 
 /// The camera in a frame: its pose in a segment, and how it came there.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PlaceCamera {
+pub(crate) struct PlaceCamera<'a> {
+    /// Number of the frame.
+    pub frame: u32,
     pub pose: SegmentPose,
     /// Motion since the last frame; `None` where it was not measured.
     pub t_current_previous: Option<Transform>,
+    /// Covariance of the motion since the last pose measured, where it is known.
+    pub covariance: Option<&'a MotionCovariance>,
+    /// The caller says where the camera is: no loop can tell it better.
+    pub is_given: bool,
 }
 
-/// Place that frames recognise, followed by the camera's motion until enough of them do.
-#[derive(Clone, Copy, Debug, Default)]
-struct Pending {
-    /// Pose of the camera in the segment recognised.
-    t_world_camera: Transform,
-    segment: MapSegment,
-    /// Frames that recognised it; 0 where no place is pending.
-    frames: u32,
-    /// Frames since the last one that did.
-    misses: u32,
-}
-
-impl Pending {
-    fn pose(&self) -> SegmentPose {
-        SegmentPose { segment: self.segment, t_world_camera: self.t_world_camera }
-    }
-
-    /// Moves the place on with the camera; without a motion it is forgotten.
-    fn advance(&mut self, t_current_previous: Option<&Transform>) {
-        match t_current_previous {
-            Some(motion) => {
-                self.t_world_camera = (self.t_world_camera * motion.inverse()).normalized();
-            }
-            None => *self = Self::default(),
-        }
-    }
-
-    /// Takes in a frame that was compared. Returns whether enough frames recognised one place.
-    fn take(&mut self, found: Option<&Candidate>, depth_m: f64) -> bool {
-        match found {
-            Some(found) => {
-                let goes_on = self.frames > 0 && agree(&self.pose(), &found.pose, depth_m);
-                *self = Self {
-                    t_world_camera: found.pose.t_world_camera,
-                    segment: found.pose.segment,
-                    frames: if goes_on { self.frames + 1 } else { 1 },
-                    misses: 0,
-                };
-            }
-            None => {
-                self.misses += 1;
-                if self.misses > MISSES_MAX {
-                    *self = Self::default();
-                }
-            }
-        }
-        self.frames >= CONSISTENT
-    }
+/// Keyframe after all loops that were closed so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettledKeyframe {
+    /// Number of the frame, from 0.
+    pub frame: u32,
+    /// Pose of its camera.
+    pub pose: SegmentPose,
 }
 
 /// Keyframes, and the place that frames begin to recognise.
@@ -135,7 +109,12 @@ pub(crate) struct Places<'s> {
     table: Table<'s>,
     index: Index<'s>,
     query: Query<'s>,
+    graph: Graph<'s>,
     pending: Pending,
+    /// Depth of the scene in the last frame, m.
+    depth_m: f64,
+    /// Loops changed the poses of keyframes in this frame.
+    has_moved: bool,
     /// Segment of the last frame, and frames in it, up to [`FIRST_FRAMES`] and in turns of
     /// [`INTERVAL`] from there on.
     segment: MapSegment,
@@ -159,6 +138,7 @@ impl<'s> Places<'s> {
         Table::bytes(keyframes)
             + Index::bytes(keyframes * KEYFRAME_POINTS)
             + Query::bytes(keyframes)
+            + Graph::bytes(keyframes)
     }
 
     /// Allocates its regions; none where the capacity has no keyframes.
@@ -170,15 +150,19 @@ impl<'s> Places<'s> {
         let make = |carver: &mut Carver<'s>| {
             let table = Table::new_in(keyframes, carver);
             let index = Index::new_in(keyframes * KEYFRAME_POINTS, carver);
-            (table, index, Query::new_in(keyframes, carver))
+            let query = Query::new_in(keyframes, carver);
+            (table, index, query, Graph::new_in(keyframes, carver))
         };
-        let (table, index, query) =
+        let (table, index, query, graph) =
             if is_on { carver.group("places", make) } else { make(&mut nowhere) };
         Self {
             table,
             index,
             query,
+            graph,
             pending: Pending::default(),
+            depth_m: DEPTH_UNKNOWN_M,
+            has_moved: false,
             segment: MapSegment::FIRST,
             frames: 0,
             thinned: 0,
@@ -194,7 +178,7 @@ impl<'s> Places<'s> {
     pub(crate) fn observe<'m>(
         &mut self,
         view: &PlaceView<'_>,
-        camera: &PlaceCamera,
+        camera: &PlaceCamera<'_>,
         matches: FramePoints<
             impl Iterator<Item = &'m Match> + Clone,
             impl Iterator<Item = &'m Match> + Clone,
@@ -206,24 +190,53 @@ impl<'s> Places<'s> {
         }
         self.count(camera.pose.segment);
         self.pending.advance(camera.t_current_previous.as_ref());
+        self.has_moved = self.graph.step(self.table.slots());
         // A guessed pose is no place.
         camera.t_current_previous?;
-        let joined = self.is_due(camera.pose.segment).then(|| {
+        let (covariance, depth_m) = (camera.covariance, self.depth_m);
+        self.graph.advance(&Measured { pose: &camera.pose, covariance, depth_m });
+        let is_due = self.is_due(camera.pose.segment) || self.may_close(camera);
+        let found = is_due.then(|| {
             self.query.describe(view.image, matches.all, usize::MAX);
             self.recognise(view, camera, estimator)
         });
-        let joined = joined.flatten();
-        if self.is_fixed {
-            return joined;
+        let joined = found.flatten().and_then(|found| self.take_place(camera, &found));
+        if !self.is_fixed {
+            self.keep(view, camera, &joined.unwrap_or(camera.pose), matches.still);
         }
-        if let Some(pose) = &joined {
-            // The young segment's own keyframes are places of the old one from now on.
-            let t_old_young = pose.t_world_camera * camera.pose.t_world_camera.inverse();
-            self.table.join(camera.pose.segment, pose.segment, &t_old_young);
-            self.pending = Pending::default();
-        }
-        self.keep(view, &joined.unwrap_or(camera.pose), matches.still);
         joined
+    }
+
+    /// Takes a place that enough frames recognised: a closure in the camera's own segment, or the
+    /// pose in another one, where the camera goes on.
+    #[inline(never)]
+    fn take_place(&mut self, camera: &PlaceCamera<'_>, found: &Candidate) -> Option<SegmentPose> {
+        if self.is_fixed {
+            return Some(found.pose);
+        }
+        let Self { table, query, graph, pending, depth_m, .. } = self;
+        // The next closure needs three frames of its own.
+        *pending = Pending::default();
+        let keyframe = table.pose(found.slot)?;
+        let place = Recognized {
+            slot: found.slot,
+            t_world_keyframe: keyframe.t_world_camera,
+            t_keyframe_camera: keyframe.t_world_camera.inverse() * found.pose.t_world_camera,
+            covariance: query.covariance(),
+            depth_m: *depth_m,
+        };
+        if found.pose.segment == camera.pose.segment {
+            graph.close(table.slots(), &place);
+            return None;
+        }
+        // The graph joins first: it needs the keyframes' poses as they were driven.
+        graph.join(table.slots(), &place);
+        graph.close(table.slots(), &place);
+        graph.go_on_at(&found.pose);
+        // The young segment's own keyframes are places of the old one from now on.
+        let t_old_young = found.pose.t_world_camera * camera.pose.t_world_camera.inverse();
+        table.join(camera.pose.segment, found.pose.segment, &t_old_young);
+        Some(found.pose)
     }
 
     /// Counts the frames of a segment.
@@ -244,52 +257,76 @@ impl<'s> Places<'s> {
             && (self.is_fixed || self.table.poses().any(|pose| pose.segment != segment))
     }
 
-    /// Compares the frame with the keyframes of other segments.
+    /// Tells that this frame is compared with keyframes of the camera's own segment.
+    fn may_close(&self, camera: &PlaceCamera<'_>) -> bool {
+        let is_turn = self.frames % INTERVAL == FIRST_FRAMES % INTERVAL;
+        let graph = &self.graph;
+        !(camera.is_given || self.is_fixed)
+            && (is_turn || self.pending.frames > 0)
+            && graph.way_since_closure() >= LOOP_SPACING_DEPTHS
+            && graph.way_since(self.table.slots().next()) >= LOOP_DEPTHS
+    }
+
+    /// Compares the frame with the keyframes of other segments, and with those that the camera left
+    /// some way ago.
     fn recognise(
         &mut self,
         view: &PlaceView<'_>,
-        camera: &PlaceCamera,
+        camera: &PlaceCamera<'_>,
         estimator: &mut Estimator<'_>,
-    ) -> Option<SegmentPose> {
-        let Self { table, index, query, pending, random, is_fixed, .. } = self;
+    ) -> Option<Candidate> {
+        let Self { table, index, query, graph, pending, random, is_fixed, .. } = self;
         let depth_m = depth_m(view.rig, query)?;
+        let may_close = !camera.is_given;
         let elsewhere = |slot: usize| {
             let segment = table.pose(slot).map(|pose| pose.segment);
-            *is_fixed || segment.is_some_and(|segment| segment != camera.pose.segment)
+            *is_fixed
+                || segment.is_some_and(|segment| segment != camera.pose.segment)
+                || (may_close && graph.way_since(Some(slot)) >= LOOP_DEPTHS)
         };
         let recognition = Recognition { table, index, query, random };
         let found = recognition.find(view, estimator, elsewhere);
-        pending.take(found.as_ref(), depth_m).then(|| pending.pose())
+        let is_place = pending.take(found.as_ref(), depth_m);
+        found.filter(|_| is_place)
     }
 
     /// Keeps the frame as a keyframe, unless one is near.
     fn keep<'m>(
         &mut self,
         view: &PlaceView<'_>,
+        camera: &PlaceCamera<'_>,
         pose: &SegmentPose,
         matches: impl Iterator<Item = &'m Match> + Clone,
     ) {
-        let Self { table, index, query, thinned, .. } = self;
+        let Self { table, index, query, graph, thinned, depth_m: depth, .. } = self;
         query.describe(view.image, matches, KEYFRAME_POINTS);
         let Some(depth_m) = depth_m(view.rig, query) else { return };
-        let is_near = |other: SegmentPose| {
+        *depth = depth_m;
+        let is_sparse = graph.way_since(table.slots().next_back()) >= LOOP_SPACING_DEPTHS;
+        let is_near = |slot: usize| {
+            let Some(other) = table.pose(slot) else { return false };
+            // A loop needs keyframes to hang on, but fewer than a new way.
+            let is_left = is_sparse && graph.way_since(Some(slot)) >= LOOP_DEPTHS;
             let apart = pose.t_world_camera.inverse() * other.t_world_camera;
-            other.segment == pose.segment
+            !is_left
+                && other.segment == pose.segment
                 && apart.distance_m() < SPACING_DEPTH_SHARE * depth_m
                 && apart.angle_rad() < SPACING_RAD
         };
-        if query.points().count() < POINTS_MIN || table.poses().any(is_near) {
+        if query.points().count() < POINTS_MIN || table.slots().any(is_near) {
             return;
         }
         let Some((slot, must_leave)) = table.next_slot() else { return };
         let numbers = |point: usize| Table::number(slot, point);
         if must_leave {
             *thinned = thinned.saturating_add(1);
+            graph.remove(table.slots(), slot);
             for (point, (_, descriptor)) in table.points(slot).enumerate() {
                 index.remove(descriptor, numbers(point));
             }
         }
         table.insert(slot, pose, query.points());
+        graph.insert(table.slots(), &pose.t_world_camera, camera.frame);
         for (point, (_, descriptor)) in table.points(slot).enumerate() {
             index.insert(descriptor, numbers(point));
         }
@@ -300,66 +337,23 @@ impl<'s> Places<'s> {
         self.table.len()
     }
 
-    /// Visits the keyframes for a file of their own.
-    pub(crate) fn visit_keyframes(&mut self, visitor: &mut impl Visitor) {
-        self.table.visit_in_order(visitor);
+    /// Keyframes of this run after all loops that were closed so far, oldest first.
+    pub(crate) fn settled(&self) -> impl Iterator<Item = SettledKeyframe> {
+        self.table.slots().filter_map(|slot| {
+            let (frame, t_world_camera) = self.graph.settled(slot)?;
+            let segment = self.table.pose(slot)?.segment;
+            Some(SettledKeyframe { frame, pose: SegmentPose { segment, t_world_camera } })
+        })
     }
 
-    /// Makes keyframes that were read the places of an old map; with `is_fixed` none is added.
-    /// Returns the last segment that one of them lies in; `None` without keyframes.
-    pub(crate) fn take_up(&mut self, is_fixed: bool) -> Option<MapSegment> {
-        let Self { table, index, .. } = self;
-        index.clear();
-        for slot in 0..table.len() {
-            for (point, (_, descriptor)) in table.points(slot).enumerate() {
-                index.insert(descriptor, Table::number(slot, point));
-            }
-        }
-        self.is_fixed = is_fixed;
-        table.poses().map(|pose| pose.segment).max()
+    /// Counts of the loops.
+    pub(crate) fn loops(&self) -> LoopCounts {
+        self.graph.counts()
     }
 
-    /// Forgets all keyframes.
-    pub(crate) fn clear(&mut self) {
-        self.table.clear();
-        self.index.clear();
-        self.is_fixed = false;
-    }
-
-    /// Visits what lives from frame to frame; nothing where there are no keyframes.
-    pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
-        // The query is scratch memory.
-        let Self {
-            table,
-            index,
-            query: _,
-            pending,
-            segment,
-            frames,
-            thinned,
-            random,
-            is_on,
-            is_fixed,
-        } = self;
-        if !*is_on {
-            return;
-        }
-        table.visit(visitor);
-        index.visit(visitor);
-        let Pending { t_world_camera, segment: pending_segment, frames: times, misses } = pending;
-        visitor.transform(t_world_camera);
-        for segment in [pending_segment, segment] {
-            visitor.code(
-                segment,
-                |segment| u32::from(segment.get()),
-                |code| MapSegment::new(code as u16),
-            );
-        }
-        visitor.u32s([times, misses, frames, thinned]);
-        let mut fixed = u8::from(*is_fixed);
-        visitor.u8(&mut fixed);
-        *is_fixed = fixed != 0;
-        random.visit(visitor);
+    /// Tells that loops changed the poses of keyframes in this frame.
+    pub(crate) fn has_moved(&self) -> bool {
+        self.has_moved
     }
 }
 

@@ -7,6 +7,7 @@ use super::{
     table::{KEYFRAME_POINTS, Table},
 };
 use crate::{
+    egomotion::MotionCovariance,
     image::View,
     memory::{Carver, region_bytes},
     scene_flow::Match,
@@ -42,6 +43,9 @@ pub(super) struct Query<'s> {
     claimed: &'s mut [u32],
     scores: &'s mut [Score],
     matches: &'s mut [Match],
+    /// One entry, because the stack is small: covariance of the motion from the best keyframe.
+    covariance: &'s mut [MotionCovariance],
+    has_covariance: bool,
     len: usize,
     match_len: usize,
 }
@@ -53,6 +57,7 @@ impl<'s> Query<'s> {
             + region_bytes::<u32>(QUERY_POINTS)
             + region_bytes::<Score>(keyframes)
             + region_bytes::<Match>(KEYFRAME_POINTS)
+            + region_bytes::<MotionCovariance>(1)
     }
 
     pub(super) fn new_in(keyframes: usize, carver: &mut Carver<'s>) -> Self {
@@ -62,6 +67,8 @@ impl<'s> Query<'s> {
             claimed: carver.alloc("places.claimed", QUERY_POINTS),
             scores: carver.alloc("places.scores", keyframes),
             matches: carver.alloc("places.match", KEYFRAME_POINTS),
+            covariance: carver.alloc("places.covariance", 1),
+            has_covariance: false,
             len: 0,
             match_len: 0,
         }
@@ -103,6 +110,19 @@ impl<'s> Query<'s> {
     pub(super) fn mean_disparity_px(&self) -> Option<f64> {
         let sum: u64 = self.points().map(|(point, _)| u64::from(point.disparity_q8)).sum();
         (self.len > 0).then(|| sum as f64 / 256.0 / self.len as f64)
+    }
+
+    /// Keeps the covariance of the motion from the best keyframe.
+    pub(super) fn keep_covariance(&mut self, covariance: Option<&MotionCovariance>) {
+        self.has_covariance = covariance.is_some();
+        if let Some((to, covariance)) = self.covariance.first_mut().zip(covariance) {
+            *to = *covariance;
+        }
+    }
+
+    /// Covariance of the motion from the best keyframe, where there is one.
+    pub(super) fn covariance(&self) -> Option<&MotionCovariance> {
+        self.covariance.first().filter(|_| self.has_covariance)
     }
 
     /// Counts the scores for the keyframes that `may` takes.

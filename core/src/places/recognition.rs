@@ -32,6 +32,8 @@ pub(super) const AGREE_RAD: f64 = 0.03;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
     pub pose: SegmentPose,
+    /// Slot of the keyframe.
+    pub slot: usize,
     /// Matches that the motion explains.
     pub inliers: u32,
 }
@@ -80,7 +82,10 @@ impl Recognition<'_, '_> {
             }
             let t_world_camera = (keyframe.t_world_camera * motion.inverse()).normalized();
             let pose = SegmentPose { segment: keyframe.segment, t_world_camera };
-            let found = Candidate { pose, inliers: estimate.inliers };
+            let found = Candidate { pose, slot, inliers: estimate.inliers };
+            if best.is_none_or(|before| before.inliers < found.inliers) {
+                query.keep_covariance(estimate.covariance.as_ref());
+            }
             match best {
                 // Neighbouring keyframes of one place confirm each other.
                 Some(before) if agree(&before.pose, &found.pose, depth_m) => {

@@ -44,6 +44,19 @@ pub struct SegmentPose {
     pub t_world_camera: Transform,
 }
 
+impl SegmentPose {
+    /// Visits segment and pose.
+    pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
+        let Self { segment, t_world_camera } = self;
+        visitor.transform(t_world_camera);
+        visitor.code(
+            segment,
+            |segment| u32::from(segment.get()),
+            |code| MapSegment::new(code as u16),
+        );
+    }
+}
+
 /// The keyframes.
 #[derive(Debug)]
 pub(super) struct Table<'s> {
@@ -74,7 +87,7 @@ impl<'s> Table<'s> {
     }
 
     /// Slots of the keyframes, oldest first.
-    fn slots(&self) -> impl DoubleEndedIterator<Item = usize> + Clone {
+    pub(super) fn slots(&self) -> impl DoubleEndedIterator<Item = usize> + Clone {
         self.order.iter().take(self.len).map(|&slot| slot as usize)
     }
 

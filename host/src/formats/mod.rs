@@ -50,11 +50,14 @@ pub use picture::{
 };
 pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
-pub use poses::{Trajectory, kitti_line, read_numbered, read_poses, tum_line, write_numbered};
+pub use poses::{
+    Trajectory, kitti_line, read_numbered, read_poses, tum_line, tum_row, write_numbered,
+};
 pub use rows_of_file::rows_of_file;
 pub use run_files::{
-    BLOCKS_TABLE_FILE, FRAMES_FILE, MAP_FILE, REPORT_FILE, SETTINGS_FILE, SUMMARY_FILE,
-    TIMED_TRAJECTORY_FILE, TRACKS_FILE, TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
+    BLOCKS_TABLE_FILE, CLOSED_TRAJECTORY_FILE, FRAMES_FILE, MAP_FILE, REPORT_FILE, SETTINGS_FILE,
+    SUMMARY_FILE, TIMED_CLOSED_TRAJECTORY_FILE, TIMED_TRAJECTORY_FILE, TRACKS_FILE,
+    TRAJECTORY_FILE, TRUE_TRAJECTORY_FILE,
 };
 pub use segments::{SEGMENT_GAP_M, ShownSegment, shown_pose};
 pub(crate) use times::parse_date;

@@ -18,5 +18,9 @@ pub const TRAJECTORY_FILE: &str = "trajectory_kitti.txt";
 pub const TRUE_TRAJECTORY_FILE: &str = "trajectory_truth_kitti.txt";
 /// The path with times, as TUM has it.
 pub const TIMED_TRAJECTORY_FILE: &str = "trajectory_tum.txt";
+/// The path after the loops that were closed, KITTI's rows.
+pub const CLOSED_TRAJECTORY_FILE: &str = "trajectory_closed_kitti.txt";
+/// The path after the loops that were closed, with times, as TUM has it.
+pub const TIMED_CLOSED_TRAJECTORY_FILE: &str = "trajectory_closed_tum.txt";
 /// Name of the page that shows a run.
 pub const REPORT_FILE: &str = "report.html";

@@ -5,6 +5,7 @@ mod block_history;
 mod blocks;
 mod bounds;
 mod chart_values;
+mod closed_path;
 mod depth_census;
 mod frame;
 mod frame_log;
@@ -37,6 +38,7 @@ pub use block_history::BlockHistoryObserver;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::ChartValues;
+pub use closed_path::{ClosedLoops, LoopSection};
 pub use depth_census::{DepthCensus, DepthTotals};
 pub use frame::{FrameRow, STAGES, StageTime, StepTimes};
 pub use frame_log::{FrameLog, StageStatistics};
@@ -188,6 +190,8 @@ pub struct Finished {
     pub mesh_path: PathBuf,
     /// The block store.
     pub store: StoreStats,
+    /// Loops that the run closed.
+    pub loops: ClosedLoops,
 }
 
 /// Sees every frame and sums up in the end. Its fields are its part of a checkpoint.

@@ -1,7 +1,10 @@
 //! The camera's path: written to `trajectory_kitti.txt` and `trajectory_tum.txt` as it comes, and
 //! kept in memory only where it is compared with true poses, which are there as well.
 
-use super::{Finished, FrameContext, GrowingFile, ObserveError, ObservedRun, Observer};
+use super::closed_path;
+use super::{
+    Finished, FrameContext, GrowingFile, LoopSection, ObserveError, ObservedRun, Observer,
+};
 use crate::evaluate::trajectory::{TrajectoryErrors, errors};
 use crate::formats::{TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, kitti_line, tum_line};
 use dynvox_core::egomotion::icp::IcpStatus;
@@ -42,6 +45,8 @@ pub struct TrajectorySection {
     pub segments: u32,
     /// Frames the depth tracker lost, where it is used.
     pub failures: Option<TrackingFailures>,
+    /// Loops that were closed; `None` where the camera found none.
+    pub loops: Option<LoopSection>,
 }
 
 /// A path with at most `MAX_POINTS` points: every so many frames one, and the last frame's.
@@ -99,6 +104,8 @@ pub struct TrajectoryObserver {
     segments: u32,
     /// Segment of the last frame.
     segment: MapSegment,
+    /// Rows of the path at which another segment begins, and that segment.
+    parts: Vec<(usize, MapSegment)>,
     /// Frames the depth tracker lost, and number and cause of the first.
     lost_frames: usize,
     first_lost: Option<(usize, IcpStatus)>,
@@ -114,6 +121,7 @@ impl Default for TrajectoryObserver {
             extrapolated_because: BTreeMap::new(),
             segments: 1,
             segment: MapSegment::FIRST,
+            parts: Vec::new(),
             lost_frames: 0,
             first_lost: None,
         }
@@ -137,6 +145,9 @@ impl Observer for TrajectoryObserver {
         // The recording's own stamp, or its time in seconds.
         let time_ns = row.stamp_ns.unwrap_or((row.time_s * 1e9).round() as u64);
         self.tum.append(tum_line(time_ns, &pose).as_bytes());
+        if row.report.segment != self.segment {
+            self.parts.push((self.path.frames, row.report.segment));
+        }
         self.path.add(pose.translation_m, row.report.segment == self.segment);
         self.segment = row.report.segment;
         // Later segments are apart from the first by an unknown motion.
@@ -160,10 +171,12 @@ impl Observer for TrajectoryObserver {
     fn finish(
         self,
         run: &ObservedRun<'_>,
-        _: &Finished,
+        finished: &Finished,
     ) -> Result<TrajectorySection, ObserveError> {
         let (frames, poses): (Vec<usize>, Vec<Transform>) = self.compared.into_iter().unzip();
         let truth = run.plan.dataset.truth().map(|truth| from_first(truth, &frames));
+        let loops =
+            closed_path::write(&run.folder, &self.parts, &finished.loops, truth.as_deref())?;
         // The most frequent reason first.
         let mut because: Vec<_> = self.extrapolated_because.into_iter().collect();
         because.sort_by_key(|(_, frames)| std::cmp::Reverse(*frames));
@@ -180,6 +193,7 @@ impl Observer for TrajectoryObserver {
                 first,
                 cause: status.name(),
             }),
+            loops,
         })
     }
 }

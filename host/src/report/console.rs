@@ -6,8 +6,10 @@ use super::rig;
 use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time};
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
-use crate::formats::{MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_TRAJECTORY_FILE};
-use crate::observe::{MavlinkSection, Sections};
+use crate::formats::{
+    MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_CLOSED_TRAJECTORY_FILE, TIMED_TRAJECTORY_FILE,
+};
+use crate::observe::{LoopSection, MavlinkSection, Sections};
 use crate::run::{Continued, RunRecord};
 use std::path::Path;
 
@@ -33,6 +35,25 @@ fn old_map(old: &Continued) -> String {
     }
 }
 
+/// Sentence on the loops that a run closed.
+fn loop_sentence(loops: &LoopSection) -> String {
+    let LoopSection { closures, refused, taken_out, .. } = loops;
+    let found = format!(
+        "{closures} places seen again ({refused} more refused, {taken_out} taken out again)"
+    );
+    if loops.moved == 0 {
+        return format!("{found}; no pose changed");
+    }
+    let ate = loops.ate_m.map(|ate_m| format!("; absolute trajectory error then {ate_m:.3} m"));
+    format!(
+        "{found}; positions move by up to {:.3} m, the last one by {:.3} m{}: see \
+         {TIMED_CLOSED_TRAJECTORY_FILE}. The map is as it was driven",
+        loops.largest_correction_m,
+        loops.end_correction_m,
+        ate.unwrap_or_default()
+    )
+}
+
 /// The figures of a run whose folder is `folder`, line by line.
 pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     let mut lines = vec![("frames", format!("{} at {:.1} fps", run.frames.len(), run.fps()))];
@@ -40,6 +61,7 @@ pub fn summary_lines(run: &RunRecord, folder: &Path) -> String {
     lines.extend(run.continued.map(|old| ("old map", old_map(&old))));
     let Sections { trajectory, reference, tracks, .. } = &run.sections;
     lines.extend(trajectory.errors.iter().flat_map(trajectory_lines));
+    lines.extend(trajectory.loops.iter().map(|loops| ("loops", loop_sentence(loops))));
     lines.extend(
         reference
             .iter()

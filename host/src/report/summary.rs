@@ -10,7 +10,8 @@ use crate::evaluate::reference::ReferenceFigures;
 use crate::evaluate::surfaces::SurfaceFigures;
 use crate::evaluate::trajectory::WithoutBoresight;
 use crate::observe::{
-    BlockTotals, BlocksSection, ReconstructedObject, TrackRecord, TrajectorySection, state_name,
+    BlockTotals, BlocksSection, LoopSection, ReconstructedObject, TrackRecord, TrajectorySection,
+    state_name,
 };
 use crate::run::{Continued, Incomplete, RunRecord, SkippedFrames, StageStatistics};
 use serde::Serialize;
@@ -37,6 +38,9 @@ pub struct Summary {
     rss_peak_bytes: Option<u64>,
     stages: BTreeMap<&'static str, StageSummary>,
     egomotion: EgomotionSummary,
+    /// Loops that were closed; absent where the camera found none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loops: Option<LoopSection>,
     /// Error of the calibration that the run found.
     #[serde(skip_serializing_if = "Option::is_none")]
     rig: Option<RigSummary>,
@@ -246,6 +250,7 @@ impl Summary {
                 .map(|(name, of)| (name, stage(of)))
                 .collect(),
             egomotion: EgomotionSummary::new(&sections.trajectory),
+            loops: sections.trajectory.loops.clone(),
             rig: super::rig::summary(run),
             inertial: sections.inertial.as_ref().map(InertialSummary::new),
             lidar: sections.reference.as_ref().and_then(|reference| reference.figures.clone()),

@@ -12,7 +12,9 @@ use super::session::Session;
 use super::state::RunState;
 use super::{RunFolder, resident_bytes};
 use crate::formats::{MAP_FILE, Mesh};
-use crate::observe::{Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections};
+use crate::observe::{
+    ClosedLoops, Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections,
+};
 use crate::owned::check_overlap;
 use crate::request::Plan;
 use crate::scene::PICTURES_FOLDER;
@@ -48,7 +50,7 @@ pub fn run(
         scene_folder: scene.path(),
         reference: ReferencePlan::of_run(&plan),
     };
-    let Mapped { mut state, mut since, regions, blocks, pruned, output, mut incomplete } =
+    let Mapped { mut state, mut since, regions, blocks, pruned, loops, output, mut incomplete } =
         map(&observed, slab.bytes_mut(), folder, checkpoint)?;
     sync(&mut state, folder, &mut incomplete);
     // The mapper is gone: its slab serves to read the map piece by piece.
@@ -62,7 +64,7 @@ pub fn run(
         Mesh::default()
     });
     let mesh_path = folder.file(MAP_FILE);
-    let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store };
+    let finished = Finished { regions, blocks, pruned, mesh, mesh_path, store, loops };
     let sections = std::mem::take(&mut state.observers).finish(&observed, &finished)?;
     add_unwritten(&mut incomplete, &sections);
     if incomplete.is_none() {
@@ -142,6 +144,7 @@ struct Mapped {
     regions: Vec<Region>,
     blocks: usize,
     pruned: PruneReport,
+    loops: ClosedLoops,
     output: MeshOutput,
     incomplete: Option<Incomplete>,
 }
@@ -172,6 +175,10 @@ fn map(
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.static_map().pool().len(),
         pruned,
+        loops: ClosedLoops {
+            counts: mapper.loops(),
+            keyframes: mapper.settled_keyframes().collect(),
+        },
         output: MeshOutput::begin(
             &mut mapper,
             (store, plan.request.storage.streaming()),

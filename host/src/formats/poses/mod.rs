@@ -13,7 +13,7 @@ mod body;
 mod row;
 mod write;
 
-pub use write::{kitti_line, tum_line, write_numbered};
+pub use write::{kitti_line, tum_line, tum_row, write_numbered};
 
 use super::rows::lines_of;
 use super::times::{TimeUnit, median_interval};

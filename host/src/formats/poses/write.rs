@@ -21,11 +21,12 @@ fn kitti_row(pose: &Transform) -> String {
 /// TUM: `t x y z qx qy qz qw`, one line a frame. The time is in ns and written as seconds to the
 /// last digit.
 pub fn tum_line(time_ns: u64, pose: &Transform) -> String {
-    format!(
-        "{} {}\n",
-        seconds_text(time_ns),
-        joined(pose.translation_m.into_iter().chain(pose.rotation))
-    )
+    tum_row(&seconds_text(time_ns), pose)
+}
+
+/// TUM's line with a time that is text already, s.
+pub fn tum_row(time_s: &str, pose: &Transform) -> String {
+    format!("{time_s} {}\n", joined(pose.translation_m.into_iter().chain(pose.rotation)))
 }
 
 fn joined(numbers: impl Iterator<Item = f64>) -> String {

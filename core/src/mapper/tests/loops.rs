@@ -1,0 +1,81 @@
+//! A camera that comes back to where it has been without having been lost.
+
+use super::resume::{restored, saved};
+use super::*;
+use crate::{geometry::MapSegment, places::LoopCounts};
+
+const WITH_PLACES: Capacity = Capacity { keyframes: 80, ..CAPACITY };
+/// Frames of a full turn, and a few that go over its beginning again.
+const TURN: usize = 64;
+const FRAMES: usize = TURN + 28;
+
+/// Pose of frame `at` of a camera that turns about a point 0.4 m behind it.
+fn turning(at: usize) -> Transform {
+    let turn = core::f64::consts::TAU * at as f64 / TURN as f64;
+    Transform::new([0.0, turn, 0.0], [0.0; 3]) * Transform::from_translation([0.0, 0.0, 0.4])
+}
+
+fn step(mapper: &mut Mapper<'_>, at: usize) -> Report {
+    let pair = see(&turning(at));
+    let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
+    mapper.step(&StereoFrame::pair(left, right), &Serial).unwrap()
+}
+
+/// True pose of a frame in the world of the first one.
+fn truth(at: usize) -> Transform {
+    turning(0).inverse() * turning(at)
+}
+
+#[test]
+fn a_full_turn_is_closed_and_changes_no_digest() {
+    let [mut slab, mut plain_slab] =
+        [WITH_PLACES, CAPACITY].map(|capacity| vec![0u8; capacity.bytes() + SLAB_ALIGN]);
+    let mut mapper = Mapper::new(&WITH_PLACES, &Walk::config(), &mut slab).unwrap();
+    let mut plain = Mapper::new(&CAPACITY, &Walk::config(), &mut plain_slab).unwrap();
+    let mut driven = Vec::new();
+    for at in 0..FRAMES {
+        let pair = see(&turning(at));
+        let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
+        let frame = StereoFrame::pair(left, right);
+        let reports = [&mut mapper, &mut plain].map(|m| m.step(&frame, &Serial).unwrap());
+        assert_eq!(reports[0].digest, reports[1].digest, "frame {at}");
+        driven.push(reports[0]);
+        if at == TURN / 2 {
+            assert_eq!(mapper.loops(), LoopCounts::default(), "nothing was seen before");
+        }
+    }
+    let counts = mapper.loops();
+    assert!(counts.closures > 0 && counts.refused + counts.taken_out == 0, "{counts:?}");
+    let moved = driven.iter().filter(|report| report.world_moved).count();
+    assert!(moved > 0 && moved == counts.moved as usize, "{counts:?}");
+    assert!(driven.iter().all(|report| report.segment == MapSegment::FIRST));
+    // The keyframes at the end are where the camera truly was, nearer than it drove.
+    let last = mapper.settled_keyframes().last().unwrap();
+    let off_m = |pose: Transform| (pose.inverse() * truth(last.frame as usize)).distance_m();
+    let [closed_m, driven_m] =
+        [last.pose.t_world_camera, driven[last.frame as usize].t_world_camera].map(off_m);
+    assert!(closed_m < driven_m && closed_m < 0.03, "{driven_m} m, closed {closed_m} m");
+}
+
+#[test]
+fn a_snapshot_while_a_loop_is_closed_goes_on_closing_it() {
+    let go_on = |mapper: &mut Mapper<'_>, from: usize| {
+        let moved: Vec<bool> = (from..FRAMES).map(|at| step(mapper, at).world_moved).collect();
+        (moved, mapper.loops(), mapper.settled_keyframes().collect::<Vec<_>>())
+    };
+    let mut slab = vec![0u8; WITH_PLACES.bytes() + SLAB_ALIGN];
+    let mut mapper = Mapper::new(&WITH_PLACES, &Walk::config(), &mut slab).unwrap();
+    let found = (0..FRAMES).find(|&at| {
+        step(&mut mapper, at);
+        mapper.loops().closures > 0
+    });
+    let next = found.expect("the loop is found") + 3;
+    (next - 2..next).for_each(|at| {
+        step(&mut mapper, at);
+    });
+    assert_eq!(mapper.loops().moved, 0, "a solution takes several frames");
+    let bytes = saved(&mut mapper);
+    let expected = go_on(&mut mapper, next);
+    let again = |mapper: &mut Mapper<'_>| go_on(mapper, next);
+    assert_eq!(restored(&WITH_PLACES, &Walk::config(), &bytes, again), Ok(expected));
+}

@@ -1,0 +1,269 @@
+//! Loops whose truth is known.
+
+use super::*;
+use crate::{
+    memory::SLAB_ALIGN,
+    state::{Hasher, Reader, Writer},
+};
+use std::{vec, vec::Vec};
+
+const KEYFRAMES: usize = 80;
+/// Steps along each side of a square, m.
+const SIDE: usize = 20;
+
+fn with_graph<R>(keyframes: usize, test: impl FnOnce(&mut Graph<'_>) -> R) -> R {
+    let bytes = Graph::bytes(keyframes);
+    let mut slab = vec![0; bytes + SLAB_ALIGN];
+    test(&mut Graph::new_in(keyframes, &mut Carver::new(&mut slab, bytes).unwrap()))
+}
+
+/// Poses of a camera that walks around a square, a metre a step, and is a little wrong each time.
+fn square(steps: usize, error: &Transform) -> (Vec<Transform>, Vec<Transform>) {
+    let quarter = Transform::new([0.0, core::f64::consts::FRAC_PI_2, 0.0], [0.0; 3]);
+    let ahead = Transform::from_translation([0.0, 0.0, 1.0]);
+    let (mut truth, mut driven) = (vec![Transform::IDENTITY], vec![Transform::IDENTITY]);
+    for step in 1..steps {
+        let motion = if step % SIDE == 0 { ahead * quarter } else { ahead };
+        truth.push((truth[step - 1] * motion).normalized());
+        driven.push((driven[step - 1] * motion * *error).normalized());
+    }
+    (truth, driven)
+}
+
+fn pose(t_world_camera: Transform) -> SegmentPose {
+    SegmentPose { segment: MapSegment::FIRST, t_world_camera }
+}
+
+/// Takes keyframes of all poses.
+fn drive(graph: &mut Graph<'_>, poses: &[Transform]) {
+    let covariance = twist::isotropic(2e-3, 0.02);
+    for (at, t_world_camera) in poses.iter().enumerate() {
+        let pose = pose(*t_world_camera);
+        graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
+        graph.insert(0..=at, t_world_camera, at as u32);
+    }
+}
+
+fn place_at(slot: usize, t_keyframe_camera: Transform) -> Recognized<'static> {
+    let t_world_keyframe = Transform::IDENTITY;
+    Recognized { slot, t_world_keyframe, t_keyframe_camera, covariance: None, depth_m: 10.0 }
+}
+
+/// Says that the last keyframe is seen from `slot` as `t_keyframe_camera`.
+fn close(graph: &mut Graph<'_>, last: usize, slot: usize, t_keyframe_camera: Transform) -> bool {
+    let place = place_at(slot, t_keyframe_camera);
+    graph.close(0..=last, &place)
+}
+
+/// Largest distance from the truth, m.
+fn worst_m(graph: &Graph<'_>, truth: &[Transform]) -> f64 {
+    let off = |(at, truth): (usize, &Transform)| {
+        (graph.settled(at).unwrap().1.inverse() * *truth).distance_m()
+    };
+    truth.iter().enumerate().map(off).fold(0.0, |a, b| if a > b { a } else { b })
+}
+
+/// Steps until the poses change; returns the frames that took.
+fn settle(graph: &mut Graph<'_>, len: usize) -> u32 {
+    (1..=2 * ROUNDS).find(|_| graph.step(0..len)).expect("it comes to rest")
+}
+
+const DRIFT: [f64; 6] = [0.0, 0.002, 0.0, 0.004, 0.003, 0.01];
+
+fn drifting() -> (Vec<Transform>, Vec<Transform>) {
+    square(KEYFRAMES, &Transform::IDENTITY.retract(DRIFT))
+}
+
+#[test]
+fn a_square_that_drifted_is_closed_to_the_truth() {
+    let (truth, driven) = drifting();
+    with_graph(KEYFRAMES, |graph| {
+        drive(graph, &driven);
+        let before_m = worst_m(graph, &truth);
+        assert!(!graph.step(0..KEYFRAMES), "nothing to do without a closure");
+        let last = KEYFRAMES - 1;
+        assert!(close(graph, last, 0, truth[0].inverse() * truth[last]));
+        assert_eq!(settle(graph, KEYFRAMES), ROUNDS);
+        let after_m = worst_m(graph, &truth);
+        assert!(before_m > 2.0 && after_m < 0.25 * before_m, "{before_m} m, then {after_m} m");
+        // The end itself is where the closure says.
+        let end = graph.settled(last).unwrap().1.inverse() * truth[last];
+        assert!(end.distance_m() < 0.05 && end.angle_rad() < 0.003, "{end:?}");
+        let LoopCounts { moved, last_moved_m, .. } = graph.counts();
+        let expected_m = (driven[last].inverse() * truth[last]).distance_m();
+        assert!(moved == 1 && (last_moved_m - expected_m).abs() < 0.1, "{last_moved_m} m");
+        assert!(!graph.step(0..KEYFRAMES), "and at rest afterwards");
+    });
+}
+
+#[test]
+fn a_wrong_closure_is_weighed_down_and_taken_out() {
+    let (truth, driven) = drifting();
+    let last = KEYFRAMES - 1;
+    let right = |graph: &mut Graph<'_>| {
+        // Three right ones: the camera comes back to where it began.
+        for slot in 0..3 {
+            drive_on(graph, &driven, KEYFRAMES + slot);
+            let t = truth[slot].inverse() * truth[last] * along(slot + 1);
+            assert!(close(graph, KEYFRAMES + slot, slot, t));
+        }
+    };
+    let end_m = |with_wrong: bool| {
+        with_graph(KEYFRAMES + 8, |graph| {
+            drive(graph, &driven);
+            if with_wrong {
+                // Off by 3 m: less than the way may have drifted, so that it is let in.
+                let wrong = Transform::from_translation([3.0, 0.0, 0.0]);
+                assert!(close(graph, last, 0, truth[0].inverse() * truth[last] * wrong));
+            }
+            right(graph);
+            settle(graph, KEYFRAMES + 3);
+            let counts = graph.counts();
+            assert_eq!(counts.taken_out, u32::from(with_wrong), "{counts:?}");
+            assert_eq!(graph.closure_len, 3);
+            worst_m(graph, &truth)
+        })
+    };
+    let (alone_m, with_wrong_m) = (end_m(false), end_m(true));
+    assert!((alone_m - with_wrong_m).abs() < 0.02, "{alone_m} m, {with_wrong_m} m");
+}
+
+/// Steps ahead after the last of [`square`].
+fn along(steps: usize) -> Transform {
+    Transform::from_translation([0.0, 0.0, steps as f64])
+}
+
+/// Takes keyframe `at`, a true step after the one before.
+fn drive_on(graph: &mut Graph<'_>, driven: &[Transform], at: usize) {
+    let t_world_camera = driven[driven.len() - 1] * along(at + 1 - driven.len());
+    let pose = pose(t_world_camera);
+    let covariance = twist::isotropic(2e-3, 0.02);
+    graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
+    graph.insert(0..=at, &t_world_camera, at as u32);
+}
+
+#[test]
+fn a_closure_far_from_what_drifts_is_refused() {
+    let (truth, driven) = drifting();
+    with_graph(KEYFRAMES, |graph| {
+        drive(graph, &driven);
+        let last = KEYFRAMES - 1;
+        let across = truth[0].inverse() * truth[last] * Transform::new([0.0; 3], [9.0, 0.0, 0.0]);
+        let turned = truth[0].inverse() * truth[last] * Transform::new([0.0, 0.5, 0.0], [0.0; 3]);
+        assert!(!close(graph, last, 0, across) && !close(graph, last, 0, turned));
+        assert_eq!(graph.counts(), LoopCounts { refused: 2, ..LoopCounts::default() });
+        assert!(!graph.step(0..KEYFRAMES));
+    });
+}
+
+#[test]
+fn a_keyframe_that_leaves_hands_its_links_and_closures_on() {
+    let (truth, driven) = drifting();
+    let last = KEYFRAMES - 1;
+    let solved = |thinned: bool| -> Vec<Transform> {
+        with_graph(KEYFRAMES, |graph| {
+            drive(graph, &driven);
+            assert!(close(graph, last, 2, truth[2].inverse() * truth[last]));
+            let mut slots: Vec<usize> = (0..KEYFRAMES).collect();
+            if thinned {
+                for gone in [2, 3, 20, 21, 22] {
+                    graph.remove(slots.clone().into_iter(), gone);
+                    slots.retain(|&slot| slot != gone);
+                }
+            }
+            assert!((0..ROUNDS).any(|_| graph.step(slots.clone().into_iter())));
+            [1, 19, 23, 50, last].map(|slot| graph.settled(slot).unwrap().1).to_vec()
+        })
+    };
+    for (all, few) in solved(false).iter().zip(solved(true)) {
+        let apart = all.inverse() * few;
+        assert!(apart.distance_m() < 0.03 && apart.angle_rad() < 2e-3, "{apart:?}");
+    }
+}
+
+#[test]
+fn more_closures_than_there_is_memory_for_stay_spread_over_the_way() {
+    let (_, driven) = drifting();
+    with_graph(16, |graph| {
+        let covariance = twist::isotropic(2e-3, 0.02);
+        for (at, t_world_camera) in driven.iter().take(16).enumerate() {
+            let pose = pose(*t_world_camera);
+            graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
+            graph.insert(0..=at, t_world_camera, at as u32);
+            if at > 2 {
+                assert!(close(graph, at, 0, driven[0].inverse() * *t_world_camera));
+            }
+        }
+        assert_eq!((graph.closure_len, closures_max(16)), (4, 4));
+        let ends: Vec<u32> = graph.closures.iter().map(|closure| closure.to).collect();
+        assert!(ends[0] == 3 && ends[3] == 15 && ends.is_sorted(), "{ends:?}");
+    });
+}
+
+#[test]
+fn a_segment_that_is_joined_comes_to_lie_where_the_place_says() {
+    let (truth, _) = square(30, &Transform::IDENTITY);
+    // Lost after 15 keyframes: those that follow begin in a world of their own.
+    let own = |at: usize| SegmentPose {
+        segment: MapSegment::new(u16::from(at >= 15)),
+        t_world_camera: if at < 15 { truth[at] } else { truth[15].inverse() * truth[at] },
+    };
+    with_graph(30, |graph| {
+        for at in 0..30 {
+            let pose = own(at);
+            graph.advance(&Measured { pose: &pose, covariance: None, depth_m: 10.0 });
+            graph.insert(0..=at, &pose.t_world_camera, at as u32);
+        }
+        let t_keyframe_camera = truth[4].inverse() * truth[29];
+        let place = place_at(4, t_keyframe_camera);
+        graph.join(0..30, &place);
+        assert!(worst_m(graph, &truth) < 1e-9);
+        assert!(graph.close(0..30, &place), "a lost camera may be anywhere");
+        settle(graph, 30);
+        assert!(worst_m(graph, &truth) < 1e-6);
+    });
+}
+
+fn digest(graph: &mut Graph<'_>) -> u64 {
+    Hasher::digest(|hasher| graph.visit(KEYFRAMES, hasher))
+}
+
+#[test]
+fn equal_loops_give_equal_bits_wherever_they_are_interrupted() {
+    let (truth, driven) = drifting();
+    let last = KEYFRAMES - 1;
+    let bits = |interrupted: bool| {
+        with_graph(KEYFRAMES, |graph| {
+            drive(graph, &driven);
+            assert!(close(graph, last, 0, truth[0].inverse() * truth[last]));
+            (0..4).for_each(|_| assert!(!graph.step(0..KEYFRAMES)));
+            if !interrupted {
+                settle(graph, KEYFRAMES);
+                return digest(graph);
+            }
+            let mut bytes = Vec::new();
+            let mut sink = |piece: &[u8]| -> Result<(), ()> {
+                bytes.extend_from_slice(piece);
+                Ok(())
+            };
+            let mut writer = Writer::new(&mut sink);
+            graph.visit(KEYFRAMES, &mut writer);
+            writer.finish().unwrap();
+            with_graph(KEYFRAMES, |other| {
+                let mut rest = &bytes[..];
+                let mut source = |piece: &mut [u8]| {
+                    let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
+                    piece.copy_from_slice(taken);
+                    rest = behind;
+                    Ok::<(), ()>(())
+                };
+                let mut reader = Reader::new(&mut source);
+                other.visit(KEYFRAMES, &mut reader);
+                reader.finish().unwrap();
+                settle(other, KEYFRAMES);
+                digest(other)
+            })
+        })
+    };
+    assert_eq!(bits(false), bits(true));
+}
