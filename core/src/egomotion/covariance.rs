@@ -94,6 +94,17 @@ impl MotionCovariance {
         self.lower
     }
 
+    /// Adds another covariance, times a factor.
+    pub(crate) fn add_scaled(&mut self, other: &Self, factor: f64) {
+        let entries = self.lower.iter_mut().zip(&other.lower);
+        entries.for_each(|(entry, value)| *entry += factor * value);
+    }
+
+    /// Row of the matrix.
+    pub(crate) fn row(&self, row: usize) -> [f64; N] {
+        core::array::from_fn(|column| self.entry(row, column))
+    }
+
     /// Visits the entries.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         visitor.f64s(&mut self.lower);
@@ -134,6 +145,8 @@ impl MotionCovariance {
     /// let [right_m, _, ahead_m] = pose.translation_sigma_m();
     /// assert!((right_m - 0.1).abs() < 1e-9 && ahead_m == 0.0);
     /// ```
+    // Never inlined: its matrices would be on the stack of each caller.
+    #[inline(never)]
     #[must_use]
     pub fn after(&self, before: &Self, t_current_previous: &Transform) -> Self {
         let [a, b, c] = t_current_previous.rotation_matrix();

@@ -10,7 +10,7 @@
 //! All of it is integers but the motion, which is the camera's own estimator's. There is no trained
 //! vocabulary: `index` looks up parts of descriptors, in lists of bounded length.
 //!
-//! **Memory.** 11.8 KiB for each of `Capacity::keyframes`, and 210 KiB; nothing where it is 0, and
+//! **Memory.** 11.8 KiB for each of `Capacity::keyframes`, and 200 KiB; nothing where it is 0, and
 //! then nothing is computed either.
 //!
 //! **Time.** 1,024 descriptors, as many look-ups, and at most six keyframes compared: only in

@@ -64,6 +64,7 @@ pub(in crate::places) struct Recognized<'a> {
 impl Graph<'_> {
     /// Takes a closure from a keyframe to the last one of the chain of `slots`. Returns whether it
     /// was taken.
+    #[inline(never)]
     pub(in crate::places) fn close(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
@@ -184,6 +185,7 @@ impl Graph<'_> {
     }
 
     /// Does one round of a solution, if one is due. Returns whether the poses in use changed.
+    #[inline(never)]
     pub(in crate::places) fn step(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
@@ -232,6 +234,7 @@ impl Graph<'_> {
 
     /// Moves the keyframes since the camera was lost last, and the camera itself, into the frame of
     /// reference of a place that was recognised.
+    #[inline(never)]
     pub(in crate::places) fn join(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
@@ -239,8 +242,7 @@ impl Graph<'_> {
     ) {
         // Keyframes of an old map are not part of the graph: they stay where they are.
         let from = self.used(place.slot).map_or(place.t_world_keyframe, |node| node.settled);
-        let used = |graph: &Self, slot: usize| graph.used(slot).copied();
-        let newest = slots.clone().rev().find_map(|slot| used(self, slot));
+        let newest = slots.clone().rev().find_map(|slot| self.used(slot));
         let Some(newest) = newest.filter(|_| !self.way.is_loose) else { return };
         // The newest keyframe comes to be where the place says.
         let joined = from * place.t_keyframe_camera * self.way.t_camera_node;

@@ -19,8 +19,7 @@ pub(super) fn factor(lower: &mut [f64], rows: usize) -> Option<()> {
         }
         let (diagonal, before) = row.split_last_mut()?;
         let pivot = *diagonal - before.iter().map(|entry| entry * entry).sum::<f64>();
-        // Not a number is not positive either.
-        if !(pivot > 0.0) {
+        if pivot.is_nan() || pivot <= 0.0 {
             return None;
         }
         *diagonal = libm::sqrt(pivot);

@@ -214,6 +214,7 @@ impl<'s> Graph<'s> {
     }
 
     /// Moves on with the camera.
+    #[inline(never)]
     pub(super) fn advance(&mut self, measured: &Measured<'_>) {
         let way = &mut self.way;
         let pose = measured.pose;
@@ -234,6 +235,7 @@ impl<'s> Graph<'s> {
     }
 
     /// Takes a keyframe into the chain of `slots`, of which it is the last.
+    #[inline(never)]
     pub(super) fn insert(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize>,
@@ -243,7 +245,8 @@ impl<'s> Graph<'s> {
         // Slots of an old map are in the table too, but not in the graph.
         let mut slots = slots.rev();
         let Some(slot) = slots.next() else { return };
-        let before = slots.find_map(|slot| self.used(slot)).copied();
+        let before = slots.find_map(|slot| self.used(slot));
+        let before = before.map(|node| (node.settled, node.working, node.way_m));
         let way = self.way;
         self.way = Way { last: way.last, ..Way::NONE };
         let t_before_node = way.t_camera_node.inverse();
@@ -252,17 +255,18 @@ impl<'s> Graph<'s> {
         let way_depths = self.node_depths;
         let Some(node) = self.nodes.get_mut(slot) else { return };
         *node = match before.filter(|_| !way.is_loose) {
-            Some(before) => {
+            Some((settled, working, way_m)) => {
                 // What is systematic in odometry adds up faster than its covariances say.
                 let (length_m, angle_rad) = (t_before_node.distance_m(), t_before_node.angle_rad());
-                let more =
+                let mut covariance =
                     isotropic(LINK_RAD + LINK_SHARE * angle_rad, LINK_M + LINK_SHARE * length_m);
+                covariance.add_scaled(&way.covariance, 1.0);
                 Node {
-                    settled: (before.settled * t_before_node).normalized(),
-                    working: (before.working * t_before_node).normalized(),
+                    settled: (settled * t_before_node).normalized(),
+                    working: (working * t_before_node).normalized(),
                     t_before_node,
-                    covariance: more.after(&way.covariance, &Transform::IDENTITY),
-                    way_m: before.way_m + way.length_m,
+                    covariance,
+                    way_m: way_m + way.length_m,
                     way_depths,
                     frame,
                     link: LINKED,
@@ -273,7 +277,7 @@ impl<'s> Graph<'s> {
                 working: *pose,
                 t_before_node: Transform::IDENTITY,
                 covariance: MotionCovariance::ZERO,
-                way_m: before.map_or(0.0, |before| before.way_m),
+                way_m: before.map_or(0.0, |(_, _, way_m)| way_m),
                 way_depths,
                 frame,
                 link: LOOSE,
@@ -282,6 +286,7 @@ impl<'s> Graph<'s> {
     }
 
     /// Takes a keyframe out of the chain of `slots`; those before and after it are linked instead.
+    #[inline(never)]
     pub(super) fn remove(&mut self, slots: impl Iterator<Item = usize> + Clone, slot: usize) {
         // Neighbours in the chain, not in the table.
         let used = slots.filter(|&slot| self.used(slot).is_some());

@@ -8,8 +8,7 @@ use super::{
     closures::Closure,
     dense::{entries, factor, solve},
     twist::{
-        Spread, Twist, add, difference, in_world, isotropic, spread_in_world, squared, times,
-        twist_of,
+        Twist, add, difference, in_world, isotropic, spread_in_world, squared, times, twist_of,
     },
 };
 use crate::{egomotion::MotionCovariance, geometry::Transform};
@@ -26,9 +25,15 @@ const WEIGHT_MIN: f64 = 1e-9;
 const LOOSE_RAD: f64 = 1.0;
 const LOOSE_M: f64 = 100.0;
 
-/// Two entries of a slice of unknown order.
-fn pair<T: Copy>(of: &[T], a: usize, b: usize) -> Option<[T; 2]> {
-    Some([*of.get(a)?, *of.get(b)?])
+/// Two entries of a slice.
+fn pair<T>(of: &[T], a: usize, b: usize) -> Option<[&T; 2]> {
+    Some([of.get(a)?, of.get(b)?])
+}
+
+/// Places in the chain of the ends of a closure.
+fn ends(places: &[u32], closure: &Closure) -> Option<[usize; 2]> {
+    let ends = pair(places, closure.from as usize, closure.to as usize)?;
+    Some(ends.map(|&place| place as usize))
 }
 
 impl Graph<'_> {
@@ -54,6 +59,7 @@ impl Graph<'_> {
     }
 
     /// Spread and error of the links up to each keyframe.
+    #[inline(never)]
     fn sum_up(&mut self, slots: impl Iterator<Item = usize>) -> Option<()> {
         let Self { nodes, sums, places, .. } = self;
         let mut sum: Option<(ChainSum, Transform)> = None;
@@ -62,10 +68,8 @@ impl Graph<'_> {
             let mut next = ChainSum { spread: MotionCovariance::ZERO, error: [0.0; 6] };
             if let Some((before, t_world_before)) = &sum {
                 // Errors of links are independent, so their covariances add up.
-                let spread = link_spread(node);
                 next = *before;
-                next.spread = MotionCovariance::from_matrix(&spread)
-                    .after(&before.spread, &Transform::IDENTITY);
+                next.spread.add_scaled(&link_spread(node), 1.0);
                 if node.link != LOOSE {
                     let expected = *t_world_before * node.t_before_node;
                     add(&mut next.error, &twist_of(&(expected * node.working.inverse())));
@@ -80,6 +84,7 @@ impl Graph<'_> {
 
     /// Fills in the equations of a closure: its error without that of the links it spans, what it
     /// shares with those before it, and its own spread.
+    #[inline(never)]
     fn fill_row(&mut self, at: usize, scale: f64) -> Option<()> {
         let Self { nodes, closures, sums, places, matrix, pulls, .. } = self;
         let (before, rest) = closures.split_at_mut_checked(at)?;
@@ -90,41 +95,39 @@ impl Graph<'_> {
         let squared = squared(&error, &closure.covariance)?;
         let share = scale / (scale + squared);
         closure.weight = share * share;
-        let ends = |closure: &Closure| {
-            pair(places, closure.from as usize, closure.to as usize)
-                .map(|ends| ends.map(|place| place as usize))
-        };
         // Links between the ends are off already: a closure need not say that again.
-        let [begin, end] = ends(closure)?;
+        let [begin, end] = ends(places, closure)?;
         let [start, stop] = pair(sums, begin, end)?;
         let links = difference(&stop.error, &start.error);
         *pulls.get_mut(at)? = difference(&in_world(&error, &to.working), &links);
         for (column, other) in before.iter().chain([&*closure]).enumerate() {
-            let [other_begin, other_end] = ends(other)?;
+            let [other_begin, other_end] = ends(places, other)?;
             // Two closures share the links that both of them span.
             let (low, high) = (begin.max(other_begin), end.min(other_end));
-            let mut block = [[0.0; 6]; 6];
+            let mut block = MotionCovariance::ZERO;
             if low < high {
                 let [start, stop] = pair(sums, low, high)?;
-                add_to(&mut block, &stop.spread.matrix(), 1.0);
-                add_to(&mut block, &start.spread.matrix(), -1.0);
+                block.add_scaled(&stop.spread, 1.0);
+                block.add_scaled(&start.spread, -1.0);
             }
             if column == at {
                 // A closure that hardly counts still needs a row that can be divided by.
                 let weight = if closure.weight > WEIGHT_MIN { closure.weight } else { WEIGHT_MIN };
                 let own = spread_in_world(&closure.covariance, &to.working);
-                add_to(&mut block, &own, 1.0 / weight);
+                block.add_scaled(&own, 1.0 / weight);
             }
-            for (row, values) in (6 * at..).zip(&block) {
+            for inner in 0..6 {
+                let row = 6 * at + inner;
                 // The last block lies on the diagonal: its upper half is not kept.
                 let kept = matrix.get_mut(entries(row)..entries(row + 1))?.get_mut(6 * column..)?;
-                kept.iter_mut().zip(values).for_each(|(to, value)| *to = *value);
+                kept.iter_mut().zip(block.row(inner)).for_each(|(to, value)| *to = value);
             }
         }
         Some(())
     }
 
     /// Moves each keyframe by what the links before it give way.
+    #[inline(never)]
     fn apply(&mut self, slots: impl Iterator<Item = usize>) -> Option<()> {
         let Self { nodes, closures, closure_len, sums, places, pulls, .. } = self;
         let mut step: Twist = [0.0; 6];
@@ -140,8 +143,8 @@ impl Graph<'_> {
                 add(&mut step, &difference(&error, &before));
                 let mut pull: Twist = [0.0; 6];
                 for (closure, one) in closures.iter().zip(&**pulls).take(*closure_len) {
-                    let [begin, end] = pair(places, closure.from as usize, closure.to as usize)?;
-                    if begin < place && place <= end {
+                    let [begin, end] = ends(places, closure)?;
+                    if begin < place as usize && place as usize <= end {
                         add(&mut pull, one);
                     }
                 }
@@ -163,16 +166,10 @@ fn used(nodes: &[Node], slot: usize) -> Option<&Node> {
 }
 
 /// Covariance of a keyframe's link in the world's frame.
-fn link_spread(node: &Node) -> Spread {
+fn link_spread(node: &Node) -> MotionCovariance {
     if node.link == LOOSE {
-        isotropic(LOOSE_RAD, LOOSE_M).matrix()
+        isotropic(LOOSE_RAD, LOOSE_M)
     } else {
         spread_in_world(&node.covariance, &node.working)
-    }
-}
-
-fn add_to(sum: &mut Spread, spread: &Spread, factor: f64) {
-    for (row, values) in sum.iter_mut().zip(spread) {
-        row.iter_mut().zip(values).for_each(|(entry, value)| *entry += factor * value);
     }
 }

@@ -4,8 +4,6 @@ use super::dense::{factor, forward};
 use crate::{egomotion::MotionCovariance, geometry::Transform};
 
 pub(super) type Twist = [f64; 6];
-/// Covariance of a twist.
-pub(super) type Spread = [[f64; 6]; 6];
 
 /// Sine of half an angle below which the angle is twice the sine to the last bit.
 const SMALL_SINE: f64 = 1e-9;
@@ -31,11 +29,15 @@ pub(super) fn in_world(twist: &Twist, t_world_camera: &Transform) -> Twist {
 }
 
 /// Covariance of the camera's frame as one of the world's.
-pub(super) fn spread_in_world(covariance: &MotionCovariance, t_world_camera: &Transform) -> Spread {
-    MotionCovariance::ZERO.after(covariance, t_world_camera).matrix()
+pub(super) fn spread_in_world(
+    covariance: &MotionCovariance,
+    t_world_camera: &Transform,
+) -> MotionCovariance {
+    MotionCovariance::ZERO.after(covariance, t_world_camera)
 }
 
 /// Covariance of errors that are alike along all axes.
+#[inline(never)]
 pub(super) fn isotropic(rotation_rad: f64, translation_m: f64) -> MotionCovariance {
     let mut matrix = [[0.0; 6]; 6];
     for (at, row) in matrix.iter_mut().enumerate() {
@@ -68,8 +70,8 @@ pub(super) fn difference(a: &Twist, b: &Twist) -> Twist {
 }
 
 /// A covariance times a twist.
-pub(super) fn times(spread: &Spread, twist: &Twist) -> Twist {
-    spread.map(|row| row.iter().zip(twist).map(|(a, b)| a * b).sum())
+pub(super) fn times(spread: &MotionCovariance, twist: &Twist) -> Twist {
+    core::array::from_fn(|row| spread.row(row).iter().zip(twist).map(|(a, b)| a * b).sum())
 }
 
 #[cfg(test)]
