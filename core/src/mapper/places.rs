@@ -3,7 +3,7 @@
 use super::Mapper;
 use crate::{
     geometry::{MapSegment, StereoRig},
-    places::{LoopCounts, SettledKeyframe},
+    places::{CorrectedKeyframe, LoopCounts},
     state::{ReadError, Reader, Visitor, Writer},
 };
 use core::fmt;
@@ -154,11 +154,11 @@ impl Mapper<'_> {
     ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
     /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
     /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
-    /// assert_eq!(mapper.settled_keyframes().count(), 0);
+    /// assert_eq!(mapper.corrected_keyframes().count(), 0);
     /// # Ok::<(), dynvox_core::NewError>(())
     /// ```
-    pub fn settled_keyframes(&self) -> impl Iterator<Item = SettledKeyframe> {
-        self.localization.places.settled()
+    pub fn corrected_keyframes(&self) -> impl Iterator<Item = CorrectedKeyframe> {
+        self.localization.places.corrected()
     }
 
     /// Counts of the loops closed so far.

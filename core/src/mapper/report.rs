@@ -187,8 +187,8 @@ pub struct Report {
     /// Counts of the objects' volumes.
     pub objects: ObjectsReport,
     /// True if loops that were closed changed poses of keyframes in this frame: the world moved.
-    /// [`crate::Mapper::settled_keyframes`] has the poses, [`crate::Mapper::loops`] the counts. The
-    /// camera and the map go on in the world as it was driven.
+    /// [`crate::Mapper::corrected_keyframes`] has the poses, [`crate::Mapper::loops`] the counts.
+    /// The camera and the map go on in the world as it was driven.
     pub world_moved: bool,
     /// True if something of the frame was fused. A frame whose pose was extrapolated is not, because
     /// it would smear the map; nor is one without depth, or between two turns of

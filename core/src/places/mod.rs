@@ -96,7 +96,7 @@ pub(crate) struct PlaceCamera<'a> {
 
 /// Keyframe after all loops that were closed so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettledKeyframe {
+pub struct CorrectedKeyframe {
     /// Number of the frame, from 0.
     pub frame: u32,
     /// Pose of its camera.
@@ -218,7 +218,7 @@ impl<'s> Places<'s> {
         // The next closure needs three frames of its own.
         *pending = Pending::default();
         let keyframe = table.pose(found.slot)?;
-        let place = Recognized {
+        let recognized = Recognized {
             slot: found.slot,
             t_world_keyframe: keyframe.t_world_camera,
             t_keyframe_camera: keyframe.t_world_camera.inverse() * found.pose.t_world_camera,
@@ -226,12 +226,12 @@ impl<'s> Places<'s> {
             depth_m: *depth_m,
         };
         if found.pose.segment == camera.pose.segment {
-            graph.close(table.slots(), &place);
+            graph.close(table.slots(), &recognized);
             return None;
         }
         // The graph joins first: it needs the keyframes' poses as they were driven.
-        graph.join(table.slots(), &place);
-        graph.close(table.slots(), &place);
+        graph.join(table.slots(), &recognized);
+        graph.close(table.slots(), &recognized);
         graph.go_on_at(&found.pose);
         // The young segment's own keyframes are places of the old one from now on.
         let t_old_young = found.pose.t_world_camera * camera.pose.t_world_camera.inverse();
@@ -338,11 +338,11 @@ impl<'s> Places<'s> {
     }
 
     /// Keyframes of this run after all loops that were closed so far, oldest first.
-    pub(crate) fn settled(&self) -> impl Iterator<Item = SettledKeyframe> {
+    pub(crate) fn corrected(&self) -> impl Iterator<Item = CorrectedKeyframe> {
         self.table.slots().filter_map(|slot| {
-            let (frame, t_world_camera) = self.graph.settled(slot)?;
+            let (frame, t_world_camera) = self.graph.corrected(slot)?;
             let segment = self.table.pose(slot)?.segment;
-            Some(SettledKeyframe { frame, pose: SegmentPose { segment, t_world_camera } })
+            Some(CorrectedKeyframe { frame, pose: SegmentPose { segment, t_world_camera } })
         })
     }
 

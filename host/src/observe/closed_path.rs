@@ -11,7 +11,7 @@ use crate::formats::{
 };
 use crate::owned;
 use dynvox_core::geometry::{MapSegment, Transform};
-use dynvox_core::places::{LoopCounts, SettledKeyframe};
+use dynvox_core::places::{CorrectedKeyframe, LoopCounts};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::fs;
@@ -23,7 +23,7 @@ pub struct ClosedLoops {
     /// Counts of closures.
     pub counts: LoopCounts,
     /// Keyframes where the closures put them, oldest first.
-    pub keyframes: Vec<SettledKeyframe>,
+    pub keyframes: Vec<CorrectedKeyframe>,
 }
 
 /// Loops that a run closed.
@@ -31,7 +31,7 @@ pub struct ClosedLoops {
 pub struct LoopSection {
     /// Closures that were taken.
     pub closures: u32,
-    /// Closures that were farther off than the camera can have drifted.
+    /// Closures that were farther off than drift explains.
     pub refused: u32,
     /// Closures that others contradicted.
     pub taken_out: u32,
@@ -180,9 +180,9 @@ mod tests {
     }
 
     /// Keyframe of frame `frame` that loops put `m` metres ahead.
-    fn keyframe(frame: u32, m: f64) -> SettledKeyframe {
+    fn keyframe(frame: u32, m: f64) -> CorrectedKeyframe {
         let pose = SegmentPose { segment: MapSegment::FIRST, t_world_camera: ahead(m) };
-        SettledKeyframe { frame, pose }
+        CorrectedKeyframe { frame, pose }
     }
 
     #[test]

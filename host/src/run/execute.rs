@@ -53,7 +53,7 @@ pub fn run(
     let Mapped { mut state, mut since, regions, blocks, pruned, loops, output, mut incomplete } =
         map(&observed, slab.bytes_mut(), folder, checkpoint)?;
     sync(&mut state, folder, &mut incomplete);
-    // The mapper is gone: its slab serves to read the map piece by piece.
+    // The mapper is removed: its slab serves to read the map piece by piece.
     let (written, store) = output.finish(
         slab.bytes_mut(),
         (&plan.capacity, &plan.config),
@@ -177,7 +177,7 @@ fn map(
         pruned,
         loops: ClosedLoops {
             counts: mapper.loops(),
-            keyframes: mapper.settled_keyframes().collect(),
+            keyframes: mapper.corrected_keyframes().collect(),
         },
         output: MeshOutput::begin(
             &mut mapper,

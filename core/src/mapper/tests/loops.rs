@@ -49,7 +49,7 @@ fn a_full_turn_is_recognised_and_changes_no_digest() {
 fn a_snapshot_while_a_loop_is_closed_goes_on_closing_it() {
     let go_on = |mapper: &mut Mapper<'_>, from: usize| {
         let moved: Vec<bool> = (from..FRAMES).map(|at| step(mapper, at).world_moved).collect();
-        (moved, mapper.loops(), mapper.settled_keyframes().collect::<Vec<_>>())
+        (moved, mapper.loops(), mapper.corrected_keyframes().collect::<Vec<_>>())
     };
     let mut slab = vec![0u8; WITH_PLACES.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&WITH_PLACES, &Walk::config(), &mut slab).unwrap();

@@ -5,7 +5,7 @@ use crate::{egomotion::MotionCovariance, geometry::Transform, state::Visitor};
 use bytemuck::{Pod, Zeroable};
 
 /// Errors of a closure beyond those that its covariance holds: points are rounded, and a keyframe
-/// may show its place in another light. A share of the scene's depth, and rad.
+/// may show it in another light. A share of the scene's depth, and rad.
 const CLOSURE_DEPTH_SHARE: f64 = 0.005;
 const CLOSURE_RAD: f64 = 2e-3;
 /// Most that a way drifts: shares of its length and of the scene's depth, and the turn, rad and
@@ -68,7 +68,7 @@ impl Graph<'_> {
     pub(in crate::places) fn close(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
-        place: &Recognized<'_>,
+        recognized: &Recognized<'_>,
     ) -> bool {
         let Some(to) = slots.clone().rev().find(|&slot| self.used(slot).is_some()) else {
             return false;
@@ -76,17 +76,21 @@ impl Graph<'_> {
         self.closed_at_depths = self.way_depths();
         let is_last = |closure: &Closure| closure.to == to as u32;
         let is_known = self.closures.iter().take(self.closure_len).any(is_last);
-        if self.way.is_loose || is_known || self.used(place.slot).is_none() || place.slot == to {
+        if self.way.is_loose
+            || is_known
+            || self.used(recognized.slot).is_none()
+            || recognized.slot == to
+        {
             return false;
         }
         // The place was seen from the camera now; the closure is of the keyframe before it.
-        let t_from_to = (place.t_keyframe_camera * self.way.t_camera_node).normalized();
-        let own = isotropic(CLOSURE_RAD, CLOSURE_DEPTH_SHARE * place.depth_m);
-        let seen = place.covariance.unwrap_or(&MotionCovariance::ZERO);
+        let t_from_to = (recognized.t_keyframe_camera * self.way.t_camera_node).normalized();
+        let own = isotropic(CLOSURE_RAD, CLOSURE_DEPTH_SHARE * recognized.depth_m);
+        let seen = recognized.covariance.unwrap_or(&MotionCovariance::ZERO);
         let covariance = own.after(seen, &self.way.t_camera_node.inverse());
-        let (from, to) = (place.slot as u32, to as u32);
+        let (from, to) = (recognized.slot as u32, to as u32);
         let closure = Closure { t_from_to, covariance, from, to, weight: 1.0 };
-        if !self.may_have_drifted(slots, &closure, place.depth_m) {
+        if !self.may_drift_so_far(slots, &closure, recognized.depth_m) {
             self.counts.refused = self.counts.refused.saturating_add(1);
             return false;
         }
@@ -102,9 +106,9 @@ impl Graph<'_> {
         true
     }
 
-    /// Tells that the way between the ends of a closure may have drifted by as much as it says. A
+    /// Tells that the way between the ends of a closure may drift by as much as it says. A
     /// camera that was lost in between may be anywhere.
-    fn may_have_drifted(
+    fn may_drift_so_far(
         &self,
         slots: impl Iterator<Item = usize>,
         closure: &Closure,
@@ -118,7 +122,7 @@ impl Graph<'_> {
         }
         // Closures so far have taken their share of the drift out of the poses in use.
         let way_m = to.way_m - from.way_m;
-        let off = to.settled.inverse() * from.settled * closure.t_from_to;
+        let off = to.corrected.inverse() * from.corrected * closure.t_from_to;
         off.distance_m() <= DRIFT_SHARE * way_m + DRIFT_DEPTH_SHARE * depth_m
             && off.angle_rad() <= DRIFT_RAD + DRIFT_RAD_PER_M * way_m
     }
@@ -138,10 +142,10 @@ impl Graph<'_> {
             }
         }
         let at = least.map_or(0, |(_, at)| at);
-        self.retain_closures(|place, _| place != at);
+        self.retain_closures(|at_now, _| at_now != at);
     }
 
-    /// Keeps the closures that `may` takes, by place and value.
+    /// Keeps the closures that `may` takes, by position and value.
     fn retain_closures(&mut self, mut may: impl FnMut(usize, &Closure) -> bool) {
         let mut kept = 0;
         for at in 0..self.closure_len {
@@ -194,7 +198,7 @@ impl Graph<'_> {
             Some(round) => round,
             None if self.is_due => {
                 self.is_due = false;
-                self.nodes.iter_mut().for_each(|node| node.working = node.settled);
+                self.nodes.iter_mut().for_each(|node| node.working = node.corrected);
                 0
             }
             None => return false,
@@ -210,18 +214,18 @@ impl Graph<'_> {
         }
         self.round = (round < last).then_some(round + 1);
         if self.round.is_none() {
-            self.settle(slots);
+            self.commit(slots);
         }
         self.round.is_none()
     }
 
     /// Puts the poses that were worked on to use, and takes out the closures they contradict.
-    fn settle(&mut self, slots: impl DoubleEndedIterator<Item = usize>) {
+    fn commit(&mut self, slots: impl DoubleEndedIterator<Item = usize>) {
         let newest = slots.rev().find_map(|slot| self.used(slot));
         let moved_m =
-            newest.map_or(0.0, |node| (node.settled.inverse() * node.working).distance_m());
+            newest.map_or(0.0, |node| (node.corrected.inverse() * node.working).distance_m());
         for node in self.nodes.iter_mut().filter(|node| node.link != UNUSED) {
-            node.settled = node.working;
+            node.corrected = node.working;
         }
         // Weights are those of the last round, at the true scale.
         let before = self.closure_len;
@@ -238,23 +242,24 @@ impl Graph<'_> {
     pub(in crate::places) fn join(
         &mut self,
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
-        place: &Recognized<'_>,
+        recognized: &Recognized<'_>,
     ) {
         // Keyframes of an old map are not part of the graph: they stay where they are.
-        let from = self.used(place.slot).map_or(place.t_world_keyframe, |node| node.settled);
+        let from =
+            self.used(recognized.slot).map_or(recognized.t_world_keyframe, |node| node.corrected);
         let newest = slots.clone().rev().find_map(|slot| self.used(slot));
         let Some(newest) = newest.filter(|_| !self.way.is_loose) else { return };
         // The newest keyframe comes to be where the place says.
-        let joined = from * place.t_keyframe_camera * self.way.t_camera_node;
-        let t_new_old = joined * newest.settled.inverse();
+        let joined = from * recognized.t_keyframe_camera * self.way.t_camera_node;
+        let t_new_old = joined * newest.corrected.inverse();
         // Back to the keyframe before which the camera was lost.
         for slot in slots.rev() {
             let Some(node) = self.nodes.get_mut(slot) else { continue };
             if node.link == UNUSED {
                 continue;
             }
-            node.settled = (t_new_old * node.settled).normalized();
-            node.working = node.settled;
+            node.corrected = (t_new_old * node.corrected).normalized();
+            node.working = node.corrected;
             if node.link != LINKED {
                 break;
             }

@@ -1,4 +1,4 @@
-//! Cholesky factor of a dense symmetric matrix, of which the lower half is kept row by row.
+//! Cholesky factor of a dense symmetric matrix, whose lower half is kept row by row.
 
 /// Entries of the lower half of a matrix of `rows` rows.
 pub(super) const fn entries(rows: usize) -> usize {

@@ -6,8 +6,8 @@
 //! (Gauss-Newton, `round`). Closures are few and the chain is a tree, so the equations are solved
 //! for what each closure pulls: six unknowns for each closure instead of six for each keyframe.
 //!
-//! **Robustness.** A closure far from what the way can have drifted is refused. Those taken are
-//! weighted anew in each round (Geman-McClure, from a wide scale to the true one), so that the
+//! **Robustness.** A closure far from where the way can lead by its drift is refused. Those taken
+//! are weighted anew in each round (Geman-McClure, from a wide scale to the true one), so that the
 //! majority and the links overrule a wrong one; it is taken out after the last round.
 //!
 //! **Memory.** 580 bytes for each of `Capacity::keyframes` and at most 160 KiB.
@@ -58,7 +58,7 @@ const LOOSE: u32 = 2;
 #[repr(C)]
 struct Node {
     /// Pose in use, and the one that the rounds work on.
-    settled: Transform,
+    corrected: Transform,
     working: Transform,
     /// Pose in the camera of the keyframe before, and its covariance, in this camera's frame.
     t_before_node: Transform,
@@ -74,8 +74,8 @@ struct Node {
 
 impl Node {
     fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { settled, working, t_before_node, covariance, .. } = self;
-        for transform in [settled, working, t_before_node] {
+        let Self { corrected, working, t_before_node, covariance, .. } = self;
+        for transform in [corrected, working, t_before_node] {
             visitor.transform(transform);
         }
         covariance.visit(visitor);
@@ -150,7 +150,7 @@ pub(super) struct Measured<'a> {
 pub struct LoopCounts {
     /// Closures that were taken.
     pub closures: u32,
-    /// Closures that were too far from what the way can have drifted.
+    /// Closures that were too far from where the way can lead by its drift.
     pub refused: u32,
     /// Closures that others contradicted and that were taken out again.
     pub taken_out: u32,
@@ -178,7 +178,7 @@ pub(super) struct Graph<'s> {
     counts: LoopCounts,
     // Scratch memory of a round: sums by place in the chain, places by slot, and the equations.
     sums: &'s mut [ChainSum],
-    places: &'s mut [u32],
+    positions: &'s mut [u32],
     matrix: &'s mut [f64],
     pulls: &'s mut [Twist],
 }
@@ -207,7 +207,7 @@ impl<'s> Graph<'s> {
             is_due: false,
             counts: LoopCounts::default(),
             sums: carver.alloc("places.chain_sum", keyframes),
-            places: carver.alloc("places.chain_place", keyframes),
+            positions: carver.alloc("places.chain_position", keyframes),
             matrix: carver.alloc("places.equation", entries(6 * closures)),
             pulls: carver.alloc("places.pull", closures),
         }
@@ -230,11 +230,11 @@ impl<'s> Graph<'s> {
         way.t_camera_node = (motion * way.t_camera_node).normalized();
         let length_m = motion.distance_m();
         way.length_m += length_m;
-        // A camera that turns sees other things as well.
+        // A camera that turns sees something else as well.
         way.length_depths += length_m / measured.depth_m + motion.angle_rad();
     }
 
-    /// Takes a keyframe into the chain of `slots`, of which it is the last.
+    /// Takes a keyframe into the chain of `slots`, as the last one.
     #[inline(never)]
     pub(super) fn insert(
         &mut self,
@@ -246,7 +246,7 @@ impl<'s> Graph<'s> {
         let mut slots = slots.rev();
         let Some(slot) = slots.next() else { return };
         let before = slots.find_map(|slot| self.used(slot));
-        let before = before.map(|node| (node.settled, node.working, node.way_m));
+        let before = before.map(|node| (node.corrected, node.working, node.way_m));
         let way = self.way;
         self.way = Way { last: way.last, ..Way::NONE };
         let t_before_node = way.t_camera_node.inverse();
@@ -255,14 +255,14 @@ impl<'s> Graph<'s> {
         let way_depths = self.node_depths;
         let Some(node) = self.nodes.get_mut(slot) else { return };
         *node = match before.filter(|_| !way.is_loose) {
-            Some((settled, working, way_m)) => {
+            Some((corrected, working, way_m)) => {
                 // What is systematic in odometry adds up faster than its covariances say.
                 let (length_m, angle_rad) = (t_before_node.distance_m(), t_before_node.angle_rad());
                 let mut covariance =
                     isotropic(LINK_RAD + LINK_SHARE * angle_rad, LINK_M + LINK_SHARE * length_m);
                 covariance.add_scaled(&way.covariance, 1.0);
                 Node {
-                    settled: (settled * t_before_node).normalized(),
+                    corrected: (corrected * t_before_node).normalized(),
                     working: (working * t_before_node).normalized(),
                     t_before_node,
                     covariance,
@@ -273,7 +273,7 @@ impl<'s> Graph<'s> {
                 }
             }
             None => Node {
-                settled: *pose,
+                corrected: *pose,
                 working: *pose,
                 t_before_node: Transform::IDENTITY,
                 covariance: MotionCovariance::ZERO,
@@ -292,13 +292,13 @@ impl<'s> Graph<'s> {
         let used = slots.filter(|&slot| self.used(slot).is_some());
         let before = used.clone().take_while(|&other| other != slot).last();
         let after = used.skip_while(|&other| other != slot).nth(1);
-        let Some(&gone) = self.used(slot) else { return };
-        self.move_closures(slot, before.filter(|_| gone.link == LINKED), &gone.t_before_node);
+        let Some(&removed) = self.used(slot) else { return };
+        self.move_closures(slot, before.filter(|_| removed.link == LINKED), &removed.t_before_node);
         match after.and_then(|after| self.nodes.get_mut(after)) {
-            Some(after) if after.link == LINKED && gone.link == LINKED => {
+            Some(after) if after.link == LINKED && removed.link == LINKED => {
                 let motion = after.t_before_node.inverse();
-                after.covariance = after.covariance.after(&gone.covariance, &motion);
-                after.t_before_node = (gone.t_before_node * after.t_before_node).normalized();
+                after.covariance = after.covariance.after(&removed.covariance, &motion);
+                after.t_before_node = (removed.t_before_node * after.t_before_node).normalized();
             }
             // A link needs both motions.
             Some(after) => after.link = LOOSE,
@@ -337,8 +337,8 @@ impl<'s> Graph<'s> {
     }
 
     /// Pose of a keyframe after all closures so far, and the number of its frame.
-    pub(super) fn settled(&self, slot: usize) -> Option<(u32, Transform)> {
-        self.used(slot).map(|node| (node.frame, node.settled))
+    pub(super) fn corrected(&self, slot: usize) -> Option<(u32, Transform)> {
+        self.used(slot).map(|node| (node.frame, node.corrected))
     }
 
     pub(super) fn counts(&self) -> LoopCounts {

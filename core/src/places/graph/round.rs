@@ -31,9 +31,9 @@ fn pair<T>(of: &[T], a: usize, b: usize) -> Option<[&T; 2]> {
 }
 
 /// Places in the chain of the ends of a closure.
-fn ends(places: &[u32], closure: &Closure) -> Option<[usize; 2]> {
-    let ends = pair(places, closure.from as usize, closure.to as usize)?;
-    Some(ends.map(|&place| place as usize))
+fn ends(positions: &[u32], closure: &Closure) -> Option<[usize; 2]> {
+    let ends = pair(positions, closure.from as usize, closure.to as usize)?;
+    Some(ends.map(|&position| position as usize))
 }
 
 impl Graph<'_> {
@@ -44,7 +44,7 @@ impl Graph<'_> {
         slots: impl Iterator<Item = usize> + Clone,
         rounds_left: u32,
     ) -> Option<()> {
-        self.sum_up(slots.clone())?;
+        self.accumulate(slots.clone())?;
         // A wide scale first: before the first round right closures look wrong as well.
         let scale = (ROUNDS_AT_SCALE..rounds_left).fold(SCALE, |scale, _| SCALE_STEP * scale);
         for at in 0..self.closure_len {
@@ -60,11 +60,11 @@ impl Graph<'_> {
 
     /// Spread and error of the links up to each keyframe.
     #[inline(never)]
-    fn sum_up(&mut self, slots: impl Iterator<Item = usize>) -> Option<()> {
-        let Self { nodes, sums, places, .. } = self;
+    fn accumulate(&mut self, slots: impl Iterator<Item = usize>) -> Option<()> {
+        let Self { nodes, sums, positions, .. } = self;
         let mut sum: Option<(ChainSum, Transform)> = None;
         let used = slots.filter_map(|slot| Some((slot, used(nodes, slot)?)));
-        for ((place, (slot, node)), to) in (0..).zip(used).zip(sums.iter_mut()) {
+        for ((position, (slot, node)), to) in (0..).zip(used).zip(sums.iter_mut()) {
             let mut next = ChainSum { spread: MotionCovariance::ZERO, error: [0.0; 6] };
             if let Some((before, t_world_before)) = &sum {
                 // Errors of links are independent, so their covariances add up.
@@ -76,7 +76,7 @@ impl Graph<'_> {
                 }
             }
             *to = next;
-            *places.get_mut(slot)? = place;
+            *positions.get_mut(slot)? = position;
             sum = Some((next, node.working));
         }
         Some(())
@@ -86,7 +86,7 @@ impl Graph<'_> {
     /// shares with those before it, and its own spread.
     #[inline(never)]
     fn fill_row(&mut self, at: usize, scale: f64) -> Option<()> {
-        let Self { nodes, closures, sums, places, matrix, pulls, .. } = self;
+        let Self { nodes, closures, sums, positions, matrix, pulls, .. } = self;
         let (before, rest) = closures.split_at_mut_checked(at)?;
         let closure = rest.first_mut()?;
         let [from, to] = pair(nodes, closure.from as usize, closure.to as usize)?;
@@ -96,12 +96,12 @@ impl Graph<'_> {
         let share = scale / (scale + squared);
         closure.weight = share * share;
         // Links between the ends are off already: a closure need not say that again.
-        let [begin, end] = ends(places, closure)?;
+        let [begin, end] = ends(positions, closure)?;
         let [start, stop] = pair(sums, begin, end)?;
         let links = difference(&stop.error, &start.error);
         *pulls.get_mut(at)? = difference(&in_world(&error, &to.working), &links);
         for (column, other) in before.iter().chain([&*closure]).enumerate() {
-            let [other_begin, other_end] = ends(places, other)?;
+            let [other_begin, other_end] = ends(positions, other)?;
             // Two closures share the links that both of them span.
             let (low, high) = (begin.max(other_begin), end.min(other_end));
             let mut block = MotionCovariance::ZERO;
@@ -129,22 +129,22 @@ impl Graph<'_> {
     /// Moves each keyframe by what the links before it give way.
     #[inline(never)]
     fn apply(&mut self, slots: impl Iterator<Item = usize>) -> Option<()> {
-        let Self { nodes, closures, closure_len, sums, places, pulls, .. } = self;
+        let Self { nodes, closures, closure_len, sums, positions, pulls, .. } = self;
         let mut step: Twist = [0.0; 6];
         let mut error_before = None;
         for slot in slots {
             let Some(node) = nodes.get_mut(slot).filter(|node| node.link != UNUSED) else {
                 continue;
             };
-            let place = *places.get(slot)?;
-            let error = sums.get(place as usize)?.error;
-            // The first keyframe stays: it holds the world in its place.
+            let position = *positions.get(slot)?;
+            let error = sums.get(position as usize)?.error;
+            // The first keyframe stays: it holds the world in its position.
             if let Some(before) = error_before.replace(error) {
                 add(&mut step, &difference(&error, &before));
                 let mut pull: Twist = [0.0; 6];
                 for (closure, one) in closures.iter().zip(&**pulls).take(*closure_len) {
-                    let [begin, end] = ends(places, closure)?;
-                    if begin < place as usize && place as usize <= end {
+                    let [begin, end] = ends(positions, closure)?;
+                    if begin < position as usize && position as usize <= end {
                         add(&mut pull, one);
                     }
                 }

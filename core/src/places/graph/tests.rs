@@ -35,7 +35,7 @@ fn pose(t_world_camera: Transform) -> SegmentPose {
 }
 
 /// Takes keyframes of all poses.
-fn drive(graph: &mut Graph<'_>, poses: &[Transform]) {
+fn walk(graph: &mut Graph<'_>, poses: &[Transform]) {
     let covariance = twist::isotropic(2e-3, 0.02);
     for (at, t_world_camera) in poses.iter().enumerate() {
         let pose = pose(*t_world_camera);
@@ -51,20 +51,20 @@ fn place_at(slot: usize, t_keyframe_camera: Transform) -> Recognized<'static> {
 
 /// Says that the last keyframe is seen from `slot` as `t_keyframe_camera`.
 fn close(graph: &mut Graph<'_>, last: usize, slot: usize, t_keyframe_camera: Transform) -> bool {
-    let place = place_at(slot, t_keyframe_camera);
-    graph.close(0..=last, &place)
+    let recognized = place_at(slot, t_keyframe_camera);
+    graph.close(0..=last, &recognized)
 }
 
 /// Largest distance from the truth, m.
 fn worst_m(graph: &Graph<'_>, truth: &[Transform]) -> f64 {
     let off = |(at, truth): (usize, &Transform)| {
-        (graph.settled(at).unwrap().1.inverse() * *truth).distance_m()
+        (graph.corrected(at).unwrap().1.inverse() * *truth).distance_m()
     };
     truth.iter().enumerate().map(off).fold(0.0, |a, b| if a > b { a } else { b })
 }
 
 /// Steps until the poses change; returns the frames that took.
-fn settle(graph: &mut Graph<'_>, len: usize) -> u32 {
+fn commit(graph: &mut Graph<'_>, len: usize) -> u32 {
     (1..=2 * ROUNDS).find(|_| graph.step(0..len)).expect("it comes to rest")
 }
 
@@ -75,19 +75,19 @@ fn drifting() -> (Vec<Transform>, Vec<Transform>) {
 }
 
 #[test]
-fn a_square_that_drifted_is_closed_to_the_truth() {
+fn a_square_with_drift_is_closed_to_the_truth() {
     let (truth, driven) = drifting();
     with_graph(KEYFRAMES, |graph| {
-        drive(graph, &driven);
+        walk(graph, &driven);
         let before_m = worst_m(graph, &truth);
         assert!(!graph.step(0..KEYFRAMES), "nothing to do without a closure");
         let last = KEYFRAMES - 1;
         assert!(close(graph, last, 0, truth[0].inverse() * truth[last]));
-        assert_eq!(settle(graph, KEYFRAMES), ROUNDS);
+        assert_eq!(commit(graph, KEYFRAMES), ROUNDS);
         let after_m = worst_m(graph, &truth);
         assert!(before_m > 2.0 && after_m < 0.25 * before_m, "{before_m} m, then {after_m} m");
         // The end itself is where the closure says.
-        let end = graph.settled(last).unwrap().1.inverse() * truth[last];
+        let end = graph.corrected(last).unwrap().1.inverse() * truth[last];
         assert!(end.distance_m() < 0.05 && end.angle_rad() < 0.003, "{end:?}");
         let LoopCounts { moved, last_moved_m, .. } = graph.counts();
         let expected_m = (driven[last].inverse() * truth[last]).distance_m();
@@ -110,14 +110,14 @@ fn a_wrong_closure_is_weighed_down_and_taken_out() {
     };
     let end_m = |with_wrong: bool| {
         with_graph(KEYFRAMES + 8, |graph| {
-            drive(graph, &driven);
+            walk(graph, &driven);
             if with_wrong {
-                // Off by 3 m: less than the way may have drifted, so that it is let in.
+                // Off by 3 m: less than the drift that a way may have, so that it is let in.
                 let wrong = Transform::from_translation([3.0, 0.0, 0.0]);
                 assert!(close(graph, last, 0, truth[0].inverse() * truth[last] * wrong));
             }
             right(graph);
-            settle(graph, KEYFRAMES + 3);
+            commit(graph, KEYFRAMES + 3);
             let counts = graph.counts();
             assert_eq!(counts.taken_out, u32::from(with_wrong), "{counts:?}");
             assert_eq!(graph.closure_len, 3);
@@ -146,7 +146,7 @@ fn drive_on(graph: &mut Graph<'_>, driven: &[Transform], at: usize) {
 fn a_closure_far_from_what_drifts_is_refused() {
     let (truth, driven) = drifting();
     with_graph(KEYFRAMES, |graph| {
-        drive(graph, &driven);
+        walk(graph, &driven);
         let last = KEYFRAMES - 1;
         let across = truth[0].inverse() * truth[last] * Transform::new([0.0; 3], [9.0, 0.0, 0.0]);
         let turned = truth[0].inverse() * truth[last] * Transform::new([0.0, 0.5, 0.0], [0.0; 3]);
@@ -162,17 +162,17 @@ fn a_keyframe_that_leaves_hands_its_links_and_closures_on() {
     let last = KEYFRAMES - 1;
     let solved = |thinned: bool| -> Vec<Transform> {
         with_graph(KEYFRAMES, |graph| {
-            drive(graph, &driven);
+            walk(graph, &driven);
             assert!(close(graph, last, 2, truth[2].inverse() * truth[last]));
             let mut slots: Vec<usize> = (0..KEYFRAMES).collect();
             if thinned {
-                for gone in [2, 3, 20, 21, 22] {
-                    graph.remove(slots.clone().into_iter(), gone);
-                    slots.retain(|&slot| slot != gone);
+                for removed in [2, 3, 20, 21, 22] {
+                    graph.remove(slots.clone().into_iter(), removed);
+                    slots.retain(|&slot| slot != removed);
                 }
             }
             assert!((0..ROUNDS).any(|_| graph.step(slots.clone().into_iter())));
-            [1, 19, 23, 50, last].map(|slot| graph.settled(slot).unwrap().1).to_vec()
+            [1, 19, 23, 50, last].map(|slot| graph.corrected(slot).unwrap().1).to_vec()
         })
     };
     for (all, few) in solved(false).iter().zip(solved(true)) {
@@ -215,11 +215,11 @@ fn a_segment_that_is_joined_comes_to_lie_where_the_place_says() {
             graph.insert(0..=at, &pose.t_world_camera, at as u32);
         }
         let t_keyframe_camera = truth[4].inverse() * truth[29];
-        let place = place_at(4, t_keyframe_camera);
-        graph.join(0..30, &place);
+        let recognized = place_at(4, t_keyframe_camera);
+        graph.join(0..30, &recognized);
         assert!(worst_m(graph, &truth) < 1e-9);
-        assert!(graph.close(0..30, &place), "a lost camera may be anywhere");
-        settle(graph, 30);
+        assert!(graph.close(0..30, &recognized), "a lost camera may be anywhere");
+        commit(graph, 30);
         assert!(worst_m(graph, &truth) < 1e-6);
     });
 }
@@ -234,11 +234,11 @@ fn equal_loops_give_equal_bits_wherever_they_are_interrupted() {
     let last = KEYFRAMES - 1;
     let bits = |interrupted: bool| {
         with_graph(KEYFRAMES, |graph| {
-            drive(graph, &driven);
+            walk(graph, &driven);
             assert!(close(graph, last, 0, truth[0].inverse() * truth[last]));
             (0..4).for_each(|_| assert!(!graph.step(0..KEYFRAMES)));
             if !interrupted {
-                settle(graph, KEYFRAMES);
+                commit(graph, KEYFRAMES);
                 return digest(graph);
             }
             let mut bytes = Vec::new();
@@ -260,7 +260,7 @@ fn equal_loops_give_equal_bits_wherever_they_are_interrupted() {
                 let mut reader = Reader::new(&mut source);
                 other.visit(KEYFRAMES, &mut reader);
                 reader.finish().unwrap();
-                settle(other, KEYFRAMES);
+                commit(other, KEYFRAMES);
                 digest(other)
             })
         })
