@@ -8,7 +8,7 @@ trap 'rm -rf "$out"' EXIT
 echo "| prune weight | blocks in the end | memory, MiB | against weight 0 | voxels reset | blocks freed | triangles | accuracy | completeness | median error, cm |"
 echo "|---|---|---|---|---|---|---|---|---|---|"
 for weight in 0 1 2 3 5; do
-    "$dynvox" run "$@" --set volume.prune_weight=$weight --out "$out/$weight" --json > "$out/$weight.json"
+    "$dynvox" run "$@" --set volume.prune_rule=weight --set volume.prune_weight=$weight --out "$out/$weight" --json > "$out/$weight.json"
     # A block with colour takes 3,072 bytes.
     jq -r --arg weight $weight --slurpfile first "$out/0.json" '
         def round3: . * 1000 | round / 1000;

@@ -6,7 +6,7 @@ use crate::{
         Value::{Choice, F32, U8},
         check, rules,
     },
-    volume::{ObservationWeight, VolumeConfig, WhenFull},
+    volume::{ObservationWeight, PruneBy, VolumeConfig, WhenFull},
 };
 
 /// Upper bound of a voxel's weight; at the bound old observations fade exponentially.
@@ -121,6 +121,7 @@ impl ObjectsConfig {
             max_weight: MAX_WEIGHT,
             when_full: WhenFull::Refuse,
             prune_weight: 0,
+            prune_rule: PruneBy::Weight,
             near_m: map.near_m * lengths,
             behind_m: map.behind_m * lengths,
             allocation_m: map.allocation_m * lengths,

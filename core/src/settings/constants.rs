@@ -62,6 +62,7 @@ pub const CONSTANTS: &[(&str, &str)] = &[
     ("tracking.segmentation.predict_frames", "3"),
     ("objects.max_weight", "200"),
     ("volume.colour_band", "0.25"),
+    ("volume.prune_distance", "two voxels where volume.prune_rule is support"),
     ("planning.margin_px", "0.5"),
     ("street.camera_height_m", "1.65"),
     ("street.lidar_noise_m", "0"),

@@ -94,10 +94,28 @@ pub enum WhenFull {
     Refuse,
 }
 
+/// Rule of what pruning removes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "lowercase")
+)]
+pub enum PruneBy {
+    /// Voxels seen at most `prune_weight` times, the paper's rule.
+    Weight,
+    /// Voxels seen at most `prune_weight` times where less than a tenth of their block was seen
+    /// more often: others belong to a surface that is well known. And blocks farther than two
+    /// voxels from any surface.
+    #[default]
+    Support,
+}
+
 choices! {
     ObservationWeight { "one" = One, "nearest" = Nearest, "depth" = Depth, "band" = Band }
     DistanceAlong { "ray" = Ray, "normal" = Normal }
     WhenFull { "evict" = Evict, "refuse" = Refuse }
+    PruneBy { "weight" = Weight, "support" = Support }
 }
 
 /// Parameters of the map. [`VolumeConfig::SETTINGS`] has their ranges, and the original's values
@@ -138,8 +156,8 @@ pub struct VolumeConfig {
     pub prune_weight: u8,
     /// Length of the pruning window, frames.
     pub prune_lag: u32,
-    /// Distance from the surface beyond which pruning frees whole blocks, share of the truncation.
-    pub prune_distance: f32,
+    /// Rule of what pruning removes.
+    pub prune_rule: PruneBy,
     /// Most blocks that pruning visits in one frame.
     pub prune_blocks_per_frame: u32,
     /// Distance from the edge of something nearer within which pixels are not fused, px.
@@ -165,7 +183,7 @@ impl Default for VolumeConfig {
             when_full: WhenFull::Evict,
             prune_weight: 1,
             prune_lag: 200,
-            prune_distance: 0.0,
+            prune_rule: PruneBy::Support,
             prune_blocks_per_frame: 20_000,
             edge_reach_px: 2,
             distance: DistanceAlong::Normal,
@@ -236,13 +254,11 @@ impl VolumeConfig {
             .range(Range::AtLeast(1.0))
             .published("300 in the paper's text, 40 in its pruning experiment")
             .text("Length of the pruning window."),
-        Row::expert("volume.prune_distance", "", |c| F32(&mut c.prune_distance))
-            .range(Range::SHARE)
-            .text(
-                "A block not visible in the window whose smallest distance is above this share of \
-                 the truncation is freed as a whole; 0 is off. With two voxels, 0.13 at the \
-                 defaults, surfaces stay.",
-            ),
+        Row::user("volume.prune_rule", "", |c| Choice(&mut c.prune_rule)).published("weight").text(
+            "Rule of what pruning removes: voxels of low weight (`weight`); or those only where \
+             less than a tenth of their block was seen more often, and blocks farther than two \
+             voxels from any surface that left the window (`support`).",
+        ),
         Row::expert("volume.prune_blocks_per_frame", "blocks", |c| {
             U32(&mut c.prune_blocks_per_frame)
         })
@@ -278,7 +294,7 @@ impl VolumeConfig {
 
     /// Tells whether anything is pruned.
     pub const fn prunes(&self) -> bool {
-        self.prune_weight > 0 || self.prune_distance > 0.0
+        self.prune_weight > 0
     }
 
     /// Notes everything wrong with the figures.

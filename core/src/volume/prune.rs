@@ -2,14 +2,21 @@
 //! the paper).
 //!
 //! After frame n the blocks visible in frame n - lag are visited. Each voxel with 0 < weight <=
-//! `prune_weight` is reset; a block without a seen voxel left goes back to the pool, and so does
-//! one that was not visible since and whose smallest |distance| exceeds `prune_distance` (Nießner
-//! et al., 2013, Section 5.3; off by default). At most `prune_blocks_per_frame` blocks are visited
-//! per frame; the rest stays due and comes first in the next.
+//! `prune_weight` is reset; a block without a seen voxel left goes back to the pool. By support,
+//! the default, voxels stay where enough of their block was seen more often, and a block goes that
+//! was not visible since and has no voxel near a surface (Nießner et al., 2013, Section 5.3). At
+//! most `prune_blocks_per_frame` blocks are visited per frame; the rest stays due and comes first in
+//! the next.
 //!
-//! With `prune_weight` and `prune_distance` 0 pruning is off, bit for bit.
+//! With `prune_weight` 0 pruning is off, bit for bit.
 
-use super::{BLOCK_VOXELS, Slot, Volume, block::Voxels};
+use super::{BLOCK_VOXELS, PruneBy, Slot, Volume, block::Voxels};
+
+/// Distance from which on a block is far from a surface, voxels: a cell that the surface runs
+/// through has a corner that is nearer.
+const FAR_VOXELS: f32 = 2.0;
+/// One of so many seen voxels must weigh more for those of low weight to stay.
+const SUPPORT_ONE_OF: u32 = 10;
 
 /// Counts of pruning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +53,8 @@ pub(super) struct PruneRule {
     pub weight: u8,
     /// Blocks farther from any surface than this share of the truncation; 0 is none.
     pub distance: f32,
+    /// One of so many seen voxels of a block must weigh more for the others to stay; 0: none stay.
+    pub support_one_of: u32,
 }
 
 impl Volume<'_> {
@@ -86,9 +95,9 @@ impl Volume<'_> {
         while self.history.expire().is_some() {}
         let frames = u8::try_from(self.visible.frame()).unwrap_or(u8::MAX);
         let expected = frames.saturating_sub(1);
-        let PruneRule { weight, distance } = self.rule();
-        let weight = if weight < expected { weight } else { expected };
-        self.visit_due(u32::MAX, PruneRule { weight, distance }, &mut report);
+        let rule = self.rule();
+        let weight = if rule.weight < expected { rule.weight } else { expected };
+        self.visit_due(u32::MAX, PruneRule { weight, ..rule }, &mut report);
         report
     }
 
@@ -107,11 +116,18 @@ impl Volume<'_> {
 
     /// Returns the rule for a block that has left the window.
     pub(super) fn rule(&self) -> PruneRule {
-        PruneRule { weight: self.config.prune_weight, distance: self.config.prune_distance }
+        let weight = self.config.prune_weight;
+        match self.config.prune_rule {
+            PruneBy::Weight => PruneRule { weight, distance: 0.0, support_one_of: 0 },
+            PruneBy::Support => {
+                let distance = FAR_VOXELS * self.config.voxel_size_m / self.config.truncation_m;
+                PruneRule { weight, distance, support_one_of: SUPPORT_ONE_OF }
+            }
+        }
     }
 
-    /// Visits at most so many blocks that are due, by a rule. Those visible in the window will be due
-    /// again, and do not go for their distance.
+    /// Visits at most so many blocks that are due, by a rule. Those visible in the window will be
+    /// due again, and do not go for their distance.
     fn visit_due(&mut self, most: u32, rule: PruneRule, report: &mut PruneReport) {
         let mut from = 0;
         while report.visited < most
@@ -137,7 +153,7 @@ impl Volume<'_> {
         let Some(Voxels { sdf, weight }) = self.blocks.voxels.get_mut(at) else {
             return (0, false);
         };
-        let census = Census::new(weight, prune_weight);
+        let census = Census::new(weight, prune_weight).supported(rule.support_one_of);
         // A block that leaves is not cleared: the next block in its slot does that.
         if census.remaining == 0 {
             self.free_block(slot);
@@ -182,6 +198,15 @@ struct Census {
 const GROUP: usize = 128;
 
 impl Census {
+    /// Counts voxels of low weight among the remaining ones where one of so many weighs more.
+    fn supported(self, one_of: u32) -> Self {
+        let seen = self.low_weight + self.remaining;
+        if self.remaining * one_of >= seen && self.remaining > 0 {
+            return Self { low_weight: 0, remaining: seen };
+        }
+        self
+    }
+
     /// Counts a block's voxels. Pruning reads nothing else of most blocks it visits, so this is its
     /// cost.
     fn new(weight: &[u8; BLOCK_VOXELS], prune_weight: u8) -> Self {

@@ -7,6 +7,7 @@ use crate::request::{Reference, Request, Source};
 use crate::run::program;
 use dynvox_core::MotionSource;
 use dynvox_core::digest::Digest;
+use dynvox_core::volume::PruneBy;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -250,7 +251,13 @@ fn values(kind: Kind, request: &SweepRequest, data: &Data) -> Vec<(String, Reque
         Kind::PruneWeight => request
             .weights
             .iter()
-            .map(|&weight| one(&weight, &|run| run.settings.volume.prune_weight = weight))
+            .map(|&weight| {
+                let by_weight = |run: &mut Request| {
+                    run.settings.volume.prune_weight = weight;
+                    run.settings.volume.prune_rule = PruneBy::Weight;
+                };
+                one(&weight, &by_weight)
+            })
             .collect(),
         Kind::FrameRate => of(&request.rates, |run, rate| run.settings.mapper.fuse_every = rate),
         Kind::Scale => {

@@ -1,20 +1,22 @@
 //! The window and what leaves it.
 
 mod by_distance;
+mod by_support;
 
 use super::*;
 use crate::random::Random;
 use crate::volume::{block::Voxels, prune::PruneRule};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A config that prunes weights up to `prune_weight` after `prune_lag` frames.
+/// A config that prunes by weight up to `prune_weight` after `prune_lag` frames.
 fn pruning(prune_weight: u8, prune_lag: u32) -> VolumeConfig {
-    VolumeConfig { prune_weight, prune_lag, ..VolumeConfig::default() }
+    let prune_rule = PruneBy::Weight;
+    VolumeConfig { prune_weight, prune_lag, prune_rule, ..VolumeConfig::default() }
 }
 
 /// Resets voxels of low weight, wherever they are.
 fn by_weight(weight: u8) -> PruneRule {
-    PruneRule { weight, distance: 0.0 }
+    PruneRule { weight, distance: 0.0, support_one_of: 0 }
 }
 
 /// Makes a block whose voxels all have that weight, with its digest entered.
