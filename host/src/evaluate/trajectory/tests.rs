@@ -168,6 +168,61 @@ fn agrees_with_evo() {
     }
 }
 
+/// Rows of a file that a pair of trajectories keeps.
+#[derive(serde::Deserialize)]
+struct KeptRows {
+    first: usize,
+    last: usize,
+    step: usize,
+    gap: [usize; 2],
+}
+
+/// A pair of trajectories, and what evo says of it.
+#[derive(serde::Deserialize)]
+struct EvoPair {
+    name: String,
+    estimate: KeptRows,
+    truth: KeptRows,
+    late_s: f64,
+    poses: usize,
+    ate_m: Option<f64>,
+}
+
+impl KeptRows {
+    fn of(&self, whole: &Trajectory, late_s: f64) -> Trajectory {
+        let rows = (self.first..self.last.min(whole.poses.len())).step_by(self.step);
+        let rows: Vec<usize> =
+            rows.filter(|row| !(self.gap[0]..self.gap[1]).contains(row)).collect();
+        Trajectory {
+            times_s: Some(rows.iter().map(|&row| 1_000.0 + 0.1 * row as f64 + late_s).collect()),
+            poses: rows.iter().map(|&row| whole.poses[row]).collect(),
+            ..Trajectory::default()
+        }
+    }
+}
+
+#[test]
+fn pairs_of_other_rates_and_overlaps_agree_with_evo() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/evaluate/trajectory/evo");
+    let [estimate, truth] =
+        ["estimate.txt", "truth.txt"].map(|name| read_trajectory(&here.join(name)).unwrap());
+    let pairs: Vec<EvoPair> = serde_json::from_str(include_str!("evo/pairs.json")).unwrap();
+    assert_eq!(pairs.len(), 12);
+    for pair in pairs {
+        let first = pair.estimate.of(&estimate, pair.late_s);
+        let joined = matched(&first, &pair.truth.of(&truth, 0.0));
+        let Some(expected_m) = pair.ate_m else {
+            assert!(joined.unwrap_err().to_string().contains("same clock"), "{}", pair.name);
+            continue;
+        };
+        let MatchedPoses { first: estimate, second: truth, .. } = joined.unwrap();
+        assert_eq!(estimate.len(), pair.poses, "{}", pair.name);
+        let found_m = errors(&truth, &estimate).unwrap().ate_m;
+        let off = (found_m / expected_m - 1.0).abs();
+        assert!(off < 1e-6, "{}: {found_m} m, evo {expected_m} m", pair.name);
+    }
+}
+
 #[test]
 fn both_formats_are_read_and_poses_are_joined_by_time() {
     let folder = tempfile::TempDir::new().unwrap();
