@@ -25,11 +25,14 @@ const MATCHED_MIN_Q8: u16 = 2 * 256;
 pub(super) struct Ratios(Vec<f32>);
 
 impl Ratios {
-    /// Adds a frame: disparities of the left image in 1/256 px, 0 unknown.
-    pub fn add(&mut self, given: &Image<u16>, matched: &Image<u16>) {
-        let pairs = given.pixels().iter().zip(matched.pixels());
-        let known = pairs.filter(|(given, matched)| **given > 0 && **matched >= MATCHED_MIN_Q8);
-        self.0.extend(known.map(|(given, matched)| f32::from(*given) / f32::from(*matched)));
+    /// Adds a frame: given disparities in px, also such as no matcher finds, 0 or less unknown;
+    /// those of the run in 1/256 px, 0 unknown.
+    pub fn add(&mut self, given_px: &Image<f32>, matched: &Image<u16>) {
+        let pairs = given_px.pixels().iter().zip(matched.pixels());
+        let known = pairs.filter(|(given_px, matched)| {
+            **given_px > 0.0 && given_px.is_finite() && **matched >= MATCHED_MIN_Q8
+        });
+        self.0.extend(known.map(|(given_px, matched)| 256.0 * given_px / f32::from(*matched)));
     }
 
     /// The factor by which given depths are too near (above 1) or too far (below 1), if there is

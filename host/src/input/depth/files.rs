@@ -198,9 +198,17 @@ fn unit_off(
     for (index, path) in there.iter().step_by(step) {
         // Frames that cannot be read are refused when their turn comes.
         let Ok(images) = dataset.frame(*index) else { continue };
-        let Ok(given) = read(path, unit, dataset.size(), &dataset.rig()) else { continue };
+        let Ok((values, quantity)) = values_of(path, unit, dataset.size()) else { continue };
+        let rig = dataset.rig();
+        let product = (rig.focal_px * rig.baseline_m) as f32;
+        // Of a wrong unit most values may be none that the rig can have: they tell it, too.
+        let given_px = values.map(|&value| match quantity {
+            Quantity::DisparityPx => value,
+            Quantity::DepthM if value > 0.0 => product / value,
+            Quantity::DepthM => 0.0,
+        });
         if let Some(matched) = compare::matched(dataset, &images) {
-            ratios.add(&given.disparity_q8, &matched);
+            ratios.add(&given_px, &matched);
         }
     }
     Ok(ratios.factor().map(|ratio| {
@@ -277,8 +285,22 @@ pub(super) fn read(
     size: (usize, usize),
     rig: &StereoRig,
 ) -> Result<GivenDepth, InputError> {
+    let (values, quantity) = values_of(path, unit, size)?;
+    let given = to_disparity(&values, quantity, rig);
+    match refused_by_most(&given, &values, quantity) {
+        Some(reason) => Err(InputError::depth(path, reason)),
+        None => Ok(given),
+    }
+}
+
+/// The values of a file, m or px.
+fn values_of(
+    path: &Path,
+    unit: FileUnit,
+    size: (usize, usize),
+) -> Result<(Image<f32>, Quantity), InputError> {
     let per_unit = unit.of(path) as f32;
-    let (values, quantity) = match ending(path) {
+    Ok(match ending(path) {
         Some("pfm") => {
             let values = read_pfm(path, size).map_err(InputError::depth_format)?;
             (values.map(|value| value * per_unit), unit.quantity)
@@ -299,12 +321,7 @@ pub(super) fn read(
             }
             (image.map(|&value| f32::from(value) * per_unit), unit.quantity)
         }
-    };
-    let given = to_disparity(&values, quantity, rig);
-    match refused_by_most(&given, &values, quantity) {
-        Some(reason) => Err(InputError::depth(path, reason)),
-        None => Ok(given),
-    }
+    })
 }
 
 /// Says why most values of a file are none, if they are.

@@ -286,7 +286,8 @@ fn depth_in_another_unit_is_named_with_its_factor() {
         ("depth", 4.0, "4.0 x too far"),
         ("depth", 0.25, "4.0 x too near"),
         ("depth", 100.0, "--depth-scale cm"),
-        ("disparity", 40.0, "256 px and more"),
+        ("depth", 0.01, "100.0 x too near"),
+        ("disparity", 40.0, "40.0 x too near"),
         ("disparity", 0.062_5, "--depth-scale 1.600e1"),
         ("disparity", 0.5, "2.0 x too far"),
     ] {
