@@ -138,6 +138,9 @@ pub fn examine(source: &dyn FrameSource, indices: &[usize]) -> Result<Vec<Findin
     let mut pairs = Vec::new();
     each_pair(source, indices, |left, right, of| pairs.push(Pair::new(left, right, of)))?;
     findings.extend(diagnose(&pairs));
+    if source.rectification().is_some() {
+        findings.iter_mut().for_each(name_calibration);
+    }
     let thumbnails = order::window(indices)
         .iter()
         .map_while(|&index| Some(order::thumbnail(&source.frame(index).ok()?.left)));
@@ -176,6 +179,23 @@ fn check_baseline(rig: &StereoRig) -> Option<Finding> {
         );
         finding(Fault::Baseline, true, message)
     })
+}
+
+/// Action where images that come rectified are not.
+const GIVE_RAW: &str = "Give the raw images with their calibration: --calibration FILE";
+/// Action where images are not rectified by their calibration.
+const CALIBRATE: &str = "The calibration is not of these cameras as they stand: calibrate anew, or \
+                         look at its rows with `dynvox calibration FILE --images DIR`";
+
+/// Says of raw images that it is their calibration which does not rectify them.
+fn name_calibration(finding: &mut Finding) {
+    if finding.fault == Fault::NotRectified {
+        let by = "their calibration does not rectify these images";
+        finding.message = finding
+            .message
+            .replace("these images are not rectified", by)
+            .replace(GIVE_RAW, CALIBRATE);
+    }
 }
 
 fn finding(fault: Fault, refused: bool, message: String) -> Finding {
@@ -327,8 +347,8 @@ fn check_rows(rows: &RowError, matches: usize, width_px: f64) -> Option<Finding>
         let message = format!(
             "these images are not rectified: rows lie {:.1} px apart in the middle, sigma \
              {shift_sigma_px:.1} ({matches} matches). Right images are {:.1} px too {} there and \
-             rotated by {roll_deg:+.2} degrees (clockwise); {rest_px:.1} px are left besides. Give \
-             the raw images with their calibration: --calibration FILE",
+             rotated by {roll_deg:+.2} degrees (clockwise); {rest_px:.1} px are left besides. \
+             {GIVE_RAW}",
             shift_px.abs(),
             shift_px.abs(),
             if shift_px > 0.0 { "low" } else { "high" }

@@ -195,3 +195,41 @@ fn a_good_rig_has_one_verdict_for_any_number_of_pictures() {
         assert!(rows.is_none(), "{count} pairs: {rows:?}");
     }
 }
+
+/// Two flat pictures 3 px apart in rows, as a rectified pair and through lenses without distortion.
+#[test]
+fn rows_that_a_calibration_leaves_apart_are_its_own_fault() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    for (side, rows, shift) in [("left", 0.0, 0.0), ("right", 3.0, 12.0)] {
+        std::fs::create_dir(path(side)).unwrap();
+        for at in 0..3 {
+            let picture = image(|u, v| texture(u + 400.0 * f64::from(at) + shift, v - rows));
+            let head = format!("P5\n{WIDTH} {HEIGHT}\n255\n");
+            let bytes = [head.as_bytes(), picture.pixels()].concat();
+            std::fs::write(path(side).join(format!("{at}.pgm")), bytes).unwrap();
+        }
+    }
+    let message = |name: &str, text: &str| {
+        std::fs::write(path(name), text).unwrap();
+        let options = OpenOptions { calibration: vec![path(name)], ..OpenOptions::default() };
+        let source = open(folder.path(), &options).unwrap();
+        let findings = examine(source.as_ref(), &[0, 1, 2]).unwrap();
+        let rows = findings.into_iter().find(|finding| finding.fault == Fault::NotRectified);
+        rows.expect("rows lie apart").message
+    };
+    let keys = "focal_px 400\ncenter_u_px 239.5\ncenter_v_px 99.5\nbaseline_m 0.1\n";
+    let rectified = message("rectified.txt", keys);
+    assert!(rectified.contains("are not rectified") && rectified.contains(GIVE_RAW), "{rectified}");
+    let matrix = "[[400, 0, 239.5], [0, 400, 99.5], [0, 0, 1]]";
+    let none = "[0, 0, 0, 0, 0]";
+    let raw = message(
+        "stereo.yml",
+        &format!(
+            "K1: {matrix}\nD1: {none}\nK2: {matrix}\nD2: {none}\nR: [[1, 0, 0], [0, 1, 0], [0, 0, \
+             1]]\nT: [-0.1, 0, 0]\n"
+        ),
+    );
+    assert!(raw.contains("their calibration does not rectify") && raw.contains("anew"), "{raw}");
+    assert!(!raw.contains(GIVE_RAW), "{raw}");
+}
