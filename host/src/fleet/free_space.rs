@@ -44,6 +44,8 @@ pub struct Camera {
 pub struct CameraPose {
     /// Number of the frame in the data set.
     pub frame: usize,
+    /// Time of the frame, s, where it is known.
+    pub time_s: Option<f64>,
     /// Segment of the map that the pose lies in.
     pub segment: MapSegment,
     /// The camera in the segment, as far as it is the first: files show others apart.

@@ -10,17 +10,20 @@
 //! The world is the plane through the origin of the fixes: x east, y down, z north.
 
 mod heading;
+mod timed;
 
 use super::FleetError;
 use super::manifest::{Given, Job, transform};
 use super::register::Uncertainty;
 use super::submap::Submap;
-use crate::formats::{Fix, LocalPlane, read_gnss};
+use crate::formats::{Fix, Fixes, LocalPlane, read_gnss};
 use dynvox_core::geometry::Transform;
 use heading::HeadingError;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 
+/// Weight of a fix whose receiver is surer of it than of most, at most.
+const WEIGHT_MAX: f64 = 100.0;
 /// Frames with a fix.
 const FIXES_MIN: usize = 10;
 /// Largest standard deviation of the turn about any axis, rad: a registration does not find more.
@@ -30,6 +33,8 @@ const TURN_MAX_RAD: f64 = 0.052;
 const ANGLES_SIGMA_RAD: f64 = 0.0175;
 /// Angles may contradict positions by no more, rad.
 const CONTRADICTION_MAX_RAD: f64 = 0.175;
+/// Standard deviations up to which a difference of headings is explained.
+const DOUBT: f64 = 3.0;
 /// A path that fits its fixes at a scale off by more has other fixes; stereo errs less.
 const SCALE_ERROR_MAX: f64 = 0.08;
 /// Fixes in a row err alike: so many count as one.
@@ -67,6 +72,16 @@ struct Observation {
     at_m: Vector3<f64>,
     /// Axes of the camera in the world, if angles were measured.
     axes: Option<Matrix3<f64>>,
+    /// Standard deviation that the receiver tells, of the three axes' mean, m.
+    sigma_m: Option<f64>,
+}
+
+/// Angles of an inertial system, as a rotation from the map to the world.
+#[derive(Clone, Copy, Debug)]
+struct GivenAxes {
+    rotation: Matrix3<f64>,
+    /// Standard deviation about any axis, rad.
+    sigma_rad: f64,
 }
 
 /// Returns the given pose of a job's map. A job with fixes needs its map.
@@ -93,12 +108,18 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
     let fixes = read_gnss(gnss)?;
     let cameras = Submap::cameras(&job.submap(folder))?;
     let plane = LocalPlane::at(*origin);
-    // Frames without a fix are left out.
-    let seen = cameras.iter().filter_map(|camera| {
-        let fix = fixes.get(camera.frame).copied().flatten()?;
-        Some(Observation::of(&camera.t_map_camera, &fix, &plane))
-    });
-    let found = georeference(&seen.collect::<Vec<_>>(), *antenna_m);
+    let seen = match fixes {
+        Fixes::ByTime(fixes) => timed::observations(&cameras, &fixes, &plane),
+        // Frames without a fix are left out.
+        Fixes::ByFrame(fixes) => {
+            let seen = cameras.iter().filter_map(|camera| {
+                let fix = fixes.get(camera.frame).copied().flatten()?;
+                Some(Observation::of(&camera.t_map_camera, &fix, &plane))
+            });
+            Ok(seen.collect())
+        }
+    };
+    let found = seen.and_then(|seen| georeference(&seen, *antenna_m));
     found.map_err(|reason| {
         FleetError::content(gnss, format!("does not say where {} lies: {reason}", job.name))
     })
@@ -111,6 +132,9 @@ impl Observation {
             t_map_camera: *t_map_camera,
             at_m: Vector3::new(east, -up, north),
             axes: fix.angles_rad.map(camera_axes),
+            sigma_m: fix
+                .sigma_m
+                .map(|[east, north, up]| ((east * east + north * north + up * up) / 3.0).sqrt()),
         }
     }
 }
@@ -146,19 +170,54 @@ struct Estimate {
     weights: Vec<f64>,
 }
 
+/// Fixes as the estimates take them.
+struct Fitted {
+    points: Vec<PointPair>,
+    /// Weight of each by what its receiver tells of it; 1 where it tells nothing.
+    weights: Vec<f64>,
+}
+
+impl Fitted {
+    fn new(frames: &[Observation], antenna_m: [f64; 3]) -> Self {
+        // The antenna is not where the camera is.
+        let points = frames
+            .iter()
+            .map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m))
+            .collect();
+        let usual_m = told_sigma_m(frames);
+        let weight = |of: &Observation| match (of.sigma_m, usual_m) {
+            (Some(sigma_m), Some(usual_m)) => (usual_m / sigma_m).powi(2).min(WEIGHT_MAX),
+            _ => 1.0,
+        };
+        Self { points, weights: frames.iter().map(weight).collect() }
+    }
+}
+
+/// Median of the standard deviations that the receiver tells, m.
+fn told_sigma_m(frames: &[Observation]) -> Option<f64> {
+    let known: Vec<f64> = frames.iter().filter_map(|of| of.sigma_m).collect();
+    (!known.is_empty()).then(|| median(known))
+}
+
+/// The upper median; 0 of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
 impl Estimate {
     /// By fixes, and angles where there are any.
-    fn of(points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
+    fn of(fitted: &Fitted, axes: Option<&GivenAxes>) -> Option<Self> {
         let start = Self {
             rotation: Matrix3::identity(),
             shift_m: Vector3::zeros(),
             sigma_m: 1.0,
-            weights: vec![1.0; points.len()],
+            weights: fitted.weights.clone(),
         };
-        let mut estimate = start.next(points, axes)?;
+        let mut estimate = start.next(fitted, axes)?;
         // Weights and pose depend on each other: iterate until the pose rests.
         for _ in 1..MAX_ROUNDS {
-            let next = estimate.next(points, axes)?;
+            let next = estimate.next(fitted, axes)?;
             let change = (next.rotation - estimate.rotation)
                 .amax()
                 .max((next.shift_m - estimate.shift_m).amax());
@@ -171,11 +230,12 @@ impl Estimate {
     }
 
     /// The motion that fits best with some weights, and the weights that follow from it.
-    fn next(&self, points: &[PointPair], axes: Option<&Matrix3<f64>>) -> Option<Self> {
+    fn next(&self, fitted: &Fitted, axes: Option<&GivenAxes>) -> Option<Self> {
+        let points = &fitted.points;
         let centres = centres(points, &self.weights);
+        // Angles, where known, weigh as their standard deviation says.
         let mut sum =
-            // Angles, where known, weigh as their standard deviation says.
-            axes.copied().unwrap_or_else(Matrix3::zeros) / (2.0 * ANGLES_SIGMA_RAD.powi(2));
+            axes.map_or_else(Matrix3::zeros, |axes| axes.rotation / (2.0 * axes.sigma_rad.powi(2)));
         for ((from, to), weight) in points.iter().zip(&self.weights) {
             sum += (weight / information_of(self.sigma_m))
                 * (to - centres.1)
@@ -184,27 +244,26 @@ impl Estimate {
         // Kabsch: the rotation nearest to the correlation of both sets.
         let rotation = nearest_rotation(&sum)?;
         let shift_m = centres.1 - rotation * centres.0;
-        let residuals_m: Vec<f64> =
-            points.iter().map(|(from, to)| (to - rotation * from - shift_m).norm()).collect();
-        let mut sorted = residuals_m.clone();
-        sorted.sort_by(f64::total_cmp);
+        // Those of surer fixes count as if they were larger.
+        let residual = |((from, to), weight): (&PointPair, &f64)| {
+            weight.sqrt() * (to - rotation * from - shift_m).norm()
+        };
+        let residuals_m: Vec<f64> = points.iter().zip(&fitted.weights).map(residual).collect();
         // The median residual gives sigma: outliers do not raise it.
-        let sigma_m = (sorted.get(sorted.len() / 2)? / MEDIAN_LENGTH).max(SIGMA_MIN_M);
+        let sigma_m = (median(residuals_m.clone()) / MEDIAN_LENGTH).max(SIGMA_MIN_M);
         let weights = residuals_m
             .iter()
-            .map(|residual_m| 1.0 / (1.0 + (residual_m / (LIMIT * sigma_m)).powi(2)))
+            .zip(&fitted.weights)
+            .map(|(residual_m, weight)| weight / (1.0 + (residual_m / (LIMIT * sigma_m)).powi(2)))
             .collect();
         Some(Self { rotation, shift_m, sigma_m, weights })
     }
 
     /// Standard deviation of the turn about the axis that is known least, rad.
-    fn turn_sigma_rad(&self, points: &[PointPair], with_angles: bool) -> f64 {
+    fn turn_sigma_rad(&self, points: &[PointPair], axes: Option<&GivenAxes>) -> f64 {
         let (centre, _) = centres(points, &self.weights);
-        let mut information = if with_angles {
-            Matrix3::identity() / ANGLES_SIGMA_RAD.powi(2)
-        } else {
-            Matrix3::zeros()
-        };
+        let mut information =
+            axes.map_or_else(Matrix3::zeros, |axes| Matrix3::identity() / axes.sigma_rad.powi(2));
         for ((from, _), weight) in points.iter().zip(&self.weights) {
             let arm = from - centre;
             information += (weight / information_of(self.sigma_m))
@@ -236,7 +295,14 @@ impl PathScale {
             along += weight * turned.dot(&(to - to_centre));
             arm += weight * turned.norm_squared();
         }
-        Self { factor: along / arm, sigma: (information_of(estimate.sigma_m) / arm).sqrt() }
+        let factor = along / arm;
+        // A wrong scale must not excuse itself: residuals are those that it would leave.
+        let residual = |(from, to): &PointPair| {
+            (to - to_centre - factor * (estimate.rotation * (from - from_centre))).norm()
+        };
+        let sigma_m = median(points.iter().map(residual).collect()) / MEDIAN_LENGTH;
+        let sigma_m = sigma_m.clamp(SIGMA_MIN_M, estimate.sigma_m.max(SIGMA_MIN_M));
+        Self { factor, sigma: (information_of(sigma_m) / arm).sqrt() }
     }
 }
 
@@ -261,43 +327,37 @@ fn centres(points: &[PointPair], weights: &[f64]) -> PointPair {
     (sum(|point| point.0), sum(|point| point.1))
 }
 
-/// Estimates the map's pose from fixes, or says why they do not determine it.
-fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, String> {
-    if frames.len() < FIXES_MIN {
-        return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
-    }
-    // The antenna is not where the camera is.
-    let points: Vec<_> = frames
-        .iter()
-        .map(|of| (Vector3::from(of.t_map_camera.transform_point(antenna_m)), of.at_m))
-        .collect();
-    // Angles, where given, fix the rotation that positions leave free.
+/// The mean rotation from the map to the world that measured angles give, if there are any.
+fn given_rotation(frames: &[Observation]) -> Option<Matrix3<f64>> {
     let turned = frames
         .iter()
         .filter_map(|of| Some(of.axes? * Matrix3::from(of.t_map_camera.rotation_matrix())));
-    let axes = turned.clone().next().and_then(|_| nearest_rotation(&turned.sum()));
-    let unclear = || "its positions are not finite".to_owned();
-    // Once without angles, to see whether they contradict the positions.
-    let by_positions = Estimate::of(&points, None).ok_or_else(unclear)?;
-    let estimate = Estimate::of(&points, axes.as_ref()).ok_or_else(unclear)?;
-    let off_rad = axes.map_or(0.0, |axes| {
-        transform_of(&(axes.transpose() * by_positions.rotation), &Vector3::zeros()).angle_rad()
-    });
-    if off_rad > CONTRADICTION_MAX_RAD && by_positions.turn_sigma_rad(&points, false) < TURN_MAX_RAD
+    turned.clone().next().and_then(|_| nearest_rotation(&turned.sum()))
+}
+
+/// Measured angles with the standard deviation that the fixes leave them, or how they contradict
+/// these.
+fn believed(
+    rotation: &Matrix3<f64>,
+    fitted: &Fitted,
+    by_positions: &Estimate,
+) -> Result<GivenAxes, String> {
+    let points = &fitted.points;
+    let apart = transform_of(&(rotation.transpose() * by_positions.rotation), &Vector3::zeros());
+    if apart.angle_rad() > CONTRADICTION_MAX_RAD
+        && by_positions.turn_sigma_rad(points, None) < TURN_MAX_RAD
     {
         return Err(format!(
             "its angles contradict its positions by {:.0} degrees. The camera must look along the \
              vehicle",
-            off_rad.to_degrees()
+            apart.angle_rad().to_degrees()
         ));
     }
     // A straight path tells its heading, if not how far the camera leans.
-    let heading = axes
-        .map(|axes| HeadingError::new(&points, &by_positions.weights, by_positions.sigma_m, &axes));
-    if let Some(HeadingError { off_rad, sigma_rad }) = heading
-        && off_rad.abs() > CONTRADICTION_MAX_RAD
-        && sigma_rad < TURN_MAX_RAD
-    {
+    let HeadingError { off_rad, sigma_rad } =
+        HeadingError::new(points, &by_positions.weights, by_positions.sigma_m, rotation);
+    let explained_rad = DOUBT * sigma_rad.hypot(ANGLES_SIGMA_RAD);
+    if off_rad.abs() > CONTRADICTION_MAX_RAD.max(explained_rad) {
         return Err(format!(
             "its angles contradict the heading of its path by {:.0} degrees. Yaw is 0 to the east \
              and rises counterclockwise, in rad: it may count from north (compass) or be in \
@@ -305,7 +365,27 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
             off_rad.abs().to_degrees()
         ));
     }
-    let scale = PathScale::new(&points, &estimate);
+    // Angles that are off by less may be a compass' near the north-east: they count for little.
+    let sigma_rad = if off_rad.abs() > explained_rad { off_rad.abs() } else { ANGLES_SIGMA_RAD };
+    Ok(GivenAxes { rotation: *rotation, sigma_rad })
+}
+
+/// Estimates the map's pose from fixes, or says why they do not determine it.
+fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, String> {
+    if frames.len() < FIXES_MIN {
+        return Err(format!("{} frames with a fix are less than {FIXES_MIN}", frames.len()));
+    }
+    let fitted = Fitted::new(frames, antenna_m);
+    let points = &fitted.points;
+    let unclear = || "its positions are not finite".to_owned();
+    // Once without angles, to see whether they contradict the positions.
+    let by_positions = Estimate::of(&fitted, None).ok_or_else(unclear)?;
+    let axes = match given_rotation(frames) {
+        Some(rotation) => Some(believed(&rotation, &fitted, &by_positions)?),
+        None => None,
+    };
+    let estimate = Estimate::of(&fitted, axes.as_ref()).ok_or_else(unclear)?;
+    let scale = PathScale::new(points, &estimate);
     if (scale.factor - 1.0).abs() > SCALE_ERROR_MAX + 3.0 * scale.sigma {
         return Err(format!(
             "its fixes lie along {:.2} x the length of its path. Latitude and longitude may be \
@@ -313,8 +393,9 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
             scale.factor
         ));
     }
-    let (position_m, rotation_rad) =
-        (estimate.sigma_m, estimate.turn_sigma_rad(&points, axes.is_some()));
+    // A receiver whose errors are alike along a path knows of more than the residuals show.
+    let position_m = estimate.sigma_m.max(told_sigma_m(frames).unwrap_or(0.0));
+    let rotation_rad = estimate.turn_sigma_rad(points, axes.as_ref());
     // Fixes of another recording do not fit the path.
     if position_m > SIGMA_MAX_M {
         return Err(format!(

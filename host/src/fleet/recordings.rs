@@ -102,9 +102,7 @@ impl Recordings {
         // Rows without a fix are skipped.
         let fixes = read_gnss(gnss).map_err(FleetError::Format)?;
         let first = fixes
-            .iter()
-            .flatten()
-            .next()
+            .first()
             .ok_or_else(|| FleetError::content(gnss, "has no fix. Give a file that has"))?;
         Ok(Some(first.geodetic))
     }

@@ -41,6 +41,9 @@ struct SubmapHeader {
     position: Position,
     /// Number of the frame in the data set, and the rows of the camera in the map.
     cameras: Vec<(usize, [f64; 12])>,
+    /// Times of these frames, s; empty in maps of older versions, and where a time is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    times_s: Vec<f64>,
     /// Frames of later segments.
     left_out_frames: usize,
 }
@@ -161,6 +164,7 @@ pub fn keep(
         colour: lattice.colour,
         position: kept.position().map_err(FleetError::io(&path))?,
         cameras: camera.poses.iter().map(|of| (of.frame, rows_of(&of.t_map_camera))).collect(),
+        times_s: camera.poses.iter().map(|of| of.time_s).collect::<Option<_>>().unwrap_or_default(),
         left_out_frames,
     };
     // The head is written last: without it the folder is no map.
@@ -202,11 +206,13 @@ impl Submap {
     /// # Errors
     /// The folder is no map.
     pub fn cameras(folder: &Path) -> Result<Vec<CameraPose>, FleetError> {
-        let camera = |(frame, rows): (usize, [f64; 12])| {
-            Some(CameraPose { frame, segment: MapSegment::FIRST, t_map_camera: transform(&rows)? })
+        let SubmapHeader { cameras, times_s, .. } = SubmapHeader::read(folder)?;
+        let times_s = times_s.into_iter().map(Some).chain(std::iter::repeat(None));
+        let camera = |((frame, rows), time_s): ((usize, [f64; 12]), Option<f64>)| {
+            let (segment, t_map_camera) = (MapSegment::FIRST, transform(&rows)?);
+            Some(CameraPose { frame, time_s, segment, t_map_camera })
         };
-        let cameras =
-            SubmapHeader::read(folder)?.cameras.into_iter().map(camera).collect::<Option<_>>();
+        let cameras = cameras.into_iter().zip(times_s).map(camera).collect::<Option<_>>();
         cameras.ok_or_else(|| {
             FleetError::content(folder, "is damaged. Remove the folder and make it again")
         })
@@ -258,6 +264,7 @@ mod tests {
             StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
         let pose = CameraPose {
             frame: 7,
+            time_s: Some(1_711_197_319.25),
             segment: MapSegment::FIRST,
             t_map_camera: Transform::from_translation([1.0, 2.0, 3.0]),
         };
@@ -310,6 +317,7 @@ mod tests {
         // The camera climbed before it was lost: no height tells its segments apart.
         let pose = |frame: usize, segment: MapSegment, y: f64| CameraPose {
             frame,
+            time_s: None,
             segment,
             t_map_camera: Transform::from_translation([0.0, y, 0.0]),
         };

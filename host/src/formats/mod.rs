@@ -37,7 +37,7 @@ pub(crate) use bayer::{Sample, demosaiced};
 pub use capacity::{CapacityFile, CapacityTable};
 pub use checksum::checksum_of;
 pub use error::{FormatError, read_bytes_within, read_text, read_text_within};
-pub use gnss::{Fix, LocalPlane, read_gnss};
+pub use gnss::{Fix, Fixes, LocalPlane, TimedFix, read_gnss};
 pub use image::{Image, luma};
 pub use inertial::{
     GRAVITY_M_S2, INERTIAL_FORMATS, InertialFormat, InertialTable, TimedReading, read_inertial,

@@ -11,8 +11,8 @@ use dynvox::formats::calibration::{
     KittiCalibration, StereoCalibration, UnitCalibration, read_rig,
 };
 use dynvox::formats::{
-    read_inertial, read_numbered, read_opencv_depth, read_pfm, read_png_deep, read_png_u16,
-    read_poses, read_stamped_names, read_times,
+    read_gnss, read_inertial, read_numbered, read_opencv_depth, read_pfm, read_png_deep,
+    read_png_u16, read_poses, read_stamped_names, read_times,
 };
 use dynvox::input::masks::{MaskChoice, attach};
 use dynvox::input::stream::netpbm::NetpbmPairs;
@@ -93,7 +93,7 @@ pub fn poses(bytes: &[u8]) -> bool {
 pub fn times(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     let path = folder.file("times.txt", bytes);
-    read_times(&path).is_ok() | read_stamped_names(&path).is_ok()
+    read_times(&path).is_ok() | read_stamped_names(&path).is_ok() | read_gnss(&path).is_ok()
 }
 
 /// Files of an inertial unit, by the first byte.

@@ -81,7 +81,12 @@ pub fn poses() -> Vec<Vec<u8>> {
 pub fn times() -> Vec<Vec<u8>> {
     let dates: &[u8] = b"2011-09-26 14:05:01.123456789\n2011-09-26 14:05:01.223456789\n";
     let table: &[u8] = b"#timestamp [ns],filename\n1403636579763555584,1403636579763555584.png\n";
-    vec![b"0.0\n0.1\n0.2\n".to_vec(), dates.to_vec(), table.to_vec()]
+    let nmea: &[u8] = b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n\
+$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n\
+$GPGST,123519,1.2,2.1,1.4,30.0,0.8,0.6,1.9*44\r\n";
+    let fixes: &[u8] = b"49 8.4 110\n-\n49 8.4 110 0.1 0.2 0.3\n";
+    let plain: &[u8] = b"0.0\n0.1\n0.2\n";
+    [plain, dates, table, nmea, fixes].map(<[u8]>::to_vec).to_vec()
 }
 
 pub fn inertial() -> Vec<Vec<u8>> {

@@ -6,7 +6,9 @@ use crate::cli::{signals, sweep};
 use crate::fleet::{
     self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap,
 };
-use crate::formats::{FRAMES_FILE, TRAJECTORY_FILE, read_poses, rows_of_file};
+use crate::formats::{
+    FRAMES_FILE, TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, read_poses, rows_of_file,
+};
 use crate::observe::tables::read_frame_digests;
 use crate::owned::{self, check_overlap, create_folder};
 use crate::report::text::counted;
@@ -167,11 +169,16 @@ fn keep_map(folder: &Path, job: &Job, plan: &Plan) -> anyhow::Result<()> {
 fn cameras(run_folder: &Path) -> anyhow::Result<Vec<CameraPose>> {
     let poses = read_poses(&run_folder.join(TRAJECTORY_FILE))?.poses;
     let rows = read_frame_digests(rows_of_file(&run_folder.join(FRAMES_FILE))?)?;
+    // Two rows at one time, of a source without clock, are read by no one.
+    let times_s = read_poses(&run_folder.join(TIMED_TRAJECTORY_FILE)).ok();
+    let times_s = times_s.and_then(|timed| timed.times_s).filter(|of| of.len() == poses.len());
     Ok(rows
         .iter()
         .zip(poses)
-        .map(|(row, t_map_camera)| CameraPose {
+        .enumerate()
+        .map(|(at, (row, t_map_camera))| CameraPose {
             frame: row.frame,
+            time_s: times_s.as_ref().and_then(|times_s| times_s.get(at).copied()),
             segment: row.segment,
             t_map_camera,
         })

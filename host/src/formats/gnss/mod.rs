@@ -1,10 +1,13 @@
 //! Where a receiver of satellites was, frame by frame: rows of latitude, longitude, altitude, and
 //! angles where an inertial system gives them.
 //!
-//! Read are a text file with a line a frame, or a folder with a file a frame (`oxts/data` of a
-//! recording of KITTI raw). A row has 3 numbers (degrees, degrees, m above the ellipsoid), 6 (with
-//! roll, pitch, yaw, rad, as KITTI's oxts: yaw 0 is east, counterclockwise) or KITTI's 30: the
-//! first six are read. A line `-` is a frame without a fix.
+//! Read are a text file with a line a frame, a folder with a file a frame (`oxts/data` of a
+//! recording of KITTI raw), or a receiver's own NMEA, which has times ([`nmea`]). A row has 3
+//! numbers (degrees, degrees, m above the ellipsoid), 6 (with roll, pitch, yaw, rad, as KITTI's
+//! oxts: yaw 0 is east, counterclockwise) or KITTI's 30: the first six are read. A line `-` is a
+//! frame without a fix.
+
+mod nmea;
 
 use super::rows::{lines_of, numbers_of};
 use super::{FormatError, read_text};
@@ -28,6 +31,36 @@ pub struct Fix {
     pub geodetic: [f64; 3],
     /// Roll, pitch, yaw of the vehicle (x forward, y left, z up) to east, north, up, rad.
     pub angles_rad: Option<[f64; 3]>,
+    /// Standard deviations to the east, north and up, m, where the receiver tells them.
+    pub sigma_m: Option<[f64; 3]>,
+}
+
+/// Position at a time of the receiver.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedFix {
+    /// Time, s since 1970, UTC.
+    pub time_s: f64,
+    /// The position.
+    pub fix: Fix,
+}
+
+/// Fixes of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fixes {
+    /// One for each frame, by its number from 0; `None` without a fix.
+    ByFrame(Vec<Option<Fix>>),
+    /// At increasing times.
+    ByTime(Vec<TimedFix>),
+}
+
+impl Fixes {
+    /// Returns the first fix.
+    pub fn first(&self) -> Option<Fix> {
+        match self {
+            Self::ByFrame(fixes) => fixes.iter().flatten().next().copied(),
+            Self::ByTime(fixes) => fixes.first().map(|first| first.fix),
+        }
+    }
 }
 
 /// East, north and up at a point: a plane that touches the ellipsoid there, so that nothing is
@@ -73,15 +106,19 @@ fn earth_centred_m([latitude_deg, longitude_deg, altitude_m]: [f64; 3]) -> [f64;
     ]
 }
 
-/// Reads the fixes of a recording, by the number of its frames from 0: a file with a line a frame,
-/// or a folder with a file a frame.
+/// Reads the fixes of a recording: a file with a line a frame, a folder with a file a frame, or
+/// NMEA.
 ///
 /// # Errors
 /// It cannot be read, a row is no fix, or the folder has none.
-pub fn read_gnss(path: &Path) -> Result<Vec<Option<Fix>>, FormatError> {
+pub fn read_gnss(path: &Path) -> Result<Fixes, FormatError> {
     if !path.is_dir() {
         let text = read_text(path)?;
-        return lines_of(&text).map(|(line, row)| row_of(path, line, row)).collect();
+        if nmea::is_nmea(&text) {
+            return nmea::read(path, &text).map(Fixes::ByTime);
+        }
+        let rows = lines_of(&text).map(|(line, row)| row_of(path, line, row));
+        return rows.collect::<Result<_, _>>().map(Fixes::ByFrame);
     }
     let files = FOLDERS
         .iter()
@@ -111,7 +148,7 @@ pub fn read_gnss(path: &Path) -> Result<Vec<Option<Fix>>, FormatError> {
         fixes.resize(*number, None);
         fixes.push(fix);
     }
-    Ok(fixes)
+    Ok(Fixes::ByFrame(fixes))
 }
 
 fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatError> {
@@ -121,8 +158,9 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
     if row.starts_with('$') {
         return Err(FormatError::content(
             path,
-            format!("line {line} is NMEA"),
-            "Write a line for each frame: latitude and longitude in degrees, altitude in m",
+            format!("line {line} is NMEA among other rows"),
+            "Give the receiver's own file with nothing else, or a line for each frame: latitude \
+             and longitude in degrees, altitude in m",
         ));
     }
     let fix = numbers_of(row).and_then(|numbers| {
@@ -136,8 +174,11 @@ fn row_of(path: &Path, line: usize, row: &str) -> Result<Option<Fix>, FormatErro
             _ => return None,
         };
         let is_on_earth = latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 360.0;
-        is_on_earth
-            .then_some(Fix { geodetic: [latitude_deg, longitude_deg, altitude_m], angles_rad })
+        is_on_earth.then_some(Fix {
+            geodetic: [latitude_deg, longitude_deg, altitude_m],
+            angles_rad,
+            sigma_m: None,
+        })
     });
     let action = "A line holds latitude, longitude, altitude (3 numbers), with roll, pitch, yaw \
                   (6), KITTI's 30, or - where there was no fix";
@@ -192,13 +233,23 @@ mod tests {
         assert!((far[2] + 0.0786).abs() < 1e-3, "{far:?}");
     }
 
+    fn by_frame(path: &Path) -> Vec<Option<Fix>> {
+        match read_gnss(path).unwrap() {
+            Fixes::ByFrame(fixes) => fixes,
+            Fixes::ByTime(fixes) => panic!("{fixes:?}"),
+        }
+    }
+
     #[test]
     fn lines_and_the_folders_of_kitti_raw_are_read() {
         let root = tempfile::TempDir::new().unwrap();
         let file = root.path().join("gnss.txt");
         std::fs::write(&file, "# a comment\n49 8.4 110\n-\n49 8.5 110 0.1 0.2 0.3\n").unwrap();
-        let fixes = read_gnss(&file).unwrap();
-        assert_eq!(fixes[0], Some(Fix { geodetic: [49.0, 8.4, 110.0], angles_rad: None }));
+        let fixes = by_frame(&file);
+        assert_eq!(
+            fixes[0],
+            Some(Fix { geodetic: [49.0, 8.4, 110.0], angles_rad: None, sigma_m: None })
+        );
         assert_eq!(
             (fixes[1], fixes[2].unwrap().angles_rad, fixes.len()),
             (None, Some([0.1, 0.2, 0.3]), 3)
@@ -213,10 +264,14 @@ mod tests {
             )
             .unwrap();
         }
-        let fixes = read_gnss(&folder).unwrap();
+        let fixes = by_frame(&folder);
         assert_eq!(
             fixes[1].unwrap(),
-            Fix { geodetic: [49.0, 8.1, 112.0], angles_rad: Some([0.01, 0.02, -1.5]) }
+            Fix {
+                geodetic: [49.0, 8.1, 112.0],
+                angles_rad: Some([0.01, 0.02, -1.5]),
+                sigma_m: None
+            }
         );
         // A gap in the files is a gap in the fixes.
         std::fs::rename(
@@ -224,11 +279,12 @@ mod tests {
             folder.join("oxts/data/0000000003.txt"),
         )
         .unwrap();
-        let gap = read_gnss(&folder).unwrap();
+        let gap = by_frame(&folder);
         assert!(gap.len() == 4 && gap[1].is_none() && gap[3] == fixes[1]);
         for (row, expected) in [
             ("49 8.4 110 0 0 90.2", "may be in degrees"),
-            ("$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47", "is NMEA"),
+            ("$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47", "without a date"),
+            ("49 8.4 110\n$GPGGA,123519,4807.038,N*47", "line 2 is NMEA among other rows"),
         ] {
             std::fs::write(&file, row).unwrap();
             let refused = read_gnss(&file).unwrap_err().to_string();
