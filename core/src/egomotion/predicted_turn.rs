@@ -8,7 +8,8 @@ pub(crate) const AGREE_SIGMAS: f64 = 5.0;
 /// Rotation of the camera over a time, with its variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Turned {
-    /// Axes now to those before; no translation.
+    /// Axes now to those before. Its translation is the way of the camera as forces tell it, 0
+    /// where they tell none.
     pub t_before_now: Transform,
     /// Variance about one axis, rad2.
     pub variance: f64,
@@ -40,10 +41,15 @@ pub(crate) struct PredictedTurn {
 }
 
 impl PredictedTurn {
-    /// The motion `t_current_previous` with its way as it is and the turn as predicted.
+    /// The motion as predicted, with the way of the last one, `t_current_previous`, where none is.
     pub fn turn(&self, t_current_previous: &Transform) -> Transform {
-        let way = t_current_previous.inverse();
-        Transform { rotation: self.last.t_before_now.rotation, ..way }.inverse().normalized()
+        let predicted = self.last.t_before_now;
+        let way = if predicted.translation_m == [0.0; 3] {
+            t_current_previous.inverse()
+        } else {
+            predicted
+        };
+        Transform { rotation: predicted.rotation, ..way }.inverse().normalized()
     }
 
     /// Returns true if a motion since the reference turns otherwise than predicted, by more than

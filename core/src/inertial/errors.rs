@@ -5,7 +5,10 @@
 //! one by `b * span + d * (rate at the end - rate at the start)`: a camera that does not change its
 //! turn says nothing of the clock, one that stands says all of the bias.
 
-use super::{InertialUnit, integral::Integral};
+use super::{
+    InertialUnit,
+    integral::{BRIDGED_MAX_S, Integral},
+};
 use crate::state::Visitor;
 use nalgebra::Vector3;
 
@@ -17,6 +20,10 @@ pub(super) const OFFSET_MAX_S: f64 = 0.1;
 const BIAS_MAX: f64 = 0.5;
 /// Change of the offset, s per square root of a second: quartz clocks drift by some 10 ppm.
 const OFFSET_WALK: f64 = 1e-4;
+/// Error of an offset as a share of the time between samples, one sigma.
+const INTERVAL_SHARE: f64 = 0.3;
+/// Share of the last interval in their mean square.
+const INTERVAL_MEMORY: f64 = 1.0 / 32.0;
 /// Errors beyond so many sigmas are of something else.
 const GATE_SIGMAS: f64 = 5.0;
 
@@ -37,11 +44,13 @@ pub(super) struct UnitErrors {
     /// Three biases, rad/s; the offset to add to samples' times, s.
     state: [f64; 4],
     covariance: [[f64; 4]; 4],
+    /// Mean square of the time between samples, s2.
+    interval2: f64,
 }
 
 impl UnitErrors {
     pub fn new(unit: &InertialUnit) -> Self {
-        let mut this = Self { state: [0.0; 4], covariance: [[0.0; 4]; 4] };
+        let mut this = Self { state: [0.0; 4], covariance: [[0.0; 4]; 4], interval2: 0.0 };
         this.widen(unit);
         this
     }
@@ -68,10 +77,18 @@ impl UnitErrors {
         offset_s
     }
 
-    /// Standard deviation of the offset, s.
+    /// Standard deviation of the offset, s. Between two samples rates are only interpolated, and
+    /// what they miss repeats from turn to turn: many turns do not make up for it.
     pub fn offset_sigma_s(&self) -> f64 {
         let [.., [.., variance]] = self.covariance;
-        root(variance)
+        root(variance + INTERVAL_SHARE * INTERVAL_SHARE * self.interval2)
+    }
+
+    /// Takes note of the time between two samples.
+    pub fn note_interval(&mut self, interval_s: f64) {
+        let interval_s = bounded(interval_s, BRIDGED_MAX_S);
+        let share = if self.interval2 > 0.0 { INTERVAL_MEMORY } else { 1.0 };
+        self.interval2 += (interval_s * interval_s - self.interval2) * share;
     }
 
     /// Standard deviation of the least known bias, rad/s.
@@ -161,8 +178,9 @@ impl UnitErrors {
 
     /// Visits every field.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { state, covariance } = self;
+        let Self { state, covariance, interval2 } = self;
         visitor.f64s(state);
+        visitor.f64s([interval2]);
         visitor.f64s(covariance.as_flattened_mut());
     }
 }

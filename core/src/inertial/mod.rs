@@ -5,7 +5,8 @@
 //! differ by tells the bias of the rates and the offset of the clocks. A unit whose turns agree is
 //! trusted: poses that images cannot give turn by it, its turn is the first hypothesis of the next
 //! motion, and a motion of the images that contradicts it is refused. A unit that contradicts the
-//! images is doubted, by name, and not used until it agrees again. Forces give the vertical.
+//! images is doubted, by name, and not used until it agrees again. Forces give the vertical, and
+//! once it is known the way of a camera in the dark.
 //!
 //! Without a unit, or without samples or times, nothing changes, to the bit.
 //!
@@ -23,6 +24,7 @@ mod sample;
 mod tests;
 mod turn;
 mod unit;
+mod velocity;
 mod vertical;
 
 pub use agreement::InertialDoubt;

@@ -1,5 +1,7 @@
 //! The unit from frame to frame: predicted turns, and what measured ones say of it.
 
+mod forces;
+
 use super::{
     INERTIAL_SAMPLES_PER_FRAME, InertialDoubt, InertialReport, InertialSample, InertialUnit,
     agreement::{Agreement, TurnPair},
@@ -7,7 +9,8 @@ use super::{
     integral::{Integral, Reading, integrate, rotation_vector},
     recent::{RecentSamples, seconds_after},
     turn::{MeasuredMotion, PendingTurn},
-    vertical::{UnitMotion, VerticalFilter},
+    velocity::Velocity,
+    vertical::VerticalFilter,
 };
 use crate::{
     egomotion::{PredictedTurn, Turned},
@@ -15,7 +18,6 @@ use crate::{
     memory::{Carver, region_bytes},
     state::{Hasher, Visitor},
 };
-use nalgebra::Point3;
 
 /// Time between a frame and the nearest sample from which on they are on two clocks, s.
 const APART_S: f64 = 1.0;
@@ -33,6 +35,7 @@ pub(crate) struct InertialPrior {
     errors: UnitErrors,
     agreement: Agreement,
     vertical: VerticalFilter,
+    velocity: Velocity,
     segment: MapSegment,
     /// Times of the last frame and of the last sample, ns.
     frame_ns: Option<u64>,
@@ -87,6 +90,7 @@ impl InertialPrior {
             errors: UnitErrors::new(unit),
             agreement: Agreement::default(),
             vertical: VerticalFilter::default(),
+            velocity: Velocity::default(),
             segment: MapSegment::FIRST,
             frame_ns: None,
             sample_ns: None,
@@ -100,13 +104,15 @@ impl InertialPrior {
 
     /// Takes the samples of a frame. Returns the turn of the camera since the frame before, and
     /// since the one that matches are sought with, if the unit is trusted and covers them.
-    /// `since_reference` is the number of frames between these two.
+    /// `since_reference` is the number of frames between these two, `t_world_camera` the camera
+    /// before.
     #[inline(never)]
     pub fn predict(
         &mut self,
         time_ns: Option<u64>,
         samples: &[InertialSample],
         since_reference: u32,
+        t_world_camera: &Transform,
     ) -> Option<PredictedTurn> {
         self.report = InertialReport { samples: samples.len() as u32, ..Default::default() };
         let (read, beyond) =
@@ -124,7 +130,10 @@ impl InertialPrior {
         }
         // Kept after the integration, which would read them twice.
         self.push(read);
-        self.predicted_turn(since_reference)
+        let mut predicted = self.predicted_turn(since_reference)?;
+        // A guess goes on by forces where they tell its way.
+        predicted.last.t_before_now.translation_m = self.way_m(t_world_camera).unwrap_or_default();
+        Some(predicted)
     }
 
     /// Readings of an interval from the recent samples and those of the frame.
@@ -188,7 +197,9 @@ impl InertialPrior {
                 self.report.ignored = self.report.ignored.saturating_add(1);
                 continue;
             }
-            self.sample_ns = Some(sample.time_ns);
+            if let Some(last_ns) = self.sample_ns.replace(sample.time_ns) {
+                self.errors.note_interval(seconds_after(last_ns, sample.time_ns));
+            }
             self.agreement.note_sample(&self.unit, sample);
             self.recent.push(sample);
         }
@@ -272,25 +283,6 @@ impl InertialPrior {
         }
     }
 
-    fn observe_force(&mut self, measured: &MeasuredMotion) {
-        if self.segment != measured.segment {
-            (self.segment, self.vertical) = (measured.segment, VerticalFilter::default());
-        }
-        // A guess at either end says nothing of the acceleration.
-        let Some((before, integral)) = measured.t_world_before.as_ref().zip(self.integral) else {
-            self.vertical.interrupt();
-            return;
-        };
-        let unit_at = |camera: &Transform| *camera * self.unit.t_camera_unit;
-        let (from, to) = (unit_at(before), unit_at(&measured.t_world_camera));
-        self.vertical.add(&UnitMotion {
-            force_world: from.rotate(integral.mean_force),
-            from: Point3::from(from.translation_m),
-            to: Point3::from(to.translation_m),
-            span_s: self.span_s,
-        });
-    }
-
     /// Report of the frame.
     pub fn report(&self) -> InertialReport {
         let bias: [f64; 3] = self.errors.bias().into();
@@ -318,6 +310,7 @@ impl InertialPrior {
             errors,
             agreement,
             vertical,
+            velocity,
             segment,
             frame_ns,
             sample_ns,
@@ -334,6 +327,7 @@ impl InertialPrior {
         errors.visit(visitor);
         agreement.visit(visitor);
         vertical.visit(visitor);
+        velocity.visit(visitor);
         let mut number = u32::from(segment.get());
         visitor.u32(&mut number);
         *segment = MapSegment::new(number as u16);

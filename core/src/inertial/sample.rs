@@ -17,6 +17,8 @@ pub const INERTIAL_SAMPLES_PER_FRAME: usize = 1024;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+// Callers in C have an array of the same layout, which is read where it lies.
+#[repr(C)]
 pub struct InertialSample {
     /// Time, ns, on the clock of the frames' times.
     pub time_ns: u64,

@@ -107,13 +107,14 @@ impl Sim {
         let samples = self.samples();
         let t = self.frame as f64 * FRAME_S;
         let time_ns = ((10.0 + t) * 1e9).round() as u64;
-        let predicted = self.prior.predict(Some(time_ns), &samples, 0);
+        let predicted = self.prior.predict(Some(time_ns), &samples, 0, &pose(t - FRAME_S));
         let off = [self.noise(), self.noise(), self.noise()].map(|noise| 0.0005 * noise);
         let before = pose(t - FRAME_S);
         let motion = before.inverse() * pose(t) * Transform::new(off, [0.0; 3]);
         self.prior.observe(&MeasuredMotion {
             t_reference_now: (self.frame > 0).then_some(motion),
             sigma_rad: 0.0005,
+            way_sigma_m: 0.005,
             strong: true,
             over_several: false,
             turned: false,
@@ -154,6 +155,44 @@ fn a_bias_of_a_tenth_is_found() {
     for (found, bias) in report.turn_bias.iter().zip(bias) {
         let off = (f64::from(*found) - bias).abs();
         assert!(off < 0.003 && off < 4.0 * f64::from(report.turn_bias_sigma), "{report:?}");
+    }
+}
+
+#[test]
+fn a_camera_in_the_dark_goes_on_by_forces_once_up_is_known() {
+    let mut sim = Sim::new(Flaws { bias: [0.01, -0.02, 0.01], ..SOUND });
+    sim.run(60);
+    // Five dark frames at ten places of the way.
+    for _ in 0..10 {
+        sim.run(7);
+        let begin = sim.frame as f64 * FRAME_S - FRAME_S;
+        let (mut guess, mut way_on) = (pose(begin), pose(begin));
+        let last = pose(begin - FRAME_S).inverse() * pose(begin);
+        for _ in 0..5 {
+            let samples = sim.samples();
+            let t = sim.frame as f64 * FRAME_S;
+            let time_ns = ((10.0 + t) * 1e9).round() as u64;
+            let predicted = sim.prior.predict(Some(time_ns), &samples, 0, &guess);
+            guess = guess * predicted.expect("it is trusted").last.t_before_now;
+            way_on = way_on * last;
+            sim.prior.observe(&MeasuredMotion {
+                t_reference_now: None,
+                sigma_rad: 0.0,
+                way_sigma_m: 0.0,
+                strong: false,
+                over_several: false,
+                turned: true,
+                refused: false,
+                t_world_before: None,
+                t_world_camera: guess,
+                segment: MapSegment::FIRST,
+            });
+            sim.frame += 1;
+        }
+        let truth = pose(begin + 5.0 * FRAME_S);
+        let off = (guess.inverse() * truth).distance_m();
+        let off_on = (way_on.inverse() * truth).distance_m();
+        assert!(off < 0.03 && off < 0.3 * off_on, "{off} m, as before {off_on}");
     }
 }
 
@@ -209,7 +248,8 @@ fn clocks_of_another_day_are_named() {
     let mut sim = Sim::new(SOUND);
     let samples = sim.samples();
     for frame in 0..5u64 {
-        sim.prior.predict(Some(900_000_000_000 + frame * 100_000_000), &samples, 0);
+        let time_ns = Some(900_000_000_000 + frame * 100_000_000);
+        sim.prior.predict(time_ns, &samples, 0, &Transform::IDENTITY);
     }
     assert_eq!(sim.prior.report().doubt, Some(InertialDoubt::ClocksApart));
 }
@@ -236,7 +276,8 @@ fn a_turn_over_several_frames_adds_up_and_ends_where_samples_are_missing() {
     for since in 0..4u32 {
         let samples = sim.samples();
         let time_ns = ((10.0 + sim.frame as f64 * FRAME_S) * 1e9).round() as u64;
-        whole = sim.prior.predict(Some(time_ns), &samples, since).unwrap().whole;
+        let before = pose(sim.frame as f64 * FRAME_S - FRAME_S);
+        whole = sim.prior.predict(Some(time_ns), &samples, since, &before).unwrap().whole;
         sim.frame += 1;
     }
     let exact = pose(2.9).inverse() * pose(3.3);
@@ -245,8 +286,8 @@ fn a_turn_over_several_frames_adds_up_and_ends_where_samples_are_missing() {
     // A second without samples: no turn, nor one since the reference after it.
     let at = |frame: usize| Some(((10.0 + frame as f64 * FRAME_S) * 1e9).round() as u64);
     sim.frame += 10;
-    assert!(sim.prior.predict(at(sim.frame - 1), &[], 4).is_none());
+    assert!(sim.prior.predict(at(sim.frame - 1), &[], 4, &Transform::IDENTITY).is_none());
     let samples = sim.samples();
-    let after = sim.prior.predict(at(sim.frame), &samples, 5);
+    let after = sim.prior.predict(at(sim.frame), &samples, 5, &Transform::IDENTITY);
     assert!(after.is_none_or(|turn| turn.whole.is_none()));
 }

@@ -13,6 +13,8 @@ pub(crate) struct MeasuredMotion {
     pub t_reference_now: Option<Transform>,
     /// Standard deviation of its turn about one axis, rad.
     pub sigma_rad: f64,
+    /// Standard deviation of its way, m.
+    pub way_sigma_m: f64,
     /// Half of the matches and more agree with it.
     pub strong: bool,
     /// True if that frame is not the one before.

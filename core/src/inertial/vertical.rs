@@ -93,21 +93,28 @@ impl VerticalFilter {
 
     /// The vertical, once there is one.
     pub fn vertical(&self, unit: &InertialUnit) -> Option<Vertical> {
+        let (held, sigma) = self.held(unit)?;
+        let size = held.norm();
+        let up: [f64; 3] = (held / size).into();
+        Some(Vertical {
+            up_world: up.map(|part| part as f32),
+            // Two of three axes tilt the vertical.
+            sigma_rad: (libm::sqrt(2.0) * sigma / size) as f32,
+        })
+    }
+
+    /// Force that holds the unit against gravity in the map's axes, m/s2, and the standard
+    /// deviation of an axis, once they are known.
+    pub fn held(&self, unit: &InertialUnit) -> Option<(Vector3<f64>, f64)> {
         let mean = Vector3::from(self.mean);
-        let size = mean.norm();
-        if self.time_s < FIRST_S || !GRAVITY.contains(&size) {
+        if self.time_s < FIRST_S || !GRAVITY.contains(&mean.norm()) {
             return None;
         }
         let independent = self.frames / CORRELATED_FRAMES;
         let independent = if independent > 1.0 { independent } else { 1.0 };
-        // Two of three axes tilt the vertical.
-        let tilt2 = (self.spread2 / independent) * (2.0 / 3.0)
-            + 2.0 * unit.force_bias_sigma * unit.force_bias_sigma;
-        let up: [f64; 3] = (mean / size).into();
-        Some(Vertical {
-            up_world: up.map(|part| part as f32),
-            sigma_rad: (libm::sqrt(tilt2) / size) as f32,
-        })
+        let variance = self.spread2 / independent / 3.0;
+        let bias = unit.force_bias_sigma;
+        Some((mean, libm::sqrt(variance + bias * bias)))
     }
 
     /// Visits every field.

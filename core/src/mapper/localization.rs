@@ -1,6 +1,8 @@
 //! The camera's pose in a frame: given, or estimated from matches or from depth.
 
-use super::{Config, MotionSource, PoseOrigin, matched::MatchedFrame, static_map::StaticMap};
+use super::{
+    Config, MotionSource, PoseOrigin, StereoFrame, matched::MatchedFrame, static_map::StaticMap,
+};
 use crate::{
     Capacity,
     egomotion::{
@@ -13,7 +15,7 @@ use crate::{
     parallel::Executor,
     places::{FramePoints, PlaceCamera, PlaceView, Places, SegmentPose},
     rectify::self_calibration::SelfCalibration,
-    scene_flow::{FlowStatus, Match},
+    scene_flow::{FlowMatcher, FlowStatus, Match},
     state::Visitor,
     tracking::{CameraMotion, EgomotionMask},
 };
@@ -152,7 +154,6 @@ impl<'s> Localization<'s> {
         let (before, over_several) =
             (*self.camera.t_world_camera(), self.camera.since_reference() > 0);
         let (segment, was_lost) = (self.camera.segment(), self.camera.is_lost());
-        self.expect_turn(seen);
         let mut found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
             // There is no motion to the first pose.
@@ -212,13 +213,22 @@ impl<'s> Localization<'s> {
         Located { camera, found, enters_segment }
     }
 
-    /// Hands the frame's samples to the inertial unit, and its turn to the camera.
-    fn expect_turn(&mut self, seen: &MatchedFrame<'_, '_>) {
+    /// Hands the frame's samples to the inertial unit, and its turn to the camera and to the search
+    /// for matches.
+    #[inline(never)]
+    pub fn expect_turn(
+        &mut self,
+        frame: &StereoFrame<'_>,
+        rig: &StereoRig,
+        scene_flow: &mut FlowMatcher<'_>,
+    ) {
         let since_reference = self.camera.since_reference();
+        let t_world_camera = self.camera.t_world_camera();
         let predicted = self.inertial.as_mut().and_then(|inertial| {
-            inertial.predict(seen.frame.time_ns, seen.frame.inertial, since_reference)
+            inertial.predict(frame.time_ns, frame.inertial, since_reference, t_world_camera)
         });
         self.camera.expect_turn(predicted);
+        scene_flow.expect_turn(rig, self.camera.expected_turn());
     }
 
     /// Tells the inertial unit how the camera moved, as far as images or the caller know.
@@ -228,20 +238,27 @@ impl<'s> Localization<'s> {
         let (refused, estimate) = (self.camera.contradicting(), found.egomotion.as_ref());
         let estimated = estimate.and_then(|estimate| estimate.t_current_previous);
         let motion = refused.map(|refused| refused.t_current_reference).or(estimated);
+        let motion = motion.map(|motion| motion.inverse());
         let sigma_rad = match (refused, estimate) {
             (Some(refused), _) => refused.sigma_rad,
             (None, Some(estimate)) => estimate.turn_sigma_rad(),
             (None, None) => 0.0,
         };
+        let covariance = estimate.and_then(|estimate| estimate.covariance.as_ref());
+        let way_sigma_m = covariance.map_or(0.0, |covariance| covariance.distance_sigma_m());
         let is_known = |origin| {
             matches!(origin, PoseOrigin::Estimated | PoseOrigin::Given | PoseOrigin::First)
         };
         let follows =
             is_known(found.origin) && !from.over_several && from.segment == self.camera.segment();
+        // Given poses tell the turn as well.
+        let is_given = follows && found.origin == PoseOrigin::Given;
+        let given = is_given.then(|| from.t_world_camera.inverse() * *self.camera.t_world_camera());
         inertial.observe(&MeasuredMotion {
-            t_reference_now: motion.map(|motion| motion.inverse()),
+            t_reference_now: motion.or(given),
             sigma_rad,
-            strong: estimate.is_some_and(|estimate| 2 * estimate.inliers >= estimate.matches),
+            way_sigma_m,
+            strong: estimate.is_none_or(|estimate| 2 * estimate.inliers >= estimate.matches),
             over_several: from.over_several,
             turned: found.origin == PoseOrigin::Extrapolated && self.camera.is_turned(),
             refused: refused.is_some(),

@@ -147,6 +147,7 @@ impl Mapper<'_> {
         store: &mut S,
         sink: &mut O,
     ) -> Report {
+        self.localization.expect_turn(frame, &self.config.rig, &mut self.scene_flow);
         // (A) Depth from the pair, and (C.1) sparse scene flow over this pair and the last.
         let (stereo, scene_flow) = self.match_images(frame, executor);
         let seen = MatchedFrame {

@@ -38,6 +38,21 @@ impl Reach {
             to_previous_left: [-far, far, -far, far],
         }
     }
+
+    /// Moves the sides between the two frames by a flow, px.
+    pub(super) fn moved_by(self, [du, dv]: [f32; 2]) -> Self {
+        // The casts saturate; a flow fits by far.
+        let (du, dv) = (du as i16, dv as i16);
+        let moved = |[left, right, up, down]: [i16; 4], du: i16, dv: i16| {
+            let add = i16::saturating_add;
+            [add(left, du), add(right, du), add(up, dv), add(down, dv)]
+        };
+        Self {
+            to_current_right: moved(self.to_current_right, du, dv),
+            to_previous_left: moved(self.to_previous_left, -du, -dv),
+            ..self
+        }
+    }
 }
 
 /// The four images' features.

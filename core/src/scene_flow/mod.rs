@@ -49,6 +49,7 @@ mod report;
 mod strongest;
 mod support;
 mod suppression;
+mod turned;
 
 pub use camera::FeatureCount;
 pub(crate) use config::MAX_FEATURES;

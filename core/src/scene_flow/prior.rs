@@ -6,9 +6,11 @@
 //! configured radius. A bin without any takes those of the nearest bins that have some to its left,
 //! right, top and bottom; where no bin has any, the whole radius is searched.
 //!
-//! Memory: 64 bytes per bin.
+//! The radius lies around the flow of the turn that an inertial unit predicts, if there is one.
+//!
+//! Memory: 64 bytes per bin, and 64 bytes.
 
-use super::{SceneFlowConfig, circle::Reach, matches::Match};
+use super::{SceneFlowConfig, circle::Reach, matches::Match, turned::TurnFlow};
 use crate::{
     memory::{Capacity, Carver, region_bytes},
     slices::clipped_mut,
@@ -40,11 +42,13 @@ pub(super) struct Prior<'s> {
     reach: &'s mut [Reach],
     columns: usize,
     rows: usize,
+    /// One item: the flow that is expected of the frame.
+    turn: &'s mut [TurnFlow],
 }
 
 impl<'s> Prior<'s> {
     pub(super) const fn bytes(capacity: &Capacity) -> usize {
-        2 * region_bytes::<Reach>(bins(capacity))
+        2 * region_bytes::<Reach>(bins(capacity)) + region_bytes::<TurnFlow>(1)
     }
 
     pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
@@ -53,7 +57,23 @@ impl<'s> Prior<'s> {
             reach: carver.alloc("scene_flow.reach", bins(capacity)),
             columns: 0,
             rows: 0,
+            turn: carver.alloc("scene_flow.turn", 1),
         }
+    }
+
+    /// Sets the flow that is expected of the next frame.
+    pub(super) fn expect(&mut self, turn: &TurnFlow) {
+        self.turn.fill(*turn);
+    }
+
+    /// Returns the flow that is expected of the frame.
+    pub(super) fn turn(&self) -> TurnFlow {
+        self.turn.first().copied().unwrap_or_default()
+    }
+
+    /// Returns the widest reach of the search for partners of a previous-left feature.
+    pub(super) fn widest(config: &SceneFlowConfig, turn: &TurnFlow, at: [f32; 2]) -> Reach {
+        Reach::widest(config).moved_by(turn.at(at))
     }
 
     /// Returns the reach of the search for partners of a previous-left feature at (u, v).
@@ -93,10 +113,12 @@ impl<'s> Prior<'s> {
             }
         }
         // Each bin's reach is widened, and never beyond what the configuration allows.
-        let widest = Reach::widest(config);
+        let turn = self.turn();
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let near = self.near(column, row);
+                let middle = [column, row].map(|bin| (bin * BIN_PX + BIN_PX / 2) as f32);
+                let widest = Self::widest(config, &turn, middle);
                 if let Some(reach) = self.reach.get_mut(row * self.columns + column) {
                     *reach = Reach {
                         to_previous_right: widened(

@@ -5,14 +5,15 @@
 //! around it, which grows ring by ring until it holds [`NEIGHBOURS`] or reaches [`RINGS`]; a match
 //! is kept when at least `support_min` of them, and at least half of them, agree in disparity and
 //! flow. No mesh, bounded work, and where matches stand dense more neighbours than a triangulation
-//! has.
+//! has. Flow that a predicted turn explains is left out: in a wide image it differs by more between
+//! neighbours than they may.
 
 use crate::slices::clipped;
 
 use super::{
-    SceneFlowConfig,
     cells::{Cells, Shape},
     matches::Match,
+    turned::TurnFlow,
 };
 
 /// Neighbours after which the square stops growing.
@@ -34,11 +35,20 @@ pub(super) struct SortedMotions<'a, 's> {
     pub motion: &'a mut [Motion],
 }
 
+/// Condition that a match must meet.
+#[derive(Clone, Copy)]
+pub(super) struct SupportRule<'a> {
+    /// Fewest neighbours that must agree; 0 takes every match.
+    pub support_min: u8,
+    /// Flow that is expected of all matches.
+    pub turn: &'a TurnFlow,
+}
+
 /// Writes 1 to `supported` for each supported match, else 0.
 pub(super) fn support(
     matches: &[Match],
     shape: Shape,
-    config: &SceneFlowConfig,
+    rule: &SupportRule<'_>,
     SortedMotions { cells, motion }: SortedMotions<'_, '_>,
     supported: &mut [u8],
 ) {
@@ -47,11 +57,11 @@ pub(super) fn support(
     for (motion, m) in
         motion.iter_mut().zip(order.iter().filter_map(|&index| matches.get(index as usize)))
     {
-        let [du, dv] = m.flow_px();
-        *motion = [m.previous_disparity_px(), du, dv, 0.0];
+        let ([du, dv], [turn_u, turn_v]) = (m.flow_px(), rule.turn.at(m.previous_left));
+        *motion = [m.previous_disparity_px(), du - turn_u, dv - turn_v, 0.0];
     }
     let motion = clipped(motion, ..matches.len());
-    let neighbours = Neighbours { shape, config, start, motion };
+    let neighbours = Neighbours { shape, rule, start, motion };
     for (&index, own) in order.iter().zip(motion) {
         if let (Some(m), Some(supported)) =
             (matches.get(index as usize), supported.get_mut(index as usize))
@@ -64,7 +74,7 @@ pub(super) fn support(
 /// Motions of all matches, cell by cell.
 struct Neighbours<'a> {
     shape: Shape,
-    config: &'a SceneFlowConfig,
+    rule: &'a SupportRule<'a>,
     /// First motion of each cell, and the end of the last.
     start: &'a [u32],
     motion: &'a [Motion],
@@ -73,8 +83,8 @@ struct Neighbours<'a> {
 impl Neighbours<'_> {
     /// Tells that enough matches around a cell move like one in it.
     fn support(&self, own: Motion, [column, row]: [usize; 2]) -> bool {
-        let &Self { shape, config, start, motion } = self;
-        let needed = usize::from(config.support_min);
+        let &Self { shape, rule, start, motion } = self;
+        let needed = usize::from(rule.support_min);
         if needed == 0 {
             return true;
         }

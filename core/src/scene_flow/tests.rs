@@ -1,5 +1,6 @@
 mod exposure;
 mod matching;
+mod turning;
 
 use super::{
     FlowMatcher, FlowStatus, Match, SceneFlowConfig,
@@ -9,9 +10,10 @@ use super::{
     features::{Features, Window, table},
     prior::Prior,
     refine::{Images, Pixels, SMALL_STEP_PX, Template, middle, refine},
-    support::{SortedMotions, support},
+    support::{SortedMotions, SupportRule, support},
     suppression::{CLASSES, Candidate},
     test_scene::{HEIGHT, RIG, WIDTH, see},
+    turned::TurnFlow,
 };
 use crate::{
     geometry::Transform,

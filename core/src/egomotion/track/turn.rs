@@ -18,6 +18,11 @@ impl Egomotion {
         (self.predicted, self.contradicting) = (predicted, None);
     }
 
+    /// The predicted turn since the frame that matches are sought with.
+    pub(crate) fn expected_turn(&self) -> Option<&Transform> {
+        self.predicted.as_ref()?.whole.as_ref().map(|turned| &turned.t_before_now)
+    }
+
     /// Tells that a guess of this frame turns as predicted.
     pub(crate) fn is_turned(&self) -> bool {
         self.predicted.is_some()

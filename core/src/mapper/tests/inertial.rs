@@ -4,6 +4,7 @@ use super::*;
 use crate::{
     PoseOrigin,
     inertial::{InertialReport, InertialSample, InertialUnit},
+    scene_flow::SceneFlowConfig,
 };
 
 /// Frames that are black.
@@ -14,8 +15,13 @@ const FRAME_NS: u64 = 100_000_000;
 const SAMPLES: usize = 10;
 
 fn pose(at: usize) -> Transform {
+    swaying(at, 1.0)
+}
+
+/// Pose of a camera that sways so many times as much.
+fn swaying(at: usize, scale: f64) -> Transform {
     let t = at as f64 * 0.1;
-    let yaw = 0.25 * libm::sin(1.6 * t);
+    let yaw = 0.25 * scale * libm::sin(1.6 * t);
     Transform::new(Vector3::new(0.0, yaw, 0.0), Vector3::new(0.0, 0.0, 0.5 * t))
 }
 
@@ -53,10 +59,19 @@ fn run(config: &Config, scale: f64, mut each: impl FnMut(usize, &Report, &mut Ma
 fn step(mapper: &mut Mapper<'_>, at: usize, scale: f64) -> Report {
     let is_black = BLACK.contains(&at);
     let pair = if is_black { [(); 2].map(|()| vec![0; WIDTH * HEIGHT]) } else { see(&pose(at)) };
-    let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
     let samples = if scale == 0.0 { Vec::new() } else { samples(at, scale) };
+    step_with(mapper, at, &pair, &samples)
+}
+
+fn step_with(
+    mapper: &mut Mapper<'_>,
+    at: usize,
+    pair: &[Vec<u8>; 2],
+    samples: &[InertialSample],
+) -> Report {
+    let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
     let frame = StereoFrame {
-        inertial: &samples,
+        inertial: samples,
         time_ns: Some((10 + at as u64) * FRAME_NS),
         ..StereoFrame::pair(left, right)
     };
@@ -87,6 +102,35 @@ fn black_frames_turn_by_the_unit_and_not_on_as_before() {
     }
     let (off, origin, _) = with[FRAMES - 1];
     assert!(origin == PoseOrigin::Estimated && off < 0.005, "{origin:?} {off}");
+}
+
+#[test]
+fn a_turn_beyond_the_search_is_followed_with_the_unit_and_lost_without() {
+    // The camera sways by 0.9 rad/s, 21 px a frame, and matches are sought within 16.
+    const SCALE: f64 = 2.2;
+    let radius = |config: Config| {
+        let scene_flow = SceneFlowConfig { search_radius_px: 16, ..config.scene_flow };
+        Config { scene_flow, ..config }
+    };
+    let lost = |config: &Config| {
+        let mut slab = vec![0u8; CAPACITY.bytes() + SLAB_ALIGN];
+        let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+        let mut mapper = Mapper::new(&CAPACITY, config, &mut slab[start..]).unwrap();
+        let mut lost = 0;
+        let mut errors = Vec::new();
+        // The unit earns its trust while the turn is slow, between frames 5 and 15.
+        for at in 5..FRAMES {
+            let report = step_with(&mut mapper, at, &see(&swaying(at, SCALE)), &samples(at, SCALE));
+            lost += u32::from(at > 16 && report.pose == PoseOrigin::Extrapolated);
+            errors.push((report.t_world_camera, swaying(at, SCALE)));
+        }
+        let [from, to] = [errors[10], errors[FRAMES - 6]];
+        let off = (from.0.inverse() * to.0).inverse() * (from.1.inverse() * to.1);
+        (lost, off.angle_rad())
+    };
+    let (without, with) = (lost(&radius(Walk::config())), lost(&radius(with_unit())));
+    assert!(without.0 >= 4 && with.0 == 0, "{without:?} {with:?}");
+    assert!(with.1 < 0.02, "{without:?} {with:?}");
 }
 
 #[test]

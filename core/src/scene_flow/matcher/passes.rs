@@ -2,14 +2,17 @@
 
 use super::{FlowMatcher, images};
 use crate::{
+    geometry::{StereoRig, Transform},
     parallel::{Bands, Executor, each, zip3},
     scene_flow::{
         SceneFlowConfig,
         cells::{CELL_MIN_PX, Shape},
-        circle::{Corners, Reach},
+        circle::Corners,
+        prior::Prior,
         refine::RefineSupported,
         report::PassCount,
-        support::{SortedMotions, support},
+        support::{SortedMotions, SupportRule, support},
+        turned::TurnFlow,
     },
     slices::clipped,
 };
@@ -18,6 +21,14 @@ use crate::{
 const SPARSE_CELL_PX: usize = 24;
 
 impl FlowMatcher<'_> {
+    /// Centres the search of the next frame on the flow of a turn, from the axes of the frame that
+    /// it is matched with to those now; on no flow without one.
+    #[inline(never)]
+    pub(crate) fn expect_turn(&mut self, rig: &StereoRig, t_before_now: Option<&Transform>) {
+        let flow = t_before_now.map(|turn| TurnFlow::new(rig, turn)).unwrap_or_default();
+        self.prior.expect(&flow);
+    }
+
     /// Matches the sparse features and learns from the supported ones where to look.
     pub(super) fn sparse_pass<E: Executor>(
         &mut self,
@@ -34,16 +45,18 @@ impl FlowMatcher<'_> {
             current_right: &right.sparse,
             current_left: &left.sparse,
         };
-        // Nothing is known of the motion yet: search everywhere.
-        let widest = Reach::widest(config);
-        corners.trace(|_| widest, self.traced, executor);
+        // Nothing is known of the motion yet but a turn: search everywhere around it.
+        let turn = self.prior.turn();
+        let widest = |at: [u16; 2]| Prior::widest(config, &turn, at.map(f32::from));
+        corners.trace(widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
         let matches = clipped(self.sparse, ..self.sparse_len);
         // A match that moves like no neighbour is an outlier.
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
-        support(matches, shape, config, memory, self.supported);
+        let rule = SupportRule { support_min: config.support_min, turn: &turn };
+        support(matches, shape, &rule, memory, self.supported);
         let supported = matches
             .iter()
             .zip(&*self.supported)
@@ -75,16 +88,18 @@ impl FlowMatcher<'_> {
             current_left: &left.dense,
         };
         // A bin that learned nothing is searched everywhere.
-        let widest = Reach::widest(config);
-        let prior = &self.prior;
-        corners.trace(|at| prior.reach(at).unwrap_or(widest), self.traced, executor);
+        let (prior, turn) = (&self.prior, self.prior.turn());
+        let widest = |at: [u16; 2]| Prior::widest(config, &turn, at.map(f32::from));
+        let reach = |at: [u16; 2]| prior.reach(at).unwrap_or_else(|| widest(at));
+        corners.trace(reach, self.traced, executor);
         // More circles than the buffer holds are dropped and counted.
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
         let matches = clipped(self.refined, ..stored);
         let shape = Shape::new(width, height, CELL_MIN_PX);
         let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
-        support(matches, shape, config, memory, self.supported);
+        let rule = SupportRule { support_min: config.support_min, turn: &turn };
+        support(matches, shape, &rule, memory, self.supported);
         let supported =
             self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
         let count = PassCount {

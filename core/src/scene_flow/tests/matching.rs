@@ -137,7 +137,8 @@ fn crowd() -> Vec<Match> {
 fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     let mut slab = slab();
     let mut cells = Cells::new_in(&CAPACITY, &mut Carver::new(&mut slab.0, BYTES).unwrap());
-    let config = SceneFlowConfig::default();
+    let turn = TurnFlow::default();
+    let rule = SupportRule { support_min: SceneFlowConfig::default().support_min, turn: &turn };
     let mut matches = crowd();
     matches[17].current_left[0] += 6.0;
     matches[31].previous_right[0] -= 6.0;
@@ -150,13 +151,13 @@ fn a_match_that_moves_unlike_its_neighbours_loses_their_support() {
     support(
         &matches,
         Shape::new(WIDTH, HEIGHT, 16),
-        &config,
+        &rule,
         SortedMotions { cells: &mut cells, motion: &mut [[0.0; 4]; 100] },
         &mut supported,
     );
     let lost: Vec<usize> = (0..matches.len()).filter(|&i| supported[i] == 0).collect();
     assert_eq!(lost, [17, 31, 60], "the two that disagree and the one that is alone");
-    let all = SceneFlowConfig { support_min: 0, ..config };
+    let all = SupportRule { support_min: 0, ..rule };
     support(
         &matches,
         Shape::new(WIDTH, HEIGHT, 16),
