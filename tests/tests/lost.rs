@@ -101,6 +101,8 @@ fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
                 t_world_camera: std::ptr::null(),
                 time_ns: std::ptr::null(),
                 disparity_q8: std::ptr::null(),
+                inertial: std::ptr::null(),
+                inertial_count: 0,
             };
             let mut report = std::mem::MaybeUninit::uninit();
             // SAFETY: the mapper and the images are there; a step that succeeds has written the

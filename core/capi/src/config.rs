@@ -1,7 +1,7 @@
 //! The configuration: a rig, and settings by their dotted keys.
 
 use crate::{
-    DynvoxRawRig, DynvoxStatus,
+    DynvoxInertialUnit, DynvoxRawRig, DynvoxStatus,
     given::{output, read},
     raw::defaults,
 };
@@ -37,6 +37,8 @@ pub struct DynvoxConfig {
     pub rig: DynvoxRig,
     /// Raw cameras, if dynvox_config_raw named them.
     pub raw: DynvoxRawRig,
+    /// Inertial unit, if dynvox_config_inertial named one.
+    pub inertial: DynvoxInertialUnit,
     /// Bytes of `settings` in use.
     pub settings_len: usize,
     /// Lines `key=value`, in the order they were set. Written by dynvox_config_set.
@@ -56,6 +58,7 @@ impl DynvoxConfig {
         let DynvoxRig { focal_px, center_u_px, center_v_px, baseline_m } = self.rig;
         let mut config =
             defaults(StereoRig { focal_px, center_u_px, center_v_px, baseline_m }, &self.raw)?;
+        config.inertial = self.inertial.unit()?;
         let lines = self.settings.get(..self.settings_len).ok_or(DynvoxStatus::Config)?;
         let lines = core::str::from_utf8(lines).map_err(|_| DynvoxStatus::Config)?;
         for line in lines.split_terminator('\n') {
@@ -98,6 +101,7 @@ pub unsafe extern "C" fn dynvox_config_default(
         config.write(DynvoxConfig {
             rig,
             raw: DynvoxRawRig::NONE,
+            inertial: DynvoxInertialUnit::NONE,
             settings_len: 0,
             settings: [0; DYNVOX_SETTINGS_BYTES],
         })

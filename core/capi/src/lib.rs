@@ -17,6 +17,7 @@ mod capacity;
 mod config;
 mod given;
 mod handle;
+mod inertial;
 mod map;
 mod plan;
 mod raw;
@@ -40,6 +41,10 @@ pub use config::{
     dynvox_config_set,
 };
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
+pub use inertial::{
+    DynvoxInertialDoubt, DynvoxInertialReport, DynvoxInertialSample, DynvoxInertialUnit,
+    dynvox_config_inertial,
+};
 pub use map::{
     DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast,
     dynvox_stream_out, dynvox_triangles,

@@ -5,6 +5,7 @@ use crate::{
     DynvoxReport, DynvoxStatus, DynvoxStore,
     given::{items, output, read},
     handle::with,
+    inertial::samples,
     retired::Retiring,
 };
 use core::{ops::Range, ptr};
@@ -66,7 +67,7 @@ pub unsafe extern "C" fn dynvox_step_with(
                 detections: detections(&frame, &mut buffered, buffer)?,
                 disparity_q8: disparity(&frame, buffer)?,
                 ignored: None,
-                inertial: &[],
+                inertial: samples(frame.inertial, frame.inertial_count, buffer)?,
                 time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
                 t_world_camera: if frame.t_world_camera.is_null() {
                     None

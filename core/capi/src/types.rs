@@ -1,6 +1,6 @@
 //! Plain values of the interface.
 
-use crate::DynvoxStatus;
+use crate::{DynvoxInertialReport, DynvoxInertialSample, DynvoxStatus};
 use dynvox_core::{PoseOrigin, Report, Severity, geometry::Transform};
 
 /// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
@@ -90,6 +90,11 @@ pub struct DynvoxFrame {
     /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
     /// values without padding; null lets the mapper match the pair.
     pub disparity_q8: *const u16,
+    /// Samples of the configuration's inertial unit since the frame before, in order of time; at
+    /// most 1,024 are read. Null without samples; they need `time_ns`.
+    pub inertial: *const DynvoxInertialSample,
+    /// Number of samples.
+    pub inertial_count: usize,
 }
 
 /// Severity of a step's events.
@@ -164,6 +169,8 @@ pub struct DynvoxReport {
     /// Digest of all that came of the step: the same frames and configuration give the same number
     /// everywhere.
     pub digest: u64,
+    /// The inertial unit.
+    pub inertial: DynvoxInertialReport,
 }
 
 impl From<&Report> for DynvoxReport {
@@ -199,6 +206,7 @@ impl From<&Report> for DynvoxReport {
             voxels_reset: report.prune.voxels_reset,
             input_digest: report.digests.input,
             digest: report.digest,
+            inertial: report.into(),
         }
     }
 }

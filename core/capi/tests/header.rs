@@ -10,8 +10,8 @@ fn the_header_is_what_the_source_says() {
         .expect("the configuration can be read");
     // In the order in which the header has them: types before the functions that take them.
     let modules = [
-        "status", "types", "config", "capacity", "callback", "handle", "step", "map", "tracks",
-        "plan", "raw", "retired", "snapshot",
+        "status", "types", "inertial", "config", "capacity", "callback", "handle", "step", "map",
+        "tracks", "plan", "raw", "retired", "snapshot",
     ];
     let builder =
         modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {

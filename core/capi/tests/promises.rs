@@ -45,6 +45,11 @@ const PROMISES: &[(&str, &str)] = &[
     ("Detections in one frame, at most 64", "bounds_beyond_their_limits_are_refused"),
     ("Keyframes by which places are recognised, at most", "bounds_beyond_their_limits_are_refused"),
     ("Width of the planner's window, cells, at most", "bounds_beyond_their_limits_are_refused"),
+    ("In a zeroed struct `t_camera_unit`", "a_unit_that_cannot_be_used_is_refused"),
+    (
+        "Samples of the configuration's inertial unit",
+        "samples_of_a_frame_are_read_up_to_their_bound_and_tell_which_way_is_up",
+    ),
     ("Nothing to say.", "a_frame_without_events_has_the_severity_info"),
     ("The upper left pixel; `stride` times", CALLER),
     ("Called on the thread of the step", "a_store_cannot_call_its_own_mapper"),

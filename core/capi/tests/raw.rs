@@ -127,6 +127,8 @@ fn raw_pairs_give_the_digests_of_the_core() {
         t_world_camera: ptr::null(),
         time_ns: ptr::null(),
         disparity_q8: ptr::null(),
+        inertial: ptr::null(),
+        inertial_count: 0,
     };
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
     // The second frame is matched with the first.

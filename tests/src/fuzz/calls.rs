@@ -179,6 +179,8 @@ fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMappe
         t_world_camera: if given & 2 == 0 { ptr::null() } else { &raw const pose },
         time_ns: if given & 4 == 0 { ptr::null() } else { &raw const time_ns },
         disparity_q8: ptr::null(),
+        inertial: ptr::null(),
+        inertial_count: 0,
     };
     let mut report = std::mem::MaybeUninit::<DynvoxReport>::uninit();
     // SAFETY: images are as long as they say, or are refused before they are read; the report is

@@ -88,6 +88,8 @@ pub fn frame(pixels: &[u8]) -> DynvoxFrame {
         t_world_camera: ptr::null(),
         time_ns: ptr::null(),
         disparity_q8: ptr::null(),
+        inertial: ptr::null(),
+        inertial_count: 0,
     }
 }
 
