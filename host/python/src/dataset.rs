@@ -6,12 +6,13 @@ use super::error::{raise, refuse};
 use super::mapper::Mapper;
 use super::rig::Rig;
 use super::running::Recipe;
-use super::{arrays, options, pose};
+use super::{arrays, inertial, options, pose};
 use dynvox::Request;
 use dynvox::formats::Image;
 use dynvox::input::StereoImages;
 use dynvox::observe::from_first;
 use dynvox::request::{MapperPlan, Plan};
+use dynvox::run::inertial_samples;
 use dynvox_core::geometry::Transform;
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
@@ -38,6 +39,23 @@ impl Dataset {
         let found = if position < 0 { from_end() } else { Some(position as usize) };
         let number = found.and_then(|at| Some((at, *listed.get(at)?)));
         number.ok_or_else(|| PyIndexError::new_err(format!("frame {position} of {}", listed.len())))
+    }
+
+    /// Adds the samples of the data set's inertial unit since the frame before.
+    fn set_inertial(
+        &self,
+        py: Python<'_>,
+        frame: &Bound<'_, PyDict>,
+        position: usize,
+    ) -> PyResult<()> {
+        let Plan { dataset, frames, .. } = &self.plan;
+        let stamp_ns = |at: usize| dataset.stamp_ns(*frames.listed().get(at)?);
+        let before_ns = position.checked_sub(1).and_then(stamp_ns);
+        let samples = inertial_samples(dataset.as_ref(), before_ns, stamp_ns(position));
+        if samples.is_empty() {
+            return Ok(());
+        }
+        frame.set_item("inertial", inertial::pair(py, samples)?)
     }
 }
 
@@ -166,6 +184,7 @@ impl Dataset {
             request: Request::default(),
             interval_s: None,
             plan: Some(plan),
+            inertial: None,
             blocks: self.blocks.clone(),
         };
         Mapper::from_recipe(py, recipe, self.plan.dataset.size())
@@ -182,6 +201,7 @@ impl Dataset {
         let frame = frame(py, images)?;
         if let Some(time_ns) = self.plan.dataset.stamp_ns(number) {
             frame.set_item("time_ns", time_ns)?;
+            self.set_inertial(py, &frame, position)?;
         }
         if let Some(pose) = self.poses.as_ref().and_then(|poses| poses.get(position)) {
             frame.set_item("t_world_camera", pose::dictionary(py, pose)?)?;

@@ -12,6 +12,7 @@ mod detection;
 mod error;
 mod examined;
 mod images;
+mod inertial;
 mod mapper;
 mod options;
 mod pickled;
@@ -29,6 +30,7 @@ fn _dynvox(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("Error", module.py().get_type::<error::Error>())?;
     module.add_class::<rig::Rig>()?;
     module.add_class::<detection::Detection>()?;
+    module.add_class::<inertial::InertialUnit>()?;
     module.add_class::<mapper::Mapper>()?;
     module.add_class::<dataset::Dataset>()?;
     module.add_function(wrap_pyfunction!(images::_borrowed, module)?)?;

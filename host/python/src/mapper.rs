@@ -5,6 +5,7 @@ use super::detection::BorrowedDetection;
 use super::error::{raise, refuse};
 use super::examined::Examined;
 use super::images::{Borrowed, Picture};
+use super::inertial::{self, InertialUnit};
 use super::planning::Plan;
 use super::readout::{map_triangles, object_triangles, report_dictionary, track_dictionary};
 use super::rig::Rig;
@@ -89,7 +90,7 @@ impl Mapper {
     #[new]
     #[pyo3(signature = (
         rig, *, image=None, frame_interval_s=None, stream=None, threads=None, force=false,
-        channels="rgb", **options
+        channels="rgb", inertial_unit=None, **options
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn new(
@@ -101,6 +102,7 @@ impl Mapper {
         threads: Option<usize>,
         force: bool,
         channels: &str,
+        inertial_unit: Option<InertialUnit>,
         options: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         if !matches!(channels, "rgb" | "bgr") {
@@ -111,6 +113,7 @@ impl Mapper {
             blocks: options::blocks(stream.as_ref())?,
             interval_s: frame_interval_s,
             plan: None,
+            inertial: inertial_unit.as_ref().map(InertialUnit::config),
             rig,
         };
         let size = image.or(recipe.rig.mapped_size());
@@ -135,9 +138,13 @@ impl Mapper {
     /// matching: give them with every frame. No stage uses the pixels of `ignored`, height x width
     /// of the rectified left picture, that are not 0. A pose must be a rigid motion within the
     /// map's bounds. `fused` in the report is true only if something was fused.
+    ///
+    /// `inertial` has the samples of the mapper's inertial unit since the frame before: N times, ns
+    /// on the clock of `time_ns`, and N x 6 values, turn rates in rad/s and accelerations in m/s2
+    /// with gravity. The report says under `inertial` what they told.
     #[pyo3(signature = (
         left, right, *, colour=None, classes=None, disparity_q8=None, ignored=None,
-        t_world_camera=None, time_ns=None, detections=None
+        t_world_camera=None, time_ns=None, detections=None, inertial=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn step<'py>(
@@ -152,6 +159,7 @@ impl Mapper {
         t_world_camera: Option<Bound<'py, PyAny>>,
         time_ns: Option<u64>,
         detections: Option<Bound<'py, PyAny>>,
+        inertial: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let borrow = if self.is_bgr { Borrowed::<u8>::reversed } else { Borrowed::<u8>::new };
         let (left, right) = (borrow("left", &left)?, borrow("right", &right)?);
@@ -166,6 +174,7 @@ impl Mapper {
         let found = found.transpose()?.unwrap_or_default();
         let detections =
             found.iter().map(BorrowedDetection::detection).collect::<PyResult<Vec<_>>>()?;
+        let samples = inertial.map(|samples| inertial::given(&samples)).transpose()?;
         let (left, right) = (Picture::of(&left)?, Picture::of(&right)?);
         let frame = StereoFrame {
             colour: colour.as_ref().map(Borrowed::colour).transpose()?.or(left.colour),
@@ -177,6 +186,7 @@ impl Mapper {
                 .transpose()?,
             time_ns,
             detections: &detections,
+            inertial: samples.as_deref().unwrap_or_default(),
             ..StereoFrame::pair(left.grey()?, right.grey()?)
         };
         let size = (frame.left.width(), frame.left.height());

@@ -8,6 +8,7 @@ use dynvox::Request;
 use dynvox::request::MapperPlan;
 use dynvox::run::{RunError, Threads, step_reason};
 use dynvox::slab::HostSlab;
+use dynvox_core::inertial::InertialUnit;
 use dynvox_core::objects::NoSink;
 use dynvox_core::{Mapper, Report, StereoFrame};
 use pyo3::PyResult;
@@ -53,6 +54,8 @@ pub struct Recipe {
     pub interval_s: Option<f64>,
     /// Plan of a data set's run, if it is made already.
     pub plan: Option<MapperPlan>,
+    /// Inertial unit of a mapper without a data set.
+    pub inertial: Option<InertialUnit>,
     pub blocks: BlocksChoice,
 }
 
@@ -250,7 +253,12 @@ impl Recipe {
     fn plan_for(&self, size: (usize, usize)) -> PyResult<MapperPlan> {
         match &self.plan {
             Some(plan) => Ok(plan.clone()),
-            None => self.request.mapper(&self.rig.fitted(size), self.interval_s).map_err(raise),
+            None => {
+                let fitted = self.rig.fitted(size);
+                let mut plan = self.request.mapper(&fitted, self.interval_s).map_err(raise)?;
+                plan.config.inertial = self.inertial;
+                Ok(plan)
+            }
         }
     }
 }

@@ -7,12 +7,13 @@ from itertools import islice as _islice
 import numpy as _np
 
 from ._dynvox import Dataset as _Dataset
-from ._dynvox import Detection, Error, Mapper, Rig, __version__, diagnose, read_calibration
+from ._dynvox import Detection, Error, InertialUnit, Mapper, Rig, __version__, diagnose, read_calibration
 
 __all__ = [
     "Dataset",
     "Detection",
     "Error",
+    "InertialUnit",
     "Mapper",
     "Rig",
     "__version__",

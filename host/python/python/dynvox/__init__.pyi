@@ -89,6 +89,7 @@ class Frame(TypedDict, total=False):
     t_world_camera: Pose
     time_ns: int
     detections: list[Detection]
+    inertial: tuple[NDArray[np.uint64], NDArray[np.float64]]
 
 class Finding(TypedDict):
     """A fault of pictures, as `diagnose` finds it."""
@@ -141,6 +142,29 @@ def read_calibration(
 
     `image` is the raw pictures' size, where the files do not say it; `rectified` and `rectified_focal_px` are as the options of that name.
     """
+
+@final
+class InertialUnit:
+    """Inertial unit that is fixed to the left camera: `t_camera_unit` maps its axes to those of the rectified left camera. `Mapper(rig, inertial_unit=...)` then
+    takes its samples with every frame.
+
+    `clock_offset_s` is added to the samples' times; what remains is found from the turns. `turn_density` is the noise of turn rates, rad/s/sqrt(Hz), `turn_bias_sigma`
+    the bias that they may begin with, rad/s, `turn_walk` its random walk, rad/s2/sqrt(Hz), and `force_bias_sigma` the error of forces, m/s2. A sample at
+    `turn_range`, rad/s, or `force_range`, m/s2, is saturated.
+    """
+
+    def __new__(
+        cls,
+        t_camera_unit: ArrayLike | Pose,
+        *,
+        clock_offset_s: float = 0.0,
+        turn_density: float = 0.001,
+        turn_bias_sigma: float = 0.1,
+        turn_walk: float = 0.0001,
+        force_bias_sigma: float = 0.03,
+        turn_range: float = 34.0,
+        force_range: float = 150.0,
+    ) -> Self: ...
 
 @final
 class Detection:
@@ -228,6 +252,7 @@ class Mapper:
         egomotion: Literal["stereo", "icp"] = "stereo",
         force: bool = False,
         channels: Literal["rgb", "bgr"] = "rgb",
+        inertial_unit: InertialUnit | None = None,
     ) -> Self:
         """`image` is (width, height). `frame_interval_s` is the time between two frames without `time_ns`.
 
@@ -251,6 +276,7 @@ class Mapper:
         t_world_camera: ArrayLike | Pose | None = None,
         time_ns: int | None = None,
         detections: Iterable[Detection] | None = None,
+        inertial: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> dict[str, Any]:
         """Maps one pair and returns the report, with the fields of `dynvox_core::Report` and `severity`. `segment` numbers the segment of the map
         that the pose lies in, from 0: another one begins, with that camera as its world, where the camera was lost and is not found again.
@@ -259,6 +285,9 @@ class Mapper:
         Nothing is copied whose pixels lie side by side in their rows; rows may lie apart, as in a part of a larger array. Other views, as `[..., ::-1]`, are
         copied. `t_world_camera` replaces the egomotion and `disparity_q8` the stereo matching: give them with every frame. No stage uses the pixels of
         `ignored`, height x width of the rectified left picture, that are not 0. A pose must be a rigid motion within the map's bounds. `fused` in the report is true only if something was fused.
+
+        `inertial` has the samples of the mapper's inertial unit since the frame before: N times, ns on the clock of `time_ns`, and N x 6 values, turn rates in rad/s
+        and accelerations in m/s2 with gravity. The report says under `inertial` what they told.
         """
 
     @property
