@@ -48,7 +48,7 @@ pub use picture::{
     Decoded, ENDINGS as PICTURE_ENDINGS, Picture, RANGE_PICTURES, SAMPLE_BITS, SampleRange,
     declared_maximum, decode_picture, picture_size, read_picture, significant_bits,
 };
-pub use ply::{Axes, Mesh, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
+pub use ply::{Axes, Mesh, MeshAxes, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
 pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
 pub use poses::{
     Trajectory, kitti_line, read_numbered, read_poses, tum_line, tum_row, write_numbered,

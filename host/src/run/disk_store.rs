@@ -3,7 +3,7 @@
 use super::map_objects::add_objects;
 use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
-use crate::formats::{Axes, MAP_FILE, Mesh, PlyWriter, ShownSegment};
+use crate::formats::{MAP_FILE, Mesh, MeshAxes, PlyWriter, ShownSegment};
 use crate::observe::StoreStats;
 use crate::owned;
 use crate::request::{MapObjects, Streaming};
@@ -117,7 +117,7 @@ impl MeshOutput {
         mapper: &mut Mapper<'_>,
         (mut store, streaming): (DiskStore, Option<Streaming>),
         folder: &RunFolder,
-        (axes, colour): (Axes, bool),
+        (axes, colour): (MeshAxes, bool),
     ) -> Self {
         let begin =
             || PlyWriter::begin_with(&folder.file(MAP_FILE), "the first camera", axes, colour);

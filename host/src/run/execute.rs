@@ -11,7 +11,7 @@ use super::saved::Saved;
 use super::session::Session;
 use super::state::RunState;
 use super::{RunFolder, resident_bytes};
-use crate::formats::{MAP_FILE, Mesh};
+use crate::formats::{MAP_FILE, Mesh, MeshAxes};
 use crate::observe::{
     ClosedLoops, Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections,
 };
@@ -168,6 +168,11 @@ fn map(
         PruneReport::default()
     });
     let Session { mut mapper, store, state, since, .. } = session;
+    let axes = plan.request.exports.axes;
+    let axes = match state.observers.up_world() {
+        Some(up) => MeshAxes::upright(axes, up),
+        None => axes.into(),
+    };
     if let Err(error) = places::write(&mut mapper, folder) {
         Incomplete::add_missing(&mut incomplete, PLACES_FILE, &error.to_string());
     }
@@ -183,7 +188,7 @@ fn map(
             &mut mapper,
             (store, plan.request.storage.streaming()),
             folder,
-            (plan.request.exports.axes, plan.capacity.colour),
+            (axes, plan.capacity.colour),
         ),
         incomplete,
         state,

@@ -5,6 +5,6 @@ mod read;
 mod records;
 mod write;
 
-pub use axes::Axes;
+pub use axes::{Axes, MeshAxes};
 pub use read::{PlyMesh, PlyVertex, PlyVertices};
 pub use write::{Mesh, PlyWriter};

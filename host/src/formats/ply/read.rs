@@ -1,7 +1,7 @@
 //! Binary little-endian PLY meshes, read triangle by triangle. Faces mostly name vertices near
 //! those before, so few of them are in memory.
 
-use super::Axes;
+use super::MeshAxes;
 use super::records::Records;
 use crate::formats::FormatError;
 use crate::formats::bounds::{MAX_PLY_HEADER_BYTES, MAX_PLY_VERTEX_BYTES, bytes_text};
@@ -35,7 +35,7 @@ struct VertexLayout {
     colour: Option<usize>,
     object: Option<usize>,
     weight: Option<usize>,
-    axes: Axes,
+    axes: MeshAxes,
 }
 
 impl VertexLayout {
@@ -143,12 +143,7 @@ fn header(file: &mut BufReader<File>, path: &Path) -> Result<Header, FormatError
                     .add(kind, name)
                     .ok_or_else(|| refuse("a type of its header is not known"))?;
             }
-            ["comment", ..] => {
-                layout.axes = Axes::ALL
-                    .into_iter()
-                    .find(|axes| line.contains(axes.description()))
-                    .unwrap_or(layout.axes);
-            }
+            ["comment", ..] => layout.axes.read(&line),
             ["ply"] => {}
             _ if read == 0 => {
                 let most = bytes_text(MAX_PLY_HEADER_BYTES);
@@ -266,7 +261,7 @@ mod tests {
     fn gives_the_triangles_that_were_written_and_refuses_what_is_no_mesh() {
         let folder = tempfile::TempDir::new().unwrap();
         let path = folder.path().join("map.ply");
-        let mut ply = PlyWriter::begin_in(&path, "a test", Axes::Enu).unwrap();
+        let mut ply = PlyWriter::begin_in(&path, "a test", crate::formats::Axes::Enu).unwrap();
         // More vertices than a chunk, and than all chunks share a slot.
         let corners = |at: u32| {
             [0.0, 0.1, 0.2].map(|d| Vertex {

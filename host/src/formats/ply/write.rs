@@ -7,8 +7,8 @@
 //! The mesh itself is never in memory. Vertices that fall out of the window are written again when
 //! they return, which costs bytes, not correctness.
 
-use super::Axes;
 use super::records::Records;
+use super::{Axes, MeshAxes};
 use crate::owned;
 use dynvox_core::view::{MeshSink, Triangle, Vertex};
 use std::fs::File;
@@ -62,7 +62,7 @@ type Recent = [u32; 5];
 pub struct PlyWriter {
     vertices: Records,
     faces: BufWriter<File>,
-    axes: Axes,
+    axes: MeshAxes,
     /// Vertices have colours.
     colour: bool,
     vertex_count_at: u64,
@@ -103,13 +103,15 @@ impl PlyWriter {
     ///
     /// # Errors
     /// The disk refuses.
-    pub fn begin_with(path: &Path, frame: &str, axes: Axes, colour: bool) -> io::Result<Self> {
+    pub fn begin_with(
+        path: &Path,
+        frame: &str,
+        axes: impl Into<MeshAxes>,
+        colour: bool,
+    ) -> io::Result<Self> {
+        let axes = axes.into();
         let mut file = BufWriter::new(owned::create_file(path)?);
-        write!(
-            file,
-            "ply\nformat binary_little_endian 1.0\ncomment metres; {} of {frame}\n",
-            axes.description()
-        )?;
+        write!(file, "ply\nformat binary_little_endian 1.0\n{}", axes.comments(frame))?;
         writeln!(
             file,
             "comment object: 0 for the static map, otherwise the number of the object's track"
