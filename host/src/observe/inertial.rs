@@ -1,14 +1,21 @@
-//! The inertial unit of a run against the camera's path.
+//! The inertial unit of a run.
 
 use super::{Finished, FrameContext, ObserveError, ObservedRun, Observer};
-use crate::evaluate::inertial::{FramePose, UnitFindings};
+use crate::evaluate::inertial::{FramePose, UnitFindings, UnitRecord};
 use dynvox_core::PoseOrigin;
 use serde::{Deserialize, Serialize};
 
-/// Keeps times and poses of all frames where the source has a unit.
+/// Keeps the mapper's reports of the unit where the source has one.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct InertialObserver {
-    frames: Vec<FramePose>,
+    record: UnitRecord,
+}
+
+impl InertialObserver {
+    /// Direction that points up in the world of the first camera; `None` of a doubted unit.
+    pub fn up_world(&self) -> Option<[f32; 3]> {
+        self.record.up_world()
+    }
 }
 
 impl Observer for InertialObserver {
@@ -24,12 +31,13 @@ impl Observer for InertialObserver {
             return Ok(());
         };
         let report = &frame.row.report;
-        self.frames.push(FramePose {
+        let pose = FramePose {
             time_ns,
             segment: report.segment,
             t_world_camera: report.t_world_camera,
             is_measured: report.pose != PoseOrigin::Extrapolated,
-        });
+        };
+        self.record.add(&pose, report.inertial.as_ref());
         Ok(())
     }
 
@@ -39,6 +47,6 @@ impl Observer for InertialObserver {
         _: &Finished,
     ) -> Result<Option<UnitFindings>, ObserveError> {
         let unit = run.plan.dataset.info().inertial.as_deref();
-        Ok(unit.map(|unit| UnitFindings::new(unit, &self.frames)))
+        Ok(unit.map(|unit| self.record.findings(unit)))
     }
 }

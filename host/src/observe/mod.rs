@@ -308,6 +308,11 @@ pub struct Sections {
 }
 
 impl Observers {
+    /// Direction that points up in the world of the first camera, if an inertial unit tells.
+    pub fn up_world(&self) -> Option<[f32; 3]> {
+        self.inertial.up_world()
+    }
+
     /// Returns the reason why a file of an observer could not be written, if so. The observer
     /// continues without the file.
     pub fn failure(&self) -> Option<&str> {

@@ -35,23 +35,21 @@ pub struct InertialSummary {
 impl InertialSummary {
     /// The figures of some findings.
     pub fn new(found: &UnitFindings) -> Self {
-        let agreement = found.agreement.as_ref();
-        let doubt = agreement.and_then(|agreement| agreement.doubt.as_ref());
-        let sound = agreement.filter(|_| doubt.is_none());
-        let offset_ms = sound.and_then(|agreement| agreement.clock_offset_ms);
+        let (agreement, doubt) = (found.agreement.as_ref(), found.doubt.as_ref());
+        let clock = found.clock_ms();
         Self {
             samples: found.samples,
             frames_without: found.frames_without,
             longest_gap_s: found.longest_gap_s,
             intervals: agreement.map_or(0, |agreement| agreement.intervals),
             turn_difference_deg: agreement.map(|agreement| agreement.difference_deg),
-            turn_bias_rad_s: sound.map(|agreement| agreement.turn_bias_rad_s),
-            clock_offset_ms: offset_ms,
-            clock_offset_sigma_ms: sound
-                .filter(|_| offset_ms.is_some())
-                .map(|agreement| agreement.clock_offset_sigma_ms),
-            up: found.vertical.map(|vertical| vertical.up_world),
-            up_sigma_deg: found.vertical.map(|vertical| vertical.sigma_deg),
+            turn_bias_rad_s: agreement
+                .filter(|_| doubt.is_none())
+                .map(|_| found.last.turn_bias.map(f64::from)),
+            clock_offset_ms: clock.map(|[offset_ms, _]| offset_ms),
+            clock_offset_sigma_ms: clock.map(|[_, sigma_ms]| sigma_ms),
+            up: found.vertical.map(|vertical| vertical.up_world.map(f64::from)),
+            up_sigma_deg: found.vertical.map(|vertical| vertical.sigma_rad.to_degrees().into()),
             doubt: doubt.map(|doubt| doubt.sentence()),
         }
     }

@@ -1,156 +1,161 @@
 use super::*;
 use crate::input::{FrameSource, StreetFrames};
 use crate::synth::{Street, StreetConfig, StreetUnit, UnitFault};
+use dynvox_core::inertial::InertialDoubt;
 
-/// Unit and true poses of a street of 15 s, with noise in the poses as of a good odometry.
-fn street(sway_deg_s: f64, change: impl Fn(&mut StreetUnit)) -> (UnitFindings, f64) {
-    let mut unit = StreetUnit {
-        rate_hz: 200.0,
-        turn_noise: 2.4e-4,
-        force_noise: 1.5e-3,
-        ..StreetUnit::default()
-    };
-    change(&mut unit);
-    let config = StreetConfig {
+fn config(sway_deg_s: f64, unit: StreetUnit) -> StreetConfig {
+    StreetConfig {
         width: 160,
         height: 48,
         frames: 150,
         sway_deg_s,
-        inertial: Some(unit),
+        inertial: Some(StreetUnit { rate_hz: 200.0, ..unit }),
         ..StreetConfig::static_street()
-    };
+    }
+}
+
+/// Findings of a run over the street's true poses disturbed as by a good odometry, with a unit
+/// whose turn is `map` of the camera's and what the mapper reports otherwise.
+fn found(
+    sway_deg_s: f64,
+    report: &InertialReport,
+    map: impl Fn([f64; 3]) -> [f64; 3],
+) -> UnitFindings {
+    let config = config(sway_deg_s, StreetUnit::default());
     let street = Street::new(config.clone()).unwrap();
     let source = StreetFrames::new(config).unwrap();
+    let unit = source.info().inertial.clone().unwrap();
     let mut random = dynvox_core::random::Random::new(5);
     let mut noise = |size: f64| {
         std::array::from_fn::<f64, 3, _>(|_| size * (f64::from(random.below(2_001)) / 1e3 - 1.0))
     };
-    let frames: Vec<FramePose> = (0..150u32)
-        .map(|index| {
-            let error = Transform::new(noise(3e-4), noise(5e-3));
-            FramePose {
-                time_ns: (street.time_s(index) * 1e9).round() as i64,
-                segment: MapSegment::FIRST,
-                t_world_camera: (street.t_world_camera(index) * error).normalized(),
-                is_measured: true,
-            }
-        })
-        .collect();
-    let found = UnitFindings::new(source.info().inertial.as_ref().unwrap(), &frames);
-    let up = nalgebra::Vector3::from(street.up_in_world());
-    let error = found.vertical.map_or(f64::NAN, |vertical| {
-        up.dot(&nalgebra::Vector3::from(vertical.up_world)).clamp(-1.0, 1.0).acos().to_degrees()
-    });
-    (found, error)
+    let (mut record, mut before) = (UnitRecord::default(), Transform::IDENTITY);
+    for index in 0..150u32 {
+        let pose = street.t_world_camera(index);
+        let turn = rotation_vector(&(before.inverse() * pose));
+        before = pose;
+        // The unit's own axes are those that are mixed up.
+        let mapped = map(unit.t_camera_unit.inverse().rotate(turn));
+        let turn = unit.t_camera_unit.rotate(mapped).map(|rad| rad as f32);
+        let mut report = *report;
+        report.turn_rad = (index > 0).then_some(turn);
+        let frame = FramePose {
+            time_ns: (street.time_s(index) * 1e9).round() as i64,
+            segment: MapSegment::FIRST,
+            t_world_camera: (pose * Transform::new(noise(3e-4), noise(5e-3))).normalized(),
+            is_measured: true,
+        };
+        record.add(&frame, Some(&report));
+    }
+    record.findings(&unit)
+}
+
+/// Report of a mapper that knows its unit.
+fn known() -> InertialReport {
+    let mut report = InertialReport::default();
+    report.samples = 20;
+    report.trusted = true;
+    report.turn_bias = [0.02; 3];
+    report.clock_offset_s = -0.012;
+    report.clock_offset_sigma_s = 0.002;
+    report.vertical = Some(Vertical { up_world: [0.0, -1.0, 0.0], sigma_rad: 0.005 });
+    report
 }
 
 #[test]
-fn clock_bias_and_vertical_are_found_on_a_swaying_and_a_calm_camera() {
-    for sway_deg_s in [0.0, 40.0, 200.0] {
-        let (found, error_deg) = street(sway_deg_s, |unit| {
-            unit.clock_offset_s = 0.012;
-            unit.turn_bias_rad_s = 0.02;
-            unit.force_bias_m_s2 = 0.03;
-        });
-        let agreement = found.agreement.clone().unwrap();
-        assert_eq!(agreement.doubt, None, "{sway_deg_s}: {}", found.sentence());
-        for bias in agreement.turn_bias_rad_s {
-            assert!((bias - 0.02).abs() < 2e-3, "{sway_deg_s}: {}", found.sentence());
+fn what_the_mapper_knows_is_told_in_a_line_and_in_figures() {
+    let found = found(40.0, &known(), |turn| turn);
+    let agreement = found.agreement.unwrap();
+    assert_eq!((agreement.intervals, found.frames_without), (149, 0));
+    assert!(agreement.difference_deg < 0.03 && agreement.turn_deg > 1.0, "{agreement:?}");
+    assert!((found.clock_ms().unwrap()[0] - 12.0).abs() < 1e-3);
+    assert!(!found.is_doubted());
+    let line = found.sentence();
+    assert!(line.contains("its clock is 12.0 ms ahead of the cameras' (sigma 2.0)"), "{line}");
+    assert!(line.contains("bias 0.0346 rad/s") && line.contains("leans 0.0 degrees"), "{line}");
+}
+
+#[test]
+fn a_clock_that_turns_hardly_tell_is_not_told() {
+    let mut report = known();
+    (report.clock_offset_s, report.clock_offset_sigma_s) = (-0.01, 0.03);
+    let vague = found(0.0, &report, |turn| turn);
+    assert_eq!(vague.clock_ms(), None);
+    assert!(vague.sentence().contains("could not be compared"), "{}", vague.sentence());
+    // A large offset is told with its sigma, however large.
+    report.clock_offset_s = -0.09;
+    let large = found(0.0, &report, |turn| turn);
+    assert!(large.sentence().contains("90.0 ms ahead"), "{}", large.sentence());
+}
+
+#[test]
+fn exchanged_axes_are_named_also_where_the_camera_hardly_turns_about_them() {
+    for sway_deg_s in [0.0, 60.0] {
+        let doubted = found(sway_deg_s, &known(), |[x, y, z]| [y, x, z]);
+        let fit = UnitDoubt::Axes { fit: ["y", "x", "z"] };
+        // A camera that turns about the vertical shows only that axis.
+        if sway_deg_s == 0.0 {
+            assert_eq!(doubted.doubt, Some(fit), "{}", doubted.sentence());
+            assert_eq!(doubted.vertical, None);
         }
-        // A calm camera tells less of the clock, and says so.
-        let offset_ms = agreement.clock_offset_ms.unwrap();
-        let sigma_ms = agreement.clock_offset_sigma_ms;
-        assert!((offset_ms - 12.0).abs() < 3.0 * sigma_ms.max(0.2), "{sway_deg_s}: {offset_ms}");
-        assert!(sigma_ms < if sway_deg_s > 0.0 { 1.0 } else { 10.0 }, "{sway_deg_s}: {sigma_ms}");
-        let vertical = found.vertical.unwrap();
-        assert!(
-            error_deg < 0.3 && error_deg < 2.0 * vertical.sigma_deg,
-            "{sway_deg_s}: {error_deg}"
-        );
-        assert!(vertical.sigma_deg < 0.6, "{}", found.sentence());
-        let line = found.sentence();
-        assert!(line.contains("ms ahead of the cameras'") && line.contains("leans"), "{line}");
+        let turned = found(sway_deg_s, &known(), |[x, y, z]| [x, -z, y]);
+        let fit = UnitDoubt::Axes { fit: ["x", "z", "-y"] };
+        assert_eq!(turned.doubt, Some(fit), "{sway_deg_s}: {}", turned.sentence());
+    }
+    assert_eq!(found(60.0, &known(), |turn| turn).doubt, None);
+}
+
+#[test]
+fn doubts_of_the_mapper_have_a_sentence_each() {
+    let doubt = |doubt| {
+        let mut report = known();
+        (report.trusted, report.doubt) = (false, Some(doubt));
+        let found = found(60.0, &report, |turn| turn);
+        assert_eq!((found.vertical, found.clock_ms()), (None, None));
+        found.doubt.unwrap()
+    };
+    use InertialDoubt as Known;
+    let pairs = [
+        (Known::Degrees, UnitDoubt::Degrees),
+        (Known::Stuck, UnitDoubt::Stuck),
+        (Known::Saturated, UnitDoubt::Saturated),
+        (Known::ClocksApart, UnitDoubt::ClocksApart),
+        (Known::Contradicts, UnitDoubt::Disagrees),
+        (Known::WrongAxes, UnitDoubt::Disagrees),
+    ];
+    for (known, expected) in pairs {
+        assert_eq!(doubt(known), expected);
     }
 }
 
 #[test]
-fn planted_faults_are_named_and_tell_no_vertical() {
-    for (fault, expected) in [
-        (UnitFault::Axes, UnitDoubt::Axes { fit: ["y", "x", "z"] }),
-        (UnitFault::Degrees, UnitDoubt::Degrees),
-    ] {
-        for sway_deg_s in [0.0, 60.0] {
-            let (found, _) = street(sway_deg_s, |unit| unit.fault = fault);
-            let doubt = found.agreement.as_ref().and_then(|found| found.doubt.clone());
-            // A camera that turns about the vertical shows only that axis.
-            let is_hidden = fault == UnitFault::Axes && sway_deg_s > 0.0;
-            assert!(
-                is_hidden || doubt == Some(expected.clone()),
-                "{sway_deg_s}: {}",
-                found.sentence()
-            );
-            assert!(is_hidden || found.vertical.is_none() && found.is_doubted());
-        }
+fn the_range_of_a_sensor_is_told_by_the_rates_that_end_at_it() {
+    let range = |fault| {
+        let unit = StreetUnit { fault, ..StreetUnit::default() };
+        let source = StreetFrames::new(config(60.0, unit)).unwrap();
+        source.info().inertial.as_ref().unwrap().config().turn_range
+    };
+    assert_eq!((range(UnitFault::None), range(UnitFault::Saturated)), (34.0, 0.3));
+}
+
+#[test]
+fn frames_without_samples_are_counted_and_too_few_turns_say_nothing() {
+    let unit = StreetFrames::new(config(0.0, StreetUnit::default())).unwrap();
+    let unit = unit.info().inertial.clone().unwrap();
+    let mut record = UnitRecord::default();
+    for at in 0..5 {
+        let frame = FramePose {
+            time_ns: at * 100_000_000,
+            segment: MapSegment::FIRST,
+            t_world_camera: Transform::IDENTITY,
+            is_measured: true,
+        };
+        let mut report = known();
+        report.samples = u32::from(at % 2 == 0);
+        record.add(&frame, Some(&report));
     }
-    let doubt = |fault| {
-        let (found, _) = street(60.0, |unit| unit.fault = fault);
-        found.agreement.and_then(|found| found.doubt)
-    };
-    assert!(matches!(doubt(UnitFault::Stuck), Some(UnitDoubt::Stuck(share)) if share > 0.5));
-    assert_eq!(doubt(UnitFault::Saturated), Some(UnitDoubt::Saturated(0.3)));
-    assert_eq!(doubt(UnitFault::None), None);
-}
-
-#[test]
-fn gaps_are_counted_and_what_lies_in_them_is_not_compared() {
-    let (found, error_deg) = street(40.0, |unit| unit.gap_s = 0.25);
-    assert_eq!(found.frames_without, 16, "twice in each of eight gaps");
-    assert!((found.longest_gap_s - 0.255).abs() < 1e-9);
-    let agreement = found.agreement.clone().unwrap();
-    assert!(agreement.doubt.is_none() && agreement.intervals < 130, "{}", found.sentence());
-    assert!(error_deg < 0.5, "{error_deg}");
-    assert!(found.sentence().contains("16 frames without (longest gap 0.26 s)"));
-}
-
-#[test]
-fn too_few_frames_say_nothing() {
-    let config = StreetConfig {
-        width: 160,
-        height: 48,
-        frames: 4,
-        inertial: Some(StreetUnit { rate_hz: 100.0, ..StreetUnit::default() }),
-        ..StreetConfig::static_street()
-    };
-    let source = StreetFrames::new(config).unwrap();
-    let unit = source.info().inertial.clone().unwrap();
-    let found = UnitFindings::new(&unit, &[]);
-    assert_eq!((found.agreement, found.vertical, found.frames_without), (None, None, 0));
-}
-
-#[dynvox_needs::clips("kitti-odometry/inertial/r1405.csv")]
-#[test]
-fn a_car_s_own_unit_agrees_with_its_odometry_over_gaps() {
-    let data = std::path::Path::new(dynvox_needs::data_folder!()).join("kitti-odometry");
-    let options = crate::input::OpenOptions {
-        inertial: crate::input::InertialChoice::File(data.join("inertial/r1405.csv")),
-        ..Default::default()
-    };
-    let source = crate::input::open(&data.join("sequences/r1405"), &options).unwrap();
-    let poses = crate::formats::read_poses(&data.join("poses/r1405.vo.txt")).unwrap().poses;
-    let frame = |(at, t_world_camera): (usize, &Transform)| FramePose {
-        time_ns: source.stamp_ns(at).unwrap() as i64,
-        segment: MapSegment::FIRST,
-        t_world_camera: *t_world_camera,
-        is_measured: true,
-    };
-    let frames: Vec<FramePose> = poses.iter().enumerate().map(frame).collect();
-    let found = UnitFindings::new(source.info().inertial.as_deref().unwrap(), &frames);
-    println!("{}", found.sentence());
-    let agreement = found.agreement.clone().unwrap();
-    assert_eq!(agreement.doubt, None, "{}", found.sentence());
-    assert!(agreement.intervals > 60 && found.frames_without > 0, "{}", found.sentence());
-    assert!(agreement.difference_deg < 0.2, "{}", found.sentence());
-    let vertical = found.vertical.unwrap();
-    // The camera is mounted upright on a car on a level street.
-    assert!(vertical.lean_deg() < 3.0 + vertical.sigma_deg, "{}", found.sentence());
+    let found = record.findings(&unit);
+    assert_eq!((found.frames_without, found.agreement, &found.doubt), (2, None, &None));
+    assert!(found.sentence().contains("2 frames without"), "{}", found.sentence());
+    assert!(found.sentence().contains("too few turns"), "{}", found.sentence());
 }

@@ -7,6 +7,8 @@ use dynvox_core::geometry::Transform;
 use dynvox_core::inertial::{InertialSample, InertialUnit};
 use std::path::PathBuf;
 
+/// Share of samples at the largest rate of an axis from which a unit is saturated.
+const SATURATED: f64 = 0.02;
 /// Samples before the first frame that it is given, ns.
 const BEFORE_FIRST_NS: u64 = 1_000_000_000;
 
@@ -78,6 +80,18 @@ impl InertialUnitData {
         self.samples.get(from..position_after(until_ns)).unwrap_or_default()
     }
 
+    /// Largest turn rate of an axis at which many samples end, rad/s: the end of the range of a
+    /// sensor that turns faster.
+    fn saturated_rate(&self) -> Option<f64> {
+        (0..3).find_map(|axis| {
+            let rates = || self.readings.iter().map(|one| one.turn_rate[axis].abs());
+            let largest = rates().fold(0.0, f64::max);
+            let at_end = rates().filter(|rate| *rate == largest).count();
+            let is_saturated = at_end as f64 > SATURATED * self.readings.len() as f64 && at_end > 4;
+            (is_saturated && largest > 0.0).then_some(largest)
+        })
+    }
+
     /// The unit as the mapper's configuration has it. The clock's offset is in the samples' times.
     pub fn config(&self) -> InertialUnit {
         let usual = InertialUnit::new(self.t_camera_unit);
@@ -87,6 +101,7 @@ impl InertialUnitData {
         InertialUnit {
             turn_density: known(self.noise.turn_density, usual.turn_density),
             turn_walk: known(self.noise.turn_walk, usual.turn_walk),
+            turn_range: self.saturated_rate().unwrap_or(usual.turn_range),
             ..usual
         }
     }

@@ -6,7 +6,7 @@ use crate::observe::FrameRow;
 use std::borrow::Cow;
 
 /// All tables, in the order of the columns.
-pub(super) static TABLES: [&[FrameColumn]; 6] = [FRAME, POSE, INPUT, MAP, OBJECTS, WORK];
+pub(super) static TABLES: [&[FrameColumn]; 7] = [FRAME, POSE, INERTIAL, INPUT, MAP, OBJECTS, WORK];
 
 type Of = fn(&FrameRow) -> Cell;
 
@@ -33,6 +33,44 @@ static FRAME: &[FrameColumn] = &[
     }),
     column("severity", "", "worst event: info, recovered or map affected", |row| {
         row.severity().name().into()
+    }),
+];
+
+/// The inertial unit; empty without one.
+static INERTIAL: &[FrameColumn] = &[
+    column("inertial_samples", "", "samples of the inertial unit with the frame", |row| {
+        row.report.inertial.map_or(Cell::Unknown, |inertial| inertial.samples.into())
+    }),
+    column("inertial_state", "", "trusted, or the reason not to trust the unit", |row| {
+        row.report.inertial.map_or(Cell::Unknown, |inertial| match inertial.doubt {
+            _ if inertial.trusted => "trusted".into(),
+            Some(doubt) => doubt.name().into(),
+            None => Cell::Unknown,
+        })
+    }),
+    column("inertial_turn_rad", "rad", "turn since the frame before, as the unit says", |row| {
+        let turn = row.report.inertial.and_then(|inertial| inertial.turn_rad);
+        turn.map_or(Cell::Unknown, |[x, y, z]| {
+            Cell::rounded((x * x + y * y + z * z).sqrt().into(), 6)
+        })
+    }),
+    column("inertial_turn_sigma_rad", "rad", "standard deviation of that turn", |row| {
+        let known = row.report.inertial.filter(|inertial| inertial.turn_rad.is_some());
+        known.map_or(Cell::Unknown, |known| Cell::rounded(known.turn_sigma_rad.into(), 6))
+    }),
+    column("inertial_use", "", "turned: a guessed pose; refused: a contradicting one", |row| {
+        row.report.inertial.map_or(Cell::Unknown, |inertial| {
+            match (inertial.turned, inertial.refused) {
+                (_, true) => "refused".into(),
+                (true, _) => "turned".into(),
+                _ => Cell::Unknown,
+            }
+        })
+    }),
+    column("inertial_clock_offset_s", "s", "time added to the samples' times", |row| {
+        row.report
+            .inertial
+            .map_or(Cell::Unknown, |inertial| Cell::rounded(inertial.clock_offset_s.into(), 5))
     }),
 ];
 
