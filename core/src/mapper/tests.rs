@@ -3,6 +3,7 @@
 mod errors;
 mod ignored;
 mod inertial;
+mod inertial_rides;
 mod loops;
 mod lost;
 mod mutations;

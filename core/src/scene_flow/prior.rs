@@ -67,8 +67,8 @@ impl<'s> Prior<'s> {
     }
 
     /// Returns the flow that is expected of the frame.
-    pub(super) fn turn(&self) -> TurnFlow {
-        self.turn.first().copied().unwrap_or_default()
+    pub(super) fn turn(&self) -> &TurnFlow {
+        self.turn.first().unwrap_or(&TurnFlow::NONE)
     }
 
     /// Returns the widest reach of the search for partners of a previous-left feature.
@@ -113,12 +113,11 @@ impl<'s> Prior<'s> {
             }
         }
         // Each bin's reach is widened, and never beyond what the configuration allows.
-        let turn = self.turn();
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let near = self.near(column, row);
                 let middle = [column, row].map(|bin| (bin * BIN_PX + BIN_PX / 2) as f32);
-                let widest = Self::widest(config, &turn, middle);
+                let widest = Self::widest(config, self.turn(), middle);
                 if let Some(reach) = self.reach.get_mut(row * self.columns + column) {
                     *reach = Reach {
                         to_previous_right: widened(

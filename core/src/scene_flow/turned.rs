@@ -20,6 +20,9 @@ pub(super) struct TurnFlow {
 }
 
 impl TurnFlow {
+    /// Flow of a camera that does not turn, or of which nothing is known.
+    pub(super) const NONE: Self = Self { rows: [[0.0; 3]; 3] };
+
     /// Flow of a camera that turns by the rotation of `t_before_now`.
     pub(super) fn new(rig: &StereoRig, t_before_now: &Transform) -> Self {
         let (focal_px, u, v) = (rig.focal_px, rig.center_u_px, rig.center_v_px);

@@ -6,9 +6,11 @@
 use super::at_10_hz;
 use crate::egomotion::{Egomotion, EgomotionConfig, Estimator, MotionStatus};
 use crate::{
-    geometry::StereoRig,
+    Config, Mapper, StereoFrame,
+    geometry::{StereoRig, Transform},
     image::View,
-    memory::{Capacity, Carver},
+    inertial::{InertialSample, InertialUnit},
+    memory::{Capacity, Carver, SLAB_ALIGN},
     parallel::Serial,
     scene_flow::{FlowMatcher, SceneFlowConfig},
 };
@@ -228,4 +230,90 @@ fn tracks_a_residential_street() {
             && errors.rotation_deg_per_m <= 0.01
             && errors.frame_rms_m <= 0.0075
     );
+}
+
+/// Maps the clip with its own unit or without; prints what is known of the unit at the end.
+fn mapped(name: &str, with_unit: bool) -> Vec<Matrix4<f64>> {
+    let folder = root().join("sequences").join(name);
+    let rig = rig(&folder.join("calib.txt"));
+    let unit = numbers(&root().join("inertial/imu_to_camera0.txt"));
+    let rows = [0, 4, 8].map(|at| [unit[at], unit[at + 1], unit[at + 2]]);
+    let t_camera_unit =
+        Transform::from_rotation_matrix(&rows, [unit[3], unit[7], unit[11]]).normalized();
+    let config = Config {
+        inertial: with_unit.then(|| InertialUnit::new(t_camera_unit)),
+        ..Config::for_rig(rig)
+    };
+    // Times of frames and samples, from a moment that leaves space before the first frame.
+    let stamp_ns = |time_s: f64| ((10.0 + time_s) * 1e9).round() as u64;
+    let table = fs::read_to_string(root().join("inertial").join(format!("{name}.csv"))).unwrap();
+    let lines = table.lines().filter(|line| !line.starts_with(['#', 't']));
+    let samples: Vec<InertialSample> = lines
+        .map(|line| {
+            let values: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
+            InertialSample {
+                time_ns: stamp_ns(values[0]),
+                turn_rate: [values[1], values[2], values[3]],
+                force: [values[4], values[5], values[6]],
+            }
+        })
+        .collect();
+    let times = numbers(&folder.join("times.txt"));
+    let capacity = Capacity::ONBOARD;
+    let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
+    let start = slab.as_ptr().align_offset(SLAB_ALIGN);
+    let mut mapper = Mapper::new(&capacity, &config, &mut slab[start..]).unwrap();
+    let (mut trajectory, mut before_ns, mut refused) = (Vec::new(), 0, 0);
+    for (frame, time_s) in times.iter().enumerate() {
+        let (Some(left), Some(right)) =
+            (grey(&folder.join("image_0"), frame), grey(&folder.join("image_1"), frame))
+        else {
+            break;
+        };
+        let (width, height) = (left.1, left.2);
+        let no_depth = vec![0u16; width * height];
+        let time_ns = stamp_ns(*time_s);
+        let since: Vec<InertialSample> = samples
+            .iter()
+            .filter(|sample| sample.time_ns > before_ns && sample.time_ns <= time_ns)
+            .copied()
+            .collect();
+        before_ns = time_ns;
+        let frame = StereoFrame {
+            disparity_q8: View::new(&no_depth, width, height),
+            inertial: &since,
+            time_ns: Some(time_ns),
+            ..StereoFrame::pair(
+                View::new(&left.0, width, height).unwrap(),
+                View::new(&right.0, width, height).unwrap(),
+            )
+        };
+        let report = mapper.step(&frame, &Serial).unwrap();
+        refused += u32::from(report.inertial.is_some_and(|inertial| inertial.refused));
+        let rows = report.t_world_camera.matrix_3x4();
+        trajectory.push(Matrix4::from_fn(|r, c| {
+            rows.get(r).map_or(f64::from(u8::from(c == 3)), |row| row[c])
+        }));
+        if with_unit && trajectory.len() % 16 == 0 {
+            println!("{name} {}: {:?}", trajectory.len(), report.inertial);
+        }
+    }
+    assert!(trajectory.len() > 1, "{name} has images");
+    assert_eq!(refused, 0, "no turn of the images is refused");
+    trajectory
+}
+
+#[dynvox_needs::clips(
+    "kitti-odometry/sequences/r1405",
+    "kitti-odometry/poses/r1405.txt",
+    "kitti-odometry/inertial/r1405.csv"
+)]
+#[test]
+fn a_car_s_own_unit_with_gaps_makes_no_pose_worse() {
+    let truth = truth("r1405.txt");
+    let [without, with] = [false, true].map(|unit| relative_errors(&truth, &mapped("r1405", unit)));
+    print_errors("r1405 without its unit", &without);
+    print_errors("r1405 with its unit", &with);
+    assert!(with.translation_percent <= 1.001 * without.translation_percent);
+    assert!(with.frame_rms_deg <= 1.001 * without.frame_rms_deg);
 }

@@ -47,7 +47,7 @@ impl FlowMatcher<'_> {
         };
         // Nothing is known of the motion yet but a turn: search everywhere around it.
         let turn = self.prior.turn();
-        let widest = |at: [u16; 2]| Prior::widest(config, &turn, at.map(f32::from));
+        let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
         corners.trace(widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
@@ -55,7 +55,7 @@ impl FlowMatcher<'_> {
         // A match that moves like no neighbour is an outlier.
         let shape = Shape::new(width, height, SPARSE_CELL_PX);
         let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
-        let rule = SupportRule { support_min: config.support_min, turn: &turn };
+        let rule = SupportRule { support_min: config.support_min, turn };
         support(matches, shape, &rule, memory, self.supported);
         let supported = matches
             .iter()
@@ -89,7 +89,7 @@ impl FlowMatcher<'_> {
         };
         // A bin that learned nothing is searched everywhere.
         let (prior, turn) = (&self.prior, self.prior.turn());
-        let widest = |at: [u16; 2]| Prior::widest(config, &turn, at.map(f32::from));
+        let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
         let reach = |at: [u16; 2]| prior.reach(at).unwrap_or_else(|| widest(at));
         corners.trace(reach, self.traced, executor);
         // More circles than the buffer holds are dropped and counted.
@@ -98,7 +98,7 @@ impl FlowMatcher<'_> {
         let matches = clipped(self.refined, ..stored);
         let shape = Shape::new(width, height, CELL_MIN_PX);
         let memory = SortedMotions { cells: &mut self.cells, motion: self.motion };
-        let rule = SupportRule { support_min: config.support_min, turn: &turn };
+        let rule = SupportRule { support_min: config.support_min, turn };
         support(matches, shape, &rule, memory, self.supported);
         let supported =
             self.supported.iter().take(stored).filter(|&&supported| supported == 1).count();
