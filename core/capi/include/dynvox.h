@@ -110,6 +110,25 @@ typedef enum {
   DYNVOX_POSE_ORIGIN_RELOCALIZED,
 } DynvoxPoseOrigin;
 
+// Reason why the inertial unit is not used.
+typedef enum {
+  // No reason is known.
+  DYNVOX_INERTIAL_DOUBT_NONE = 0,
+  // Turns contradict those of the images, for no reason that was found.
+  DYNVOX_INERTIAL_DOUBT_CONTRADICTS,
+  // Turns are as large as those of the images, about other axes.
+  DYNVOX_INERTIAL_DOUBT_WRONG_AXES,
+  // Turn rates seem to be in degrees per second.
+  DYNVOX_INERTIAL_DOUBT_DEGREES,
+  // Samples repeat.
+  DYNVOX_INERTIAL_DOUBT_STUCK,
+  // Samples lie at the end of the sensor's range.
+  DYNVOX_INERTIAL_DOUBT_SATURATED,
+  // Samples lie more than a second from the frames, or the clocks differ by more than can be
+  // corrected.
+  DYNVOX_INERTIAL_DOUBT_CLOCKS_APART,
+} DynvoxInertialDoubt;
+
 // Motion state of a track.
 typedef enum {
   // Not known yet.
@@ -132,6 +151,37 @@ typedef enum {
 
 // A mapper; only ever behind a pointer.
 typedef struct DynvoxMapper DynvoxMapper;
+
+// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
+// Camera axes: x right, y down, z forward.
+typedef struct {
+  // w, x, y, z.
+  double rotation[4];
+  // m.
+  double translation_m[3];
+} DynvoxPose;
+
+// Inertial unit that is fixed to the left camera. In a zeroed struct `t_camera_unit` must be set;
+// 0 of any other number takes its default.
+typedef struct {
+  // Unit's axes to those of the rectified left camera.
+  DynvoxPose t_camera_unit;
+  // Seconds to add to the samples' times so that they are on the camera's clock, -1 to 1; what
+  // remains is found from the turns.
+  double clock_offset_s;
+  // Noise density of turn rates, rad/s/sqrt(Hz); 0.001 by default.
+  double turn_density;
+  // Bias of turn rates that the unit may begin with, one sigma, rad/s; 0.1 by default.
+  double turn_bias_sigma;
+  // Random walk of that bias, rad/s2/sqrt(Hz); 0.0001 by default.
+  double turn_walk;
+  // Constant error of the specific force, one sigma, m/s2; 0.03 by default.
+  double force_bias_sigma;
+  // Largest turn rate that an axis can show, rad/s; 34 by default.
+  double turn_range;
+  // Largest specific force that an axis can show, m/s2; 150 by default.
+  double force_range;
+} DynvoxInertialUnit;
 
 // Two identical pinhole cameras, rectified.
 typedef struct {
@@ -190,6 +240,8 @@ typedef struct {
   DynvoxRig rig;
   // Raw cameras, if dynvox_config_raw named them.
   DynvoxRawRig raw;
+  // Inertial unit, if dynvox_config_inertial named one.
+  DynvoxInertialUnit inertial;
   // Bytes of `settings` in use.
   size_t settings_len;
   // Lines `key=value`, in the order they were set. Written by dynvox_config_set.
@@ -299,14 +351,16 @@ typedef struct {
   const uint8_t *mask;
 } DynvoxDetection;
 
-// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
-// Camera axes: x right, y down, z forward.
+// Turn rate and specific force at one time, in the unit's own axes.
 typedef struct {
-  // w, x, y, z.
-  double rotation[4];
-  // m.
-  double translation_m[3];
-} DynvoxPose;
+  // Time, ns, on the clock of the frames' times.
+  uint64_t time_ns;
+  // Turn rates about the unit's axes, rad/s.
+  double turn_rate[3];
+  // Specific force along the unit's axes, m/s2, gravity included: a unit at rest shows 9.8 along
+  // the axis that points up.
+  double force[3];
+} DynvoxInertialSample;
 
 // A stereo pair and what is known of it, rectified, or raw where the configuration is
 // dynvox_config_raw's. Everything is read during the call alone.
@@ -333,6 +387,11 @@ typedef struct {
   // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
   // values without padding; null lets the mapper match the pair.
   const uint16_t *disparity_q8;
+  // Samples of the configuration's inertial unit since the frame before, in order of time; at
+  // most 1,024 are read. Null without samples; they need `time_ns`.
+  const DynvoxInertialSample *inertial;
+  // Number of samples.
+  size_t inertial_count;
 } DynvoxFrame;
 
 // An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
@@ -376,6 +435,36 @@ typedef struct {
   bool (*load)(void *context, const DynvoxLoadedBlock *block);
 } DynvoxStore;
 
+// Use of the inertial unit in a step, and what is known of it. All 0 without a unit.
+typedef struct {
+  // Samples that came with the frame.
+  uint32_t samples;
+  // Samples that were not read: beyond 1,024, not finite, or not later than those before.
+  uint32_t ignored;
+  // Gaps between samples that were bridged.
+  uint32_t bridged;
+  // True if the unit is trusted: its turns agree with those that images show.
+  bool trusted;
+  // Reason not to use it.
+  DynvoxInertialDoubt doubt;
+  // True if a pose that images did not give was turned by it.
+  bool turned;
+  // True if a turn that images showed was refused: it contradicts the unit's.
+  bool refused;
+  // Bias of the turn rates, rad/s.
+  float turn_bias[3];
+  // Standard deviation of the least known bias, rad/s.
+  float turn_bias_sigma;
+  // Seconds to add to the samples' times.
+  float clock_offset_s;
+  // Standard deviation of the offset, s: large until the camera changed its turn.
+  float clock_offset_sigma_s;
+  // Unit vector that points up, in the world of `t_world_camera`; zeros while it is unknown.
+  float up_world[3];
+  // Standard deviation of its angle, rad.
+  float up_sigma_rad;
+} DynvoxInertialReport;
+
 // Report of one step.
 typedef struct {
   // Number of the frame, from 0.
@@ -418,6 +507,8 @@ typedef struct {
   // Digest of all that came of the step: the same frames and configuration give the same number
   // everywhere.
   uint64_t digest;
+  // The inertial unit.
+  DynvoxInertialReport inertial;
 } DynvoxReport;
 
 // An object that leaves. Valid during the call.
@@ -645,6 +736,14 @@ extern "C" {
 
 // A sentence for a status, in static memory; "no such status" for another number.
 const char *dynvox_status_text(uint32_t status);
+
+// Adds an inertial unit to a configuration, whose frames then bring its samples. A unit that
+// cannot be used is DYNVOX_STATUS_POSE or DYNVOX_STATUS_CONFIG.
+//
+// # Safety
+// `unit` is null or points to a unit, `config` is null or points to a configuration from
+// dynvox_config_default or dynvox_config_raw.
+DynvoxStatus dynvox_config_inertial(const DynvoxInertialUnit *unit, DynvoxConfig *config);
 
 // Writes all defaults for a rig.
 //

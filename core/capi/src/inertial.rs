@@ -52,6 +52,7 @@ impl DynvoxInertialUnit {
         if self.t_camera_unit.rotation == [0.0; 4] {
             return Ok(None);
         }
+        // A caller who knows only where the unit sits gets a unit of the common kind.
         let known = InertialUnit::new(self.t_camera_unit.transform()?);
         let or = |given: f64, default: f64| if given == 0.0 { default } else { given };
         let unit = InertialUnit {
@@ -64,6 +65,7 @@ impl DynvoxInertialUnit {
             force_range: or(self.force_range, known.force_range),
             ..known
         };
+        // Checked now, because a mapper that is made later cannot say which number was wrong.
         let mut problems = Problems::new();
         unit.validate(&mut problems);
         if problems.is_empty() { Ok(Some(unit)) } else { Err(DynvoxStatus::Config) }
@@ -192,6 +194,7 @@ pub struct DynvoxInertialReport {
 impl From<&Report> for DynvoxInertialReport {
     fn from(report: &Report) -> Self {
         use DynvoxInertialDoubt as Doubt;
+        // Zeros tell the same as no unit: C has no options.
         let inertial = report.inertial.unwrap_or_default();
         let vertical = inertial.vertical.unwrap_or_default();
         Self {
@@ -206,6 +209,7 @@ impl From<&Report> for DynvoxInertialReport {
                 Some(InertialDoubt::Stuck) => Doubt::Stuck,
                 Some(InertialDoubt::Saturated) => Doubt::Saturated,
                 Some(InertialDoubt::ClocksApart) => Doubt::ClocksApart,
+                // A doubt that a later core adds is a contradiction to older callers.
                 Some(_) => Doubt::Contradicts,
             },
             turned: inertial.turned,

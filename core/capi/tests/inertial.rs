@@ -40,6 +40,7 @@ fn at_rest(frame: u64, count: usize) -> Vec<DynvoxInertialSample> {
 /// Reports of a camera that stands, with `count` samples of each frame.
 fn standing(config: &DynvoxConfig, count: usize) -> Vec<DynvoxReport> {
     let mut buffer = Buffer::new();
+    // The pair repeats, as of a camera that stands.
     let mapper = create(&mut buffer, config).unwrap();
     let (left, mut right) = (pixels(), pixels());
     right.rotate_left(8);

@@ -20,7 +20,7 @@ pub(super) struct TurnFlow {
 }
 
 impl TurnFlow {
-    /// Flow of a camera that does not turn, or of which nothing is known.
+    /// Flow of a camera that does not turn, or may turn anyhow.
     pub(super) const NONE: Self = Self { rows: [[0.0; 3]; 3] };
 
     /// Flow of a camera that turns by the rotation of `t_before_now`.

@@ -90,6 +90,7 @@ pub fn given(value: &Bound<'_, PyAny>) -> PyResult<Vec<InertialSample>> {
     if !is_empty && !matches!(kind.as_str(), "i" | "u") {
         return Err(refused("has times that are no integers"));
     }
+    // Signed, so that a time below 0 is seen and does not wrap.
     let times: PyReadonlyArray1<'_, i64> = times
         .call_method1("astype", ("int64",))?
         .extract()

@@ -258,6 +258,7 @@ fn mapped(name: &str, with_unit: bool) -> Vec<Matrix4<f64>> {
             }
         })
         .collect();
+    // Depth costs time and tells nothing of the motion.
     let times = numbers(&folder.join("times.txt"));
     let capacity = Capacity::ONBOARD;
     let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];

@@ -135,6 +135,7 @@ fn ride_with(path: Path, images: &[[Vec<u8>; 2]], fault: Option<Fault>) -> Outco
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut mapper = Mapper::new(&CAPACITY, &config, &mut slab[start..]).unwrap();
     let (black, no_depth) = (vec![0; WIDTH * HEIGHT], vec![0; WIDTH * HEIGHT]);
+    // All rides see the same images, so that only the unit differs.
     let mut reports = Vec::new();
     for (at, pair) in images.iter().enumerate() {
         let is_black = BLACK.iter().any(|black| black.contains(&at));
@@ -150,7 +151,7 @@ fn ride_with(path: Path, images: &[[Vec<u8>; 2]], fault: Option<Fault>) -> Outco
         };
         reports.push(mapper.step(&frame, &Serial).unwrap());
     }
-    judged(path, &reports)
+    evaluated(path, &reports)
 }
 
 /// Error of the motion between two frames, m and degrees.
@@ -161,9 +162,10 @@ fn error(path: Path, reports: &[Report], from: usize, to: usize) -> [f64; 2] {
     [off.distance_m(), off.angle_rad().to_degrees()]
 }
 
-fn judged(path: Path, reports: &[Report]) -> Outcome {
+fn evaluated(path: Path, reports: &[Report]) -> Outcome {
     let is_black = |at: usize| BLACK.iter().any(|black| black.contains(&at));
     let is_guess = |at: usize| reports[at].pose == PoseOrigin::Extrapolated;
+    // A guess says nothing of what the images tell, at either end.
     let measured: Vec<[f64; 2]> = (1..reports.len())
         .filter(|&at| {
             !is_guess(at) && !is_guess(at - 1) && reports[at].segment == reports[at - 1].segment
@@ -175,6 +177,7 @@ fn judged(path: Path, reports: &[Report]) -> Outcome {
             / measured.len() as f64)
             .sqrt()
     };
+    // Five seconds are what the vertical may take.
     let vertical = reports[50..].iter().filter_map(|report| {
         let vertical = report.inertial?.vertical?;
         let up = Vector3::from(vertical.up_world.map(f64::from));
@@ -231,6 +234,7 @@ fn a_fault_of_the_unit_is_corrected_or_named_and_costs_nothing() {
         };
         assert_eq!(with.doubt, expected, "{fault:?}");
         assert!(with.lost <= without.lost && with.wrong <= without.wrong, "{fault:?}");
+        // Two in a hundred are what chance makes of other draws.
         let [way_m, turn_deg] = without.steps;
         let [way_with_m, turn_with_deg] = with.steps;
         assert!(way_with_m <= 1.02 * way_m && turn_with_deg <= 1.02 * turn_deg, "{fault:?}");

@@ -71,8 +71,10 @@ pub(super) fn doubt(known: Option<InertialDoubt>, turns: &[RawTurn]) -> Option<U
         Some(InertialDoubt::Saturated) => return Some(UnitDoubt::Saturated),
         _ => {}
     }
+    // The mapper saw each turn by itself; all of them together tell axes apart.
     let turn = mean_square(turns.iter().map(|turn| turn.camera)).sqrt();
     let axes = (turn > LEAST_TURN_RAD).then(|| better_axes(turns)).flatten();
+    // Axes explain a contradiction better than a clock does.
     match (axes, known) {
         (Some(fit), _) => Some(UnitDoubt::Axes { fit }),
         (None, Some(InertialDoubt::ClocksApart)) => Some(UnitDoubt::ClocksApart),

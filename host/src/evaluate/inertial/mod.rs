@@ -142,6 +142,7 @@ impl UnitRecord {
             .iter()
             .map(|turn| [in_unit(turn.predicted), in_unit(turn.measured)])
             .collect();
+        // A few turns may agree or disagree by chance.
         let is_enough = pairs.len() >= LEAST;
         let agreement = is_enough.then(|| TurnAgreement {
             intervals: pairs.len(),
@@ -189,6 +190,7 @@ impl UnitFindings {
     pub fn clock_ms(&self) -> Option<[f64; 2]> {
         let [offset_s, sigma_s] =
             [self.last.clock_offset_s, self.last.clock_offset_sigma_s].map(f64::from);
+        // A large offset is worth telling even where it is known only roughly.
         let is_known = sigma_s < KNOWN_SIGMA_S || offset_s.abs() > 2.0 * sigma_s;
         (is_known && self.doubt.is_none() && self.agreement.is_some())
             .then_some([-offset_s * 1e3, sigma_s * 1e3])
@@ -208,6 +210,7 @@ impl UnitFindings {
             let gap_s = self.longest_gap_s;
             parts.push(format!("{without} frames without (longest gap {gap_s:.2} s)"));
         }
+        // A doubted unit's bias and clock are of no use to anyone.
         match (&self.doubt, &self.agreement) {
             (Some(doubt), _) => parts.push(doubt.sentence()),
             (None, None) => parts.push("too few turns to compare with the images".to_owned()),

@@ -71,6 +71,7 @@ impl MeshAxes {
         let own = Vector3::new(0.0, -1.0, 0.0);
         let (axis, cosine) = (up.cross(&own), up.dot(&own));
         let angle = axis.norm().atan2(cosine);
+        // Without a turn the header stays as readers of older files know it.
         let is_turned = axes == Axes::Enu && axis.norm() > 1e-9 && angle.is_finite();
         let turn = || Transform::new(axis * (angle / axis.norm()), [0.0; 3]).matrix_3x4();
         let rows = || turn().map(|[x, y, z, _]| [x, y, z].map(|part| part as f32));

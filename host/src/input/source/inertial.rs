@@ -83,6 +83,7 @@ impl InertialUnitData {
     /// Largest turn rate of an axis at which many samples end, rad/s: the end of the range of a
     /// sensor that turns faster.
     fn saturated_rate(&self) -> Option<f64> {
+        // No table says the range, and a mapper that knows it takes no clipped rate for a turn.
         (0..3).find_map(|axis| {
             let rates = || self.readings.iter().map(|one| one.turn_rate[axis].abs());
             let largest = rates().fold(0.0, f64::max);
