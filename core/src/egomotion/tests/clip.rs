@@ -304,11 +304,7 @@ fn mapped(name: &str, with_unit: bool) -> Vec<Matrix4<f64>> {
     trajectory
 }
 
-#[dynvox_needs::clips(
-    "kitti-odometry/sequences/r1405",
-    "kitti-odometry/poses/r1405.txt",
-    "kitti-odometry/inertial/r1405.csv"
-)]
+// Long, and needs the clip with its unit: two attributes that ignore a test do not stand together.
 #[dynvox_needs::long]
 #[test]
 fn a_car_s_own_unit_with_gaps_makes_no_pose_worse() {
