@@ -236,7 +236,13 @@ fn tracks_a_residential_street() {
 fn mapped(name: &str, with_unit: bool) -> Vec<Matrix4<f64>> {
     let folder = root().join("sequences").join(name);
     let rig = rig(&folder.join("calib.txt"));
-    let unit = numbers(&root().join("inertial/imu_to_camera0.txt"));
+    // The heading holds a number of its own.
+    let unit: Vec<f64> = fs::read_to_string(root().join("inertial/imu_to_camera0.txt"))
+        .unwrap()
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .flat_map(|line| line.split_whitespace().map(|word| word.parse().unwrap()))
+        .collect();
     let rows = [0, 4, 8].map(|at| [unit[at], unit[at + 1], unit[at + 2]]);
     let t_camera_unit =
         Transform::from_rotation_matrix(&rows, [unit[3], unit[7], unit[11]]).normalized();
