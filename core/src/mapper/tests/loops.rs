@@ -22,27 +22,19 @@ fn step(mapper: &mut Mapper<'_>, at: usize) -> Report {
 }
 
 #[test]
-fn a_full_turn_is_recognised_and_changes_no_digest() {
-    let [mut slab, mut plain_slab] =
-        [WITH_PLACES, CAPACITY].map(|capacity| vec![0u8; capacity.bytes() + SLAB_ALIGN]);
+fn a_full_turn_is_recognised() {
+    let mut slab = vec![0u8; WITH_PLACES.bytes() + SLAB_ALIGN];
     let mut mapper = Mapper::new(&WITH_PLACES, &Walk::config(), &mut slab).unwrap();
-    let mut plain = Mapper::new(&CAPACITY, &Walk::config(), &mut plain_slab).unwrap();
-    let mut driven = Vec::new();
+    let mut moved = 0;
     for at in 0..FRAMES {
-        let pair = see(&turning(at));
-        let [left, right] = pair.each_ref().map(|pixels| View::new(pixels, WIDTH, HEIGHT).unwrap());
-        let frame = StereoFrame::pair(left, right);
-        let reports = [&mut mapper, &mut plain].map(|m| m.step(&frame, &Serial).unwrap());
-        assert_eq!(reports[0].digest, reports[1].digest, "frame {at}");
-        driven.push(reports[0]);
+        moved += u32::from(step(&mut mapper, at).world_moved);
         if at == TURN / 2 {
             assert_eq!(mapper.loops(), LoopCounts::default(), "nothing was seen before");
         }
     }
     let counts = mapper.loops();
     assert!(counts.closures > 0 && counts.refused + counts.taken_out == 0, "{counts:?}");
-    let moved = driven.iter().filter(|report| report.world_moved).count();
-    assert_eq!(moved, counts.moved as usize, "{counts:?}");
+    assert_eq!(moved, counts.moved, "{counts:?}");
 }
 
 #[test]
