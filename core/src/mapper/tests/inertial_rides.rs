@@ -213,13 +213,11 @@ fn fast_turns_and_dark_frames_cost_little_with_a_unit() {
         println!("{name}\n  without {without:?}\n  with {with:?}");
         assert!(5 * with.lost <= without.lost, "{name}: lost {} {}", with.lost, without.lost);
         assert_eq!(with.wrong, 0, "{name}");
-        for ((off, deg), (off_without, deg_without)) in with
-            .gaps
-            .iter()
-            .map(|gap| (gap[0], gap[1]))
-            .zip(without.gaps.iter().map(|gap| (gap[0], gap[1])))
-        {
-            assert!(off <= 0.3 * off_without && deg <= 0.3 * deg_without, "{name}: {off} {deg}");
+        // Over all gaps: in one of them a guess without the unit may be right by chance.
+        for side in 0..2 {
+            let sum = |ride: &Outcome| ride.gaps.iter().map(|gap| gap[side]).sum::<f64>();
+            let (off, off_without) = (sum(&with), sum(&without));
+            assert!(off <= 0.3 * off_without, "{name}: {off} {off_without}");
         }
         assert!(with.vertical[0] < 0.3 && with.vertical[1] < 2.0, "{name}: {:?}", with.vertical);
     }
