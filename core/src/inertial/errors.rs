@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 /// Offset of the clock before any turn was compared, one sigma, s.
 const OFFSET_SIGMA_S: f64 = 0.03;
 /// Largest offset that is corrected, s: farther apart, no turn can be compared.
-pub(super) const OFFSET_MAX_S: f64 = 0.1;
+pub(super) const OFFSET_MAX_S: f64 = 0.15;
 /// Largest bias that is corrected, rad/s.
 const BIAS_MAX: f64 = 0.5;
 /// Change of the offset, s per square root of a second: quartz clocks drift by some 10 ppm.

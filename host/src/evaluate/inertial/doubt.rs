@@ -47,7 +47,7 @@ impl UnitDoubt {
             Self::Saturated => "its turn rates end at the end of its range, and the camera turns \
                                 faster: choose a wider range of the sensor"
                 .to_owned(),
-            Self::ClocksApart => "its clock differs from the cameras' by more than 0.1 s: align \
+            Self::ClocksApart => "its clock differs from the cameras' by more than 0.15 s: align \
                                   them, or give timeshift_cam_imu in --inertial-calibration"
                 .to_owned(),
             Self::Disagrees => "its turns are not those of the images: check that samples, clock \
