@@ -234,6 +234,8 @@ mod tests {
         let (rows, text) = (rows().unwrap(), Settings::resolve(None, &[]).unwrap());
         let table = text.to_toml(Worlds::ALL).unwrap().parse().unwrap();
         for (key, value) in leaves("", &table) {
+            // Errors of a room's rig have the street's keys, and one row names them.
+            let key = key.replace("room.rig_error.", "street.rig_error.");
             let found = rows.iter().filter(|row| row.about.key == key).count();
             assert_eq!(found, 1, "{key} = {value} has a row");
         }
@@ -249,8 +251,10 @@ mod tests {
     }
 
     #[test]
-    fn there_are_at_most_158_settings_and_some_60_are_for_users() {
-        let rows = rows().unwrap();
+    fn there_are_at_most_158_settings_without_rooms_and_some_60_for_users() {
+        // The second synthetic world says what it shows, and nothing of how it is mapped.
+        let rows: Vec<_> = rows().unwrap();
+        let rows: Vec<_> = rows.iter().filter(|row| !row.about.key.starts_with("room.")).collect();
         let users = rows.iter().filter(|row| row.about.tier == Tier::User).count();
         assert!(rows.len() <= 158 && (50..=70).contains(&users), "{} and {users}", rows.len());
     }

@@ -135,7 +135,7 @@ fn a_tracker_finds_as_little_motion_in_rooms_and_yards() {
         let shares = shares(&room, [0, 1]);
         let [low, middle, high] = [1, 2, 3].map(|part| shares[part * shares.len() / 4]);
         println!("{kind:?}, {} windows: {low:.2}, {middle:.2}, {high:.2}", shares.len());
-        assert!(shares.len() > 100, "{kind:?}: {} windows", shares.len());
+        assert!(shares.len() > 40, "{kind:?}: {} windows", shares.len());
         assert!((0.9..1.2).contains(&middle), "{kind:?}: half of the windows find {middle}");
         assert!(high - low < 0.3, "{kind:?}: quarters find {low} and {high}");
     }
