@@ -97,8 +97,8 @@ fn a_unit_that_cannot_be_used_is_refused() {
         dynvox_config_inertial(unit, config)
     };
     assert_eq!(add(ptr::null(), &raw mut config), DynvoxStatus::Null);
-    let unit = unit();
-    assert_eq!(add(&raw const unit, ptr::null_mut()), DynvoxStatus::Null);
+    let sound = unit();
+    assert_eq!(add(&raw const sound, ptr::null_mut()), DynvoxStatus::Null);
     let refused = |change: fn(&mut DynvoxInertialUnit)| {
         let mut unit = unit();
         change(&mut unit);

@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_at_most_158_settings_without_rooms_and_some_60_for_users() {
+    fn there_are_at_most_158_settings_but_for_the_room_and_some_60_for_users() {
         // The second synthetic world says what it shows, and nothing of how it is mapped.
         let rows: Vec<_> = rows().unwrap();
         let rows: Vec<_> = rows.iter().filter(|row| !row.about.key.starts_with("room.")).collect();
