@@ -125,7 +125,7 @@ mod tests {
     use dynvox_core::geometry::{StereoRig, Transform};
     use dynvox_core::image::View;
     use dynvox_core::view::Triangle;
-    use dynvox_core::volume::{DepthImage, NoStore, Observation, Viewpoint};
+    use dynvox_core::volume::{DepthImage, NoStore, Observation, PruneBy, Viewpoint};
 
     const WIDTH: usize = 96;
     const HEIGHT: usize = 64;
@@ -134,7 +134,8 @@ mod tests {
     /// use.
     fn with_volume(colour: bool, test: impl FnOnce(&Volume<'_>)) {
         let capacity = Capacity { blocks: 500, colour, ..Capacity::TINY };
-        let config = VolumeConfig { truncation_m: 0.2, ..VolumeConfig::default() };
+        let prune_rule = PruneBy::Weight;
+        let config = VolumeConfig { truncation_m: 0.2, prune_rule, ..VolumeConfig::default() };
         let bytes = Volume::bytes(&capacity);
         let mut slab = HostSlab::map(bytes).unwrap();
         let mut volume =

@@ -168,10 +168,26 @@ impl<'s> Mapper<'s> {
     #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
         Self::check(capacity, config, slab)?;
-        let mut carver = Carver::new(slab, capacity.bytes())?;
-        let mut mapper = Self::new_in(capacity, config, &mut carver);
-        mapper.prepare(config, &mut carver)?;
-        Ok(mapper)
+        Self::prepared_in(capacity, config, Carver::new(slab, capacity.bytes())?)
+    }
+
+    /// Makes a mapper where its caller wants it: one place is written and returned, so that none is
+    /// moved over the stack.
+    #[inline(never)]
+    fn prepared_in(
+        capacity: &Capacity,
+        config: &Config,
+        mut carver: Carver<'s>,
+    ) -> Result<Self, NewError> {
+        let mut made = Ok(Self::new_in(capacity, config, &mut carver));
+        let prepared = match &mut made {
+            Ok(mapper) => mapper.prepare(config, &mut carver),
+            Err(_) => Ok(()),
+        };
+        if let Err(error) = prepared {
+            made = Err(error);
+        }
+        made
     }
 
     /// Makes a mapper like [`Mapper::new`], in `slot`: what it holds is dropped first, and it is

@@ -89,11 +89,14 @@ fn budget_shows_every_profile_and_the_regions_sum_to_the_slab() {
     let tiny =
         String::from_utf8(dynvox(root.path(), &["budget", "--profile", "tiny"]).stdout).unwrap();
     let bytes = |line: &str| -> u64 {
-        line.split_whitespace().nth_back(2).unwrap().replace(',', "").parse().unwrap()
+        let number = line.split_whitespace().find(|word| word.contains(','));
+        number.or(line.split_whitespace().nth(1)).unwrap().replace(',', "").parse().unwrap()
     };
     let lines: Vec<&str> = tiny.lines().skip(1).collect();
-    let (slab, regions) = lines.split_last().unwrap();
+    // The slab, and how much of it belongs into fast and how much into large memory.
+    let (regions, [slab, fast, large]) = lines.split_last_chunk().unwrap();
     assert_eq!(regions.iter().map(|line| bytes(line)).sum::<u64>(), bytes(slab));
+    assert_eq!(bytes(fast) + bytes(large), bytes(slab));
     assert_eq!(bytes(slab), dynvox_core::Capacity::TINY.bytes() as u64);
 }
 
