@@ -25,7 +25,7 @@ fn a_run_sends_directions_and_points_to_an_autopilot() {
     socket.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     let address = format!("udp:{}", socket.local_addr().unwrap());
     let run = |more: &[&str]| {
-        let args = "run --profile small --frames 4 --out result --overwrite --planning 60x60x12 \
+        let args = "run --profile small --frames 4 --out result --overwrite --planning 240x240x16 \
                     --set street.width=320 --set street.height=96 --mavlink";
         let args: Vec<&str> =
             args.split_whitespace().chain([address.as_str()]).chain(more.iter().copied()).collect();
