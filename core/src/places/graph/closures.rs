@@ -76,18 +76,16 @@ impl Graph<'_> {
         self.closed_at_depths = self.way_depths();
         let is_last = |closure: &Closure| closure.to == to as u32;
         let is_known = self.closures.iter().take(self.closure_len).any(is_last);
-        if self.way.is_loose
-            || is_known
-            || self.used(recognized.slot).is_none()
-            || recognized.slot == to
+        let Some(way) = self.way.as_deref() else { return false };
+        if way.is_loose || is_known || self.used(recognized.slot).is_none() || recognized.slot == to
         {
             return false;
         }
         // The place was seen from the camera now; the closure is of the keyframe before it.
-        let t_from_to = (recognized.t_keyframe_camera * self.way.t_camera_node).normalized();
+        let t_from_to = (recognized.t_keyframe_camera * way.t_camera_node).normalized();
         let own = isotropic(CLOSURE_RAD, CLOSURE_DEPTH_SHARE * recognized.depth_m);
         let seen = recognized.covariance.unwrap_or(&MotionCovariance::ZERO);
-        let covariance = own.after(seen, &self.way.t_camera_node.inverse());
+        let covariance = own.after(seen, &way.t_camera_node.inverse());
         let (from, to) = (recognized.slot as u32, to as u32);
         let closure = Closure { t_from_to, covariance, from, to, weight: 1.0 };
         if !self.may_drift_so_far(slots, &closure, recognized.depth_m) {
@@ -248,9 +246,10 @@ impl Graph<'_> {
         let from =
             self.used(recognized.slot).map_or(recognized.t_world_keyframe, |node| node.corrected);
         let newest = slots.clone().rev().find_map(|slot| self.used(slot));
-        let Some(newest) = newest.filter(|_| !self.way.is_loose) else { return };
+        let Some(way) = self.way.as_deref().filter(|way| !way.is_loose) else { return };
+        let Some(newest) = newest else { return };
         // The newest keyframe comes to be where the place says.
-        let joined = from * recognized.t_keyframe_camera * self.way.t_camera_node;
+        let joined = from * recognized.t_keyframe_camera * way.t_camera_node;
         let t_new_old = joined * newest.corrected.inverse();
         // Back to the keyframe before which the camera was lost.
         for slot in slots.rev() {

@@ -96,6 +96,10 @@ struct ChainSum {
     error: Twist,
 }
 
+/// Bytes of the slab for the way, on machines of any width.
+const WAY_BYTES: usize = 512;
+const _: () = assert!(size_of::<Way>() <= WAY_BYTES);
+
 /// Way of the camera since the last keyframe.
 #[derive(Clone, Copy, Debug)]
 struct Way {
@@ -167,7 +171,8 @@ pub(super) struct Graph<'s> {
     nodes: &'s mut [Node],
     closures: &'s mut [Closure],
     closure_len: usize,
-    way: Way,
+    /// In the slab, since a mapper is moved when it is made; `None` without keyframes.
+    way: Option<&'s mut Way>,
     /// Way up to the newest keyframe and up to the last closure, in depths of the scene.
     node_depths: f64,
     closed_at_depths: f64,
@@ -192,6 +197,13 @@ impl<'s> Graph<'s> {
             + region_bytes::<u32>(keyframes)
             + region_bytes::<f64>(entries(6 * closures))
             + region_bytes::<Twist>(closures)
+            + region_bytes::<u8>(WAY_BYTES)
+    }
+
+    /// Takes the region of the way. Never inlined: what is made lies on the stack until then.
+    #[inline(never)]
+    fn alloc_way(carver: &mut Carver<'s>) -> Option<&'s mut Way> {
+        carver.alloc_value("places.way", WAY_BYTES, Way::NONE)
     }
 
     pub(super) fn new_in(keyframes: usize, carver: &mut Carver<'s>) -> Self {
@@ -200,7 +212,6 @@ impl<'s> Graph<'s> {
             nodes: carver.alloc("places.node", keyframes),
             closures: carver.alloc("places.closure", closures),
             closure_len: 0,
-            way: Way::NONE,
             node_depths: 0.0,
             closed_at_depths: 0.0,
             round: None,
@@ -210,13 +221,14 @@ impl<'s> Graph<'s> {
             positions: carver.alloc("places.chain_position", keyframes),
             matrix: carver.alloc("places.equation", entries(6 * closures)),
             pulls: carver.alloc("places.pull", closures),
+            way: Self::alloc_way(carver),
         }
     }
 
     /// Moves on with the camera.
     #[inline(never)]
     pub(super) fn advance(&mut self, measured: &Measured<'_>) {
-        let way = &mut self.way;
+        let Some(way) = self.way.as_deref_mut() else { return };
         let pose = measured.pose;
         let last = way.last.replace(*pose);
         let Some(last) = last.filter(|last| last.segment == pose.segment) else {
@@ -247,8 +259,9 @@ impl<'s> Graph<'s> {
         let Some(slot) = slots.next() else { return };
         let before = slots.find_map(|slot| self.used(slot));
         let before = before.map(|node| (node.corrected, node.working, node.way_m));
-        let way = self.way;
-        self.way = Way { last: way.last, ..Way::NONE };
+        let Some(kept) = self.way.as_deref_mut() else { return };
+        let way = *kept;
+        *kept = Way { last: way.last, ..Way::NONE };
         let t_before_node = way.t_camera_node.inverse();
         // A way on which the camera was lost counts as well: it leads away from older keyframes.
         self.node_depths += way.length_depths;
@@ -303,7 +316,7 @@ impl<'s> Graph<'s> {
             // A link needs both motions.
             Some(after) => after.link = LOOSE,
             // The newest keyframe never leaves a table of three; the next one begins a chain.
-            None => self.way.is_loose = true,
+            None => self.way.iter_mut().for_each(|way| way.is_loose = true),
         }
         if let Some(node) = self.nodes.get_mut(slot) {
             node.link = UNUSED;
@@ -328,12 +341,12 @@ impl<'s> Graph<'s> {
 
     /// Way of the camera in depths of the scene.
     fn way_depths(&self) -> f64 {
-        self.node_depths + self.way.length_depths
+        self.node_depths + self.way.as_deref().map_or(0.0, |way| way.length_depths)
     }
 
     /// Goes on in another segment, whose pose is known by a place.
     pub(super) fn go_on_at(&mut self, pose: &SegmentPose) {
-        self.way.last = Some(*pose);
+        self.way.iter_mut().for_each(|way| way.last = Some(*pose));
     }
 
     /// Pose of a keyframe after all closures so far, and the number of its frame.
@@ -357,7 +370,7 @@ impl<'s> Graph<'s> {
         for closure in closures.iter_mut().take(*closure_len) {
             closure.visit(len, visitor);
         }
-        way.visit(visitor);
+        way.iter_mut().for_each(|way| way.visit(visitor));
         visitor.option(round, || 0, |visitor, round| visitor.u32(round));
         let mut due = u8::from(*is_due);
         visitor.u8(&mut due);
@@ -370,7 +383,8 @@ impl<'s> Graph<'s> {
     /// Forgets all keyframes.
     pub(super) fn clear(&mut self) {
         self.nodes.iter_mut().for_each(|node| node.link = UNUSED);
-        (self.closure_len, self.way, self.round, self.is_due) = (0, Way::NONE, None, false);
+        (self.closure_len, self.round, self.is_due) = (0, None, false);
+        self.way.iter_mut().for_each(|way| **way = Way::NONE);
         (self.node_depths, self.closed_at_depths) = (0.0, 0.0);
         self.counts = LoopCounts::default();
     }
