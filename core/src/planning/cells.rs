@@ -37,19 +37,6 @@ pub(super) fn seen_surface(bits: u8) -> u8 {
     bits & (OCCUPIED | OBJECT | FREE)
 }
 
-/// The bits of a cell before the map is read anew: a surface that no frame has seen through since
-/// is remembered as [`OBJECT`].
-pub(super) fn before_reading(bits: u8) -> u8 {
-    let is_solid = bits & OCCUPIED != 0 && bits >> THROUGH_SHIFT == 0;
-    bits & !(OCCUPIED | OBJECT) | if is_solid { OBJECT } else { 0 }
-}
-
-/// The bits of a cell after the map was read; `None` where the map has lost the surface, because
-/// its block left or was pruned: the cell is unknown then, however often it was seen free before.
-pub(super) fn after_reading(bits: u8) -> Option<u8> {
-    (bits & (OCCUPIED | OBJECT) != OBJECT).then_some(bits & !OBJECT)
-}
-
 /// Returns true if the map has a surface in the cell that is not believed any more.
 pub(super) fn is_ghost(bits: u8) -> bool {
     bits & OCCUPIED != 0 && bits >> THROUGH_SHIFT >= GHOST_FRAMES

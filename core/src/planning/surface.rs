@@ -12,7 +12,7 @@
 //! bits, so the order does not matter.
 
 use super::{
-    cells::{Cells, OCCUPIED, after_reading, before_reading},
+    cells::{Cells, OBJECT, OCCUPIED},
     grid::{Grid, TURN_BITS},
 };
 use crate::{
@@ -162,7 +162,7 @@ impl Window<'_> {
 
 /// Reads the map's surface into the cells anew. Surface points in the window.
 pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut Cells<'_>) -> u32 {
-    cells.bits.iter_mut().for_each(|bits| *bits = before_reading(*bits));
+    cells.bits.iter_mut().for_each(|bits| *bits &= !(OCCUPIED | OBJECT));
     cells.count.fill(0);
     cells.sum.fill(0);
     let cell = i64::from(grid.cell_voxels) << TURN_BITS;
@@ -185,12 +185,6 @@ pub(super) fn read(volume: &Volume<'_>, grid: &Grid, min_weight: u8, cells: &mut
             crossings(volume, slot, coord, window.min_weight, |crossing| {
                 points += u32::from(mark(&window, &crossing, cells))
             });
-        }
-    }
-    for (bits, observed_at) in cells.bits.iter_mut().zip(cells.observed_at.iter_mut()) {
-        match after_reading(*bits) {
-            Some(read) => *bits = read,
-            None => (*bits, *observed_at) = (0, 0),
         }
     }
     points

@@ -182,31 +182,6 @@ fn an_object_that_left_is_no_obstacle_and_a_thin_pole_stays_one() {
 }
 
 #[test]
-fn an_obstacle_that_the_map_lost_is_unknown_until_it_is_seen_through() {
-    let mut scene = Scene::new(&CONFIG());
-    let street = |with_car: bool| {
-        move |camera: [f64; 3], ray: [f64; 3]| {
-            let car = solid([-1.9, 0.0, 5.0], [-0.4, 1.4, 7.0])(camera, ray).filter(|_| with_car);
-            nearest([wall_and_pole(camera, ray), car])
-        }
-    };
-    let state = |scene: &Scene| scene.planning.slice_state(scene.cell_of([-1.1, 0.0, 5.05]));
-    // The way is free, then a car stands in it, then its blocks leave the map.
-    scene.observe(at(0.0, 0.0), street(false));
-    scene.planning.update(&scene.volume);
-    assert_eq!(state(&scene), CellState::Free);
-    (0..3).for_each(|_| scene.observe(at(0.0, 0.0), street(true)));
-    scene.planning.update(&scene.volume);
-    assert_eq!(state(&scene), CellState::Occupied);
-    scene.volume.prune_whole(u8::MAX);
-    scene.planning.update(&scene.volume);
-    assert_eq!(state(&scene), CellState::Unknown);
-    scene.observe(at(0.0, 0.0), street(false));
-    scene.planning.update(&scene.volume);
-    assert_eq!(state(&scene), CellState::Free);
-}
-
-#[test]
 fn unknown_is_an_obstacle_only_if_asked() {
     for unknown_is_obstacle in [false, true] {
         let mut scene = Scene::new(&PlanningConfig { unknown_is_obstacle, ..CONFIG() });
