@@ -49,9 +49,9 @@ fn differences(one: &Config, other: &Config) -> Vec<usize> {
 }
 
 /// Names of all choices.
-const CHOICES: [&str; 16] = [
+const CHOICES: [&str; 18] = [
     "stereo", "icp", "mask", "box", "surface", "farther", "ray", "normal", "one", "depth", "band",
-    "evict", "refuse", "apply", "report", "off",
+    "evict", "refuse", "weight", "support", "apply", "report", "off",
 ];
 
 #[test]
@@ -105,6 +105,7 @@ fn a_choice_takes_each_of_its_names_and_no_other() {
         ("volume.observation_weight", &["one", "depth", "band"]),
         ("objects.observation_weight", &["one", "depth", "band"]),
         ("volume.when_full", &["evict", "refuse"]),
+        ("volume.prune_rule", &["weight", "support"]),
         ("rig.self_calibration", &["apply", "report", "off"]),
     ] {
         assert_eq!(accepted(key), names, "{key}");

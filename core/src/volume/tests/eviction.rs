@@ -90,6 +90,7 @@ fn config(prune_weight: u8) -> VolumeConfig {
         far_m: 4.0,
         prune_weight,
         prune_lag: 12,
+        prune_rule: PruneBy::Weight,
         ..VolumeConfig::default()
     }
 }
