@@ -168,20 +168,24 @@ impl<'s> Mapper<'s> {
     #[inline(never)]
     pub fn new(capacity: &Capacity, config: &Config, slab: &'s mut [u8]) -> Result<Self, NewError> {
         Self::check(capacity, config, slab)?;
-        Self::prepared_in(capacity, config, Carver::new(slab, capacity.bytes())?)
+        // By reference: a carver lists all regions, and would lie on the stack twice.
+        match &mut Carver::new(slab, capacity.bytes()) {
+            Ok(carver) => Self::prepared_in(capacity, config, carver),
+            Err(error) => Err(NewError::Slab(*error)),
+        }
     }
 
     /// Makes a mapper where its caller wants it: one place is written and returned, so that none is
     /// moved over the stack.
     #[inline(never)]
-    fn prepared_in(
+    pub(super) fn prepared_in(
         capacity: &Capacity,
         config: &Config,
-        mut carver: Carver<'s>,
+        carver: &mut Carver<'s>,
     ) -> Result<Self, NewError> {
-        let mut made = Ok(Self::new_in(capacity, config, &mut carver));
+        let mut made = Ok(Self::new_in(capacity, config, carver));
         let prepared = match &mut made {
-            Ok(mapper) => mapper.prepare(config, &mut carver),
+            Ok(mapper) => mapper.prepare(config, carver),
             Err(_) => Ok(()),
         };
         if let Err(error) = prepared {

@@ -78,8 +78,6 @@ impl<'s> Mapper<'s> {
         Self::check_bounds(capacity, config)?;
         let needed = [capacity.hot_bytes(), capacity.cold_bytes()];
         let mut carver = Carver::new_in_two(slabs, needed)?;
-        let mut mapper = Self::new_in(capacity, config, &mut carver);
-        mapper.prepare(config, &mut carver)?;
-        Ok(mapper)
+        Self::prepared_in(capacity, config, &mut carver)
     }
 }
