@@ -68,17 +68,23 @@ pub fn digest(clip: &Clip<'_>, slab: &mut [u8]) -> u64 {
     let mut slot = None;
     make(&mut slot, slab);
     let Some(mapper) = slot.as_mut() else { return 0 };
-    let (mut blocks, mut objects) = (Leaving(Digest::default()), Leaving(Digest::default()));
+    let mut leaving = [Leaving(Digest::default()), Leaving(Digest::default())];
     let mut digest = Digest::default();
-    if !step(mapper, clip, [&mut blocks, &mut objects], &mut digest) {
+    if !step(mapper, clip, &mut leaving, &mut digest) {
         return 0;
     }
     inspect(mapper, &mut digest);
-    digest.u64(u64::from(mapper.finish_with(&mut objects).visited));
-    digest.u64(u64::from(mapper.stream_out(&mut blocks).stored));
-    digest.u64(blocks.0.finish());
-    digest.u64(objects.0.finish());
+    finish(mapper, &mut leaving, &mut digest);
+    leaving.iter().for_each(|leaving| digest.u64(leaving.0.finish()));
     digest.finish()
+}
+
+/// Ends the run: what is left goes to the stores.
+// Never inlined: its reports must not lie below the steps.
+#[inline(never)]
+fn finish(mapper: &mut Mapper<'_>, [blocks, objects]: &mut [Leaving; 2], digest: &mut Digest) {
+    digest.u64(u64::from(mapper.finish_with(objects).visited));
+    digest.u64(u64::from(mapper.stream_out(blocks).stored));
 }
 
 /// Makes the mapper; the slot stays empty where that fails.
@@ -98,25 +104,21 @@ fn make<'s>(slot: &mut Option<Mapper<'s>>, slab: &'s mut [u8]) {
 fn step(
     mapper: &mut Mapper<'_>,
     clip: &Clip<'_>,
-    [blocks, objects]: [&mut Leaving; 2],
+    [blocks, objects]: &mut [Leaving; 2],
     digest: &mut Digest,
 ) -> bool {
     let [width, height] = clip.size();
     for (index, frame) in clip.frames().enumerate().take(FRAMES) {
         let Frame::Pair(pair) = frame else { return false };
-        let seen = pair.stereo();
-        let late = index >= FRAMES / 2;
-        let frame = StereoFrame {
-            colour: if late { View::new(&COLOUR, width, height) } else { None },
-            class: late.then_some(seen.left),
-            disparity_q8: if index == FRAMES - 1 {
-                View::new(&DISPARITY_Q8, width, height)
-            } else {
-                None
-            },
-            t_world_camera: late.then(|| *mapper.t_world_camera()),
-            ..seen
-        };
+        let mut frame = pair.stereo();
+        if index >= FRAMES / 2 {
+            frame.colour = View::new(&COLOUR, width, height);
+            frame.class = Some(frame.left);
+            frame.t_world_camera = Some(*mapper.t_world_camera());
+        }
+        if index == FRAMES - 1 {
+            frame.disparity_q8 = View::new(&DISPARITY_Q8, width, height);
+        }
         // By reference: a report is some kilobytes.
         let taken = mapper.step_with(black_box(&frame), &Serial, blocks, objects);
         let Ok(report) = &taken else { return false };
