@@ -68,7 +68,7 @@ pub unsafe extern "C" fn dynvox_bytes(
 
 /// Makes a mapper in `buffer` and writes its handle to `mapper`. The buffer is the mapper's until
 /// dynvox_destroy: nothing else may read, write, move or free it. What it holds before does not
-/// matter: a mapper that lived there ends, its handle is then the new one's. Takes less than 36 KiB
+/// matter: a mapper that lived there ends, its handle is then the new one's. Takes less than 40 KiB
 /// of stack, as a step does.
 ///
 /// # Safety

@@ -210,9 +210,11 @@ impl<'s> Mapper<'s> {
         *slot = None;
         // Before anything is taken from the slab.
         Self::check(capacity, config, slab)?;
-        let mut carver = Carver::new(slab, capacity.bytes())?;
-        let mapper = slot.insert(Self::new_in(capacity, config, &mut carver));
-        let prepared = mapper.prepare(config, &mut carver);
+        // By reference, as above.
+        let mut carver = Carver::new(slab, capacity.bytes());
+        let carver = carver.as_mut().map_err(|error| NewError::Slab(*error))?;
+        let mapper = slot.insert(Self::new_in(capacity, config, carver));
+        let prepared = mapper.prepare(config, carver);
         // `slot` must not hold a mapper that cannot rectify.
         if prepared.is_err() {
             *slot = None;
