@@ -125,7 +125,7 @@ fn the_way_of_a_slow_camera_is_right_within_a_hundredth() {
 fn a_camera_that_stands_keeps_its_place() {
     let poses = travel(&[0.0; 40], true);
     let drift_m = |pose: &Transform| pose.distance_m();
-    let farthest_m = poses.iter().map(drift_m).fold(0.0, f64::max);
+    let farthest_m = poses.iter().map(drift_m).fold(0.0, crate::geometry::scalar::max_f64);
     let without_m = drift_m(travel(&[0.0; 40], false).last().unwrap());
     println!("standing: {farthest_m:.5} m at most, {without_m:.5} m without an anchor");
     assert!(farthest_m < 0.003, "{farthest_m}");

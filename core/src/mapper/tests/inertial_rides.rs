@@ -6,6 +6,7 @@
 use super::*;
 use crate::{
     PoseOrigin,
+    geometry::scalar::{max_f64, min_f64},
     inertial::{InertialDoubt, InertialSample, InertialUnit},
     scene_flow::SceneFlowConfig,
 };
@@ -24,7 +25,7 @@ type Path = fn(f64) -> Transform;
 
 /// Growth of a movement from rest, from 0 to 1 between the first and the third second.
 fn grown(t: f64) -> f64 {
-    let share = ((t - 1.0) / 2.0).clamp(0.0, 1.0);
+    let share = max_f64(0.0, min_f64(1.0, (t - 1.0) / 2.0));
     share * share * (3.0 - 2.0 * share)
 }
 
@@ -67,7 +68,7 @@ fn reading(path: Path, t: f64) -> [[f64; 3]; 2] {
     let [x, y, z, w] = (unit(t - h).inverse() * unit(t + h)).rotation;
     let at = |t: f64| unit(t).translation();
     let felt = (at(t + h) - at(t) * 2.0 + at(t - h)) / (h * h) + Vector3::new(0.0, -9.81, 0.0);
-    [[x, y, z].map(|part| part * w.signum() / h), unit(t).inverse().rotate(felt).into()]
+    [[x, y, z].map(|part| part * libm::copysign(1.0, w) / h), unit(t).inverse().rotate(felt).into()]
 }
 
 /// Samples of the time up to a frame, with noise and a fault.
@@ -186,7 +187,7 @@ fn evaluated(path: Path, reports: &[Report]) -> Outcome {
         gaps: BLACK.iter().map(|gap| error(path, reports, gap.start - 1, gap.end - 1)).collect(),
         wrong: steps.iter().flatten().filter(|error| error[1] > 5.0).count(),
         steps,
-        vertical: vertical.fold([0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]),
+        vertical: vertical.fold([0.0; 2], |a, b| [max_f64(a[0], b[0]), max_f64(a[1], b[1])]),
         doubt: reports.last().and_then(|report| report.inertial?.doubt),
     }
 }

@@ -110,7 +110,7 @@ impl MeshAxes {
     }
 
     /// A point or direction in these axes, in the camera's.
-    pub(super) fn to_camera(&self, point: [f32; 3]) -> [f32; 3] {
+    pub(super) fn to_camera(self, point: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = self.axes.to_camera(point);
         let back = |at: usize, [a, b, c]: [[f32; 3]; 3]| a[at] * x + b[at] * y + c[at] * z;
         self.upright.map_or([x, y, z], |rows| [0, 1, 2].map(|at| back(at, rows)))
