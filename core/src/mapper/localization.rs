@@ -98,6 +98,20 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     aligned.then(|| pairs.map(|(left, right)| rig.observation(left, right)))
 }
 
+/// Selected matches that may be used for the camera's motion. Masks are of the frame before: where
+/// matches are with an earlier one, what moves is left to RANSAC.
+fn still<'f>(
+    seen: &'f MatchedFrame<'_, '_>,
+    mask: &'f EgomotionMask<'_, '_>,
+    over_several: bool,
+) -> impl Iterator<Item = &'f Match> + Clone {
+    let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
+    selection
+        .iter()
+        .filter(move |&&index| over_several || mask.includes(index))
+        .filter_map(|&index| refined.get(index as usize))
+}
+
 impl<'s> Localization<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
@@ -185,7 +199,7 @@ impl<'s> Localization<'s> {
         } else {
             self.correct_slow(seen, mask, &mut found);
         }
-        if self.recognise(seen, mask, &found) {
+        if self.recognise(seen, still(seen, mask, over_several), &found) {
             found.origin = PoseOrigin::Relocalized;
             self.anchor.clear();
         }
@@ -271,18 +285,15 @@ impl<'s> Localization<'s> {
     /// Hands the frame to the places. Returns whether they say that the camera is in another
     /// segment, in which it goes on.
     #[inline(never)]
-    fn recognise(
+    fn recognise<'m>(
         &mut self,
-        seen: &MatchedFrame<'_, '_>,
-        mask: &EgomotionMask<'_, '_>,
+        seen: &'m MatchedFrame<'_, '_>,
+        still: impl Iterator<Item = &'m Match> + Clone,
         found: &Found,
     ) -> bool {
         let rig = seen.config.scaled_rig();
         let view =
             PlaceView { rig: &rig, egomotion: &seen.config.egomotion, image: seen.frame.left };
-        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
-        let still = selection.iter().filter(|&&index| mask.includes(index));
-        let still = still.filter_map(|&index| refined.get(index as usize));
         let is_measured = matches!(
             found.origin,
             PoseOrigin::Estimated | PoseOrigin::Relocalized | PoseOrigin::Given
@@ -297,7 +308,7 @@ impl<'s> Localization<'s> {
             covariance: found.egomotion.as_ref().and_then(|motion| motion.covariance.as_ref()),
             is_given: found.origin == PoseOrigin::Given,
         };
-        let points = FramePoints { all: refined.iter(), still };
+        let points = FramePoints { all: seen.scene_flow.refined().iter(), still };
         let joined = self.places.observe(&view, &camera, points, &mut self.estimator);
         if let Some(SegmentPose { segment, t_world_camera }) = &joined {
             self.camera.join_segment(*segment, t_world_camera);
@@ -329,12 +340,8 @@ impl<'s> Localization<'s> {
         static_map: &mut StaticMap<'_>,
         executor: &E,
     ) -> Found {
-        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
-        // Masks are of the frame before; matches over several frames are left to RANSAC.
-        let over_several = self.camera.since_reference() > 0;
-        let included = selection.iter().filter(|&&index| over_several || mask.includes(index));
-        let excluded = selection.len() - included.clone().count();
-        let matches = included.filter_map(|&index| refined.get(index as usize));
+        let matches = still(seen, mask, self.camera.since_reference() > 0);
+        let excluded = seen.scene_flow.selection().len() - matches.clone().count();
         // The rig with the baseline that is in use, not the calibrated one.
         let (rig, was_lost) = (seen.config.scaled_rig(), self.camera.is_lost());
         let estimate = self.camera.step(
@@ -380,13 +387,12 @@ impl<'s> Localization<'s> {
             return;
         };
         let rig = seen.config.scaled_rig();
-        let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
-        let included = selection.iter().filter(|&&index| mask.includes(index));
         let frame = SlowFrame {
             config: &seen.config.egomotion,
             rig: &rig,
             matcher: seen.scene_flow,
-            matches: included.filter_map(|&index| refined.get(index as usize)),
+            // Not over several frames: there is no anchor then.
+            matches: still(seen, mask, false),
         };
         self.anchor.step(&frame, &mut self.camera, &mut self.estimator);
         estimate.t_current_previous = Some(*self.camera.t_current_previous());

@@ -28,8 +28,7 @@ const SMALL: Capacity = Capacity {
     objects: 2,
     object_blocks: 12,
     crop_pixels: 1_500,
-    // With keyframes the state of loops differs after a resume, in what no digest has: to be found.
-    keyframes: 0,
+    keyframes: 6,
     planning_width: 24,
     planning_length: 20,
     planning_height: 10,
