@@ -224,7 +224,7 @@ fn fast_turns_and_dark_frames_cost_little_with_a_unit() {
     }
 }
 
-#[ignore = "the figures of stuck sensors and degrees are not taken yet"]
+#[dynvox_needs::long]
 #[test]
 fn a_fault_of_the_unit_is_corrected_or_named_and_costs_nothing() {
     use Fault::{Axes, Bias, Degrees, Late, Stuck};
@@ -236,14 +236,23 @@ fn a_fault_of_the_unit_is_corrected_or_named_and_costs_nothing() {
     println!("without {without:?}");
     for (fault, with) in faults.iter().zip(&outcomes[1..]) {
         println!("{fault:?} {with:?}");
-        // At 200 degrees/s readings in degrees exceed any sensor's range first.
-        let is_named = matches!(fault, Axes | Degrees | Stuck);
-        assert_eq!(with.doubt.is_some(), is_named, "{fault:?}: {:?}", with.doubt);
+        let expected = match fault {
+            Axes => Some(InertialDoubt::WrongAxes),
+            // At 200 degrees/s readings in degrees exceed any sensor's range first.
+            Degrees => Some(InertialDoubt::Saturated),
+            Stuck => Some(InertialDoubt::Stuck),
+            _ => None,
+        };
+        assert_eq!(with.doubt, expected, "{fault:?}");
         assert!(with.lost <= without.lost && with.wrong <= without.wrong, "{fault:?}");
-        // With a clock 30 ms late the way is off by 4.6 mm for 4.1, until the offset is found.
+        // A unit that is refused changes two in a hundred at most, by chance. One that is used costs
+        // some of the way: a clock 30 ms late and a bias of 0.1 rad/s 13 in a hundred, a sensor that
+        // sticks in mid-ride 11.
+        let most = if matches!(fault, Axes | Degrees) { 1.02 } else { 1.15 };
         for side in 0..2 {
             let [off_without, off] = rms_of_both(without, with, side);
-            assert!(off <= 1.5 * off_without, "{fault:?}: {off} {off_without}");
+            println!("{fault:?}: {off} {off_without}");
+            assert!(off <= most * off_without, "{fault:?}: {off} {off_without}");
         }
     }
 }
