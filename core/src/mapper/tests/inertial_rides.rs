@@ -245,9 +245,9 @@ fn a_fault_of_the_unit_is_corrected_or_named_and_costs_nothing() {
         };
         assert_eq!(with.doubt, expected, "{fault:?}");
         assert!(with.lost <= without.lost && with.wrong <= without.wrong, "{fault:?}");
-        // A unit that is refused changes two in a hundred at most, by chance. One that is used costs
-        // some of the way: a clock 30 ms late and a bias of 0.1 rad/s 13 in a hundred, a sensor that
-        // sticks in mid-ride 11.
+        // A unit that is refused changes two in a hundred at most, by chance. One that is used
+        // costs some of the way: a clock 30 ms late and a bias of 0.1 rad/s 13 in a hundred, a
+        // sensor that sticks in mid-ride 11.
         let most = if matches!(fault, Axes | Degrees) { 1.02 } else { 1.15 };
         for side in 0..2 {
             let [off_without, off] = rms_of_both(without, with, side);
