@@ -20,10 +20,9 @@ use super::path::{Centerline, RoadSpan, SEGMENT_M};
 use super::random::Rng;
 use super::scene::Scene;
 use super::segment::{Segment, segment};
-use super::sensor::luma;
 use super::shadow::SunAxes;
 use super::street_scene::{StreetView, street_scene};
-use super::studio::{Exposing, Shots, Studio};
+use super::studio::{Moment, Studio};
 use super::surface::Tone;
 use super::traffic::{self, Road};
 use crate::formats::calibration::StereoCalibration;
@@ -162,24 +161,9 @@ impl Street {
         t_world_camera: Transform,
     ) -> SynthFrame {
         let scene = core::slice::from_ref(&around.scene);
-        let Shots { image_size, left_rgb, right_rgb, depth_m, instances } =
-            self.studio.shots(scene, Exposing { index, gain: 1.0 });
         let objects = around.cars.iter().map(|car| self.truth(car)).collect();
-        SynthFrame {
-            index,
-            time_s: self.time_s(index),
-            width: self.config.width as usize,
-            height: self.config.height as usize,
-            image_size,
-            left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            left_rgb,
-            right_rgb,
-            depth_m,
-            instances,
-            t_world_camera,
-            objects,
-        }
+        let time_s = self.time_s(index);
+        self.studio.frame(scene, Moment { index, time_s, gain: 1.0, t_world_camera, objects })
     }
 
     fn truth(&self, car: &Present) -> ObjectTruth {

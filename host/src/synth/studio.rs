@@ -1,8 +1,10 @@
 //! Pictures of scenes by a world's cameras: what every world shares.
 
+use dynvox_core::geometry::Transform;
 use dynvox_core::rectify::Rectification;
 
 use super::error::SynthError;
+use super::frame::{ObjectTruth, SynthFrame};
 use super::light::Light;
 use super::optics::Optics;
 use super::paint::Painter;
@@ -10,7 +12,7 @@ use super::raster::Pinhole;
 use super::raw::{self, CameraView};
 use super::render::{Picture, Renderer};
 use super::scene::Scene;
-use super::sensor::Sensor;
+use super::sensor::{Sensor, luma};
 use crate::formats::calibration::StereoCalibration;
 
 /// Cameras, painter and light.
@@ -25,27 +27,18 @@ pub struct Studio {
     views: Option<[CameraView; 2]>,
 }
 
-/// Images of both cameras at one frame, and what the left one sees.
-pub struct Shots {
-    /// Width and height of the images.
-    pub image_size: [usize; 2],
-    /// Left colour image.
-    pub left_rgb: Vec<[u8; 3]>,
-    /// Right colour image.
-    pub right_rgb: Vec<[u8; 3]>,
-    /// Depth of each left pixel's centre, m.
-    pub depth_m: Vec<f32>,
-    /// Instance at each left pixel's centre.
-    pub instances: Vec<u8>,
-}
-
-/// Exposure of one frame: its number, and the light let in.
-#[derive(Clone, Copy)]
-pub struct Exposing {
+/// A frame before its pictures are taken: what the world knows of it.
+pub struct Moment {
     /// Number of the frame, which chooses the noise.
     pub index: u32,
+    /// Time since frame 0, s.
+    pub time_s: f64,
     /// Light let in, 1 is that of the street.
     pub gain: f64,
+    /// Camera to world.
+    pub t_world_camera: Transform,
+    /// Every object near the camera, seen or not.
+    pub objects: Vec<ObjectTruth>,
 }
 
 impl Studio {
@@ -77,31 +70,40 @@ impl Studio {
 
     /// Takes both images of the scenes seen while the shutter is open, in equal shares; depth and
     /// instances are those of the scene in the middle.
-    pub fn shots(&self, scenes: &[Scene], exposing: Exposing) -> Shots {
+    pub fn frame(&self, scenes: &[Scene], moment: Moment) -> SynthFrame {
         let (left, right) =
-            rayon::join(|| self.view(scenes, exposing, 0), || self.view(scenes, exposing, 1));
+            rayon::join(|| self.view(scenes, &moment, 0), || self.view(scenes, &moment, 1));
         let ideal = self.optics.pinhole();
         // What an ideal rig sees holds depth and masks as well; through a lens they are rendered
         // for themselves.
         let middle = &scenes[scenes.len() / 2];
         let truth = self.views.as_ref().map(|_| self.render(middle, ideal, 0, 1.0));
-        let (left_rgb, seen) = left;
+        let ((left_rgb, seen), (right_rgb, _)) = (left, right);
         let Picture { depth_m, instances, .. } = truth.unwrap_or(seen);
-        Shots {
+        let Moment { index, time_s, t_world_camera, objects, .. } = moment;
+        SynthFrame {
+            index,
+            time_s,
+            width: ideal.width,
+            height: ideal.height,
             image_size: self
                 .views
                 .as_ref()
                 .map_or([ideal.width, ideal.height], |[left, _]| left.size),
+            left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
+            right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
             left_rgb,
-            right_rgb: right.0,
+            right_rgb,
             depth_m,
             instances,
+            t_world_camera,
+            objects,
         }
     }
 
     /// One camera's image, 0 left or 1 right; with depth and masks where the rig is ideal.
-    fn view(&self, scenes: &[Scene], exposing: Exposing, camera: u32) -> (Vec<[u8; 3]>, Picture) {
-        let Exposing { index, gain } = exposing;
+    fn view(&self, scenes: &[Scene], moment: &Moment, camera: u32) -> (Vec<[u8; 3]>, Picture) {
+        let &Moment { index, gain, .. } = moment;
         let sensor = Sensor::new(self.optics.seed, index, camera, self.optics.noise_sigma);
         let view = self.views.as_ref().and_then(|views| views.get(camera as usize));
         // The ideal rig renders what its camera sees.

@@ -24,9 +24,8 @@ use crate::synth::mesh::{Mesh, Point};
 use crate::synth::optics::Optics;
 use crate::synth::random::Rng;
 use crate::synth::scene::{Scene, SceneObject, Sunlight};
-use crate::synth::sensor::luma;
 use crate::synth::shadow::{GroundLight, ShadowMap, ShadowTile, SunAxes};
-use crate::synth::studio::{Exposing, Shots, Studio};
+use crate::synth::studio::{Moment, Studio};
 use crate::synth::world::World;
 
 /// Moments within an open shutter at which the scene is rendered.
@@ -205,25 +204,15 @@ impl World for Room {
         let time_s = self.time_s(index);
         let scene = |time_s: f64| self.scene(time_s, &self.path.t_room_camera(time_s));
         let scenes: Vec<Scene> = self.moments(time_s).map(scene).collect();
-        let exposing = Exposing { index, gain: self.gain(time_s) };
-        let Shots { image_size, left_rgb, right_rgb, depth_m, instances } =
-            self.studio.shots(&scenes, exposing);
         let truth = |(number, person): (u32, &Standing)| person.truth(number, &self.t_camera0_room);
-        SynthFrame {
+        let moment = Moment {
             index,
             time_s,
-            width: self.config.width as usize,
-            height: self.config.height as usize,
-            image_size,
-            left_grey: left_rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            right_grey: right_rgb.iter().map(|&pixel| luma(pixel)).collect(),
-            left_rgb,
-            right_rgb,
-            depth_m,
-            instances,
+            gain: self.gain(time_s),
             t_world_camera: self.t_world_camera(index),
             objects: (0..).zip(&self.people_at(time_s)).map(truth).collect(),
-        }
+        };
+        self.studio.frame(&scenes, moment)
     }
 
     fn lidar(&self, index: u32) -> Vec<[f32; 4]> {
