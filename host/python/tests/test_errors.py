@@ -37,7 +37,7 @@ def test_the_sentence_is_that_of_the_command_line(command_line, path, options):
 
 
 def test_options_that_are_none_are_named():
-    with pytest.raises(dynvox.Error, match="there is no option frame. Did you mean frames\\? Give one of path, sequence"):
+    with pytest.raises(dynvox.Error, match="there is no option frame. Did you mean frames\\? Give one of path, world, sequence"):
         dynvox.Dataset(frame=3)
     with pytest.raises(dynvox.Error, match="read frame by frame has no exports.record"):
         dynvox.Dataset(mcap=True)
