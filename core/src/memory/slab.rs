@@ -136,6 +136,8 @@ pub struct Carver<'s> {
     footprint: Footprint,
     /// Replaces the names of regions while a group is allocated.
     name: Option<&'static str>,
+    /// A stage is made that is not used.
+    absent: bool,
     failure: Option<SlabError>,
 }
 
@@ -198,6 +200,7 @@ impl<'s> Carver<'s> {
             cold: None,
             footprint: Footprint::default(),
             name: None,
+            absent: false,
             failure: None,
         }
     }
@@ -253,7 +256,7 @@ impl<'s> Carver<'s> {
     fn take(&mut self, name: &'static str, bytes: usize) -> &'s mut [u8] {
         // After the first failure everything is empty: constructors need not check each region,
         // only the carver at the end.
-        if self.failure.is_some() {
+        if self.failure.is_some() || self.absent {
             return &mut [];
         }
         let name = self.name.unwrap_or(name);
@@ -290,9 +293,19 @@ impl<'s> Carver<'s> {
         made
     }
 
-    /// Records a failure unless a value fits its region. Without a slab there is no region.
+    /// Makes a stage that is not used: each of its regions is empty, and none is recorded. A second
+    /// carver would do as well, but lists all regions, which is too much for a small stack.
+    pub(crate) fn absent<R>(&mut self, make: impl FnOnce(&mut Self) -> R) -> R {
+        self.absent = true;
+        let made = make(self);
+        self.absent = false;
+        made
+    }
+
+    /// Records a failure unless a value fits its region. Without a slab, or in a stage that is not
+    /// used, there is no region.
     pub(crate) fn require_fit(&mut self, fits: bool) {
-        if self.rest.is_some() && !fits {
+        if self.rest.is_some() && !self.absent && !fits {
             self.failure.get_or_insert(SlabError::RegionTooSmall);
         }
     }

@@ -132,13 +132,7 @@ impl<'s> Planning<'s> {
         carver: &mut Carver<'s>,
     ) -> Self {
         if Self::bytes(capacity) == 0 {
-            // Nothing is allocated, and no region named.
-            return Self::alloc(
-                &Capacity { tracks: 0, ..*capacity },
-                config,
-                voxel_size_m,
-                &mut Carver::without_slab(),
-            );
+            return carver.absent(|carver| Self::alloc(capacity, config, voxel_size_m, carver));
         }
         carver.group("planning", |carver| Self::alloc(capacity, config, voxel_size_m, carver))
     }
