@@ -103,6 +103,8 @@ fn map_covered_in_c(before: &Street, after: &Street) -> Vec<DynvoxReport> {
                 disparity_q8: std::ptr::null(),
                 inertial: std::ptr::null(),
                 inertial_count: 0,
+                layout: dynvox_capi::DYNVOX_SAMPLES_BYTES,
+                ignored: no_image,
             };
             let mut report = std::mem::MaybeUninit::uninit();
             // SAFETY: the mapper and the images are there; a step that succeeds has written the

@@ -324,10 +324,10 @@ typedef struct {
 
 // An image of one byte a pixel, three for a colour image: red, green, blue.
 typedef struct {
-  // The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from
+  // The upper left pixel; `stride` times `height - 1` and one row's pixels must be readable from
   // here on. Null: there is no such image.
   const uint8_t *pixels;
-  // Pixels from one row to the next.
+  // Pixels from one row to the next; bytes where samples are packed.
   size_t stride;
 } DynvoxImage;
 
@@ -362,12 +362,16 @@ typedef struct {
   double force[3];
 } DynvoxInertialSample;
 
+// Arrangement of the samples of an image.
+typedef uint32_t DynvoxSampleLayout;
+
 // A stereo pair and what is known of it, rectified, or raw where the configuration is
 // dynvox_config_raw's. Everything is read during the call alone.
 typedef struct {
-  // Width of every image, px.
+  // Width of every image, px; disparities and ignored pixels of raw pairs have the size of the
+  // rectified images.
   size_t width;
-  // Height of every image, px.
+  // Height of every image, px; as above.
   size_t height;
   // Left grey image.
   DynvoxImage left;
@@ -384,14 +388,20 @@ typedef struct {
   // Time of the pair, ns since any moment that stays the same, rising from frame to frame; null
   // if unknown: then "tracking.frame_interval_s" has passed since the frame before.
   const uint64_t *time_ns;
-  // Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
-  // values without padding; null lets the mapper match the pair.
+  // Disparity of the left pixels in 1/256 px, 0 where it is unknown, a value for each pixel
+  // without padding; null lets the mapper match the pair.
   const uint16_t *disparity_q8;
   // Samples of the configuration's inertial unit since the frame before, in order of time; at
   // most 1,024 are read. Null without samples; they need `time_ns`.
   const DynvoxInertialSample *inertial;
   // Number of samples.
   size_t inertial_count;
+  // DYNVOX_SAMPLES_..., the arrangement of the samples of `left` and `right`. Packed ones need a
+  // mapper that rectifies: DYNVOX_STATUS_SIZE from others.
+  DynvoxSampleLayout layout;
+  // Pixels of the left image that no stage uses, marked by any value but 0: the car's own
+  // bonnet, a dirty lens. Null pixels: none.
+  DynvoxImage ignored;
 } DynvoxFrame;
 
 // An evicted block of 8 x 8 x 8 voxels; x runs fastest, then y, then z. Valid during the call.
@@ -701,6 +711,16 @@ typedef bool (*DynvoxWrite)(void *context, const uint8_t *bytes, size_t len);
 
 // Fills `bytes` with the next `len` bytes of a snapshot; false when there are not as many.
 typedef bool (*DynvoxRead)(void *context, uint8_t *bytes, size_t len);
+
+// A byte for each sample (RAW8).
+#define DYNVOX_SAMPLES_BYTES 0
+
+// Five bytes for four samples (RAW10): a row has 5 bytes for each group of four, a last group that
+// is not full included.
+#define DYNVOX_SAMPLES_PACKED_10 1
+
+// Three bytes for two samples (RAW12), counted likewise.
+#define DYNVOX_SAMPLES_PACKED_12 2
 
 // Below 8 MiB, images up to 320 x 96, no colour.
 #define DYNVOX_PROFILE_TINY 0

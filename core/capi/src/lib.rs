@@ -64,6 +64,7 @@ pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step, dynvox_step_with};
 pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
 pub use types::{
-    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxPoseOrigin, DynvoxReport,
+    DYNVOX_SAMPLES_BYTES, DYNVOX_SAMPLES_PACKED_10, DYNVOX_SAMPLES_PACKED_12, DynvoxDetection,
+    DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxPoseOrigin, DynvoxReport, DynvoxSampleLayout,
     DynvoxSeverity,
 };

@@ -1,8 +1,9 @@
 //! Taking frames.
 
 use crate::{
-    DynvoxDetection, DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose,
-    DynvoxReport, DynvoxStatus, DynvoxStore,
+    DYNVOX_SAMPLES_BYTES, DYNVOX_SAMPLES_PACKED_10, DYNVOX_SAMPLES_PACKED_12, DynvoxDetection,
+    DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxReport,
+    DynvoxSampleLayout, DynvoxStatus, DynvoxStore,
     given::{items, output, read},
     handle::with,
     inertial::samples,
@@ -58,15 +59,24 @@ pub unsafe extern "C" fn dynvox_step_with(
             let report = if report.is_null() { None } else { Some(output(report)?) };
             // Detections are converted in a buffer on the stack: MAX_DETECTIONS bounds it.
             let mut buffered = [NOTHING; MAX_DETECTIONS];
+            let layout = layout(frame.layout)?;
+            // A row takes less than twice its width; a width that is nonsense must not overflow.
+            frame.width.checked_mul(2).ok_or(DynvoxStatus::Size)?;
+            let row = layout.row_bytes(frame.width);
+            let size = [frame.width, frame.height];
+            // What lies over the left image lies over the rectified one.
+            let rectified = mapper.config().rectification.as_ref();
+            let rectified =
+                rectified.map_or(size, |raw| [raw.width, raw.height].map(|n| n as usize));
             let frame_in_core = StereoFrame {
-                left: image(&frame, frame.left, buffer)?.ok_or(DynvoxStatus::Null)?,
-                right: image(&frame, frame.right, buffer)?.ok_or(DynvoxStatus::Null)?,
-                colour: image(&frame, frame.colour, buffer)?,
-                layout: SampleLayout::Bytes,
+                left: image(frame.left, size, row, buffer)?.ok_or(DynvoxStatus::Null)?,
+                right: image(frame.right, size, row, buffer)?.ok_or(DynvoxStatus::Null)?,
+                colour: image(frame.colour, size, size[0], buffer)?,
+                layout,
                 class: None,
                 detections: detections(&frame, &mut buffered, buffer)?,
-                disparity_q8: disparity(&frame, buffer)?,
-                ignored: None,
+                disparity_q8: disparity(&frame, rectified, buffer)?,
+                ignored: image(frame.ignored, rectified, rectified[0], buffer)?,
                 inertial: samples(frame.inertial, frame.inertial_count, buffer)?,
                 time_ns: if frame.time_ns.is_null() { None } else { Some(read(frame.time_ns)?) },
                 t_world_camera: if frame.t_world_camera.is_null() {
@@ -103,43 +113,51 @@ pub unsafe extern "C" fn dynvox_pose(
     }
 }
 
-/// An image of the frame; none where its pixels are null.
+fn layout(layout: DynvoxSampleLayout) -> Result<SampleLayout, DynvoxStatus> {
+    match layout {
+        DYNVOX_SAMPLES_BYTES => Ok(SampleLayout::Bytes),
+        DYNVOX_SAMPLES_PACKED_10 => Ok(SampleLayout::Packed10),
+        DYNVOX_SAMPLES_PACKED_12 => Ok(SampleLayout::Packed12),
+        _ => Err(DynvoxStatus::Unknown),
+    }
+}
+
+/// An image of the frame, whose last row has `row` items; none where its pixels are null.
 ///
 /// # Safety
-/// The image is as large as the frame says.
+/// The image is as large as `size` says.
 unsafe fn image<'a, T>(
-    frame: &DynvoxFrame,
     image: DynvoxImage,
+    [width, height]: [usize; 2],
+    row: usize,
     buffer: &Range<usize>,
 ) -> Result<Option<View<'a, T>>, DynvoxStatus> {
     if image.pixels.is_null() {
         return Ok(None);
     }
-    let before_last = frame.height.checked_sub(1).and_then(|rows| rows.checked_mul(image.stride));
-    let len =
-        before_last.and_then(|pixels| pixels.checked_add(frame.width)).ok_or(DynvoxStatus::Size)?;
+    let before_last = height.checked_sub(1).and_then(|rows| rows.checked_mul(image.stride));
+    let len = before_last.and_then(|pixels| pixels.checked_add(row)).ok_or(DynvoxStatus::Size)?;
     // SAFETY: the caller's promise; a pixel is bytes, so that no alignment is asked of it.
     let pixels = unsafe { items(image.pixels.cast::<T>(), len, buffer)? };
-    View::with_stride(pixels, frame.width, frame.height, image.stride)
-        .map(Some)
-        .ok_or(DynvoxStatus::Size)
+    View::with_stride(pixels, width, height, image.stride).map(Some).ok_or(DynvoxStatus::Size)
 }
 
 /// The frame's own disparity; none where it is null.
 ///
 /// # Safety
-/// It is as large as the frame says.
+/// It is as large as `size` says.
 unsafe fn disparity<'a>(
     frame: &DynvoxFrame,
+    [width, height]: [usize; 2],
     buffer: &Range<usize>,
 ) -> Result<Option<View<'a, u16>>, DynvoxStatus> {
     if frame.disparity_q8.is_null() {
         return Ok(None);
     }
-    let len = frame.width.checked_mul(frame.height).ok_or(DynvoxStatus::Size)?;
+    let len = width.checked_mul(height).ok_or(DynvoxStatus::Size)?;
     // SAFETY: the caller's promise.
     let pixels = unsafe { items(frame.disparity_q8, len, buffer)? };
-    View::new(pixels, frame.width, frame.height).map(Some).ok_or(DynvoxStatus::Size)
+    View::new(pixels, width, height).map(Some).ok_or(DynvoxStatus::Size)
 }
 
 const NOTHING: Detection<'static> =

@@ -34,10 +34,10 @@ impl From<&Transform> for DynvoxPose {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxImage {
-    /// The upper left pixel; `stride` times `height - 1` and `width` pixels must be readable from
+    /// The upper left pixel; `stride` times `height - 1` and one row's pixels must be readable from
     /// here on. Null: there is no such image.
     pub pixels: *const u8,
-    /// Pixels from one row to the next.
+    /// Pixels from one row to the next; bytes where samples are packed.
     pub stride: usize,
 }
 
@@ -68,9 +68,10 @@ pub struct DynvoxDetection {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct DynvoxFrame {
-    /// Width of every image, px.
+    /// Width of every image, px; disparities and ignored pixels of raw pairs have the size of the
+    /// rectified images.
     pub width: usize,
-    /// Height of every image, px.
+    /// Height of every image, px; as above.
     pub height: usize,
     /// Left grey image.
     pub left: DynvoxImage,
@@ -87,15 +88,31 @@ pub struct DynvoxFrame {
     /// Time of the pair, ns since any moment that stays the same, rising from frame to frame; null
     /// if unknown: then "tracking.frame_interval_s" has passed since the frame before.
     pub time_ns: *const u64,
-    /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, `width` times `height`
-    /// values without padding; null lets the mapper match the pair.
+    /// Disparity of the left pixels in 1/256 px, 0 where it is unknown, a value for each pixel
+    /// without padding; null lets the mapper match the pair.
     pub disparity_q8: *const u16,
     /// Samples of the configuration's inertial unit since the frame before, in order of time; at
     /// most 1,024 are read. Null without samples; they need `time_ns`.
     pub inertial: *const DynvoxInertialSample,
     /// Number of samples.
     pub inertial_count: usize,
+    /// DYNVOX_SAMPLES_..., the arrangement of the samples of `left` and `right`. Packed ones need a
+    /// mapper that rectifies: DYNVOX_STATUS_SIZE from others.
+    pub layout: DynvoxSampleLayout,
+    /// Pixels of the left image that no stage uses, marked by any value but 0: the car's own
+    /// bonnet, a dirty lens. Null pixels: none.
+    pub ignored: DynvoxImage,
 }
+
+/// Arrangement of the samples of an image.
+pub type DynvoxSampleLayout = u32;
+/// A byte for each sample (RAW8).
+pub const DYNVOX_SAMPLES_BYTES: DynvoxSampleLayout = 0;
+/// Five bytes for four samples (RAW10): a row has 5 bytes for each group of four, a last group that
+/// is not full included.
+pub const DYNVOX_SAMPLES_PACKED_10: DynvoxSampleLayout = 1;
+/// Three bytes for two samples (RAW12), counted likewise.
+pub const DYNVOX_SAMPLES_PACKED_12: DynvoxSampleLayout = 2;
 
 /// Severity of a step's events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -90,8 +90,7 @@ fn digest_of_core(capacity: &Capacity) -> u64 {
     (0..2).map(|_| mapper.step(&frame, &Serial).unwrap().digest).last().unwrap()
 }
 
-#[test]
-fn raw_pairs_give_the_digests_of_the_core() {
+fn capacity_and_bytes() -> (DynvoxCapacity, usize) {
     let (mut capacity, mut len): (DynvoxCapacity, usize) = (unsafe { std::mem::zeroed() }, 0);
     assert_eq!(
         unsafe { dynvox_capacity_of_profile(DYNVOX_PROFILE_TINY, &raw mut capacity) },
@@ -100,47 +99,93 @@ fn raw_pairs_give_the_digests_of_the_core() {
     // The named profiles hold no raw images.
     (capacity.raw_width, capacity.raw_height) = (RAW[0], RAW[1]);
     assert_eq!(unsafe { dynvox_bytes(&raw const capacity, &raw mut len) }, DynvoxStatus::Ok);
+    (capacity, len)
+}
+
+/// Digest that the second of two equal frames gives, or the first status that is not OK.
+fn digest_of(
+    images: [&[u8]; 2],
+    stride: usize,
+    change: impl Fn(&mut DynvoxFrame),
+) -> Result<u64, DynvoxStatus> {
+    let (capacity, len) = capacity_and_bytes();
     let mut buffer = vec![0u8; len + dynvox_alignment()];
     let start = buffer.as_ptr().align_offset(dynvox_alignment());
     let (config, mut mapper) = (config_of(&rig()).unwrap(), ptr::null_mut());
-    assert!(
-        (config.rig.baseline_m - 0.5).abs() < 1e-12 && config.rig.focal_px > 80.0,
-        "{:?}",
-        config.rig
-    );
     let at = buffer[start..].as_mut_ptr();
     assert_eq!(
         unsafe { dynvox_create(&raw const capacity, &raw const config, at, len, &raw mut mapper) },
         DynvoxStatus::Ok
     );
-    // Disparities of 4 px.
-    let (left, right) = (pixels(0), pixels(4));
-    let image = |pixels: &[u8]| DynvoxImage { pixels: pixels.as_ptr(), stride: RAW[0] };
-    let frame = DynvoxFrame {
-        width: RAW[0],
-        height: RAW[1],
-        left: image(&left),
-        right: image(&right),
-        colour: DynvoxImage { pixels: ptr::null(), stride: 0 },
-        detections: ptr::null(),
-        detection_count: 0,
-        t_world_camera: ptr::null(),
-        time_ns: ptr::null(),
-        disparity_q8: ptr::null(),
-        inertial: ptr::null(),
-        inertial_count: 0,
-    };
+    let [left, right] = images.map(|pixels| DynvoxImage { pixels: pixels.as_ptr(), stride });
+    let mut frame: DynvoxFrame = unsafe { std::mem::zeroed() };
+    (frame.width, frame.height) = (RAW[0], RAW[1]);
+    (frame.left, frame.right) = (left, right);
+    change(&mut frame);
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
     // The second frame is matched with the first.
     for _ in 0..2 {
-        assert_eq!(
-            unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) },
-            DynvoxStatus::Ok
-        );
+        match unsafe { dynvox_step(mapper, &raw const frame, ptr::null(), &raw mut report) } {
+            DynvoxStatus::Ok => {}
+            status => return Err(status),
+        }
     }
-    let of_core = Capacity { raw_width: RAW[0], raw_height: RAW[1], ..Capacity::TINY };
-    assert_eq!(report.digest, digest_of_core(&of_core));
     assert_eq!(unsafe { dynvox_destroy(mapper) }, DynvoxStatus::Ok);
+    Ok(report.digest)
+}
+
+#[test]
+fn raw_pairs_give_the_digests_of_the_core() {
+    let config = config_of(&rig()).unwrap();
+    assert!(
+        (config.rig.baseline_m - 0.5).abs() < 1e-12 && config.rig.focal_px > 80.0,
+        "{:?}",
+        config.rig
+    );
+    // Disparities of 4 px.
+    let digest = digest_of([&pixels(0), &pixels(4)], RAW[0], |_| {});
+    let of_core = Capacity { raw_width: RAW[0], raw_height: RAW[1], ..Capacity::TINY };
+    assert_eq!(digest, Ok(digest_of_core(&of_core)));
+}
+
+/// Samples packed in groups, a byte of low bits, which are not read, after each.
+fn packed(pixels: &[u8], group: usize) -> Vec<u8> {
+    pixels.chunks(group).flat_map(|samples| samples.iter().copied().chain([0x5A])).collect()
+}
+
+#[test]
+fn packed_samples_give_the_digest_of_bytes() {
+    let (left, right) = (pixels(0), pixels(4));
+    let of_bytes = digest_of([&left, &right], RAW[0], |_| {});
+    for (layout, group) in [(DYNVOX_SAMPLES_PACKED_10, 4), (DYNVOX_SAMPLES_PACKED_12, 2)] {
+        let images = [&left, &right].map(|pixels| packed(pixels, group));
+        let images = [&images[0][..], &images[1]];
+        let row = RAW[0] + RAW[0] / group;
+        let digest = |stride, layout| digest_of(images, stride, |frame| frame.layout = layout);
+        assert_eq!(digest(row, layout), of_bytes, "layout {layout}");
+        assert_ne!(digest(row, DYNVOX_SAMPLES_BYTES), of_bytes, "read as bytes");
+        assert_eq!(digest(row - 1, layout), Err(DynvoxStatus::Size), "rows that are too short");
+        assert_eq!(digest(row, 3), Err(DynvoxStatus::Unknown));
+    }
+}
+
+#[test]
+fn marks_and_disparities_of_raw_pairs_have_the_rectified_size() {
+    let (left, right) = (pixels(0), pixels(4));
+    let rectified = RECTIFIED[0] as usize * RECTIFIED[1] as usize;
+    let ignoring = |value| {
+        let marks = vec![value; rectified];
+        digest_of([&left, &right], RAW[0], |frame| {
+            frame.ignored = DynvoxImage { pixels: marks.as_ptr(), stride: RECTIFIED[0] as usize };
+        })
+    };
+    let plain = digest_of([&left, &right], RAW[0], |_| {});
+    assert!(ignoring(1).is_ok());
+    assert_ne!(ignoring(1), plain, "nothing is left to map");
+    assert_eq!(ignoring(0), plain, "nothing is marked");
+    let near = vec![9 << 8; rectified];
+    let given = digest_of([&left, &right], RAW[0], |frame| frame.disparity_q8 = near.as_ptr());
+    assert!(given.is_ok_and(|digest| Ok(digest) != plain), "{given:?}");
 }
 
 #[test]

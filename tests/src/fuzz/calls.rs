@@ -181,6 +181,8 @@ fn step(program: &mut Program<'_>, caller: &mut Caller, mapper: *mut DynvoxMappe
         disparity_q8: ptr::null(),
         inertial: ptr::null(),
         inertial_count: 0,
+        layout: DYNVOX_SAMPLES_BYTES,
+        ignored: DynvoxImage { pixels: ptr::null(), stride: 0 },
     };
     let mut report = std::mem::MaybeUninit::<DynvoxReport>::uninit();
     // SAFETY: images are as long as they say, or are refused before they are read; the report is

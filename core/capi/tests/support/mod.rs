@@ -90,6 +90,8 @@ pub fn frame(pixels: &[u8]) -> DynvoxFrame {
         disparity_q8: ptr::null(),
         inertial: ptr::null(),
         inertial_count: 0,
+        layout: DYNVOX_SAMPLES_BYTES,
+        ignored: DynvoxImage { pixels: ptr::null(), stride: 0 },
     }
 }
 
