@@ -40,6 +40,7 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
     objects_ =
         create_publisher<vision_msgs::msg::Detection3DArray>("~/objects", rclcpp::QoS(10));
     points_ = create_publisher<sensor_msgs::msg::PointCloud2>("~/points", rclcpp::QoS(1));
+    mesh_ = create_publisher<visualization_msgs::msg::Marker>("~/mesh", latest);
     diagnostics_ =
         create_publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics", rclcpp::QoS(10));
     return CallbackReturn::SUCCESS;
@@ -57,6 +58,19 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
     right_ = create_subscription<Image>(
         options_.depth ? "left/depth" : "right" + name, images,
         [this](Image::ConstSharedPtr image) { take(&Node::right, std::move(image)); });
+    if (options_.imu)
+      imu_ = create_subscription<Imu>("imu", rclcpp::SensorDataQoS().keep_last(1024),
+                                      [this](Imu::ConstSharedPtr sample) {
+                                        take([&] { return node_->imu(*sample); });
+                                      });
+    if (options_.instances)
+      instances_ = create_subscription<Image>(
+          "left/instances", images,
+          [this](Image::ConstSharedPtr image) { take(&Node::instances, std::move(image)); });
+    if (options_.ignored)
+      ignored_ = create_subscription<Image>(
+          "left/ignored", images,
+          [this](Image::ConstSharedPtr image) { take(&Node::ignored, std::move(image)); });
     left_info_ = create_subscription<CameraInfo>(
         "left/camera_info", images,
         [this](CameraInfo::ConstSharedPtr info) { node_->left_info(*info); });
@@ -80,6 +94,9 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
     right_info_.reset();
     static_frames_.reset();
     pose_.reset();
+    imu_.reset();
+    instances_.reset();
+    ignored_.reset();
     return LifecycleNode::on_deactivate(state);
   }
 
@@ -97,6 +114,11 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
     options_.depth = declare_parameter<bool>("depth", options_.depth);
     options_.depth_baseline_m =
         declare_parameter<double>("depth_baseline_m", options_.depth_baseline_m);
+    options_.imu = declare_parameter<bool>("imu", options_.imu);
+    options_.instances = declare_parameter<bool>("instances", options_.instances);
+    options_.ignored = declare_parameter<bool>("ignored", options_.ignored);
+    options_.mesh_every = static_cast<uint32_t>(whole("mesh_every", options_.mesh_every));
+    options_.mesh_triangles = whole("mesh_triangles", options_.mesh_triangles);
     options_.slack_s = declare_parameter<double>("slack_s", options_.slack_s);
     options_.mapper.bytes = whole("memory_mib", 256) << 20;
     using Texts = std::vector<std::string>;
@@ -137,8 +159,13 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
   // Takes an image, and publishes what the pair gives that it completes.
   void take(std::optional<Outputs> (Node::*side)(Image::ConstSharedPtr),
             Image::ConstSharedPtr image) {
+    take([&] { return (node_.get()->*side)(std::move(image)); });
+  }
+
+  template <typename Taking>
+  void take(Taking taking) {
     try {
-      if (auto outputs = (node_.get()->*side)(std::move(image))) publish(*outputs);
+      if (auto outputs = taking()) publish(*outputs);
     } catch (const std::exception &error) {
       RCLCPP_ERROR_THROTTLE(get_logger(), *get_clock(), 5000, "%s", error.what());
     }
@@ -151,6 +178,7 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
     if (outputs.grid) send(*grid_, *outputs.grid);
     if (outputs.objects) send(*objects_, *outputs.objects);
     if (outputs.points) send(*points_, *outputs.points);
+    if (outputs.mesh) send(*mesh_, *outputs.mesh);
   }
 
   // Hands a message over, so that a subscriber in the same process gets it without a copy.
@@ -174,8 +202,10 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
   Publisher<nav_msgs::msg::OccupancyGrid> grid_;
   Publisher<vision_msgs::msg::Detection3DArray> objects_;
   Publisher<sensor_msgs::msg::PointCloud2> points_;
+  Publisher<visualization_msgs::msg::Marker> mesh_;
   Publisher<diagnostic_msgs::msg::DiagnosticArray> diagnostics_;
-  Subscription<Image> left_, right_;
+  Subscription<Image> left_, right_, instances_, ignored_;
+  Subscription<Imu> imu_;
   Subscription<CameraInfo> left_info_, right_info_;
   Subscription<tf2_msgs::msg::TFMessage> static_frames_;
   Subscription<nav_msgs::msg::Odometry> pose_;

@@ -331,6 +331,134 @@ void what_cannot_be_used_is_refused_in_a_sentence() {
   require(refuses(refusal([&] { look(poor, 12, 12); }), "at least"), "too few bytes");
 }
 
+Imu at_rest(int64_t ns) {
+  Imu sample;
+  set_stamp(sample, ns);
+  sample.header.frame_id = "unit";
+  // Samples that repeat would be a stuck unit.
+  sample.angular_velocity.x = 1e-14 * static_cast<double>(ns % 7000000000);
+  // The unit's z axis points up.
+  sample.linear_acceleration.z = 9.81;
+  return sample;
+}
+
+// Where the camera and the unit are on the robot: the camera looks along the robot's x axis.
+tf2_msgs::msg::TFMessage mounting() {
+  tf2_msgs::msg::TFMessage message;
+  message.transforms.resize(2);
+  message.transforms[0].header.frame_id = message.transforms[1].header.frame_id = "base_link";
+  message.transforms[0].child_frame_id = "left_optical";
+  message.transforms[0].transform.rotation =
+      quaternion_message({{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}}});
+  message.transforms[1].child_frame_id = "unit";
+  message.transforms[1].transform.translation.x = -0.1;
+  return message;
+}
+
+void a_pair_waits_for_its_samples() {
+  NodeOptions options = small();
+  options.imu = true;
+  Node node = ready(options);
+  std::optional<Outputs> outputs;
+  for (int64_t frame = 0; frame < 24; ++frame) {
+    const int64_t ns = 1000000000 + frame * 100000000;
+    for (int64_t at = ns - 90000000; at < ns; at += 10000000)
+      require(!node.imu(at_rest(at)), "nothing waits");
+    node.left(wall(ns, true, 12, 12));
+    require(!node.right(wall(ns, false, 12, 12)), "the sample of its time is missing");
+    if (frame == 0) {
+      const auto lost = [&] { node.imu(at_rest(ns)); };
+      require(refuses(refusal(lost), "no static transforms lead"), "nobody said where it is");
+      node.static_frames(mounting());
+      continue;
+    }
+    outputs = node.imu(at_rest(ns + 1000000));
+    require(outputs.has_value(), "the last sample completes the pair");
+  }
+  const DynvoxInertialReport &said = outputs->report.inertial;
+  require(said.samples == 9 || said.samples == 10, "the samples of one frame");
+  require(said.up_world[1] < -0.99, "which way is up");
+  require(node.incomplete() == 0, "all came in time");
+  // The unit falls silent: as many pairs wait as images do, then the oldest goes on without.
+  for (int64_t frame = 0; frame <= 10; ++frame) {
+    const int64_t ns = 5000000000 + frame * 100000000;
+    node.left(wall(ns, true, 12, 12));
+    outputs = node.right(wall(ns, false, 12, 12));
+    require(outputs.has_value() == (frame == 10), "ten wait");
+  }
+  require(node.incomplete() == 1, "and it is counted");
+}
+
+// Numbers of instances: one of class 1, a car, and pixels that are nothing.
+std::shared_ptr<Image> marks(int64_t ns, uint16_t number) {
+  auto image = std::make_shared<Image>();
+  set_stamp(*image, ns);
+  image->width = WIDTH;
+  image->height = HEIGHT;
+  image->encoding = "16UC1";
+  image->step = 2 * WIDTH;
+  image->data.resize(size_t{2} * WIDTH * HEIGHT);
+  for (size_t v = 20; v < 60; ++v)
+    for (size_t u = 100; u < 180; ++u) {
+      image->data[v * image->step + 2 * u] = static_cast<uint8_t>(number & 255);
+      image->data[v * image->step + 2 * u + 1] = static_cast<uint8_t>(number >> 8);
+    }
+  return image;
+}
+
+void instances_become_tracks_and_ignored_pixels_nothing() {
+  const auto image = marks(0, 1007);
+  const Instances seen(*image);
+  require(seen.detections().size() == 1, "one instance");
+  const DynvoxDetection &car = seen.detections()[0];
+  require(car.class_code == 1 && car.left == 100 && car.top == 20, "a car and its box");
+  require(car.width == 80 && car.height == 40 && car.mask[79] == 1, "as large as it is");
+
+  NodeOptions options = small();
+  options.instances = options.ignored = true;
+  Node node = ready(options), blind = ready(small());
+  std::optional<Outputs> outputs;
+  for (int64_t frame = 0; frame < 4; ++frame) {
+    const int64_t ns = 1000000000 + frame * 100000000;
+    node.left(wall(ns, true, 12, 12));
+    require(!node.right(wall(ns, false, 12, 12)), "marks are missing");
+    require(!node.instances(marks(ns, 1007)), "the ignored pixels are missing");
+    outputs = node.ignored(marks(ns, frame < 3 ? 0 : 0x0101));
+    require(outputs.has_value(), "all is there");
+    blind.left(wall(ns, true, 12, 12));
+    const auto without = blind.right(wall(ns, false, 12, 12));
+    require(without->report.digest != outputs->report.digest, "the car is a track");
+    const uint32_t lacking = without->report.disparities - outputs->report.disparities;
+    require(frame < 3 ? lacking == 0 : lacking > 2000, "ignored pixels have no depth");
+  }
+  auto small_marks = marks(2000000000, 1007);
+  small_marks->height = 60;
+  node.left(wall(2000000000, true, 12, 12));
+  node.right(wall(2000000000, false, 12, 12));
+  node.ignored(marks(2000000000, 0));
+  require(refuses(refusal([&] { node.instances(small_marks); }), "size of the left image"),
+          "marks of another size");
+}
+
+void a_mesh_stands_in_the_map() {
+  NodeOptions options = small();
+  options.mesh_every = 1;
+  options.mesh_triangles = 1000;
+  Node node = ready(options);
+  const Outputs outputs = look(node, 12, 12);
+  require(outputs.mesh && outputs.mesh->points.size() == 3000, "as many triangles as asked for");
+  const auto &q = outputs.mesh->pose.orientation;
+  const Matrix turn = rotation_of({q.w, q.x, q.y, q.z});
+  double nearest = 1e9, farthest = 0;
+  for (const auto &point : outputs.mesh->points) {
+    const double ahead = (turn * Vector{point.x, point.y, point.z})[0];
+    nearest = std::min(nearest, ahead);
+    farthest = std::max(farthest, ahead);
+  }
+  // 200 px times 0.5 m over 12 px.
+  require(nearest > 7.5 && farthest < 9.2, "the wall is 8.3 m ahead");
+}
+
 void points_are_where_the_wall_is() {
   NodeOptions options = small();
   options.points_every = 1;
@@ -362,5 +490,8 @@ int main() {
   depth_and_poses_of_others_are_mapped();
   what_cannot_be_used_is_refused_in_a_sentence();
   points_are_where_the_wall_is();
+  a_pair_waits_for_its_samples();
+  instances_become_tracks_and_ignored_pixels_nothing();
+  a_mesh_stands_in_the_map();
   return failures;
 }

@@ -154,6 +154,20 @@ class StaticFrames {
     return std::nullopt;
   }
 
+  // Maps coordinates of `from` to those of `to`, if chains lead from both up to one frame.
+  std::optional<Rigid> between(const std::string &to, const std::string &from) const {
+    Rigid ancestor_to;
+    std::string at = to;
+    for (size_t step = 0; step <= links_.size(); ++step) {
+      if (const auto ancestor_from = find(at, from)) return ancestor_to.inverse() * *ancestor_from;
+      const auto link = links_.find(at);
+      if (link == links_.end()) return std::nullopt;
+      ancestor_to = link->second.parent_child * ancestor_to;
+      at = link->second.parent;
+    }
+    return std::nullopt;
+  }
+
  private:
   struct Link {
     std::string parent;

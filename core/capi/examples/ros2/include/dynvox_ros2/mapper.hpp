@@ -21,11 +21,13 @@ inline void check(DynvoxStatus status, const std::string &what) {
   throw std::runtime_error(what + ": " + dynvox_status_text(status));
 }
 
-// Cameras and the size of their images, px. Pairs are raw where `raw` is there.
+// Cameras and the size of their images, px. Pairs are raw where `raw` is there; frames bring
+// samples where `unit` is.
 struct Cameras {
   DynvoxRig rig;
   size_t width, height;
   std::optional<DynvoxRawRig> raw;
+  std::optional<DynvoxInertialUnit> unit = std::nullopt;
 };
 
 struct MapperOptions {
@@ -60,6 +62,8 @@ class Mapper {
       check(dynvox_config_default(&cameras.rig, &config), "the rig cannot be used");
     }
     rig_ = config.rig;
+    if (cameras.unit)
+      check(dynvox_config_inertial(&*cameras.unit, &config), "the inertial unit cannot be used");
     // No detector is needed: what moves is found by its motion, unless a setting says otherwise.
     check(dynvox_config_set(&config, "segmentation.enabled", "true"), "motion segmentation");
     for (const auto &[key, value] : options.settings)
@@ -118,6 +122,20 @@ class Mapper {
                           {colour[3 * at], colour[3 * at + 1], colour[3 * at + 2]}});
       }
     return points;
+  }
+
+  // Triangles of the static map, in the mapper's world; at most `most` of them.
+  std::vector<DynvoxTriangle> triangles(size_t most) {
+    struct Taken {
+      size_t most;
+      std::vector<DynvoxTriangle> triangles;
+    } taken{most, {}};
+    const auto take = [](void *context, const DynvoxTriangle *triangle) {
+      Taken &taken = *static_cast<Taken *>(context);
+      if (taken.triangles.size() < taken.most) taken.triangles.push_back(*triangle);
+    };
+    check(dynvox_triangles(mapper_, take, &taken, nullptr), "no mesh");
+    return std::move(taken.triangles);
   }
 
   std::vector<DynvoxTrack> tracks() {

@@ -17,6 +17,7 @@
 #include <nav_msgs/msg/occupancy_grid.hpp>
 #include <sensor_msgs/msg/point_cloud2.hpp>
 #include <vision_msgs/msg/detection3_d_array.hpp>
+#include <visualization_msgs/msg/marker.hpp>
 
 namespace dynvox_ros2 {
 
@@ -154,6 +155,38 @@ inline sensor_msgs::msg::PointCloud2 points_message(const Header &header,
     to += 16;
   }
   return cloud;
+}
+
+// Triangles of the map with their colours; `map_world` maps the mapper's world to the map.
+inline visualization_msgs::msg::Marker mesh_message(const Header &header,
+                                                    const std::vector<DynvoxTriangle> &triangles,
+                                                    const Rigid &map_world) {
+  using visualization_msgs::msg::Marker;
+  Marker mesh;
+  mesh.header = header;
+  mesh.ns = "dynvox";
+  mesh.type = Marker::TRIANGLE_LIST;
+  mesh.action = Marker::ADD;
+  mesh.pose = pose_message(map_world);
+  mesh.scale.x = mesh.scale.y = mesh.scale.z = 1.0;
+  mesh.color.a = 1.0f;
+  mesh.points.reserve(3 * triangles.size());
+  mesh.colors.reserve(3 * triangles.size());
+  for (const DynvoxTriangle &triangle : triangles)
+    for (const DynvoxVertex &corner : triangle.vertices) {
+      geometry_msgs::msg::Point point;
+      point.x = corner.position_m[0];
+      point.y = corner.position_m[1];
+      point.z = corner.position_m[2];
+      mesh.points.push_back(point);
+      std_msgs::msg::ColorRGBA colour;
+      colour.r = static_cast<float>(corner.colour[0]) / 255.0f;
+      colour.g = static_cast<float>(corner.colour[1]) / 255.0f;
+      colour.b = static_cast<float>(corner.colour[2]) / 255.0f;
+      colour.a = 1.0f;
+      mesh.colors.push_back(colour);
+    }
+  return mesh;
 }
 
 // A named number of a diagnostic message.

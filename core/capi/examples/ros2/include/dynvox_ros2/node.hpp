@@ -2,6 +2,7 @@
 #pragma once
 
 #include "dynvox.h"
+#include "dynvox_ros2/companions.hpp"
 #include "dynvox_ros2/geometry.hpp"
 #include "dynvox_ros2/mapper.hpp"
 #include "dynvox_ros2/messages.hpp"
@@ -12,6 +13,7 @@
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -23,12 +25,15 @@
 #include <nav_msgs/msg/odometry.hpp>
 #include <sensor_msgs/msg/camera_info.hpp>
 #include <sensor_msgs/msg/image.hpp>
+#include <sensor_msgs/msg/imu.hpp>
 #include <tf2_msgs/msg/tf_message.hpp>
+#include <visualization_msgs/msg/marker.hpp>
 
 namespace dynvox_ros2 {
 
 using Image = sensor_msgs::msg::Image;
 using CameraInfo = sensor_msgs::msg::CameraInfo;
+using Imu = sensor_msgs::msg::Imu;
 
 struct NodeOptions {
   MapperOptions mapper;
@@ -43,6 +48,10 @@ struct NodeOptions {
   bool depth = false;
   // Baseline of the stereo camera that such depth errs like, m.
   double depth_baseline_m = 0.1;
+  // A pair waits for the samples of an inertial unit up to its time; /tf_static leads to the unit.
+  bool imu = false;
+  // A pair waits for the instances seen in its left image, and for the pixels not to be used.
+  bool instances = false, ignored = false;
   // Times of a pair may differ by this much, s.
   double slack_s = 0.005;
   // Images of each camera that wait for their partner.
@@ -51,6 +60,9 @@ struct NodeOptions {
   uint32_t points_every = 5, grid_every = 1;
   // Columns and rows from one point to the next.
   size_t points_stride = 2;
+  // Frames from one mesh of the whole map to the next, 0: none; and most triangles of it.
+  uint32_t mesh_every = 0;
+  size_t mesh_triangles = 200000;
 };
 
 // All that one pair gives.
@@ -62,13 +74,16 @@ struct Outputs {
   std::optional<nav_msgs::msg::OccupancyGrid> grid;
   std::optional<vision_msgs::msg::Detection3DArray> objects;
   std::optional<sensor_msgs::msg::PointCloud2> points;
+  std::optional<visualization_msgs::msg::Marker> mesh;
 };
 
 class Node {
  public:
   explicit Node(NodeOptions options)
       : options_(std::move(options)),
-        pairs_(std::llround(1e9 * options_.slack_s), options_.queue) {}
+        pairs_(std::llround(1e9 * options_.slack_s), options_.queue),
+        instances_(std::llround(1e9 * options_.slack_s), options_.queue),
+        ignored_(std::llround(1e9 * options_.slack_s), options_.queue) {}
 
   void left_info(const CameraInfo &info) { left_info_ = info; }
   void right_info(const CameraInfo &info) { right_info_ = info; }
@@ -78,14 +93,32 @@ class Node {
   // node's own egomotion: a pair waits for none, it takes the last pose that is not newer.
   void pose(const nav_msgs::msg::Odometry &odometry) { pose_ = odometry; }
 
-  // An image of the left camera. Returns what the pair that it completes gives.
+  // An image of the left camera. Returns what the pair gives that is complete by it.
   std::optional<Outputs> left(Image::ConstSharedPtr image) {
-    return mapped(pairs_.left(std::move(image)));
+    return completed(pairs_.left(std::move(image)));
   }
 
   // An image of the right camera, or a depth image where the options say so.
   std::optional<Outputs> right(Image::ConstSharedPtr image) {
-    return mapped(pairs_.right(std::move(image)));
+    return completed(pairs_.right(std::move(image)));
+  }
+
+  // A sample of the inertial unit, for which a pair may have waited.
+  std::optional<Outputs> imu(const Imu &sample) {
+    samples_.add(sample);
+    return completed(std::nullopt);
+  }
+
+  // Numbers of the instances that a detector saw in a left image; see Instances.
+  std::optional<Outputs> instances(Image::ConstSharedPtr image) {
+    instances_.add(std::move(image));
+    return completed(std::nullopt);
+  }
+
+  // Pixels of a left image that are not used, any value but 0.
+  std::optional<Outputs> ignored(Image::ConstSharedPtr image) {
+    ignored_.add(std::move(image));
+    return completed(std::nullopt);
   }
 
   // Pairs that were mapped, and those that were refused.
@@ -93,19 +126,37 @@ class Node {
   uint64_t pairs_refused() const { return pairs_refused_; }
   // Images that found no partner.
   uint64_t unpaired() const { return pairs_.unpaired(); }
+  // Pairs that were mapped without samples or images of theirs that did not come in time.
+  uint64_t incomplete() const { return incomplete_; }
 
  private:
   using Pair = Pairing<Image>::Pair;
 
-  std::optional<Outputs> mapped(const std::optional<Pair> &pair) {
-    if (!pair) return std::nullopt;
+  // Maps the oldest pair if all of it is there, or if too many wait.
+  std::optional<Outputs> completed(std::optional<Pair> pair) {
+    if (pair) waiting_.push_back(std::move(*pair));
+    if (waiting_.empty()) return std::nullopt;
+    const bool is_complete = complete(time_ns(*waiting_.front().first));
+    if (!is_complete && waiting_.size() <= options_.queue) return std::nullopt;
+    if (!is_complete) ++incomplete_;
+    const Pair oldest = std::move(waiting_.front());
+    waiting_.pop_front();
+    return mapped(oldest);
+  }
+
+  bool complete(int64_t ns) const {
+    return (!options_.imu || samples_.reach(ns)) && (!options_.instances || instances_.reach(ns)) &&
+           (!options_.ignored || ignored_.reach(ns));
+  }
+
+  std::optional<Outputs> mapped(const Pair &pair) {
     // Without both descriptions nothing can be measured: the cameras are just starting.
     if (!mapper_ && !(left_info_ && (right_info_ || options_.depth))) {
       ++pairs_refused_;
       return std::nullopt;
     }
     try {
-      Outputs outputs = map(*pair->first, *pair->second);
+      Outputs outputs = map(*pair.first, *pair.second);
       ++pairs_mapped_;
       return outputs;
     } catch (...) {
@@ -133,6 +184,18 @@ class Node {
     if (options_.depth) frame.disparity_q8 = disparity.data();
     frame.colour = left_picture.colour;
     frame.time_ns = &stamp_ns;
+    // All of these live until the step has read them.
+    const std::vector<DynvoxInertialSample> samples = samples_.take_until(time_ns(left));
+    frame.inertial = samples.data();
+    frame.inertial_count = samples.size();
+    const std::optional<Instances> seen = instances_of(left);
+    if (seen) {
+      frame.detections = seen->detections().data();
+      frame.detection_count = seen->detections().size();
+    }
+    const Image::ConstSharedPtr ignored = ignored_.at(time_ns(left));
+    std::optional<Picture> ignored_picture;
+    if (ignored) frame.ignored = ignored_picture.emplace(marks_of(*ignored, left)).grey;
     const std::optional<DynvoxPose> given = given_pose(left);
     if (options_.depth && !given) throw std::runtime_error("depth needs poses: publish pose");
     if (given) frame.t_world_camera = &*given;
@@ -143,6 +206,37 @@ class Node {
     return outputs;
   }
 
+  std::optional<Instances> instances_of(const Image &left) const {
+    const Image::ConstSharedPtr image = instances_.at(time_ns(left));
+    if (!image) return std::nullopt;
+    return Instances(marks_of(*image, left));
+  }
+
+  // An image that lies over the left one.
+  static const Image &marks_of(const Image &image, const Image &left) {
+    if (image.width != left.width || image.height != left.height)
+      throw std::runtime_error("instances and ignored pixels have the size of the left image");
+    return image;
+  }
+
+  // The inertial unit where /tf_static says it is.
+  DynvoxInertialUnit unit_of(const Image &left) const {
+    const auto camera_unit = frames_.between(left.header.frame_id, samples_.frame());
+    if (!camera_unit)
+      throw std::runtime_error("no static transforms lead from the inertial unit's frame " +
+                               samples_.frame() + " to " + left.header.frame_id +
+                               ": publish them, or set imu to false");
+    // Raw images are rectified by a turn of their camera.
+    Rigid rectified;
+    if (!options_.rectified) {
+      const auto &r = left_info_->r;
+      rectified.rotation = {{{r[0], r[1], r[2]}, {r[3], r[4], r[5]}, {r[6], r[7], r[8]}}};
+    }
+    DynvoxInertialUnit unit{};
+    unit.t_camera_unit = pose_of(rectified * *camera_unit);
+    return unit;
+  }
+
   // Makes the mapper for images of this size.
   void begin(const Image &left) {
     const auto &p = left_info_->p;
@@ -150,6 +244,7 @@ class Node {
                                          : rig_of(p, right_info_->p);
     Cameras cameras{rig, left.width, left.height, {}};
     if (!options_.rectified && !options_.depth) cameras.raw = raw_rig_of(*left_info_, *right_info_);
+    if (options_.imu && !samples_.frame().empty()) cameras.unit = unit_of(left);
     mapper_ = std::make_unique<Mapper>(cameras, options_.mapper);
     has_window_ = options_.mapper.window[0] > 0;
     // The mapper's world has the axes of the first camera; the window knows which way is up.
@@ -193,6 +288,9 @@ class Node {
       const size_t stride = options_.points_stride > 0 ? options_.points_stride : 1;
       outputs.points = points_message(left.header, mapper_->seen(report.t_world_camera, stride));
     }
+    if (options_.mesh_every > 0 && report.frame % options_.mesh_every == 0)
+      outputs.mesh =
+          mesh_message(map_header, mapper_->triangles(options_.mesh_triangles), map_world_);
     describe_state(map_header, outputs);
   }
 
@@ -298,6 +396,9 @@ class Node {
         {"digest", digest},
         {"pairs refused", std::to_string(pairs_refused_)},
         {"images without a partner", std::to_string(pairs_.unpaired())},
+        {"pairs that waited in vain", std::to_string(incomplete_)},
+        {"samples of the inertial unit", std::to_string(report.inertial.samples)},
+        {"inertial unit trusted", report.inertial.trusted ? "yes" : "no"},
         {"pixels with disparity", std::to_string(report.disparities)},
         {"matches of the motion", std::to_string(report.inliers)},
         {"blocks in use", std::to_string(report.blocks)},
@@ -317,6 +418,10 @@ class Node {
 
   NodeOptions options_;
   Pairing<Image> pairs_;
+  // Pairs whose samples or images have not come yet.
+  std::deque<Pair> waiting_;
+  InertialSamples samples_;
+  LatestImages instances_, ignored_;
   std::optional<CameraInfo> left_info_, right_info_;
   StaticFrames frames_;
   std::optional<nav_msgs::msg::Odometry> pose_;
@@ -327,7 +432,7 @@ class Node {
   std::optional<Last> last_;
   // Error of the camera's pose, in its own axes.
   Covariance error_{};
-  uint64_t pairs_mapped_ = 0, pairs_refused_ = 0;
+  uint64_t pairs_mapped_ = 0, pairs_refused_ = 0, incomplete_ = 0;
 };
 
 }  // namespace dynvox_ros2
