@@ -712,6 +712,19 @@ typedef bool (*DynvoxWrite)(void *context, const uint8_t *bytes, size_t len);
 // Fills `bytes` with the next `len` bytes of a snapshot; false when there are not as many.
 typedef bool (*DynvoxRead)(void *context, uint8_t *bytes, size_t len);
 
+// Memory of two kinds for one mapper; both buffers begin at a multiple of dynvox_alignment(), and
+// they do not overlap.
+typedef struct {
+  // Fast memory, for what each frame works on.
+  uint8_t *hot;
+  // Bytes of `hot`.
+  size_t hot_len;
+  // Large memory, for the map.
+  uint8_t *cold;
+  // Bytes of `cold`.
+  size_t cold_len;
+} DynvoxTwoBuffers;
+
 // A byte for each sample (RAW8).
 #define DYNVOX_SAMPLES_BYTES 0
 
@@ -1033,6 +1046,33 @@ DynvoxStatus dynvox_restore(const DynvoxCapacity *capacity,
                             DynvoxRead read,
                             void *context,
                             DynvoxMapper **mapper);
+
+// Writes how many bytes of two buffers a mapper of that capacity takes.
+//
+// # Safety
+// `capacity` is null or points to a capacity, `hot` and `cold` are null or point to a number.
+DynvoxStatus dynvox_bytes_in_two(const DynvoxCapacity *capacity, size_t *hot, size_t *cold);
+
+// Makes a mapper like dynvox_create in two buffers, with the same results. Both are the mapper's
+// until dynvox_destroy.
+//
+// # Safety
+// As dynvox_create; `buffers` is null or points to two buffers that are as long as it says.
+DynvoxStatus dynvox_create_in_two(const DynvoxCapacity *capacity,
+                                  const DynvoxConfig *config,
+                                  const DynvoxTwoBuffers *buffers,
+                                  DynvoxMapper **mapper);
+
+// Restores a mapper like dynvox_restore in two buffers, wherever the saved one lay.
+//
+// # Safety
+// As dynvox_create_in_two.
+DynvoxStatus dynvox_restore_in_two(const DynvoxCapacity *capacity,
+                                   const DynvoxConfig *config,
+                                   const DynvoxTwoBuffers *buffers,
+                                   DynvoxRead source,
+                                   void *context,
+                                   DynvoxMapper **mapper);
 
 #ifdef __cplusplus
 }  // extern "C"

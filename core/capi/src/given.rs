@@ -2,7 +2,7 @@
 //! else.
 
 use crate::DynvoxStatus;
-use core::{ops::Range, slice};
+use core::slice;
 
 /// Most bytes a slice may have.
 const MOST: usize = isize::MAX as usize;
@@ -36,14 +36,27 @@ pub unsafe fn output<T>(pointer: *mut T) -> Result<*mut T, DynvoxStatus> {
     }
 }
 
-/// Items of a caller's that must not lie in `forbidden`, the mapper's own buffer.
+/// Addresses of a mapper's own buffer, or of both where it has two.
+#[derive(Clone, Debug)]
+pub struct Owned {
+    /// First address, and the one behind the last.
+    pub buffers: [[usize; 2]; 2],
+}
+
+impl Owned {
+    fn overlaps(&self, start: usize, end: usize) -> bool {
+        self.buffers.iter().any(|&[first, behind]| start < behind && first < end)
+    }
+}
+
+/// Items of a caller's that must not lie in `forbidden`, the mapper's own memory.
 ///
 /// # Safety
 /// `pointer` is null, misaligned or points to `len` items that nothing writes to for 'a.
 pub unsafe fn items<'a, T>(
     pointer: *const T,
     len: usize,
-    forbidden: &Range<usize>,
+    forbidden: &Owned,
 ) -> Result<&'a [T], DynvoxStatus> {
     if len == 0 {
         return Ok(&[]);
@@ -60,7 +73,7 @@ pub unsafe fn items<'a, T>(
     let start = pointer as usize;
     // Overlapping references would be undefined behaviour, hence the comparison of addresses.
     let end = start.checked_add(bytes).ok_or(DynvoxStatus::Size)?;
-    if start < forbidden.end && forbidden.start < end {
+    if forbidden.overlaps(start, end) {
         return Err(DynvoxStatus::Overlap);
     }
     // SAFETY: not null, aligned, no longer than a slice can be; as long as it says, and left alone,
@@ -75,7 +88,7 @@ pub unsafe fn items<'a, T>(
 pub unsafe fn items_mut<'a, T>(
     pointer: *mut T,
     len: usize,
-    forbidden: &Range<usize>,
+    forbidden: &Owned,
 ) -> Result<&'a mut [T], DynvoxStatus> {
     // SAFETY: the same promise, and more.
     unsafe { items(pointer.cast_const(), len, forbidden)? };

@@ -1,16 +1,19 @@
-//! A mapper in a caller's buffer.
+//! A mapper in a caller's memory: one buffer, or two.
 //!
-//! The buffer begins with a [`HandleHeader`], behind which, at the next multiple of the alignment,
-//! lies the slab. A handle points to the header. The two never overlap, so the mapper's exclusive
-//! hold on the slab and a handle's access to the header do not meet.
+//! The (first) buffer begins with a [`HandleHeader`], behind which, at the next multiple of the
+//! alignment, lies the slab. A handle points to the header. The two never overlap, so the mapper's
+//! exclusive hold on the slab and a handle's access to the header do not meet.
 
 use crate::{
     DynvoxCapacity, DynvoxConfig, DynvoxStatus,
     capacity::given,
-    given::{output, read},
+    given::{Owned, output, read},
 };
-use core::{mem::MaybeUninit, ops::Range, ptr, slice};
-use dynvox_core::{Capacity, Config, Mapper, memory::SLAB_ALIGN};
+use core::{mem::MaybeUninit, ptr, slice};
+use dynvox_core::{
+    Capacity, Config, Mapper,
+    memory::{SLAB_ALIGN, Slabs, TwoSlabs},
+};
 
 /// A mapper; only ever behind a pointer.
 pub struct DynvoxMapper {
@@ -27,13 +30,13 @@ struct HandleHeader {
     /// references lead into the buffer it was made in.
     own: usize,
     busy: bool,
-    /// Bytes of head and slab.
-    bytes: usize,
+    /// Addresses of the mapper's memory: head and slab, and the second slab if there is one.
+    owned: [[usize; 2]; 2],
     /// Made here by the core: it is some kilobytes, which the stack need not hold.
     mapper: MaybeUninit<Option<Mapper<'static>>>,
 }
 
-/// Bytes of a buffer before its slab.
+/// Bytes of the (first) buffer before its slab.
 pub const HEAD_BYTES: usize = size_of::<HandleHeader>().next_multiple_of(SLAB_ALIGN);
 
 const fn bytes(capacity: &Capacity) -> usize {
@@ -85,10 +88,86 @@ pub unsafe extern "C" fn dynvox_create(
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     unsafe {
-        make((capacity, config), (buffer, len), mapper, |slot, capacity, config, slab| {
-            Mapper::new_into(slot, capacity, config, slab).map_err(DynvoxStatus::from)
-        })
+        make(
+            Order { capacity, config, memory: Memory { buffer, len, cold: None }, mapper },
+            new_mapper,
+        )
     }
+}
+
+pub fn new_mapper(
+    slot: &mut Option<Mapper<'static>>,
+    capacity: &Capacity,
+    config: &Config,
+    slabs: Slabs<'static>,
+) -> Result<(), DynvoxStatus> {
+    Mapper::new_into(slot, capacity, config, slabs).map_err(DynvoxStatus::from)
+}
+
+/// Memory for a mapper: a buffer that begins with its head, and one for cold regions if there is.
+#[derive(Clone, Copy)]
+pub struct Memory {
+    pub buffer: *mut u8,
+    pub len: usize,
+    pub cold: Option<(*mut u8, usize)>,
+}
+
+impl Memory {
+    /// Slabs for a mapper, behind the head, and the addresses of all of them.
+    ///
+    /// # Safety
+    /// Buffers are null or as long as they say, and nothing else uses them.
+    unsafe fn slabs(
+        self,
+        capacity: &Capacity,
+    ) -> Result<(Slabs<'static>, [[usize; 2]; 2]), DynvoxStatus> {
+        let hot_bytes = self.cold.map_or(capacity.bytes(), |_| capacity.hot_bytes());
+        let needed = [HEAD_BYTES + hot_bytes, self.cold.map_or(0, |_| capacity.cold_bytes())];
+        let buffers = [(self.buffer, self.len), self.cold.unwrap_or((self.buffer, 0))];
+        for ((buffer, len), needed) in buffers.into_iter().zip(needed) {
+            if buffer.is_null() {
+                return Err(DynvoxStatus::Null);
+            }
+            if !(buffer as usize).is_multiple_of(SLAB_ALIGN) {
+                return Err(DynvoxStatus::Misaligned);
+            }
+            if len < needed {
+                return Err(DynvoxStatus::TooSmall);
+            }
+        }
+        let [hot, cold] = buffers.map(|(buffer, _)| buffer);
+        let owned = Owned {
+            buffers: [
+                [hot as usize, hot as usize + needed[0]],
+                [cold as usize, cold as usize + needed[1]],
+            ],
+        };
+        let [[hot_start, hot_end], [cold_start, cold_end]] = owned.buffers;
+        if self.cold.is_some() && cold_start < hot_end && hot_start < cold_end {
+            return Err(DynvoxStatus::Overlap);
+        }
+        // SAFETY: within the buffers, behind the head, and apart; nothing but the mapper made here
+        // will use them until it is destroyed.
+        let slabs = unsafe {
+            let hot = slice::from_raw_parts_mut(hot.add(HEAD_BYTES), hot_bytes);
+            match self.cold {
+                None => Slabs::One(hot),
+                Some(_) => {
+                    let cold = slice::from_raw_parts_mut(cold, needed[1]);
+                    Slabs::Two(TwoSlabs { hot, cold })
+                }
+            }
+        };
+        Ok((slabs, owned.buffers))
+    }
+}
+
+/// Pointers that a caller gives for a mapper, and where its handle goes.
+pub struct Order {
+    pub capacity: *const DynvoxCapacity,
+    pub config: *const DynvoxConfig,
+    pub memory: Memory,
+    pub mapper: *mut *mut DynvoxMapper,
 }
 
 /// Makes a mapper by `new` in a caller's buffer.
@@ -100,14 +179,12 @@ pub unsafe extern "C" fn dynvox_create(
 /// # Safety
 /// The promises of [`dynvox_create`].
 pub unsafe fn make(
-    (capacity, config): (*const DynvoxCapacity, *const DynvoxConfig),
-    (buffer, len): (*mut u8, usize),
-    mapper: *mut *mut DynvoxMapper,
+    Order { capacity, config, memory, mapper }: Order,
     new: impl FnOnce(
         &mut Option<Mapper<'static>>,
         &Capacity,
         &Config,
-        &'static mut [u8],
+        Slabs<'static>,
     ) -> Result<(), DynvoxStatus>,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
@@ -118,35 +195,27 @@ pub unsafe fn make(
         (Ok(capacity), Ok(config), Ok(handle)) => (capacity, config, handle),
         (Err(status), ..) | (_, Err(status), _) | (_, _, Err(status)) => return status,
     };
-    if buffer.is_null() {
-        return DynvoxStatus::Null;
-    }
-    if !(buffer as usize).is_multiple_of(SLAB_ALIGN) {
-        return DynvoxStatus::Misaligned;
-    }
-    // All arguments are checked before the buffer is touched.
-    if len < bytes(&capacity) {
-        return DynvoxStatus::TooSmall;
-    }
-    // SAFETY: within the buffer, behind the head, which nothing but the mapper made here will use
-    // until it is destroyed.
-    let slab: &'static mut [u8] =
-        unsafe { slice::from_raw_parts_mut(buffer.add(HEAD_BYTES), capacity.bytes()) };
-    if let Err(error) = Mapper::check(&capacity, &config, slab) {
+    // All arguments are checked before any memory is touched.
+    // SAFETY: the caller's promise.
+    let (slabs, owned) = match unsafe { memory.slabs(&capacity) } {
+        Ok(placed) => placed,
+        Err(status) => return status,
+    };
+    if let Err(error) = Mapper::check_slabs(&capacity, &config, &slabs) {
         return error.into();
     }
-    let head = buffer.cast::<HandleHeader>();
+    let head = memory.buffer.cast::<HandleHeader>();
     // SAFETY: the buffer is aligned better than a head, and long enough; no reference into it lives
     // but those of the mapper under construction; the handle was checked.
     unsafe {
         ptr::addr_of_mut!((*head).alive).write(0);
         let slot = (*ptr::addr_of_mut!((*head).mapper)).write(None);
-        if let Err(status) = new(slot, &capacity, &config, slab) {
+        if let Err(status) = new(slot, &capacity, &config, slabs) {
             return status;
         }
         ptr::addr_of_mut!((*head).own).write(head as usize);
         ptr::addr_of_mut!((*head).busy).write(false);
-        ptr::addr_of_mut!((*head).bytes).write(bytes(&capacity));
+        ptr::addr_of_mut!((*head).owned).write(owned);
         ptr::addr_of_mut!((*head).alive).write(ALIVE);
         handle.write(head.cast());
     }
@@ -205,7 +274,7 @@ unsafe fn head(mapper: *mut DynvoxMapper) -> Result<*mut HandleHeader, DynvoxSta
 /// uses it.
 pub unsafe fn with(
     mapper: *mut DynvoxMapper,
-    work: impl FnOnce(&mut Mapper<'static>, &Range<usize>) -> Result<(), DynvoxStatus>,
+    work: impl FnOnce(&mut Mapper<'static>, &Owned) -> Result<(), DynvoxStatus>,
 ) -> DynvoxStatus {
     // SAFETY: the caller's promise.
     let head = match unsafe { head(mapper) } {
@@ -216,9 +285,9 @@ pub unsafe fn with(
     // busy keeps a second one from being made.
     let done = unsafe {
         ptr::addr_of_mut!((*head).busy).write(true);
-        let buffer = head as usize..head as usize + ptr::addr_of!((*head).bytes).read();
+        let owned = Owned { buffers: ptr::addr_of!((*head).owned).read() };
         let done = match (*ptr::addr_of_mut!((*head).mapper)).assume_init_mut() {
-            Some(mapper) => work(mapper, &buffer),
+            Some(mapper) => work(mapper, &owned),
             None => Err(DynvoxStatus::NoMapper),
         };
         ptr::addr_of_mut!((*head).busy).write(false);

@@ -2,9 +2,9 @@
 
 use crate::{
     DynvoxConfig, DynvoxPose, DynvoxStatus,
-    given::{items, output, read},
+    given::{Owned, items, output, read},
 };
-use core::{mem::offset_of, ops::Range, slice};
+use core::{mem::offset_of, slice};
 use dynvox_core::{
     Problems, Report,
     inertial::{InertialDoubt, InertialSample, InertialUnit},
@@ -130,7 +130,7 @@ const _: () = {
 pub(crate) unsafe fn samples<'a>(
     samples: *const DynvoxInertialSample,
     count: usize,
-    buffer: &Range<usize>,
+    buffer: &Owned,
 ) -> Result<&'a [InertialSample], DynvoxStatus> {
     // SAFETY: the caller's promise.
     let given: &[DynvoxInertialSample] = unsafe { items(samples, count, buffer)? };

@@ -26,6 +26,7 @@ mod snapshot;
 mod status;
 mod step;
 mod tracks;
+mod two_buffers;
 mod types;
 
 pub use callback::{
@@ -63,6 +64,9 @@ pub use snapshot::{DynvoxRead, DynvoxWrite, dynvox_restore, dynvox_save};
 pub use status::{DynvoxStatus, dynvox_status_text};
 pub use step::{dynvox_pose, dynvox_step, dynvox_step_with};
 pub use tracks::{DynvoxMotionState, DynvoxTrack, dynvox_object_triangles, dynvox_tracks};
+pub use two_buffers::{
+    DynvoxTwoBuffers, dynvox_bytes_in_two, dynvox_create_in_two, dynvox_restore_in_two,
+};
 pub use types::{
     DYNVOX_SAMPLES_BYTES, DYNVOX_SAMPLES_PACKED_10, DYNVOX_SAMPLES_PACKED_12, DynvoxDetection,
     DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxPoseOrigin, DynvoxReport, DynvoxSampleLayout,

@@ -3,11 +3,11 @@
 use crate::{
     DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxStatus, DynvoxStore, DynvoxTriangle,
     DynvoxTriangleSink,
-    given::{items_mut, output, read},
+    given::{Owned, items_mut, output, read},
     handle::with,
     retired::Retiring,
 };
-use core::{ffi::c_void, ops::Range};
+use core::ffi::c_void;
 use dynvox_core::{Serial, image::View, view::Triangle};
 
 /// A rendered view of the map: buffers of the caller, any may be null. The view has the size of the
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn dynvox_raycast(
 unsafe fn fill<T: Copy>(
     image: Option<View<'_, T>>,
     output: *mut T,
-    mapper: &Range<usize>,
+    mapper: &Owned,
 ) -> Result<(), DynvoxStatus> {
     let Some(image) = image.filter(|_| !output.is_null()) else { return Ok(()) };
     // SAFETY: the caller's promise.

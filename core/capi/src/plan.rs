@@ -2,10 +2,9 @@
 
 use crate::{
     DynvoxMapper, DynvoxStatus,
-    given::{items, items_mut, output, read},
+    given::{Owned, items, items_mut, output, read},
     handle::with,
 };
-use core::ops::Range;
 use dynvox_core::planning::{CellState, FreePath, MovingBox, PathEnd, Planning, RobotCylinder};
 
 /// The planner's window from above: buffers of the caller, any may be null. Columns are in rows
@@ -174,7 +173,7 @@ pub unsafe extern "C" fn dynvox_update_planning_maps(
 unsafe fn copy_window(
     planning: &Planning<'_>,
     to: &DynvoxWindow,
-    buffer: &Range<usize>,
+    buffer: &Owned,
 ) -> Result<(), DynvoxStatus> {
     let [width, length, height] = planning.size();
     let [x, y, z] = planning.origin();
@@ -216,7 +215,7 @@ unsafe fn copy_window(
 unsafe fn fill<T>(
     output: *mut T,
     count: usize,
-    mapper: &Range<usize>,
+    mapper: &Owned,
     value: impl Fn(usize) -> T,
 ) -> Result<(), DynvoxStatus> {
     if output.is_null() {

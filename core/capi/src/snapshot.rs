@@ -2,7 +2,7 @@
 
 use crate::{
     DynvoxCapacity, DynvoxConfig, DynvoxMapper, DynvoxStatus,
-    handle::{make, with},
+    handle::{Memory, Order, make, with},
 };
 use core::ffi::c_void;
 use dynvox_core::{Mapper, RestoreError};
@@ -60,6 +60,16 @@ pub unsafe extern "C" fn dynvox_restore(
     context: *mut c_void,
     mapper: *mut *mut DynvoxMapper,
 ) -> DynvoxStatus {
+    let memory = Memory { buffer, len, cold: None };
+    // SAFETY: the caller's promise.
+    unsafe { restore(Order { capacity, config, memory, mapper }, read, context) }
+}
+
+/// Restores a mapper in a caller's memory.
+///
+/// # Safety
+/// The promises of [`dynvox_restore`].
+pub unsafe fn restore(order: Order, read: DynvoxRead, context: *mut c_void) -> DynvoxStatus {
     let Some(read) = read else { return DynvoxStatus::Null };
     let mut source = |bytes: &mut [u8]| {
         if read(context, bytes.as_mut_ptr(), bytes.len()) {
@@ -70,8 +80,8 @@ pub unsafe extern "C" fn dynvox_restore(
     };
     // SAFETY: the caller's promise.
     unsafe {
-        make((capacity, config), (buffer, len), mapper, |slot, capacity, config, slab| {
-            Mapper::restore_into(slot, capacity, config, slab, &mut source).map_err(|error| {
+        make(order, |slot, capacity, config, slabs| {
+            Mapper::restore_into(slot, capacity, config, slabs, &mut source).map_err(|error| {
                 match error {
                     RestoreError::New(error) => error.into(),
                     RestoreError::Source(status) => status,

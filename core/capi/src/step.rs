@@ -4,12 +4,12 @@ use crate::{
     DYNVOX_SAMPLES_BYTES, DYNVOX_SAMPLES_PACKED_10, DYNVOX_SAMPLES_PACKED_12, DynvoxDetection,
     DynvoxFrame, DynvoxImage, DynvoxMapper, DynvoxObjectSink, DynvoxPose, DynvoxReport,
     DynvoxSampleLayout, DynvoxStatus, DynvoxStore,
-    given::{items, output, read},
+    given::{Owned, items, output, read},
     handle::with,
     inertial::samples,
     retired::Retiring,
 };
-use core::{ops::Range, ptr};
+use core::ptr;
 use dynvox_core::{
     Serial, StereoFrame,
     image::{SampleLayout, View},
@@ -130,7 +130,7 @@ unsafe fn image<'a, T>(
     image: DynvoxImage,
     [width, height]: [usize; 2],
     row: usize,
-    buffer: &Range<usize>,
+    buffer: &Owned,
 ) -> Result<Option<View<'a, T>>, DynvoxStatus> {
     if image.pixels.is_null() {
         return Ok(None);
@@ -149,7 +149,7 @@ unsafe fn image<'a, T>(
 unsafe fn disparity<'a>(
     frame: &DynvoxFrame,
     [width, height]: [usize; 2],
-    buffer: &Range<usize>,
+    buffer: &Owned,
 ) -> Result<Option<View<'a, u16>>, DynvoxStatus> {
     if frame.disparity_q8.is_null() {
         return Ok(None);
@@ -170,7 +170,7 @@ const NOTHING: Detection<'static> =
 unsafe fn detections<'a>(
     frame: &DynvoxFrame,
     buffered: &'a mut [Detection<'a>; MAX_DETECTIONS],
-    buffer: &Range<usize>,
+    buffer: &Owned,
 ) -> Result<&'a [Detection<'a>], DynvoxStatus> {
     // SAFETY: the caller's promise.
     let given: &[DynvoxDetection] =

@@ -10,8 +10,21 @@ fn the_header_is_what_the_source_says() {
         .expect("the configuration can be read");
     // In the order in which the header has them: types before the functions that take them.
     let modules = [
-        "status", "types", "inertial", "config", "capacity", "callback", "handle", "step", "map",
-        "tracks", "plan", "raw", "retired", "snapshot",
+        "status",
+        "types",
+        "inertial",
+        "config",
+        "capacity",
+        "callback",
+        "handle",
+        "step",
+        "map",
+        "tracks",
+        "plan",
+        "raw",
+        "retired",
+        "snapshot",
+        "two_buffers",
     ];
     let builder =
         modules.iter().fold(cbindgen::Builder::new().with_config(config), |builder, module| {

@@ -51,7 +51,7 @@ use crate::{
     geometry::{StereoRig, Transform},
     image::View,
     inertial::InertialPrior,
-    memory::{Carver, SlabError},
+    memory::{Carver, SlabError, Slabs, TwoSlabs},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
     rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier},
@@ -194,9 +194,9 @@ impl<'s> Mapper<'s> {
         made
     }
 
-    /// Makes a mapper like [`Mapper::new`], in `slot`: what it holds is dropped first, and it is
-    /// empty after an error. For callers that keep a mapper in memory of their own and have little
-    /// stack.
+    /// Makes a mapper like [`Mapper::new`] or [`Mapper::new_in_two`], in `slot`: what it holds is
+    /// dropped first, and it is empty after an error. For callers that keep a mapper in memory of
+    /// their own and have little stack.
     ///
     /// # Errors
     /// Returns the errors of [`Mapper::new`].
@@ -205,13 +205,18 @@ impl<'s> Mapper<'s> {
         slot: &mut Option<Self>,
         capacity: &Capacity,
         config: &Config,
-        slab: &'s mut [u8],
+        slabs: Slabs<'s>,
     ) -> Result<(), NewError> {
         *slot = None;
-        // Before anything is taken from the slab.
-        Self::check(capacity, config, slab)?;
+        // Before anything is taken from the slabs.
+        Self::check_slabs(capacity, config, &slabs)?;
         // By reference, as above.
-        let mut carver = Carver::new(slab, capacity.bytes());
+        let mut carver = match slabs {
+            Slabs::One(slab) => Carver::new(slab, capacity.bytes()),
+            Slabs::Two(slabs) => {
+                Carver::new_in_two(slabs, [capacity.hot_bytes(), capacity.cold_bytes()])
+            }
+        };
         let carver = carver.as_mut().map_err(|error| NewError::Slab(*error))?;
         let mapper = slot.insert(Self::new_in(capacity, config, carver));
         let prepared = mapper.prepare(config, carver);
@@ -257,6 +262,27 @@ impl<'s> Mapper<'s> {
     pub fn check(capacity: &Capacity, config: &Config, slab: &[u8]) -> Result<(), NewError> {
         Self::check_bounds(capacity, config)?;
         Ok(Carver::check_fit(slab, capacity.bytes()).map(|_| ())?)
+    }
+
+    /// Checks like [`Mapper::check`] what [`Mapper::new_into`] needs.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Mapper::new`]; of two slabs that are too small it names what the hot
+    /// one lacks.
+    #[inline(never)]
+    pub fn check_slabs(
+        capacity: &Capacity,
+        config: &Config,
+        slabs: &Slabs<'_>,
+    ) -> Result<(), NewError> {
+        match slabs {
+            Slabs::One(slab) => Self::check(capacity, config, slab),
+            Slabs::Two(TwoSlabs { hot, cold }) => {
+                Self::check_bounds(capacity, config)?;
+                Carver::check_fit(hot, capacity.hot_bytes())?;
+                Ok(Carver::check_fit(cold, capacity.cold_bytes()).map(|_| ())?)
+            }
+        }
     }
 
     /// Checks configuration and capacity by themselves.

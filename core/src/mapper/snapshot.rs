@@ -27,7 +27,7 @@ use super::{Mapper, NewError};
 use crate::{
     Capacity, Config,
     digest::Digest,
-    memory::Carver,
+    memory::{Carver, Slabs},
     state::{ReadError, Reader, Visitor, Writer},
 };
 use core::fmt::{self, Write};
@@ -218,11 +218,11 @@ impl<'s> Mapper<'s> {
         slot: &mut Option<Self>,
         capacity: &Capacity,
         config: &Config,
-        slab: &'s mut [u8],
+        slabs: Slabs<'s>,
         source: &mut impl FnMut(&mut [u8]) -> Result<(), E>,
     ) -> Result<(), RestoreError<E>> {
         // The capacity and configuration are the caller's; `read` refuses a snapshot of others.
-        Self::new_into(slot, capacity, config, slab).map_err(RestoreError::New)?;
+        Self::new_into(slot, capacity, config, slabs).map_err(RestoreError::New)?;
         let read = slot.as_mut().map_or(Ok(()), |mapper| mapper.read(source));
         // Half of the regions may be overwritten: such a mapper must not be used.
         if read.is_err() {

@@ -14,4 +14,4 @@ pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
 pub(crate) use one_shot::OneShot;
 pub use placement::Placement;
-pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, TwoSlabs, region_bytes};
+pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, Slabs, TwoSlabs, region_bytes};

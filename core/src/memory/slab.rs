@@ -109,6 +109,15 @@ pub struct TwoSlabs<'s> {
     pub cold: &'s mut [u8],
 }
 
+/// Memory of a mapper: one slab, or a fast and a large one.
+#[derive(Debug)]
+pub enum Slabs<'s> {
+    /// All regions in one slab, at least [`Capacity::bytes`](crate::Capacity::bytes).
+    One(&'s mut [u8]),
+    /// Hot regions in one slab, cold ones in another.
+    Two(TwoSlabs<'s>),
+}
+
 /// Allocates typed, zeroed regions from a slab, front to back, and records each by name.
 ///
 /// A single allocation returns no error: from the first failure on every region is empty, and

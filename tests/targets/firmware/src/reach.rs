@@ -8,6 +8,7 @@ use dynvox_core::{
     Capacity, Mapper, Serial, StereoFrame,
     digest::Digest,
     image::View,
+    memory::Slabs,
     objects::{ObjectSink, RetiredObject},
     planning::RobotCylinder,
     view::Raycaster,
@@ -95,7 +96,7 @@ fn make<'s>(slot: &mut Option<Mapper<'s>>, slab: &'s mut [u8]) {
     config.volume.observation_weight = black_box(ObservationWeight::Depth);
     config.stereo.median = black_box(true);
     // What fails shows in the slot.
-    let _ = Mapper::new_into(slot, black_box(&CAPACITY), black_box(&config), slab);
+    let _ = Mapper::new_into(slot, black_box(&CAPACITY), black_box(&config), Slabs::One(slab));
 }
 
 /// Takes the frames; false where one is not taken.
