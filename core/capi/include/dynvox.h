@@ -486,7 +486,8 @@ typedef struct {
   // Origin of the pose.
   DynvoxPoseOrigin pose_origin;
   // Covariance of the motion since the frame it was matched with, row by row: rotation vector
-  // (rad), then translation (m), in this camera's axes. All 0 where no motion was estimated.
+  // (rad), then translation (m), in this camera's axes. A slow camera's is that since an older
+  // frame, and does not add up from frame to frame. All 0 where no motion was estimated.
   double motion_covariance[36];
   // True if something of the frame was fused into the map: its pose is known, and it shows
   // depth.

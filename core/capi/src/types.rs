@@ -155,7 +155,8 @@ pub struct DynvoxReport {
     /// Origin of the pose.
     pub pose_origin: DynvoxPoseOrigin,
     /// Covariance of the motion since the frame it was matched with, row by row: rotation vector
-    /// (rad), then translation (m), in this camera's axes. All 0 where no motion was estimated.
+    /// (rad), then translation (m), in this camera's axes. A slow camera's is that since an older
+    /// frame, and does not add up from frame to frame. All 0 where no motion was estimated.
     pub motion_covariance: [f64; 36],
     /// True if something of the frame was fused into the map: its pose is known, and it shows
     /// depth.

@@ -5,7 +5,7 @@
 //! motions is too long or too short. So scene points are kept from one frame and found again in
 //! those after it, until they have flowed by [`SPENT_PX`]: the pose follows from the anchor's and
 //! from that one longer motion, and the error counts once for all of it. A camera that stands keeps
-//! its anchor, and does not drift.
+//! its anchor, and does not drift. The covariance is that of the one longer motion as well.
 //!
 //! Flow decides, not a count of frames. Where the flow of one frame reaches [`FAST_PX`] there is no
 //! anchor, and nothing changes.
@@ -18,7 +18,10 @@
 //! **What can go wrong.** Points get lost: where fewer than half of them agree on a motion, the
 //! frame's own estimate stands and the next frame begins another anchor.
 
-use super::{Egomotion, EgomotionConfig, Estimator, points::SinglePrecision};
+use super::{
+    Egomotion, EgomotionConfig, Estimator, MotionCovariance, MotionEstimate,
+    points::SinglePrecision,
+};
 use crate::{
     geometry::{StereoRig, Transform},
     memory::{Capacity, Carver, region_bytes},
@@ -59,6 +62,12 @@ pub(crate) struct SlowFrame<'a, 's, I> {
     pub matches: I,
 }
 
+/// Motion since the anchor's frame.
+struct Since {
+    t_current_anchor: Transform,
+    covariance: Option<MotionCovariance>,
+}
+
 impl<'s> Anchor<'s> {
     const fn points(capacity: &Capacity) -> usize {
         let share = capacity.matches / 8;
@@ -90,13 +99,14 @@ impl<'s> Anchor<'s> {
         self.len == 0
     }
 
-    /// Corrects the pose of a camera that moves slowly by what its anchor shows. The camera's last
-    /// motion must be an estimate.
+    /// Corrects the pose of a camera that moves slowly by what its anchor shows, and with it its
+    /// last motion, which must be `estimate`.
     #[inline(never)]
     pub fn step<'m, I: Iterator<Item = &'m Match> + Clone>(
         &mut self,
         frame: &SlowFrame<'_, '_, I>,
         camera: &mut Egomotion,
+        estimate: &mut MotionEstimate,
         estimator: &mut Estimator<'_>,
     ) {
         // What moves by itself says nothing of the camera's flow, and is not kept.
@@ -111,10 +121,13 @@ impl<'s> Anchor<'s> {
             self.begin(frame.matcher, still, count);
             self.t_world_anchor = camera.t_world_previous();
         } else {
-            match self.t_current_anchor(frame, camera, estimator) {
-                Some(motion) => {
-                    let pose = (self.t_world_anchor * motion.inverse()).normalized();
+            match self.since_anchor(frame, camera, estimator) {
+                Some(Since { t_current_anchor, covariance }) => {
+                    let pose = (self.t_world_anchor * t_current_anchor.inverse()).normalized();
                     camera.correct_pose(&pose);
+                    estimate.t_current_previous = Some(*camera.t_current_previous());
+                    // Short motions since the anchor no longer count, nor do their errors.
+                    (estimate.covariance, estimate.anchored) = (covariance, true);
                 }
                 None => self.clear(),
             }
@@ -141,12 +154,12 @@ impl<'s> Anchor<'s> {
     }
 
     /// Motion since the anchor; `None` where too few points agree on one.
-    fn t_current_anchor<I>(
+    fn since_anchor<I>(
         &mut self,
         frame: &SlowFrame<'_, '_, I>,
         camera: &Egomotion,
         estimator: &mut Estimator<'_>,
-    ) -> Option<Transform> {
+    ) -> Option<Since> {
         let expected = (camera.t_world_camera().inverse() * self.t_world_anchor).normalized();
         let needed = self.len / SHARE;
         let points = self.points.get_mut(..self.len)?;
@@ -161,7 +174,8 @@ impl<'s> Anchor<'s> {
         let agreeing = matches.filter(|m| view.explains(m, frame.rig, EXPLAINED_PX));
         let (count, flow_px) = mean_flow(agreeing);
         self.is_spent = flow_px > SPENT_PX;
-        (count >= needed).then_some(motion)
+        (count >= needed)
+            .then_some(Since { t_current_anchor: motion, covariance: found.covariance })
     }
 
     /// Digest of the state.

@@ -24,6 +24,10 @@ const SPREAD: f64 = 1.5;
 /// the left and in the right image, both rows together): columns of both images, rows of both,
 /// columns of the left image only.
 const SHARED_PX: [[f64; 3]; 3] = [[0.03, 0.03, 0.0], [0.0, 0.0, 0.06], [0.02, 0.0, 0.0]];
+/// Error along the flow that all matches share, as a share of the flow, and at most, px: refinement
+/// lags behind flow of less than a pixel, or runs ahead of it.
+const FLOW_SHARE: f64 = 0.2;
+const FLOW_PX: f64 = 0.02;
 /// Standard deviation of the rig's scale: baseline and focal length.
 const SCALE_SHARE: f64 = 0.005;
 
@@ -55,6 +59,7 @@ impl MotionCovariance {
         let mut sums = NormalEquations::ZERO;
         let mut spread = [[0.0; N]; N];
         let mut shared = [[0.0; N]; SHARED_PX.len()];
+        let mut along_flow = [0.0; N];
         for point in points {
             let Some(rows) = PointRows::new(&point, &matrix, rig) else { continue };
             let weight = weight(&point, rows.squared);
@@ -66,7 +71,10 @@ impl MotionCovariance {
             for (sum, error) in shared.iter_mut().zip(SHARED_PX) {
                 sum.iter_mut().zip(rows.slope(error)).for_each(|(s, slope)| *s += weight * slope);
             }
+            let slope = rows.slope(flow_error(&point, rig));
+            along_flow.iter_mut().zip(slope).for_each(|(s, slope)| *s += weight * slope);
         }
+        add_outer(&mut spread, along_flow, 1.0);
         for pull in shared {
             add_outer(&mut spread, pull, 1.0);
         }
@@ -180,6 +188,21 @@ impl MotionCovariance {
         let (high, low) = if row < column { (column, row) } else { (row, column) };
         self.lower.get(high * (high + 1) / 2 + low).copied().unwrap_or_default()
     }
+}
+
+/// Error of a point along its flow, px: column in the left and in the right image, both rows
+/// together.
+fn flow_error(point: &Point, rig: &StereoRig) -> [f64; 3] {
+    let Some(before) = rig.project(point.xyz) else { return [0.0; 3] };
+    let left = [point.left[0] - before.u_left_px, point.left[1] - before.v_px];
+    let right = [point.right[0] - before.u_right_px, point.right[1] - before.v_px];
+    let [left, right] = [left, right].map(|[along, down]| {
+        let flow_px = libm::sqrt(along * along + down * down);
+        let most = FLOW_PX / FLOW_SHARE;
+        let share = if flow_px > most { FLOW_PX / flow_px } else { FLOW_SHARE };
+        [share * along, share * down]
+    });
+    [left[0], right[0], left[1] + right[1]]
 }
 
 fn add_outer(sum: &mut [[f64; N]; N], vector: [f64; N], factor: f64) {

@@ -70,8 +70,13 @@ pub struct MotionEstimate {
     /// Root mean square error of one coordinate over the inliers, px.
     pub residual_rms_px: f64,
     /// Covariance of the motion, in the current camera's frame; `None` unless `status` is
-    /// `Estimated`. It holds the noise of the inliers as measured, and what all of them share.
+    /// `Estimated`. It holds the noise of the inliers as measured, and what all of them share. Of
+    /// an `anchored` motion it is the covariance since the anchor.
     pub covariance: Option<MotionCovariance>,
+    /// For the camera: true where the pose follows from that of an older frame, the anchor, because
+    /// the camera is slow. The anchor is the frame before the last estimate that is not anchored,
+    /// and errors of the motions since then do not add up.
+    pub anchored: bool,
     /// For the camera: directions in which the motion is not determined; along them the last one
     /// was continued, if there was one.
     pub weak: WeakDirections,
@@ -102,6 +107,7 @@ impl MotionEstimate {
             inliers: inliers as u32,
             residual_rms_px: 0.0,
             covariance: None,
+            anchored: false,
             weak: WeakDirections::default(),
             samples,
             steps: 0,

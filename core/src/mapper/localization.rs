@@ -6,7 +6,7 @@ use super::{
 use crate::{
     Capacity,
     egomotion::{
-        Anchor, Egomotion, Estimator, MotionEstimate, SlowFrame, TimedMatches,
+        Anchor, Egomotion, Estimator, MotionCovariance, MotionEstimate, SlowFrame, TimedMatches,
         icp::{self, IcpReport},
     },
     geometry::{MapSegment, StereoObservation, StereoRig, Transform},
@@ -78,6 +78,13 @@ impl Found {
         let covariance = self.egomotion.and_then(|motion| motion.covariance);
         let limit_m = IMPRECISE_SHARE * f64::from(voxel_size_m);
         covariance.is_some_and(|covariance| covariance.distance_sigma_m() > limit_m)
+    }
+
+    /// Covariance that this frame adds to the way of the camera. While an anchor holds the camera,
+    /// the motion that began it stands for all of them: their errors do not add up.
+    fn covariance_of_way(&self) -> Option<&MotionCovariance> {
+        let estimate = self.egomotion.as_ref()?;
+        if estimate.anchored { Some(&MotionCovariance::ZERO) } else { estimate.covariance.as_ref() }
     }
 
     fn new(origin: PoseOrigin) -> Self {
@@ -305,7 +312,7 @@ impl<'s> Localization<'s> {
                 t_world_camera: *self.camera.t_world_camera(),
             },
             t_current_previous: is_measured.then(|| *self.camera.t_current_previous()),
-            covariance: found.egomotion.as_ref().and_then(|motion| motion.covariance.as_ref()),
+            covariance: found.covariance_of_way(),
             is_given: found.origin == PoseOrigin::Given,
         };
         let points = FramePoints { all: seen.scene_flow.refined().iter(), still };
@@ -394,8 +401,7 @@ impl<'s> Localization<'s> {
             // Not over several frames: there is no anchor then.
             matches: still(seen, mask, false),
         };
-        self.anchor.step(&frame, &mut self.camera, &mut self.estimator);
-        estimate.t_current_previous = Some(*self.camera.t_current_previous());
+        self.anchor.step(&frame, &mut self.camera, estimate, &mut self.estimator);
     }
 
     /// Registers the depth with the map as it appears from the last pose. All of the picture

@@ -19,6 +19,10 @@ pub struct PathCertainty {
     /// Covariance and pose of the last frame whose pose is not a guess.
     reference: MotionCovariance,
     t_world_reference: Transform,
+    /// Covariance and pose of the frame that an anchored motion counts from: the one before the
+    /// last estimate that is not anchored.
+    anchor: MotionCovariance,
+    t_world_anchor: Transform,
     /// Frames guessed since.
     guessed: u32,
 }
@@ -30,26 +34,44 @@ impl Default for PathCertainty {
             segment: MapSegment::FIRST,
             reference: MotionCovariance::ZERO,
             t_world_reference: Transform::IDENTITY,
+            anchor: MotionCovariance::ZERO,
+            t_world_anchor: Transform::IDENTITY,
             guessed: 0,
         }
     }
 }
 
 impl PathCertainty {
+    /// Begins with a frame whose pose counts as known.
+    fn from_first(report: &Report) -> Self {
+        let pose = report.t_world_camera;
+        Self {
+            segment: report.segment,
+            t_world_reference: pose,
+            t_world_anchor: pose,
+            ..Self::default()
+        }
+    }
+
     /// Takes a frame, and returns the covariance of its pose against the segment's first frame, in
     /// the camera's axes.
     pub fn add(&mut self, report: &Report) -> MotionCovariance {
         let begins = report.segment != self.segment || report.pose == PoseOrigin::First;
         if begins || report.pose == PoseOrigin::Given {
-            *self = Self { segment: report.segment, ..Self::default() };
-            self.t_world_reference = report.t_world_camera;
+            *self = Self::from_first(report);
             return self.reference;
         }
         let motion = (report.t_world_camera.inverse() * self.t_world_reference).normalized();
         let covariance = report.egomotion.and_then(|motion| motion.covariance);
         match covariance.filter(|_| report.pose == PoseOrigin::Estimated) {
             Some(covariance) => {
-                self.reference = covariance.after(&self.reference, &motion);
+                // An anchored motion replaces those since its anchor; others begin where the last
+                // one ended.
+                if !report.egomotion.is_some_and(|motion| motion.anchored) {
+                    (self.anchor, self.t_world_anchor) = (self.reference, self.t_world_reference);
+                }
+                let motion = (report.t_world_camera.inverse() * self.t_world_anchor).normalized();
+                self.reference = covariance.after(&self.anchor, &motion);
                 (self.t_world_reference, self.guessed) = (report.t_world_camera, 0);
                 self.reference
             }
@@ -117,6 +139,11 @@ impl Honesty {
         self.within.map(|within| f64::from(within) / f64::from(self.count.max(1)))
     }
 
+    /// Root mean square of the distances by which positions were off, and of their sigmas, m.
+    pub fn distances_m(&self) -> [f64; 2] {
+        self.sizes().map(|[.., x, y, z]| (x * x + y * y + z * z).sqrt())
+    }
+
     /// Root mean square of the errors, and of the sigmas, by direction.
     pub fn sizes(&self) -> [[f64; 6]; 2] {
         let count = f64::from(self.count.max(1));
@@ -127,7 +154,7 @@ impl Honesty {
 /// Honesty of single motions and of poses along a path.
 #[derive(Clone, Debug, Default)]
 pub struct PathHonesty {
-    /// Motions from one frame to the next.
+    /// Motions from one frame to the next, or since the anchor.
     pub motions: Honesty,
     /// Poses against the first frame of their segment.
     pub poses: Honesty,
@@ -135,6 +162,8 @@ pub struct PathHonesty {
     /// Estimated and true pose of the segment's first frame, and of the last frame.
     first: Option<[Transform; 2]>,
     last: Option<[Transform; 2]>,
+    /// Estimated and true pose of the frame that an anchored motion counts from.
+    anchor: Option<[Transform; 2]>,
     segment: MapSegment,
 }
 
@@ -142,17 +171,25 @@ impl PathHonesty {
     /// Takes a frame with its true pose.
     pub fn add(&mut self, report: &Report, truth: &Transform) {
         let now = [report.t_world_camera, *truth];
-        let covariance = self.certainty.add(report);
         let begins = self.first.is_none() || report.segment != self.segment;
+        let covariance = if self.first.is_none() {
+            self.certainty = PathCertainty::from_first(report);
+            MotionCovariance::ZERO
+        } else {
+            self.certainty.add(report)
+        };
         if begins {
-            (self.first, self.segment) = (Some(now), report.segment);
+            (self.first, self.segment, self.anchor) = (Some(now), report.segment, None);
         } else if report.pose == PoseOrigin::Estimated {
             let since = |then: [Transform; 2]| [0, 1].map(|k| now[k].inverse() * then[k]);
             if let Some([found, truth]) = self.first.map(since) {
                 self.poses.add(&found, &truth, &covariance);
             }
+            if !report.egomotion.is_some_and(|motion| motion.anchored) {
+                self.anchor = self.last;
+            }
             let motion = report.egomotion.and_then(|motion| motion.covariance);
-            if let (Some([found, truth]), Some(covariance)) = (self.last.map(since), motion) {
+            if let (Some([found, truth]), Some(covariance)) = (self.anchor.map(since), motion) {
                 self.motions.add(&found, &truth, &covariance);
             }
         }

@@ -2,7 +2,7 @@
 //! below the pixel.
 
 use super::*;
-use crate::egomotion::{Anchor, SlowFrame};
+use crate::egomotion::{Anchor, MotionCovariance, SlowFrame};
 use std::{f64::consts::TAU, println};
 
 /// Focal length of the scene, px, and its panels: left end, right end and depth, m.
@@ -71,6 +71,17 @@ impl Scene {
 
 /// Poses of a camera at `ways_m` along its axis, with an anchor or without.
 fn travel(ways_m: &[f64], anchored: bool) -> Vec<Transform> {
+    travel_noisily(ways_m, anchored, 3).into_iter().map(|frame| frame.t_world_camera).collect()
+}
+
+/// Pose of a frame, and the estimate that led to it; the first one has none.
+struct Travelled {
+    t_world_camera: Transform,
+    estimate: Option<MotionEstimate>,
+}
+
+/// Camera like that of [`travel`], with noise drawn from a seed.
+fn travel_noisily(ways_m: &[f64], anchored: bool, seed: u64) -> Vec<Travelled> {
     let (mut flow_slab, mut slab) = (slab(), Box::new(Slab([0; BYTES])));
     let mut anchor_slab = Box::new(Slab([0; ANCHOR_BYTES]));
     let mut matcher = FlowMatcher::new_in(
@@ -80,25 +91,44 @@ fn travel(ways_m: &[f64], anchored: bool) -> Vec<Transform> {
     let mut estimator = estimator(&mut slab);
     let mut anchor =
         Anchor::new_in(&CAPACITY, &mut Carver::new(&mut anchor_slab.0, ANCHOR_BYTES).unwrap());
-    let (scene, mut noise, mut camera) = (Scene::new(), Random::new(3), Egomotion::default());
+    let (scene, mut noise, mut camera) = (Scene::new(), Random::new(seed), Egomotion::default());
     let config = EgomotionConfig::default();
-    let mut poses = vec![Transform::IDENTITY];
+    let mut travelled = vec![Travelled { t_world_camera: Transform::IDENTITY, estimate: None }];
     for (frame, &way_m) in ways_m.iter().enumerate() {
         let [left, right] = scene.see(way_m, &mut noise);
         let view = |pixels| View::new(pixels, WIDTH, HEIGHT).unwrap();
         matcher.push(&SceneFlowConfig::default(), view(&left), view(&right), &Serial);
         if frame > 0 {
             let matches = matcher.bucketed();
-            let estimate = camera.step(&config, &RIG, at_10_hz(matches.clone()), &mut estimator);
+            let mut estimate =
+                camera.step(&config, &RIG, at_10_hz(matches.clone()), &mut estimator);
             assert_eq!(estimate.status, MotionStatus::Estimated, "{frame}");
             if anchored {
                 let frame = SlowFrame { config: &config, rig: &RIG, matcher: &matcher, matches };
-                anchor.step(&frame, &mut camera, &mut estimator);
+                anchor.step(&frame, &mut camera, &mut estimate, &mut estimator);
             }
-            poses.push(*camera.t_world_camera());
+            let t_world_camera = *camera.t_world_camera();
+            travelled.push(Travelled { t_world_camera, estimate: Some(estimate) });
         }
     }
-    poses
+    travelled
+}
+
+/// Covariances of the poses against the first one.
+fn integrated(travelled: &[Travelled]) -> Vec<MotionCovariance> {
+    let first = (MotionCovariance::ZERO, Transform::IDENTITY);
+    let (mut anchor, mut last, mut all) = (first, first, vec![first.0]);
+    for Travelled { t_world_camera, estimate } in travelled {
+        let Some(estimate) = estimate else { continue };
+        if !estimate.anchored {
+            anchor = last;
+        }
+        let motion = t_world_camera.inverse() * anchor.1;
+        let covariance = estimate.covariance.unwrap().after(&anchor.0, &motion);
+        last = (covariance, *t_world_camera);
+        all.push(covariance);
+    }
+    all
 }
 
 /// Frames `step_m` apart.
@@ -152,4 +182,76 @@ fn a_camera_that_speeds_up_and_slows_down_again_is_followed() {
     let error_m = last.translation_m[2] - way_m;
     println!("{error_m:+.5} m of {way_m} m");
     assert!(error_m.abs() < 0.01 * way_m, "{error_m}");
+}
+
+/// Errors of position along the camera's axes against two sigma, over all frames but the first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Within {
+    count: u32,
+    within: u32,
+    squared: f64,
+    variance: f64,
+}
+
+impl Within {
+    fn add(&mut self, error_m: f64, sigma_m: f64) {
+        self.count += 1;
+        self.within += u32::from(error_m.abs() <= 2.0 * sigma_m);
+        self.squared += error_m * error_m;
+        self.variance += sigma_m * sigma_m;
+    }
+
+    fn share(&self) -> f64 {
+        f64::from(self.within) / f64::from(self.count)
+    }
+
+    /// Sigma per error, as a ratio of their root mean squares.
+    fn excess(&self) -> f64 {
+        (self.variance / self.squared).sqrt()
+    }
+}
+
+/// Certainty to the right, downwards and ahead, of cameras with a noise of their own each.
+fn certainty(ways_m: &[f64], anchored: bool) -> [Within; 3] {
+    let mut axes = [Within::default(); 3];
+    for seed in 1..=2 {
+        let travelled = travel_noisily(ways_m, anchored, seed);
+        let sigmas = integrated(&travelled);
+        for ((frame, covariance), way_m) in travelled.iter().zip(sigmas).zip(ways_m).skip(1) {
+            let [right, down, ahead] = frame.t_world_camera.translation_m;
+            let errors_m = [right, down, ahead - (way_m - ways_m[0])];
+            for (axis, (error_m, sigma_m)) in
+                axes.iter_mut().zip(errors_m.into_iter().zip(covariance.translation_sigma_m()))
+            {
+                axis.add(error_m, sigma_m);
+            }
+        }
+    }
+    axes
+}
+
+#[test]
+fn errors_of_a_slow_camera_lie_within_two_sigma() {
+    let mut all = Vec::new();
+    for (step_m, frames) in [(0.003, 36), (0.01, 30), (0.03, 20)] {
+        let axes = certainty(&steady(step_m, frames), true);
+        let shown = axes.map(|axis| [axis.share(), axis.excess()]);
+        println!("{step_m} m a frame: shares within and sigma per error {shown:.2?}");
+        for (axis, within) in ["right", "down", "ahead"].iter().zip(axes) {
+            let (share, excess) = (within.share(), within.excess());
+            // Errors of one way are alike from frame to frame: a single axis may be unlucky.
+            assert!(share > 0.5, "{step_m} m a frame, {axis}: {share} within two sigma");
+            assert!(excess < 5.0, "{step_m} m a frame, {axis}: sigma {excess} times the error");
+        }
+        all.extend(axes);
+    }
+    let share = all.iter().map(Within::share).sum::<f64>() / all.len() as f64;
+    assert!((0.9..=0.99).contains(&share), "{share} within two sigma");
+}
+
+#[test]
+fn errors_that_motions_share_are_in_no_sigma_without_an_anchor() {
+    let [.., ahead] = certainty(&steady(0.005, 30), false);
+    println!("without an anchor {:.2} within, sigma {:.2}", ahead.share(), ahead.excess());
+    assert!(ahead.share() < 0.7, "{}", ahead.share());
 }

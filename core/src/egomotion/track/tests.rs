@@ -31,6 +31,7 @@ fn estimated(inliers: u32) -> MotionEstimate {
         inliers,
         residual_rms_px: 0.5,
         covariance: None,
+        anchored: false,
         weak: WeakDirections::default(),
         samples: 3,
         steps: 9,
