@@ -2,6 +2,7 @@
 
 pub mod certainty;
 pub mod faults;
+pub mod gauntlet;
 pub mod histogram;
 pub mod inertial;
 pub mod masks;

@@ -258,7 +258,9 @@ pub struct Options {
     /// Inject faults, to see what becomes of them:
     /// `NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT]`, separated by commas; drop,
     /// duplicate, swap, jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS,
-    /// occlude=SHARE, brightness=FACTOR, masks; seed=N
+    /// occlude=SHARE, brightness=FACTOR, masks, truck=METRES, walker=METRES, bus=METRES_A_FRAME,
+    /// bonnet=SHARE, reflection=SHARE, dirt=SHARE, tunnel=SHARE, pattern=GREY_LEVELS,
+    /// rain=STREAKS, wind=PX, drift=PX_A_FRAME, zoom=FACTOR, jpeg=QUALITY, flicker=SHARE; seed=N
     #[arg(long, value_name = "SPEC")]
     #[serde(deserialize_with = "words::parsed")]
     pub faults: Option<Faults>,

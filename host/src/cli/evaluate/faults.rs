@@ -2,8 +2,10 @@
 
 use super::mapped::each_report;
 use crate::cli::run;
+use crate::evaluate::certainty::PathHonesty;
 use crate::evaluate::faults::{EvaluatedFrame, FaultOutcome};
-use crate::request::{Plan, Request};
+use crate::evaluate::gauntlet::Trial;
+use crate::request::{Plan, Request, Source};
 use anyhow::{Context, bail};
 use serde::Serialize;
 
@@ -18,6 +20,15 @@ pub struct FaultsArgs {
     /// One fault instead of the list, as `dynvox run --faults` takes it; may be repeated
     #[arg(long, value_name = "SPEC")]
     fault: Vec<String>,
+    /// Only rows whose kind has this word, or of this world: street, room, yard
+    #[arg(long, value_name = "WORD", conflicts_with = "fault")]
+    only: Option<String>,
+    /// Only a few rows, one for each cause of errors
+    #[arg(long, conflicts_with = "fault")]
+    short: bool,
+    /// Seed of the synthetic worlds
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Write the table to standard output as JSON
     #[arg(long)]
     json: bool,
@@ -29,48 +40,33 @@ pub struct FaultsArgs {
 /// A line of the table.
 #[derive(Serialize)]
 struct FaultRow {
-    fault: String,
+    #[serde(flatten)]
+    trial: Trial,
     #[serde(flatten)]
     outcome: FaultOutcome,
+    /// Root mean squares over estimated poses since the fault, m: of the error, and of its sigma.
+    error_m: f64,
+    sigma_m: f64,
+    /// Errors of these poses within two sigma, all six directions together.
+    within: u32,
+    compared: u32,
 }
 
-/// The faults of the table that begin in frame `at`.
-fn listed(at: usize) -> Vec<String> {
-    let (next, third, fifth) = (at + 1, at + 3, at + 5);
-    [
-        format!("drop@{at}"),
-        format!("drop@{at}..{fifth}"),
-        format!("duplicate@{at}"),
-        format!("duplicate@{at}..{third}"),
-        format!("swap@{at}"),
-        format!("exchange@{at}"),
-        format!("exchange@{at}.."),
-        format!("freeze:right@{at}.."),
-        format!("freeze:left@{at}.."),
-        format!("freeze@{at}..{fifth}"),
-        format!("delay:right@{at}.."),
-        format!("delay:left@{at}.."),
-        format!("black@{at}"),
-        format!("black@{at}..{fifth}"),
-        format!("black:right@{at}..{third}"),
-        format!("noise=10@{at}.."),
-        format!("noise=40@{at}..{fifth}"),
-        format!("occlude=0.5@{at}..{fifth}"),
-        format!("occlude:left=0.9@{at}..{fifth}"),
-        format!("brightness=0.3@{at}..{fifth}"),
-        format!("brightness:right=1.5@{at}.."),
-        format!("jump=2@{at}"),
-        format!("jump=10@{at}"),
-        format!("jump=20@{at}"),
-        format!("jump=30@{at}"),
-        format!("jump=100@{at}"),
-        format!("masks@{at}"),
-        format!("masks@{at}..{fifth}"),
-        format!("drop@{at}..%20"),
-        format!("black@{at},drop@{next}"),
-    ]
-    .into()
-}
+/// Heads of the table's columns.
+const HEADS: [&str; 12] = [
+    "scene",
+    "fault",
+    "error, m (RMS)",
+    "sigma, m (RMS)",
+    "within 2 sigma, %",
+    "unreported error, m",
+    "deg",
+    "wrong and unreported",
+    "fused from a wrong pose",
+    "extrapolated",
+    "map affected",
+    "recovered after",
+];
 
 pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
     if args.at == 0 || args.at >= args.frames {
@@ -80,19 +76,13 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
             args.frames.saturating_sub(1)
         );
     }
-    let mut request = run::request_of(&args.run)?;
-    request.frames.most = request.frames.most.or(Some(args.frames));
-    let faults = if args.fault.is_empty() { listed(args.at) } else { args.fault.clone() };
     let mut rows = Vec::new();
     if !args.json {
-        outln!(
-            "| fault | unreported error, m | deg | wrong and unreported | fused from a wrong pose \
-             | extrapolated | map affected | recovered after |"
-        );
-        outln!("|---|---|---|---|---|---|---|---|");
+        outln!("| {} |", HEADS.join(" | "));
+        outln!("|{}", "---|".repeat(HEADS.len()));
     }
-    for fault in faults {
-        let row = FaultRow { outcome: outcome(&request, &fault, args.at)?, fault };
+    for trial in trials(args)? {
+        let row = tried(args, trial)?;
         if !args.json {
             outln!("{}", line(&row));
         }
@@ -100,11 +90,32 @@ pub fn run(args: &FaultsArgs) -> anyhow::Result<()> {
     }
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&rows)?);
+    } else {
+        outln!("{}", total(&rows));
     }
     Ok(())
 }
 
-fn line(FaultRow { fault, outcome }: &FaultRow) -> String {
+/// Rows that are asked for.
+fn trials(args: &FaultsArgs) -> anyhow::Result<Vec<Trial>> {
+    if !args.fault.is_empty() {
+        return Ok(args.fault.iter().map(|fault| Trial::from_fault(fault)).collect());
+    }
+    // A recording has no other worlds than its own.
+    let is_rendered = !matches!(run::request_of(&args.run)?.input.source, Source::Recording(_));
+    let mut trials = Trial::listed(args.at);
+    trials.retain(|trial| {
+        (is_rendered || trial.fits_any_data())
+            && (!args.short || trial.is_short())
+            && args.only.as_ref().is_none_or(|word| trial.is_of(word))
+    });
+    if trials.is_empty() {
+        bail!("no row of the table is asked for. Try --only with another word, or without it");
+    }
+    Ok(trials)
+}
+
+fn line(FaultRow { trial, outcome, error_m, sigma_m, within, compared }: &FaultRow) -> String {
     let FaultOutcome {
         unreported_m,
         unreported_deg,
@@ -114,28 +125,61 @@ fn line(FaultRow { fault, outcome }: &FaultRow) -> String {
         map_affected,
         recovered_after,
     } = outcome;
+    let (name, fault) = (trial.name(), &trial.fault);
+    let fault = if fault.is_empty() { String::new() } else { format!("`{fault}`") };
     let recovered = recovered_after.map_or_else(|| "not".to_owned(), |frames| frames.to_string());
+    let share = percent(*within, *compared);
     format!(
-        "| `{fault}` | {unreported_m:.2} | {unreported_deg:.2} | {unreported_frames} \
-         | {wrong_fused} | {extrapolated} | {map_affected} | {recovered} |"
+        "| {name} | {fault} | {error_m:.3} | {sigma_m:.3} | {share} | {unreported_m:.2} \
+         | {unreported_deg:.2} | {unreported_frames} | {wrong_fused} | {extrapolated} \
+         | {map_affected} | {recovered} |"
     )
 }
 
-/// Maps with one fault and compares with the truth.
-fn outcome(request: &Request, fault: &str, at: usize) -> anyhow::Result<FaultOutcome> {
-    let trial = || -> anyhow::Result<Plan> {
-        let mut request = request.clone();
-        request.input.faults = Some(fault.parse().map_err(anyhow::Error::msg)?);
-        Ok(request.resolve()?)
-    };
-    let plan = trial().with_context(|| format!("{fault} cannot be tried"))?;
-    Ok(FaultOutcome::from_frames(&evaluated(&plan)?, at))
+/// Share in percent; a dash of nothing.
+fn percent(part: u32, whole: u32) -> String {
+    if whole == 0 {
+        "-".to_owned()
+    } else {
+        format!("{:.1}", 100.0 * f64::from(part) / f64::from(whole))
+    }
 }
 
-/// Maps the frames of a plan and puts the truth beside each.
-fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
-    let mut frames = Vec::new();
-    each_report(plan, |report, true_t_world_camera| {
+/// Sentence on all rows.
+fn total(rows: &[FaultRow]) -> String {
+    let wrong = |row: &FaultRow| row.outcome.unreported_frames;
+    let (frames, bad) =
+        (rows.iter().map(wrong).sum::<usize>(), rows.iter().filter(|r| wrong(r) > 0));
+    let within = rows.iter().map(|row| row.within).sum();
+    let compared = rows.iter().map(|row| row.compared).sum();
+    format!(
+        "{} rows: {frames} frames wrong and unreported, in {} rows; {} % of the errors within \
+         2 sigma",
+        rows.len(),
+        bad.count(),
+        percent(within, compared)
+    )
+}
+
+/// Maps a row's scene with its fault and compares with the truth.
+fn tried(args: &FaultsArgs, trial: Trial) -> anyhow::Result<FaultRow> {
+    let plan = || -> anyhow::Result<Plan> {
+        let own = if trial.fits_any_data() && args.seed.is_none() {
+            Vec::new()
+        } else {
+            trial.arguments(args.seed)
+        };
+        let mut request: Request = run::request_of(&[&own[..], &args.run].concat())?;
+        request.frames.most = request.frames.most.or(Some(args.frames));
+        if !trial.fault.is_empty() {
+            request.input.faults = Some(trial.fault.parse().map_err(anyhow::Error::msg)?);
+        }
+        Ok(request.resolve()?)
+    };
+    let plan =
+        plan().with_context(|| format!("{}{} cannot be tried", trial.name(), trial.fault))?;
+    let (mut frames, mut path) = (Vec::new(), PathHonesty::default());
+    each_report(&plan, |report, true_t_world_camera| {
         frames.push(EvaluatedFrame {
             t_world_camera: report.t_world_camera,
             true_t_world_camera: *true_t_world_camera,
@@ -144,6 +188,13 @@ fn evaluated(plan: &Plan) -> anyhow::Result<Vec<EvaluatedFrame>> {
             fused: report.fused,
             segment: report.segment.get().into(),
         });
+        // Poses count from the frame before the fault, as they do in the outcome.
+        if frames.len() >= args.at {
+            path.add(report, true_t_world_camera);
+        }
     })?;
-    Ok(frames)
+    let outcome = FaultOutcome::from_frames(&frames, args.at);
+    let [error_m, sigma_m] = path.poses.distances_m();
+    let (within, compared) = (path.poses.within.iter().sum(), 6 * path.poses.count);
+    Ok(FaultRow { trial, outcome, error_m, sigma_m, within, compared })
 }

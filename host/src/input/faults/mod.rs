@@ -3,11 +3,15 @@
 //!
 //! [`Faults`] says which, [`FaultySource`] is the recording with them. The truth of a frame is that of the images delivered.
 
+mod changed;
+mod noise;
 mod order;
+mod pasted;
 mod pictures;
 mod spec;
 #[cfg(test)]
 mod tests;
+mod weather;
 
 pub use spec::{Fault, FaultKind, Faults, Side};
 
@@ -112,7 +116,11 @@ impl FrameSource for FaultySource {
                     self.inner.frame(self.delivered(other)?.frame)?,
                     &mut images,
                 ),
-                None => pictures::apply(fault.kind, &mut images, &mut random),
+                None => {
+                    let (rig, since) = (&self.info.rig, position - fault.first);
+                    let happening = pictures::Happening { kind: fault.kind, rig, since };
+                    pictures::apply(&happening, &mut images, &mut random);
+                }
             }
         }
         Ok(images)

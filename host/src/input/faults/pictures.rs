@@ -1,8 +1,11 @@
 //! What happens to a delivered pair of images.
 
+use super::pasted::{self, Panel};
 use super::spec::{FaultKind, Side};
+use super::weather;
 use crate::formats::Image;
 use crate::input::source::{InstanceMask, StereoImages};
+use dynvox_core::geometry::StereoRig;
 use dynvox_core::masks::PixelBox;
 use dynvox_core::random::Random;
 use dynvox_core::tracking::Class;
@@ -10,8 +13,17 @@ use dynvox_core::tracking::Class;
 /// Grey level of what covers a lens.
 const COVER: u8 = 40;
 
+/// A fault in a frame.
+pub(super) struct Happening<'a> {
+    pub kind: FaultKind,
+    pub rig: &'a StereoRig,
+    /// Frames since the fault began: 0 in the first.
+    pub since: usize,
+}
+
 /// Changes the images of a frame as a fault does that needs no other frame.
-pub(super) fn apply(kind: FaultKind, images: &mut StereoImages, random: &mut Random) {
+pub(super) fn apply(happening: &Happening<'_>, images: &mut StereoImages, random: &mut Random) {
+    let Happening { kind, rig, since } = *happening;
     match kind {
         FaultKind::Exchange => {
             std::mem::swap(&mut images.left, &mut images.right);
@@ -31,6 +43,22 @@ pub(super) fn apply(kind: FaultKind, images: &mut StereoImages, random: &mut Ran
         FaultKind::Masks => {
             images.masks.instances = absurd_masks(images.left.width(), images.left.height())
         }
+        FaultKind::Truck(ahead_m) => pasted::put_panel(images, rig, &Panel::truck(ahead_m)),
+        FaultKind::Walker(ahead_m) => pasted::put_panel(images, rig, &Panel::walker(ahead_m)),
+        FaultKind::Bus(step_m) => {
+            pasted::put_panel(images, rig, &Panel::bus(step_m * since as f64));
+        }
+        FaultKind::Bonnet(share) => pasted::put_bonnet(images, share),
+        FaultKind::Reflection(weight) => pasted::put_reflection(images, weight),
+        FaultKind::Dirt(share) => pasted::put_dirt(images, share),
+        FaultKind::Tunnel(share) => pasted::put_tunnel(images, share),
+        FaultKind::Pattern(sigma) => pasted::put_pattern(images, sigma),
+        FaultKind::Rain(streaks) => weather::put_rain(images, streaks, random),
+        FaultKind::Wind(px) => weather::put_wind(images, px, since),
+        FaultKind::Drift(px) => weather::put_drift(images, px * (since as f64 + 1.0)),
+        FaultKind::Zoom(factor) => weather::put_zoom(images, factor),
+        FaultKind::Jpeg(quality) => weather::put_compression(images, quality),
+        FaultKind::Flicker(share) => weather::put_flicker(images, share, random),
         FaultKind::Freeze(_) | FaultKind::Delay(_) => {}
         FaultKind::Drop | FaultKind::Duplicate | FaultKind::Swap | FaultKind::Jump(_) => {}
     }

@@ -51,6 +51,34 @@ pub enum FaultKind {
     Occlude(Side, f64),
     /// All values times this factor: another exposure.
     Brightness(Side, f64),
+    /// The rear of a truck this far ahead, which drives at the camera's speed, m.
+    Truck(f64),
+    /// A person this far ahead, who walks at the camera's speed, m.
+    Walker(f64),
+    /// A row of buses that fills the view 5 m ahead and passes by so many m a frame.
+    Bus(f64),
+    /// The vehicle's own bonnet over this lower share of both images.
+    Bonnet(f64),
+    /// A windscreen's reflection of this weight over the lower half of both images.
+    Reflection(f64),
+    /// Dirt on about this share of both lenses.
+    Dirt(f64),
+    /// Only this middle share of the images' sides shows anything: what is far.
+    Tunnel(f64),
+    /// A pattern that each sensor has in all frames alike, grey levels (1 sigma).
+    Pattern(f64),
+    /// So many streaks of rain in each image.
+    Rain(usize),
+    /// Leaves in the upper half move to and fro by so many px.
+    Wind(f64),
+    /// The right image moves by so many px a frame: a rig that warms up.
+    Drift(f64),
+    /// Images are larger than calibrated by this factor.
+    Zoom(f64),
+    /// JPEG compression of this quality, percent.
+    Jpeg(u8),
+    /// Each frame's brightness is another one, by up to this share.
+    Flicker(f64),
     /// Masks that make no sense: the whole image, one pixel, a score of 1.
     Masks,
 }
@@ -97,7 +125,10 @@ pub struct Faults {
 const GRAMMAR: &str = "NAME[:left|:right][=AMOUNT][@FIRST[..[END]]][%PERCENT], separated by \
     commas, with NAME one of drop, duplicate, swap, \
                        jump=FRAMES, exchange, freeze, delay, black, noise=GREY_LEVELS, \
-                       occlude=SHARE, brightness=FACTOR, masks; and seed=N";
+                       occlude=SHARE, brightness=FACTOR, masks, truck=METRES, \
+                       walker=METRES, bus=METRES_A_FRAME, bonnet=SHARE, reflection=SHARE, \
+                       dirt=SHARE, tunnel=SHARE, pattern=GREY_LEVELS, rain=STREAKS, wind=PX, \
+                       drift=PX_A_FRAME, zoom=FACTOR, jpeg=QUALITY, flicker=SHARE; and seed=N";
 
 impl FromStr for Faults {
     type Err = String;
@@ -189,6 +220,20 @@ fn kind(whole: &str, text: &str) -> Result<FaultKind, String> {
         "occlude" => FaultKind::Occlude(side, amount(0.0, 1.0)?),
         "brightness" => FaultKind::Brightness(side, amount(0.0, 100.0)?),
         "masks" => FaultKind::Masks,
+        "truck" => FaultKind::Truck(amount(1.0, 100.0)?),
+        "walker" => FaultKind::Walker(amount(0.5, 100.0)?),
+        "bus" => FaultKind::Bus(amount(-5.0, 5.0)?),
+        "bonnet" => FaultKind::Bonnet(amount(0.0, 1.0)?),
+        "reflection" => FaultKind::Reflection(amount(0.0, 1.0)?),
+        "dirt" => FaultKind::Dirt(amount(0.0, 1.0)?),
+        "tunnel" => FaultKind::Tunnel(amount(0.0, 1.0)?),
+        "pattern" => FaultKind::Pattern(amount(0.0, 255.0)?),
+        "rain" => FaultKind::Rain(amount(0.0, 1e5)? as usize),
+        "wind" => FaultKind::Wind(amount(0.0, 100.0)?),
+        "drift" => FaultKind::Drift(amount(-10.0, 10.0)?),
+        "zoom" => FaultKind::Zoom(amount(0.25, 4.0)?),
+        "jpeg" => FaultKind::Jpeg(amount(1.0, 100.0)? as u8),
+        "flicker" => FaultKind::Flicker(amount(0.0, 1.0)?),
         _ => {
             return Err(format!("{whole}: there is no fault {name}. Faults are written {GRAMMAR}"));
         }

@@ -74,3 +74,57 @@ fn equal_seeds_spoil_alike_and_truth_and_time_follow_the_images() {
     assert_eq!(faulty("drop@2").stamp_ns(2), street.stamp_ns(3));
     assert!(faulty("drop@2").frame(5).unwrap_err().to_string().contains("ends after 5 frames"));
 }
+
+#[test]
+fn what_moves_with_the_cameras_stays_where_it_is_in_their_images() {
+    for spec in ["bonnet=0.3@2..", "truck=6@2.."] {
+        let [(first, clean), _, (last, _)] = frames(spec).try_into().ok().unwrap();
+        let stays = |u: usize, v: usize| first.left.get(u, v) == last.left.get(u, v);
+        let (u, v) = if spec.starts_with("bonnet") { (80, 46) } else { (80, 30) };
+        assert!((0..4).all(|at| stays(u + at, v)), "{spec}");
+        assert_ne!(first.left.get(u, v), clean.left.get(u, v), "{spec}");
+        assert_eq!(first.left.get(2, 2), clean.left.get(2, 2), "{spec}");
+    }
+}
+
+#[test]
+fn a_truck_has_the_disparity_of_its_distance() {
+    let source = faulty("truck=5@0..");
+    let rig = source.info().rig;
+    let disparity_px = rig.focal_px * rig.baseline_m / 5.0;
+    let frame = source.frame(1).unwrap();
+    let row = |image: &Image<u8>, from: usize| {
+        (from..from + 12).map(|u| f64::from(image.get(u, 28).unwrap())).collect::<Vec<_>>()
+    };
+    let left = row(&frame.left, 80);
+    let apart = |shift: usize| -> f64 {
+        left.iter().zip(row(&frame.right, 80 - shift)).map(|(a, b)| (a - b).abs()).sum()
+    };
+    let best = (0..30).min_by(|&a, &b| apart(a).total_cmp(&apart(b))).unwrap();
+    assert!((best as f64 - disparity_px).abs() <= 0.6, "{best} px instead of {disparity_px}");
+}
+
+#[test]
+fn every_scene_changes_both_images_a_little_or_much() {
+    for spec in [
+        "walker=2@2..",
+        "bus=0.5@2..",
+        "reflection=0.4@2..",
+        "dirt=0.4@2..",
+        "tunnel=0.4@2..",
+        "pattern=6@2..",
+        "rain=60@2..",
+        "wind=3@2..",
+        "zoom=1.1@2..",
+        "jpeg=20@2..",
+        "flicker=0.4@2..",
+    ] {
+        for (frame, clean) in frames(spec) {
+            assert_ne!(frame.left, clean.left, "{spec}");
+            assert_ne!(frame.right, clean.right, "{spec}");
+        }
+    }
+    let (moved, clean) = &frames("drift=0.5@2..")[1];
+    assert_eq!(moved.left, clean.left);
+    assert_eq!(moved.right.get(41, 20), clean.right.get(40, 20), "a pixel in two frames");
+}
