@@ -19,7 +19,9 @@ const CAPACITY: Capacity = Capacity { colour: true, blocks: 8_000, ..Capacity::T
 /// Frames before the camera is covered, and the first that it sees again.
 const COVERED: u32 = 12;
 const UNCOVERED: u32 = COVERED + MAX_REFERENCE_FRAMES + 4;
-const FRAMES: u32 = UNCOVERED + 6;
+/// The frame in which a search for the camera ends: the fourth with an estimated motion.
+const FOUND: u32 = UNCOVERED + 4;
+const FRAMES: u32 = UNCOVERED + 9;
 
 fn street(seed: u64) -> Street {
     let [width, height] = SIZE.map(|side| side as u32);
@@ -138,12 +140,14 @@ fn a_covered_camera_is_found_again_in_its_map() {
     let street = street(3);
     let reports = map_covered(&street, &street);
     assert_eq!(segments(&reports), vec![0; FRAMES as usize]);
-    let found = &reports[UNCOVERED as usize + 1];
+    let found = &reports[FOUND as usize];
+    let searched = &reports[UNCOVERED as usize..FOUND as usize];
+    assert!(searched.iter().all(|report| report.pose == PoseOrigin::Extrapolated && !report.fused));
     assert_eq!(
         (found.pose, found.fused, found.severity()),
         (PoseOrigin::Relocalized, true, Severity::Recovered)
     );
-    let t_truth_camera = street.t_world_camera(UNCOVERED + 1).inverse() * found.t_world_camera;
+    let t_truth_camera = street.t_world_camera(FOUND).inverse() * found.t_world_camera;
     assert!(t_truth_camera.distance_m() < 0.3, "{} m off", t_truth_camera.distance_m());
     assert_eq!(reports.last().map(Report::severity), Some(Severity::Info));
 }
@@ -155,7 +159,7 @@ fn the_c_interface_reports_the_same() {
     let (expected, reports) = (map_covered(&street, &street), map_covered_in_c(&street, &street));
     let digests: Vec<u64> = reports.iter().map(|report| report.digest).collect();
     assert_eq!(digests, expected.iter().map(|report| report.digest).collect::<Vec<_>>());
-    let found = &reports[UNCOVERED as usize + 1];
+    let found = &reports[FOUND as usize];
     assert_eq!((found.severity, found.fused, found.segment), (DynvoxSeverity::Recovered, true, 0));
 }
 
@@ -163,7 +167,8 @@ fn the_c_interface_reports_the_same() {
 fn a_camera_that_sees_another_street_begins_a_segment_apart() {
     // Two streets have nothing in common by which the camera could be found.
     let reports = map_covered(&street(3), &street(4));
-    let began = UNCOVERED as usize + 1;
+    // The first frame with a motion, and the second, register the guess with the wrong map.
+    let began = UNCOVERED as usize + 2;
     assert_eq!(segments(&reports), [vec![0; began], vec![1; FRAMES as usize - began]].concat());
     assert!(
         reports[COVERED as usize..].iter().all(|report| report.severity() == Severity::MapAffected),

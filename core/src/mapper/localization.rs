@@ -1,7 +1,8 @@
 //! The camera's pose in a frame: given, or estimated from matches or from depth.
 
 use super::{
-    Config, MotionSource, PoseOrigin, StereoFrame, matched::MatchedFrame, static_map::StaticMap,
+    Config, MotionSource, PoseOrigin, StereoFrame, matched::MatchedFrame, search::Search,
+    static_map::StaticMap,
 };
 use crate::{
     Capacity,
@@ -30,6 +31,8 @@ pub(super) struct Localization<'s> {
     pub anchor: Anchor<'s>,
     /// Keyframes of the places that the camera has been at.
     pub places: Places<'s>,
+    /// Search for a camera that was lost.
+    pub search: Search,
     /// Inertial unit; `None` without one.
     pub inertial: Option<&'s mut InertialPrior>,
     /// True if the right image's rows are moved otherwise in the next frame than in this one: it
@@ -141,6 +144,7 @@ impl<'s> Localization<'s> {
             estimator: Estimator::new_in(capacity, carver),
             anchor: Anchor::new_in(capacity, carver),
             places: Places::new_in(capacity, carver),
+            search: Search::Off,
             inertial: None,
             rows_moved: false,
         }
@@ -149,14 +153,20 @@ impl<'s> Localization<'s> {
     /// Visits what lives from frame to frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         // Estimates keep nothing.
-        let Self { camera, self_calibration, estimator: _, anchor, places, inertial, rows_moved } =
-            self;
+        let Self {
+            camera,
+            self_calibration,
+            estimator: _,
+            anchor,
+            places,
+            search,
+            inertial,
+            rows_moved,
+        } = self;
         camera.visit(visitor);
         anchor.visit(visitor);
         self_calibration.visit(visitor);
-        let mut moved = u8::from(*rows_moved);
-        visitor.u8(&mut moved);
-        *rows_moved = moved != 0;
+        search.visit_above(rows_moved, visitor);
         places.visit(visitor);
         // Without a unit the state is what it was before there was any.
         if let Some(inertial) = inertial {
@@ -177,6 +187,7 @@ impl<'s> Localization<'s> {
         let (segment, was_lost) = (self.camera.segment(), self.camera.is_lost());
         let mut found = if let Some(t_world_camera) = &seen.frame.t_world_camera {
             self.camera.set_pose(t_world_camera);
+            self.search = Search::Off;
             // There is no motion to the first pose.
             Found::new(if seen.number == 0 { PoseOrigin::First } else { PoseOrigin::Given })
         } else if seen.config.mapper.egomotion == MotionSource::Icp {
@@ -208,6 +219,7 @@ impl<'s> Localization<'s> {
         }
         if self.recognise(seen, still(seen, mask, over_several), &found) {
             found.origin = PoseOrigin::Relocalized;
+            self.search = Search::Off;
             self.anchor.clear();
         }
         let enters_segment = self.camera.segment() != segment;
@@ -330,7 +342,7 @@ impl<'s> Localization<'s> {
     }
 
     /// The origin of a pose that was estimated, if it was.
-    fn origin(&self, is_estimated: bool) -> PoseOrigin {
+    pub(super) fn origin(&self, is_estimated: bool) -> PoseOrigin {
         match (is_estimated, self.camera.extrapolated_frames()) {
             (false, _) => PoseOrigin::First,
             (true, 0) => PoseOrigin::Estimated,
@@ -368,12 +380,19 @@ impl<'s> Localization<'s> {
             );
         }
         // After a long loss the map, not the last pose, has to say where the camera is.
-        let ends_loss = was_lost && !self.camera.is_lost();
-        let is_found = ends_loss && self.end_loss(seen, static_map, executor);
+        let is_estimated = self.camera.extrapolated_frames() == 0;
+        if was_lost && is_estimated {
+            self.search = Search::Guess;
+        }
+        let origin = if is_estimated {
+            self.search_on(seen, static_map, executor)
+        } else {
+            PoseOrigin::Extrapolated
+        };
         Found {
             egomotion: Some(estimate),
             matches_excluded: excluded as u32,
-            ..Found::new(if is_found { PoseOrigin::Relocalized } else { self.origin(true) })
+            ..Found::new(origin)
         }
     }
 
@@ -415,7 +434,7 @@ impl<'s> Localization<'s> {
         let config = &seen.config.icp;
         let is_cast = static_map.cast(&seen.view(self.camera.t_world_camera()), executor);
         let mut report =
-            if is_cast { static_map.register(seen, config) } else { IcpReport::unpaired() };
+            if is_cast { static_map.register(seen, config, 1) } else { IcpReport::unpaired() };
         // Matches do not take part; they only tell how much of the image moves as depth says.
         report.matches = self.estimator.count_inliers(
             &seen.config.scaled_rig(),

@@ -16,6 +16,7 @@ mod raycast;
 mod relocalization;
 mod report;
 mod scale;
+mod search;
 mod segmentation;
 mod set;
 mod settings;

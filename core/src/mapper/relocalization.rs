@@ -7,10 +7,20 @@
 //! does not hold a camera along the street, and a small part of the view lets it circle. Without
 //! colour in the map no pose is believed.
 //!
-//! **Time.** Seven raycasts and two registrations, in the one frame that ends a loss. **Memory.**
-//! The raycaster's.
+//! **Time.** The search takes four frames with an estimated motion, each compared with the map as
+//! it sees it: a registration in each of the first two, poses ahead and behind in the third, poses
+//! around in the fourth. A frame takes at most [`PICTURES`] pictures of half the width and height,
+//! which is where edges are compared, and a registration at a quarter of it. Until the search ends
+//! the pose counts as a guess, and nothing is fused. **Memory.** The raycaster's.
 
-use super::{localization::Localization, matched::MatchedFrame, static_map::StaticMap, work};
+use super::{
+    PoseOrigin,
+    localization::Localization,
+    matched::MatchedFrame,
+    search::Search,
+    static_map::StaticMap,
+    work::{PICTURE_EVERY, PICTURES},
+};
 use crate::{
     egomotion::icp::{IcpConfig, IcpStatus},
     geometry::Transform,
@@ -20,6 +30,8 @@ use crate::{
 
 /// Distance over which brightness is compared, px: wider than what fusion blurs.
 const EDGE_PX: usize = 4;
+// Both ends of a difference are pixels of the picture.
+const _: () = assert!(EDGE_PX.is_multiple_of(PICTURE_EVERY));
 /// Least correlation of edges. Right poses have 0.16 to 0.74 on 06 and r1405, those half a metre
 /// aside up to 0.29.
 const CORRELATION_MIN: f64 = 0.25;
@@ -44,77 +56,127 @@ const REGISTRATION: IcpConfig = IcpConfig {
 };
 
 impl Localization<'_> {
-    /// Ends a loss after a motion was estimated: the camera is found, or a segment begins. Returns
-    /// whether it is found. Where no map is yet, the guess is as good as any pose.
-    pub(super) fn end_loss<E: Executor>(
+    /// Takes the next step of the search for a camera that was lost, in a frame whose motion was
+    /// estimated. Returns the origin of the pose that follows: the camera is searched for on, is
+    /// found, or begins a segment. Where no map is yet, the guess is as good as any pose.
+    pub(super) fn search_on<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
         static_map: &mut StaticMap<'_>,
         executor: &E,
-    ) -> bool {
-        if static_map.volume.pool().is_empty() {
-            return false;
+    ) -> PoseOrigin {
+        let step = core::mem::take(&mut self.search);
+        if step == Search::Off || static_map.volume.pool().is_empty() {
+            return self.origin(true);
         }
-        let found = static_map.relocalize(seen, self.camera.t_world_camera(), executor);
-        // Found: the old segment goes on. Not found: another begins.
-        match &found {
-            Some(t_world_camera) => self.camera.relocalize(t_world_camera),
-            None => self.camera.begin_segment(),
+        let guess = *self.camera.t_world_camera();
+        // A step leads to a pose and to the next step, or ends the search.
+        let found = match step {
+            Search::Off => None,
+            Search::Guess => static_map
+                .register_pose(seen, &guess, executor)
+                .map(|found| (Search::Registered, found)),
+            Search::Registered => static_map
+                .register_pose(seen, &guess, executor)
+                .filter(|found| found.correlation >= CORRELATION_MIN)
+                .map(|found| (Search::Along, found)),
+            Search::Along => {
+                let aside = |_| [ASIDE_M, -ASIDE_M].map(ahead);
+                static_map
+                    .confirm_pose(seen, &guess, aside, executor)
+                    .map(|found| (Search::Around, found))
+            }
+            Search::Around => {
+                let aside =
+                    |depth_m| [ASIDE_RAD, -ASIDE_RAD].map(|angle_rad| around(depth_m, angle_rad));
+                static_map
+                    .confirm_pose(seen, &guess, aside, executor)
+                    .map(|found| (Search::Off, found))
+            }
+        };
+        match found {
+            // The pose moves on with the camera until the next step is due.
+            Some((next, found)) => {
+                self.camera.relocalize(&found.t_world_camera);
+                self.search = next;
+                if next == Search::Off { PoseOrigin::Relocalized } else { PoseOrigin::Extrapolated }
+            }
+            None => {
+                self.camera.begin_segment();
+                self.origin(true)
+            }
         }
-        found.is_some()
     }
 }
 
+/// Pose, and correlation of the map from it with the image.
+struct ComparedPose {
+    t_world_camera: Transform,
+    correlation: f64,
+}
+
+/// A way along the view, m.
+fn ahead(way_m: f64) -> Transform {
+    Transform::from_translation([0.0, 0.0, way_m])
+}
+
+/// A turn about the scene's middle, so that the view stays on it.
+fn around(depth_m: f64, angle_rad: f64) -> Transform {
+    ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m)
+}
+
 impl StaticMap<'_> {
-    /// Finds the pose near a guessed one from which the map looks like the image.
-    fn relocalize<E: Executor>(
+    /// Registers the frame's depth with the map from a pose. Returns the pose from which the map
+    /// looks more like the image: registration may run off. `None` where the map shows too little.
+    fn register_pose<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
         guess: &Transform,
         executor: &E,
-    ) -> Option<Transform> {
-        let mut t_world_camera = *guess;
-        let mut correlation = self.correlation_at(seen, &t_world_camera, executor)?;
-        // Registration may run off: the best of all steps counts, not the last.
-        let mut best = (correlation, t_world_camera, self.mean_depth_m());
-        for _ in 0..work::REGISTRATIONS {
-            let report = self.register(seen, &REGISTRATION);
-            if report.status != IcpStatus::Tracked {
-                break;
-            }
-            t_world_camera = (t_world_camera * report.t_current_previous.inverse()).normalized();
-            correlation = self.correlation_at(seen, &t_world_camera, executor).unwrap_or(0.0);
-            if correlation > best.0 {
-                best = (correlation, t_world_camera, self.mean_depth_m());
-            }
+    ) -> Option<ComparedPose> {
+        let guessed = self.compare_pose(seen, guess, executor)?;
+        let report = self.register(seen, &REGISTRATION, PICTURE_EVERY);
+        if report.status != IcpStatus::Tracked {
+            return Some(guessed);
         }
-        let (correlation, t_world_camera, depth_m) = best;
-        // A pose is accepted only if poses a little to each side look less like the image: on a
-        // plain wall all look alike.
-        let is_less_like = |aside: &Transform| {
-            let there =
-                self.correlation_at(seen, &(t_world_camera * *aside).normalized(), executor);
-            is_clearer(correlation, there.unwrap_or(0.0))
-        };
-        let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
-        // Turned about the scene's middle, so that the view stays on it.
-        let around = |angle_rad: f64| {
-            ahead(depth_m) * Transform::new([0.0, angle_rad, 0.0], [0.0; 3]) * ahead(-depth_m)
-        };
-        let aside: [_; work::POSES_ASIDE] =
-            [ahead(ASIDE_M), ahead(-ASIDE_M), around(ASIDE_RAD), around(-ASIDE_RAD)];
-        (correlation >= CORRELATION_MIN && aside.iter().all(is_less_like)).then_some(t_world_camera)
+        let t_world_camera = (*guess * report.t_current_previous.inverse()).normalized();
+        let registered = self.compare_pose(seen, &t_world_camera, executor);
+        Some(registered.filter(|pose| pose.correlation > guessed.correlation).unwrap_or(guessed))
     }
 
-    /// Correlation of the map from a pose with the image; `None` where it shows too little of it.
-    fn correlation_at<E: Executor>(
+    /// Confirms a pose if the map looks enough like the image from there, and less from two poses
+    /// aside: on a plain wall all look alike. Those follow from the mean depth in view, m.
+    fn confirm_pose<E: Executor>(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        t_world_camera: &Transform,
+        aside: impl Fn(f64) -> [Transform; PICTURES - 1],
+        executor: &E,
+    ) -> Option<ComparedPose> {
+        let found = self
+            .compare_pose(seen, t_world_camera, executor)
+            .filter(|found| found.correlation >= CORRELATION_MIN)?;
+        let aside = aside(self.mean_depth_m());
+        let is_less_like = |aside: &Transform| {
+            let t_world_aside = (*t_world_camera * *aside).normalized();
+            let there = self.compare_pose(seen, &t_world_aside, executor);
+            is_clearer(found.correlation, there.map_or(0.0, |there| there.correlation))
+        };
+        aside.iter().all(is_less_like).then_some(found)
+    }
+
+    /// Compares the map from a pose with the image; `None` where it shows too little of it.
+    fn compare_pose<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
         t_world_camera: &Transform,
         executor: &E,
-    ) -> Option<f64> {
-        let is_cast = self.cast(&seen.view(t_world_camera), executor);
-        edge_correlation(self.raycaster.colour().filter(|_| is_cast)?, seen.frame.left)
+    ) -> Option<ComparedPose> {
+        let view = seen.view(t_world_camera).thinned(PICTURE_EVERY)?;
+        let is_cast = self.cast(&view, executor);
+        let picture = self.raycaster.colour().filter(|_| is_cast)?;
+        let correlation = edge_correlation(picture, seen.frame.left)?;
+        Some(ComparedPose { t_world_camera: *t_world_camera, correlation })
     }
 
     /// Mean depth of what was cast last, m.
@@ -138,12 +200,13 @@ fn is_clearer(correlation: f64, other: f64) -> bool {
     correlation * (1.0 - other) >= SIGNAL_FACTOR * other * (1.0 - correlation)
 }
 
-/// The correlation of brightness differences, across and down, of a picture with a grey image of
-/// its size; `None` where the picture, which is black where it shows nothing, has too few.
+/// The correlation of brightness differences, across and down, of a picture that has every
+/// [`PICTURE_EVERY`]-th pixel with a grey image; `None` where the picture, which is black where it
+/// shows nothing, has too few.
 fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f64> {
     let (width, height) = (grey.width(), grey.height());
     let shown = |u: usize, v: usize| {
-        let [red, green, blue] = picture.get(u, v)?.map(i64::from);
+        let [red, green, blue] = picture.get(u / PICTURE_EVERY, v / PICTURE_EVERY)?.map(i64::from);
         // Black shows nothing of the map.
         (red + green + blue > 0).then_some((red + 2 * green + blue) / 4)
     };
@@ -151,9 +214,9 @@ fn edge_correlation(picture: View<'_, [u8; 3]>, grey: View<'_, u8>) -> Option<f6
     // Sums of one image's differences, the other's, their squares and products: differences are
     // below 2^8, so sums fit.
     let (mut sums, mut squares, mut products, mut count) = ([0i64; 2], [0i64; 2], 0i64, 0i64);
-    for v in (EDGE_PX..height.saturating_sub(EDGE_PX)).step_by(2) {
+    for v in (EDGE_PX..height.saturating_sub(EDGE_PX)).step_by(PICTURE_EVERY) {
         // A quarter of the pixels is enough for a correlation.
-        for u in (EDGE_PX..width.saturating_sub(EDGE_PX)).step_by(2) {
+        for u in (EDGE_PX..width.saturating_sub(EDGE_PX)).step_by(PICTURE_EVERY) {
             for (before, after) in
                 [([u - EDGE_PX, v], [u + EDGE_PX, v]), ([u, v - EDGE_PX], [u, v + EDGE_PX])]
             {
@@ -203,12 +266,16 @@ mod tests {
         let mut random = Random::new(3);
         // Noise has edges everywhere, so that a shift of 7 px correlates no more.
         let grey: [u8; WIDTH * HEIGHT] = core::array::from_fn(|_| 20 + random.below(100) as u8);
-        let picture = |shift: usize, gain: u8| -> [[u8; 3]; WIDTH * HEIGHT] {
-            core::array::from_fn(|at| [gain * grey[(at + shift) % (WIDTH * HEIGHT)]; 3])
+        // Of every second column and row.
+        let picture = |shift: usize, gain: u8| -> [[u8; 3]; WIDTH * HEIGHT / 4] {
+            core::array::from_fn(|at| {
+                let (u, v) = (2 * (at % (WIDTH / 2)), 2 * (at / (WIDTH / 2)));
+                [gain * grey[(v * WIDTH + u + shift) % (WIDTH * HEIGHT)]; 3]
+            })
         };
         let correlation = |pixels: &[[u8; 3]]| {
             let views = (
-                View::new(pixels, WIDTH, HEIGHT).unwrap(),
+                View::new(pixels, WIDTH / 2, HEIGHT / 2).unwrap(),
                 View::new(&grey, WIDTH, HEIGHT).unwrap(),
             );
             edge_correlation(views.0, views.1)
@@ -218,7 +285,7 @@ mod tests {
         // out.
         assert!(correlation(&picture(0, 2)).unwrap() > 0.999);
         assert!(correlation(&picture(7, 1)).unwrap().abs() < 0.2);
-        assert_eq!(correlation(&[[0; 3]; WIDTH * HEIGHT]), None, "nothing is shown");
-        assert_eq!(correlation(&[[90; 3]; WIDTH * HEIGHT]), None, "nothing is to be seen");
+        assert_eq!(correlation(&[[0; 3]; WIDTH * HEIGHT / 4]), None, "nothing is shown");
+        assert_eq!(correlation(&[[90; 3]; WIDTH * HEIGHT / 4]), None, "nothing is to be seen");
     }
 }

@@ -90,8 +90,9 @@ pub enum PoseOrigin {
     First,
     /// Estimated from this frame.
     Estimated,
-    /// A guess: the estimate failed, and the motion before was continued. The next frames are
-    /// matched with the last one whose pose is not a guess.
+    /// A guess: the estimate failed, and the motion before was continued, or a camera that was lost
+    /// is still searched for. Where it failed, the next frames are matched with the last one whose
+    /// pose is not a guess.
     Extrapolated,
     /// Given with the frame.
     Given,
@@ -297,6 +298,7 @@ impl Report {
                 flow.right.dense,
                 flow.right.sparse,
             ]),
+            compared_descriptors: flow.sparse.compared + flow.dense.compared,
             circles: sum(&[flow.sparse.closed, flow.dense.closed]),
             cast_pixels: map.cast_pixels,
             block_requests: u64::from(allocate.requests),

@@ -193,8 +193,13 @@ impl<'s> StaticMap<'s> {
         report
     }
 
-    /// Registers a frame's depth with the map as it was cast last.
-    pub fn register(&mut self, seen: &MatchedFrame<'_, '_>, config: &IcpConfig) -> IcpReport {
+    /// Registers a frame's depth with the map as it was cast last, of every so many pixels.
+    pub fn register(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        config: &IcpConfig,
+        every: usize,
+    ) -> IcpReport {
         let (Some(depth_m), Some(normal)) = (self.raycaster.depth_m(), self.raycaster.normal())
         else {
             return IcpReport::unpaired();
@@ -205,6 +210,6 @@ impl<'s> StaticMap<'s> {
             limits_m: [volume.near_m, volume.far_m],
             disparity_q8: seen.disparity_q8,
         };
-        icp::track(config, &measured, &MapPicture { depth_m, normal }, self.depth_m)
+        icp::track(config, &measured, &MapPicture { depth_m, normal, every }, self.depth_m)
     }
 }

@@ -6,6 +6,7 @@ use super::{
     StageDigests, StepError, StereoFrame, WorkUnits,
     localization::{Localization, Located},
     matched::MatchedFrame,
+    search::Search,
     segmentation::Segmentation,
 };
 use crate::{
@@ -385,7 +386,7 @@ impl Mapper<'_> {
 
     /// Digest of the camera's motion and of what it says about the rig.
     fn egomotion_digest(&mut self, estimate: Option<&MotionEstimate>) -> u64 {
-        let Localization { camera, self_calibration, anchor, inertial, .. } =
+        let Localization { camera, self_calibration, anchor, search, inertial, .. } =
             &mut self.localization;
         let mut digest = Digest::default();
         digest.u64(camera.digest(estimate));
@@ -393,6 +394,9 @@ impl Mapper<'_> {
         // Without one the digest is what it was before there was any.
         if !anchor.is_empty() {
             digest.u64(anchor.digest());
+        }
+        if *search != Search::Off {
+            digest.u64(*search as u64);
         }
         if let Some(inertial) = inertial {
             digest.u64(inertial.digest());

@@ -5,23 +5,21 @@
 
 use super::{Config, MotionSource};
 use crate::{
-    Capacity, stereo,
+    Capacity, scene_flow, stereo,
     volume::{BLOCK_VOXELS, MAX_BLOCKS_PER_RAY, PIXEL_STEP},
 };
 
 /// Triangles of a triangulation, at most so many per point.
 const TRIANGLES_PER_POINT: usize = 2;
-/// Number of times that the pose of a camera that was lost is refined.
-pub(super) const REGISTRATIONS: usize = 2;
-/// Poses aside from which the map must look less like the image for the camera to be found.
-pub(super) const POSES_ASIDE: usize = 4;
-/// Most pictures of the map in one frame: from the guess, after each registration, from aside.
-const CASTS_MAX: usize = 1 + REGISTRATIONS + POSES_ASIDE;
+/// Most pictures of the map that a frame of a search takes.
+pub(super) const PICTURES: usize = 3;
+/// Interval of a picture's pixels, px: brightness is compared at every second pixel.
+pub(super) const PICTURE_EVERY: usize = 2;
 
 /// Units of work, by kind: of one step in a report, the most of any step in [`Capacity::work`].
 ///
-/// Not counted yet, and without a bound here: descriptor distances, hypotheses of egomotion and
-/// segmentation, keyframes that places compare, and the voxels of objects.
+/// Not counted yet, and without a bound here: hypotheses of egomotion and segmentation, searches
+/// for matches on objects, keyframes that places compare, and the voxels of objects.
 ///
 /// ```
 /// use dynvox_core::{Capacity, Config, geometry::StereoRig};
@@ -44,6 +42,8 @@ pub struct WorkUnits {
     pub triangles: u64,
     /// Features kept in both images, of both passes.
     pub features: u64,
+    /// Descriptors compared with that of a feature, of both passes.
+    pub compared_descriptors: u64,
     /// Circles of matches that closed, of both passes.
     pub circles: u64,
     /// Pixels of the pictures that the step itself takes of the map, to find a camera again or to
@@ -81,7 +81,7 @@ pub struct DeferredWork {
 
 impl WorkUnits {
     /// Number of units.
-    pub const COUNT: usize = 10;
+    pub const COUNT: usize = 11;
 
     /// Name and count of each unit, in pipeline order.
     ///
@@ -96,6 +96,7 @@ impl WorkUnits {
             support_candidates,
             triangles,
             features,
+            compared_descriptors,
             circles,
             cast_pixels,
             block_requests,
@@ -108,6 +109,7 @@ impl WorkUnits {
             ("support_candidates", support_candidates),
             ("triangles", triangles),
             ("features", features),
+            ("compared_descriptors", compared_descriptors),
             ("circles", circles),
             ("cast_pixels", cast_pixels),
             ("block_requests", block_requests),
@@ -137,10 +139,13 @@ impl Capacity {
         let rays = self.image_width.div_ceil(PIXEL_STEP) * self.image_height.div_ceil(PIXEL_STEP);
         let requests = rays * MAX_BLOCKS_PER_RAY;
         let pruned = self.blocks.min(config.volume.prune_blocks_per_frame as usize);
-        // A camera is found again by several whole pictures; registering depth takes one.
-        let casts = match config.mapper.egomotion {
-            MotionSource::Stereo => CASTS_MAX,
-            MotionSource::Icp => 1,
+        // A camera is found again by several thinned pictures; registering depth takes a whole one.
+        let thinned = |side: usize| side.div_ceil(PICTURE_EVERY);
+        let cast_pixels = match config.mapper.egomotion {
+            MotionSource::Stereo => {
+                PICTURES * thinned(self.image_width) * thinned(self.image_height)
+            }
+            MotionSource::Icp => self.pixels(),
         };
         WorkUnits {
             stereo_pixels: self.pixels() as u64,
@@ -148,9 +153,10 @@ impl Capacity {
             // Of both images.
             triangles: (2 * TRIANGLES_PER_POINT * points) as u64,
             features: (2 * features) as u64,
+            compared_descriptors: scene_flow::most_compared(self, &config.scene_flow),
             // A feature of the previous left image begins one circle.
             circles: features as u64,
-            cast_pixels: (casts * self.pixels()) as u64,
+            cast_pixels: cast_pixels as u64,
             block_requests: requests as u64,
             // A request evicts one block at most, and loads one.
             moved_blocks: (2 * requests) as u64,

@@ -4,7 +4,7 @@
 
 use super::{
     SceneFlowConfig,
-    features::{Features, Window},
+    features::{CELL_U, CELL_V, Features, Sought, Window},
     matches::Match,
 };
 use crate::{
@@ -28,6 +28,21 @@ pub(super) struct Reach {
 }
 
 impl Reach {
+    /// Returns the most features that the search for the partners of one can compare, where an
+    /// image has at most so many.
+    pub(super) fn most_compared(config: &SceneFlowConfig, features: usize) -> usize {
+        let far = config.search_radius_px as usize;
+        let rows = 2 * config.stereo_tolerance_px as usize + 1;
+        // Runs of features end at cells; no square of this side holds two of a class.
+        const APART_PX: usize = 4;
+        let within = |width: usize, height: usize| {
+            ((width + 2 * CELL_U) / APART_PX + 1) * ((height + 2 * CELL_V) / APART_PX + 1)
+        };
+        let least = |a: usize, b: usize| if a < b { a } else { b };
+        let (stereo, flow) = (within(far, rows), within(2 * far + 1, 2 * far + 1));
+        2 * least(stereo, features) + 2 * least(flow, features)
+    }
+
     /// Returns the widest reach that the configuration allows.
     pub(super) fn widest(config: &SceneFlowConfig) -> Self {
         let (far, rows) = (config.search_radius_px as i16, i16::from(config.stereo_tolerance_px));
@@ -71,32 +86,40 @@ struct TraceBand<'t, 'a, 's, R> {
     /// The first of them.
     first: usize,
     traced: &'t mut [[u32; 3]],
+    /// Descriptors that were compared.
+    compared: &'t mut u64,
 }
 
 impl<R: Fn([u16; 2]) -> Reach> Comparison for TraceBand<'_, '_, '_, R> {
     #[inline(always)]
     fn run(self, kernels: &impl Kernels) {
         for (index, partners) in (self.first..).zip(self.traced) {
-            *partners = self.corners.circle(index, self.reach, kernels).unwrap_or(NONE);
+            let circle = self.corners.circle(index, self.reach, kernels, self.compared);
+            *partners = circle.unwrap_or(NONE);
         }
     }
 }
 
 impl Corners<'_, '_> {
     /// Traces every circle. `traced[i]` becomes the partners of previous-left feature i, in the
-    /// circle's order.
+    /// circle's order. Returns the number of descriptors that were compared.
     pub(super) fn trace<E: Executor>(
         &self,
         reach: impl Fn([u16; 2]) -> Reach + Sync,
         traced: &mut [[u32; 3]],
         executor: &E,
-    ) {
+    ) -> u64 {
         let len = self.previous_left.len();
-        let Some(traced) = traced.get_mut(..len) else { return };
+        let Some(traced) = traced.get_mut(..len) else { return 0 };
         let bands = Bands::new(len);
-        each(executor, zip2(bands.first(), bands.split_mut(traced, 1)), |(first, traced)| {
-            compare(executor.vectors(), TraceBand { corners: self, reach: &reach, first, traced });
+        let jobs = zip2(bands.first(), bands.split_mut(traced, 1));
+        let compared = each(executor, jobs, |(first, traced)| {
+            let (reach, mut compared) = (&reach, 0);
+            let band = TraceBand { corners: self, reach, first, traced, compared: &mut compared };
+            compare(executor.vectors(), band);
+            compared
         });
+        compared.iter().sum()
     }
 
     /// The circle that begins with one feature, if it closes.
@@ -106,6 +129,7 @@ impl Corners<'_, '_> {
         first: usize,
         reach: impl Fn([u16; 2]) -> Reach,
         kernels: &impl Kernels,
+        compared: &mut u64,
     ) -> Option<[u32; 3]> {
         // The class stays along the circle: a maximum never matches a minimum.
         let class = self.previous_left.class(first);
@@ -124,7 +148,8 @@ impl Corners<'_, '_> {
             let ([u, v], by) = (from.at(index)?.map(i32::from), by.map(i32::from));
             let window =
                 Window { u_min: u + by[0], u_max: u + by[1], v_min: v + by[2], v_max: v + by[3] };
-            index = to.nearest(class, window, from.descriptor(index)?, kernels)?;
+            let sought = Sought { class, window, descriptor: from.descriptor(index)? };
+            index = to.nearest(sought, kernels, compared)?;
             *corner = index;
         }
         let [_, previous_right, current_right, current_left, back] = corners;

@@ -41,6 +41,13 @@ const SAMPLES: [(isize, isize); DESCRIPTOR / 2] = [
     (2, 5),
 ];
 
+/// Class and place of a feature that is sought, and the descriptor that it should have.
+pub(super) struct Sought<'d> {
+    pub class: usize,
+    pub window: Window,
+    pub descriptor: &'d [Descriptor; 2],
+}
+
 /// One image's features of one pass.
 #[derive(Debug)]
 pub(super) struct Features<'s> {
@@ -162,16 +169,16 @@ impl<'s> Features<'s> {
         self.descriptor.get(index)
     }
 
-    /// The feature of `class` within the window whose descriptor is nearest; the first of equals in
-    /// the set's order.
+    /// The feature of a class within a window whose descriptor is nearest; the first of equals in
+    /// the set's order. Adds the descriptors that were compared to `compared`.
     #[inline(always)]
     pub(super) fn nearest(
         &self,
-        class: usize,
-        window: Window,
-        descriptor: &[Descriptor; 2],
+        sought: Sought<'_>,
         kernels: &impl Kernels,
+        compared: &mut u64,
     ) -> Option<usize> {
+        let Sought { class, window, descriptor } = sought;
         if window.u_max < 0
             || window.v_max < 0
             || window.u_min > window.u_max
@@ -206,6 +213,7 @@ impl<'s> Features<'s> {
                 best.take(origin, keys);
                 (origin, keys) = (from, [NO_FEATURE; LANES]);
             }
+            *compared += u64::from(to.saturating_sub(from));
             let end = to.saturating_sub(origin);
             for offset in (from.saturating_sub(origin)..end).step_by(LANES) {
                 let start = (origin + offset) as usize;

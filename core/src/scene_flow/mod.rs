@@ -52,12 +52,21 @@ mod suppression;
 mod turned;
 
 pub use camera::FeatureCount;
+use circle::Reach;
 pub(crate) use config::MAX_FEATURES;
 pub use config::SceneFlowConfig;
 pub(crate) use matcher::AnchorPoint;
 pub use matcher::FlowMatcher;
 pub use matches::Match;
 pub use report::{FlowReport, FlowStatus, PassCount};
+
+/// The most descriptors that a frame compares, over both passes.
+pub(crate) fn most_compared(capacity: &crate::Capacity, config: &SceneFlowConfig) -> u64 {
+    // The sparse pass keeps a quarter of what the dense one does.
+    let passes = [capacity.features, capacity.features / 4];
+    let most = |features| features as u64 * Reach::most_compared(config, features) as u64;
+    passes.map(most).iter().sum()
+}
 
 #[cfg(test)]
 pub(crate) mod test_scene;

@@ -34,6 +34,8 @@ pub struct PassCount {
     pub dropped: u32,
     /// Kept ones without support in their neighbourhood.
     pub unsupported: u32,
+    /// Descriptors that were compared with one.
+    pub compared: u64,
 }
 
 /// One frame's scene flow.

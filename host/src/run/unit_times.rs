@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Units that may explain a stage's time, most telling first. Stages without units are not here.
 const EXPLAINED: [(Stage, &[&str]); 5] = [
     (Stage::Stereo, &["stereo_pixels", "support_candidates", "triangles"]),
-    (Stage::SceneFlow, &["features", "circles"]),
+    (Stage::SceneFlow, &["features", "circles", "compared_descriptors"]),
     (Stage::Allocate, &["block_requests"]),
     (Stage::Fuse, &["fused_voxels"]),
     (Stage::Prune, &["pruned_voxels"]),

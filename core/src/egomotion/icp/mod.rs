@@ -16,7 +16,7 @@
 //! which the tracker does not use, are asked whether they agree ([`IcpStatus::Contradicted`]).
 //!
 //! **Memory.** None of its own: the pyramid takes a third of a depth image that is lent. **Time.**
-//! Pixels / 4 x steps, on one thread.
+//! Pixels / 4 x steps, on one thread; with a picture of every second pixel a quarter of it.
 //!
 //! **What can go wrong.** [`IcpStatus`] says it; a failed motion is not handed out. Sums run row by
 //! row.
@@ -141,6 +141,9 @@ pub struct MapPicture<'a> {
     pub depth_m: View<'a, f32>,
     /// Normals in that camera's axes, in 1/127.
     pub normal: View<'a, [i8; 3]>,
+    /// Interval of the picture's pixels in the image of the disparity, px, at least 1. Levels of
+    /// the pyramid that are less than half as coarse as the picture are left out.
+    pub every: usize,
 }
 
 /// Depth that a rig measured.
@@ -167,7 +170,8 @@ pub fn track(
     let pyramid = Pyramid::build(rig, limits_m, disparity_q8, config.levels, memory);
     let mut t_previous_current = Transform::IDENTITY;
     let mut report = IcpReport::unpaired();
-    for (level, disparity_px) in pyramid.coarse_to_fine() {
+    let finest = pyramid.finest_for(map.every);
+    for (level, disparity_px) in pyramid.coarse_to_fine().filter(|(level, _)| *level >= finest) {
         let pairing = Pairing::new(config, rig, level);
         for _ in 0..config.steps {
             report.steps += 1;
@@ -182,7 +186,7 @@ pub fn track(
             }
         }
         // Only the finest level says how well the motion fits.
-        if level == 0 {
+        if level == finest {
             let sums = pairing.sums(&t_previous_current, disparity_px, map);
             (report.points, report.pairs) = (sums.points, sums.pairs);
             report.residual_rms_m = libm::sqrt(sums.squared_m2 / f64::from(sums.pairs.max(1)));
@@ -296,7 +300,9 @@ impl<'c> Pairing<'c> {
     ) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let rig = self.rig;
         let seen = rig.project((*point).into())?;
-        let (u, v) = (seen.u_left_px + rig.center_u_px, seen.v_px + rig.center_v_px);
+        let every = map.every as f64;
+        let (u, v) =
+            ((seen.u_left_px + rig.center_u_px) / every, (seen.v_px + rig.center_v_px) / every);
         // Rounded down half a pixel further on: the nearest pixel. Casts hold at the ends, and a
         // negative one is none.
         if !(u >= -0.5 && v >= -0.5) {
@@ -305,6 +311,7 @@ impl<'c> Pairing<'c> {
         let (u, v) = ((u + 0.5) as usize, (v + 0.5) as usize);
         let depth = f64::from(map.depth_m.get(u, v).filter(|depth| *depth > 0.0)?);
         let normal = map.normal.get(u, v)?.map(|part| f64::from(part) / NORMAL_ONE);
-        Some((Vector3::from(rig.ray(u as f64, v as f64)) * depth, Vector3::from(normal)))
+        let ray = rig.ray(u as f64 * every, v as f64 * every);
+        Some((Vector3::from(ray) * depth, Vector3::from(normal)))
     }
 }

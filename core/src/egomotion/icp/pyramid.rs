@@ -64,6 +64,14 @@ impl<'a> Pyramid<'a> {
         self.levels.iter().enumerate().rev().filter_map(|(at, level)| Some((at, (*level)?)))
     }
 
+    /// The finest level with pixels at least twice as far apart as those of a picture of every so
+    /// many pixels, or else the coarsest.
+    pub fn finest_for(&self, every: usize) -> usize {
+        let is_coarse = |level: &usize| Self::stride_px(*level) >= (2 * every) as f64;
+        let levels = self.levels.iter().flatten().count();
+        (0..levels).find(is_coarse).unwrap_or(levels.saturating_sub(1))
+    }
+
     /// Px of the image between two pixels of a level.
     pub fn stride_px(level: usize) -> f64 {
         f64::from(2u32 << level.min(usize::from(MAX_LEVELS)))

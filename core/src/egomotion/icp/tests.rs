@@ -75,9 +75,33 @@ fn tracked(config: &IcpConfig, planes: &[Plane], motion: &Transform) -> IcpRepor
     let map = MapPicture {
         depth_m: View::new(&before.depth_m, WIDTH, HEIGHT).unwrap(),
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
+        every: 1,
     };
     let mut memory = vec![7.0; WIDTH * HEIGHT];
     track(config, &measured(&now.disparity_q8), &map, &mut memory)
+}
+
+#[test]
+fn a_picture_of_every_second_pixel_leads_to_the_same_motion() {
+    let motion = walk([0.0, 0.01, 0.0], [0.05, 0.0, 0.2]);
+    let (before, now) = (render(&SCENE, &Transform::IDENTITY), render(&SCENE, &motion));
+    let [width, height] = [WIDTH / 2, HEIGHT / 2];
+    let kept = |at: usize| (2 * (at / width)) * WIDTH + 2 * (at % width);
+    let depth_m: Vec<f32> = (0..width * height).map(|at| before.depth_m[kept(at)]).collect();
+    let normal: Vec<_> = (0..width * height).map(|at| before.normal[kept(at)]).collect();
+    let map = MapPicture {
+        depth_m: View::new(&depth_m, width, height).unwrap(),
+        normal: View::new(&normal, width, height).unwrap(),
+        every: 2,
+    };
+    let mut memory = vec![7.0; WIDTH * HEIGHT];
+    let config = IcpConfig::default();
+    let report = track(&config, &measured(&now.disparity_q8), &map, &mut memory);
+    assert_eq!(report.status, IcpStatus::Tracked);
+    let off_m = (report.t_current_previous.inverse() * motion.inverse()).distance_m();
+    assert!(off_m < 0.02, "{off_m} m");
+    let whole = tracked(&config, &SCENE, &motion);
+    assert!(4 * report.points <= whole.points + whole.points / 8, "a quarter of the points");
 }
 
 fn walk(turn: [f64; 3], way_m: [f64; 3]) -> Transform {
@@ -142,6 +166,7 @@ fn depth_off_the_map_is_no_estimate() {
     let map = MapPicture {
         depth_m: View::new(&before.depth_m, WIDTH, HEIGHT).unwrap(),
         normal: View::new(&before.normal, WIDTH, HEIGHT).unwrap(),
+        every: 1,
     };
     let mut memory = vec![0.0; WIDTH * HEIGHT / 3];
     let report = track(

@@ -10,12 +10,17 @@ use crate::{
     view::RaycastView,
     volume::{BlockKey, EvictedBlock, LoadedBlock},
 };
+use core::cmp::Ordering;
 
 /// Frames until the camera is covered, and the first that is seen again.
 const SEEN: usize = 5;
 const AGAIN: usize = SEEN + MAX_REFERENCE_FRAMES as usize + 1;
 /// The first frame whose motion is estimated again.
 const BEGAN: usize = AGAIN + 1;
+/// The frame that ends the search in a map whose colours say where the camera is.
+const FOUND: usize = BEGAN + 3;
+/// The capacity with colour, without which no pose is compared.
+const COLOURED: Capacity = Capacity { colour: true, ..CAPACITY };
 const SECOND: MapSegment = MapSegment::new(1);
 
 fn pose(at: usize) -> Transform {
@@ -60,10 +65,61 @@ fn with_lost<R>(capacity: &Capacity, test: impl FnOnce(&mut Mapper<'_>, Report) 
 
 #[test]
 fn a_camera_that_was_lost_is_found_where_the_map_looks_like_the_image() {
-    with_lost(&Capacity { colour: true, ..CAPACITY }, |_, report| {
-        assert_eq!((report.pose, report.segment), (PoseOrigin::Relocalized, MapSegment::FIRST));
-        let off_m = (report.t_world_camera.inverse() * pose(BEGAN)).distance_m();
-        assert!(off_m < 0.1, "{off_m} m");
+    with_lost(&COLOURED, |mapper, began| {
+        let mut reports = vec![began];
+        reports.extend((BEGAN + 1..=FOUND + 1).map(|at| step(mapper, at, None)));
+        for (at, report) in (BEGAN..).zip(&reports) {
+            // Nothing is believed before all steps of the search agree.
+            let expected = match at.cmp(&FOUND) {
+                Ordering::Less => (PoseOrigin::Extrapolated, false),
+                Ordering::Equal => (PoseOrigin::Relocalized, true),
+                Ordering::Greater => (PoseOrigin::Estimated, true),
+            };
+            assert_eq!((report.pose, report.fused), expected, "frame {at}");
+            assert_eq!(report.segment, MapSegment::FIRST);
+            let off_m = (report.t_world_camera.inverse() * pose(at)).distance_m();
+            assert!(off_m < 0.1 || at < FOUND, "frame {at}: {off_m} m");
+        }
+    });
+}
+
+#[test]
+fn a_search_stopped_after_any_frame_goes_on_as_if_it_never_stopped() {
+    with_lost(&COLOURED, |mapper, _| {
+        for at in BEGAN + 1..=FOUND {
+            let bytes = saved(mapper);
+            let expected = step(mapper, at, None);
+            let resumed =
+                restored(&COLOURED, &Walk::config(), &bytes, |mapper| step(mapper, at, None))
+                    .unwrap();
+            let outcome = |report: &Report| (report.digest, report.pose, report.t_world_camera);
+            assert_eq!(outcome(&resumed), outcome(&expected), "stopped before frame {at}");
+        }
+    });
+}
+
+#[test]
+fn a_pose_given_during_a_search_ends_it() {
+    with_lost(&COLOURED, |mapper, _| {
+        let given = step(mapper, BEGAN + 1, Some(pose(BEGAN + 1)));
+        assert_eq!((given.pose, given.fused), (PoseOrigin::Given, true));
+        let next = step(mapper, BEGAN + 2, None);
+        assert_eq!((next.pose, next.work.cast_pixels), (PoseOrigin::Estimated, 0));
+    });
+}
+
+#[test]
+fn a_search_begins_anew_where_the_camera_is_covered_again() {
+    with_lost(&COLOURED, |mapper, began| {
+        assert_eq!(began.pose, PoseOrigin::Extrapolated);
+        // Covered for as long as before, a frame into the search.
+        let covered = MAX_REFERENCE_FRAMES as usize + 1;
+        for _ in 0..covered {
+            assert_eq!(step(mapper, SEEN, None).pose, PoseOrigin::Extrapolated);
+        }
+        let again: Vec<_> = (BEGAN..=BEGAN + 4).map(|at| step(mapper, at, None).pose).collect();
+        let expected = [[PoseOrigin::Extrapolated; 4].as_slice(), &[PoseOrigin::Relocalized]];
+        assert_eq!(again, expected.concat(), "one frame to compare with, then all four steps");
     });
 }
 
@@ -196,15 +252,17 @@ fn objects_of_the_first_segment_retire_where_the_second_begins() {
 }
 
 #[test]
-fn a_camera_that_is_found_again_costs_as_many_pictures_as_the_bound_says() {
-    let capacity = Capacity { colour: true, ..CAPACITY };
+fn a_camera_that_is_found_again_costs_less_than_a_whole_picture_a_frame() {
     let mut config = Walk::config();
-    let bound = capacity.work(&config).cast_pixels;
-    with_lost(&capacity, |mapper, report| {
-        assert_eq!(report.work.cast_pixels, bound, "each picture was needed");
-        let next = step(mapper, BEGAN + 1, None);
-        assert_eq!(next.work.cast_pixels, 0, "counted in the frame that took them");
+    let bound = COLOURED.work(&config).cast_pixels;
+    assert!(bound <= 3 * (WIDTH * HEIGHT) as u64 / 4, "three pictures of a quarter of the pixels");
+    with_lost(&COLOURED, |mapper, report| {
+        let mut pixels = vec![report.work.cast_pixels];
+        pixels.extend((BEGAN + 1..=FOUND + 1).map(|at| step(mapper, at, None).work.cast_pixels));
+        let third = bound / 3;
+        let expected = [2 * third, 2 * third, bound, bound, 0];
+        assert_eq!(pixels, expected, "each picture was needed, in the frame that took it");
     });
     config.mapper.egomotion = MotionSource::Icp;
-    assert_eq!(capacity.work(&config).cast_pixels, (WIDTH * HEIGHT) as u64);
+    assert_eq!(COLOURED.work(&config).cast_pixels, (WIDTH * HEIGHT) as u64);
 }

@@ -99,7 +99,7 @@ fn no_input_costs_more_than_the_bound_and_each_unit_comes_up() {
         assert!(most > 0 || name == "cast_pixels", "no {name}: no input reaches that stage");
     }
     // Lists that noise fills to the last entry.
-    let [pixels, candidates, _, features, _, _, _, _, fused, _] = most;
+    let [pixels, candidates, _, features, _, _, _, _, _, fused, _] = most;
     let full = [bound.stereo_pixels, bound.support_candidates, bound.features, bound.fused_voxels];
     std::println!("most {most:?} of {:?}", bound.named());
     assert_eq!([pixels, candidates, fused], [full[0], full[1], full[3]]);

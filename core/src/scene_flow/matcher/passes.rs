@@ -48,7 +48,7 @@ impl FlowMatcher<'_> {
         // Nothing is known of the motion yet but a turn: search everywhere around it.
         let turn = self.prior.turn();
         let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
-        corners.trace(widest, self.traced, executor);
+        let compared = corners.trace(widest, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
         let matches = clipped(self.sparse, ..self.sparse_len);
@@ -68,6 +68,7 @@ impl FlowMatcher<'_> {
             closed: closed as u32,
             dropped: (closed - self.sparse_len) as u32,
             unsupported: (self.sparse_len - supported.count()) as u32,
+            compared,
         }
     }
 
@@ -91,7 +92,7 @@ impl FlowMatcher<'_> {
         let (prior, turn) = (&self.prior, self.prior.turn());
         let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
         let reach = |at: [u16; 2]| prior.reach(at).unwrap_or_else(|| widest(at));
-        corners.trace(reach, self.traced, executor);
+        let compared = corners.trace(reach, self.traced, executor);
         // More circles than the buffer holds are dropped and counted.
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());
@@ -106,6 +107,7 @@ impl FlowMatcher<'_> {
             closed: closed as u32,
             dropped: (closed - stored) as u32,
             unsupported: (stored - supported) as u32,
+            compared,
         };
         (count, stored)
     }

@@ -1,6 +1,7 @@
 //! Which features are matched, which matches have support, and which are selected.
 
 use super::*;
+use crate::scene_flow::features::Sought;
 
 fn features_for<'s>(carver: &mut Carver<'s>, count: usize) -> Features<'s> {
     let start = carver.alloc("cell", table(&CAPACITY));
@@ -33,7 +34,10 @@ struct Finds<'f, 's>(&'f Features<'s>, usize, Window, [Descriptor; 2], Option<us
 impl Comparison for Finds<'_, '_> {
     fn run(self, kernels: &impl Kernels) {
         let Self(features, class, window, sought, expected) = self;
-        assert_eq!(features.nearest(class, window, &sought, kernels), expected);
+        assert_eq!(
+            features.nearest(Sought { class, window, descriptor: &sought }, kernels, &mut 0),
+            expected
+        );
     }
 }
 

@@ -26,11 +26,12 @@ const UNITS: [Unit; WorkUnits::COUNT] = [
     unit("support_candidates", "stereo", "lattice points of the image"),
     unit("triangles", "stereo", "2 images x 2 for each lattice point"),
     unit("features", "scene flow", "2 images x (features + features / 4)"),
+    unit("compared_descriptors", "scene flow", "of each pass: features x most within the reach"),
     unit("circles", "scene flow", "features + features / 4"),
     unit(
         "cast_pixels",
         "egomotion",
-        "pixels x pictures of the map: 7, with mapper.egomotion icp 1",
+        "3 x every second column and row; with mapper.egomotion icp all pixels once",
     ),
     unit("block_requests", "allocate", "rays of every second pixel x blocks on a ray"),
     unit("moved_blocks", "allocate", "2 for each request"),
@@ -67,8 +68,8 @@ pub fn show(
         outln!("{stage:<12}{name:<20}{:>16}  {formula}", grouped(most));
     }
     outln!(
-        "\nWhat a step did is in the columns work_* of frames.csv. Not counted: descriptor \
-         distances, hypotheses of motions, keyframes compared, voxels of objects."
+        "\nWhat a step did is in the columns work_* of frames.csv. Not counted: \
+         hypotheses of motions, keyframes compared, voxels of objects."
     );
     Ok(())
 }

@@ -97,6 +97,7 @@ fn picture(shown: &Shown) -> MapPicture<'_> {
     MapPicture {
         depth_m: View::new(&shown.depth_m, WIDTH, HEIGHT).unwrap(),
         normal: View::new(&shown.normal, WIDTH, HEIGHT).unwrap(),
+        every: 1,
     }
 }
 

@@ -271,6 +271,9 @@ static WORK: &[FrameColumn] = &[
     column("work_features", "", "features kept in both images, of both passes", |row| {
         row.report.work.features.into()
     }),
+    column("work_compared_descriptors", "", "descriptors compared with a feature's", |row| {
+        row.report.work.compared_descriptors.into()
+    }),
     column("work_circles", "", "circles of matches that closed, of both passes", |row| {
         row.report.work.circles.into()
     }),
