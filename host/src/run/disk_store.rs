@@ -1,7 +1,7 @@
 //! The store of evicted blocks during a run, and the mesh made of pool and store.
 
 use super::map_objects::add_objects;
-use super::store::{self, BlockFile, PoolAndFile, Position, StoreError};
+use super::store::{self, BehindFile, BlockFile, PoolAndFile, Position, StoreError};
 use super::{FolderError, RunFolder};
 use crate::formats::{MAP_FILE, Mesh, MeshAxes, PlyWriter, ShownSegment};
 use crate::observe::StoreStats;
@@ -21,7 +21,7 @@ pub const BLOCKS_FILE: &str = "map.blocks";
 /// A file of blocks, or none.
 #[derive(Debug)]
 pub struct DiskStore {
-    file: Option<BlockFile<File>>,
+    file: Option<BehindFile<File>>,
     /// Blocks evicted since they were last taken.
     evicted: HashSet<BlockKey>,
 }
@@ -39,7 +39,7 @@ impl BlockStore for DiskStore {
 
 impl DiskStore {
     fn of(file: Option<BlockFile<File>>) -> Self {
-        Self { file, evicted: HashSet::new() }
+        Self { file: file.map(BehindFile::new), evicted: HashSet::new() }
     }
 
     /// The blocks that were evicted since this was last asked, stored or lost.
@@ -81,19 +81,26 @@ impl DiskStore {
         Ok(Self::of(Some(file)))
     }
 
+    /// Ends a step: what it evicted is written from here on, while the next frame is read. Returns
+    /// the number of blocks of earlier steps that a failing disk did not take.
+    pub fn end_step(&mut self) -> u32 {
+        self.file.as_mut().map_or(0, BehindFile::hand_over)
+    }
+
     /// The end of the file, if there is one; synced to the disk up to there.
     pub fn position(&self) -> std::io::Result<Option<Position>> {
-        self.file.as_ref().map(BlockFile::position).transpose()
+        self.file.as_ref().map(|file| file.with_file(BlockFile::position)).transpose()
     }
 
     /// Returns true if the disk refused, rather than the limit that was asked for.
     pub fn disk_failed(&self) -> bool {
-        self.file.as_ref().is_some_and(BlockFile::disk_failed)
+        self.file.as_ref().is_some_and(|file| file.with_file(BlockFile::disk_failed))
     }
 
     /// Returns the reason why blocks are no longer stored, if so.
     pub fn failure(&self) -> Option<String> {
-        self.file.as_ref().and_then(BlockFile::failure).map(ToString::to_string)
+        let failure = |file: &BlockFile<File>| file.failure().map(ToString::to_string);
+        self.file.as_ref().and_then(|file| file.with_file(failure))
     }
 }
 
@@ -101,7 +108,7 @@ impl DiskStore {
 pub struct MeshOutput {
     /// Or why there is no file.
     ply: std::io::Result<PlyWriter>,
-    store: DiskStore,
+    file: Option<BlockFile<File>>,
     /// True if blocks of the file are not in the mesh yet.
     file_is_due: bool,
     /// Blocks that are in the mesh already.
@@ -115,7 +122,7 @@ impl MeshOutput {
     /// otherwise they are meshed where they are, with those of the file around them.
     pub fn begin(
         mapper: &mut Mapper<'_>,
-        (mut store, streaming): (DiskStore, Option<Streaming>),
+        (store, streaming): (DiskStore, Option<Streaming>),
         folder: &RunFolder,
         (axes, colour): (MeshAxes, bool),
     ) -> Self {
@@ -128,10 +135,10 @@ impl MeshOutput {
         });
         let (mut report, mut meshed, mut failed) =
             (EvictionReport::default(), HashSet::new(), None);
+        let mut file = store.file.and_then(BehindFile::into_file);
         let keeps_file = streaming.is_some_and(|streaming| streaming.keep_file);
         let mut file_is_due = true;
-        match store
-            .file
+        match file
             .as_mut()
             .filter(|file| (file.records() > 0 || keeps_file) && file.failure().is_none())
         {
@@ -155,9 +162,9 @@ impl MeshOutput {
                 }
                 file_is_due = false;
             }
-            Some(_) => report = mapper.stream_out(&mut store),
+            Some(file) => report = mapper.stream_out(file),
         }
-        Self { ply, store, file_is_due, meshed, failed, report }
+        Self { ply, file, file_is_due, meshed, failed, report }
     }
 
     /// Adds the stored blocks, reading them piece by piece into `slab`, and the objects, and ends
@@ -168,10 +175,10 @@ impl MeshOutput {
         (capacity, config): (&Capacity, &Config),
         (folder, objects): (&RunFolder, MapObjects),
     ) -> (Result<Mesh, FolderError>, StoreStats) {
-        let mut stats =
-            StoreStats { end: self.report, failure: self.store.failure(), ..StoreStats::default() };
+        let failure = self.file.as_ref().and_then(BlockFile::failure).map(ToString::to_string);
+        let mut stats = StoreStats { end: self.report, failure, ..StoreStats::default() };
         let mut failed = self.failed;
-        if let Some(file) = self.store.file.as_mut() {
+        if let Some(file) = self.file.as_mut() {
             if self.file_is_due
                 && let Ok(ply) = &mut self.ply
             {

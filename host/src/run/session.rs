@@ -346,9 +346,10 @@ impl<'p, 's> Session<'p, 's> {
         let (mapper, threads, store) = (&mut self.mapper, &self.threads, &mut self.store);
         let mut retired = RetiredVolumes::default();
         let stepped = threads.run(|| mapper.step_with(&frame, threads, store, &mut retired));
-        let report = stepped.map_err(|error| refused(step_reason(error)))?;
+        let mut report = stepped.map_err(|error| refused(step_reason(error)))?;
         self.state.before_last_ns = before_ns;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
+        report.allocate.eviction.lost += self.store.end_step();
         let times = self.threads.take_times();
         let row = FrameRow {
             frame: index,

@@ -295,6 +295,17 @@ impl<F: Read + Write + Seek> BlockFile<F> {
         self.most = most;
     }
 
+    /// Returns the file or memory that the store writes to.
+    #[cfg(test)]
+    pub(super) fn into_inner(self) -> F {
+        self.file
+    }
+
+    /// Bytes that the file may still grow by; 0 once storing has ended.
+    pub(super) fn free_bytes(&self) -> u64 {
+        if self.failure.is_some() { 0 } else { self.most.saturating_sub(self.end) }
+    }
+
     /// Records in the store, superseded ones included.
     pub fn records(&self) -> u64 {
         self.records

@@ -1,5 +1,6 @@
 //! Blocks on disk: where the map goes when it leaves memory, and where it comes back from.
 
+mod behind;
 mod block_index;
 mod file;
 pub mod mesh;
@@ -9,6 +10,7 @@ mod segment;
 #[cfg(test)]
 mod tests;
 
+pub use behind::BehindFile;
 pub use block_index::Tile;
 pub use file::{BlockFile, Opened, Position, StoreError};
 pub use pool::PoolAndFile;
