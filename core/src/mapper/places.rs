@@ -325,7 +325,9 @@ impl Mapper<'_> {
         if last.is_some_and(|last| !self.localization.camera.begin_after(last)) {
             return Err(LoadPlacesError::Damaged);
         }
-        self.static_map.volume.enter_segment(self.localization.camera.segment());
+        let volume = &mut self.static_map.volume;
+        volume.enter_segment(self.localization.camera.segment());
+        volume.without_submaps();
         Ok(keyframes)
     }
 }

@@ -7,13 +7,14 @@ use crate::{
     geometry::MapSegment,
     image::ViewMut,
     memory::{Carver, region_bytes},
+    places::Places,
     segmentation::MotionSegmenter,
     state::Visitor,
     tracking::{CameraMotion, Tracked},
     view::{RaycastError, RaycastReport, Raycaster},
     volume::{
         AllocationReport, BLOCK_SIDE, BlockStore, DepthImage, FusedBlocks, NotedDepth, Observation,
-        ObservedDepth, PruneReport, Viewpoint, Volume,
+        ObservedDepth, PruneReport, Viewpoint, Volume, submaps::SubmapCamera,
     },
 };
 use bytemuck::TransparentWrapper;
@@ -107,6 +108,27 @@ impl<'s> StaticMap<'s> {
         // After all pixels have depth: objects are removed from it, and not allocated.
         let mut depth_m = depths.peeled_mut();
         executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
+    }
+
+    /// Moves the map's submaps where loops moved keyframes in this frame.
+    pub fn close_loops(&mut self, places: &Places<'_>) {
+        if places.has_moved() {
+            self.volume.close(places.closing_by_frame());
+        }
+    }
+
+    /// Takes the camera of the frame that is fused next: a submap of the map may begin with it.
+    pub fn advance_submaps(
+        &mut self,
+        seen: &MatchedFrame<'_, '_>,
+        camera: &CameraMotion,
+        places: &Places<'_>,
+    ) {
+        self.volume.advance_submaps(&SubmapCamera {
+            frame: seen.number,
+            t_world_camera: &camera.t_world_camera,
+            t_closed_driven: places.newest_closing(self.volume.segment()),
+        });
     }
 
     /// Allocates blocks around the depth that was taken, and averages it in.

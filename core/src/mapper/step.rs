@@ -196,8 +196,13 @@ impl Mapper<'_> {
         // (E) The static map without what may move, and objects' maps; not at a pose extrapolated.
         let erase_trails = || static_map.erase_trails(&camera, segmenter);
         let voxels_erased = executor.stage(Stage::Prune, erase_trails);
+        static_map.close_loops(&localization.places);
         let (mut allocation, mut shows_depth) = (AllocationReport::default(), false);
         if fused {
+            // A pose that the caller gives does not drift: what is seen again belongs to one map.
+            if located.found.origin != PoseOrigin::Given {
+                static_map.advance_submaps(&seen, &camera, &localization.places);
+            }
             static_map.take_depth(&seen, &mut tracked, executor);
             shows_depth = static_map.has_depth(frame.left.width() * frame.left.height());
             allocation = static_map.fuse(&seen, &camera, executor, store);

@@ -159,6 +159,8 @@ const fn bounds(capacity: &Capacity) -> Capacity {
         blocks: capacity.object_blocks,
         visible_blocks: capacity.object_blocks,
         history_frames: 1,
+        // An object has no places, and no submaps.
+        keyframes: 0,
         ..*capacity
     }
 }

@@ -21,6 +21,7 @@
 //! place is not found from the opposite direction, nor where it looks otherwise; the camera then
 //! goes on in its own segment.
 
+mod closing;
 mod descriptor;
 mod graph;
 mod index;

@@ -117,6 +117,11 @@ impl Volume<'_> {
             report.probes_most = probes;
         }
         let slot = match found {
+            // The camera came back: by now its pose has another error than then.
+            Some(slot) if self.is_left(slot) => match self.replace_left(slot, store, report) {
+                Some(made) => made,
+                None => slot,
+            },
             Some(slot) => slot,
             // A full pool evicts the block unseen for longest, or refuses.
             None => {
@@ -142,6 +147,7 @@ impl Volume<'_> {
             report.unlisted += 1;
         }
         self.lru.touch(slot);
+        self.enter_submap(slot);
     }
 
     /// Takes a slot for a new, empty block.
@@ -153,6 +159,7 @@ impl Volume<'_> {
             return None;
         }
         self.history.allocated_at(slot, self.visible.frame());
+        self.submaps.insert(slot, key.coord);
         Some(slot)
     }
 

@@ -217,6 +217,13 @@ impl<'s> Blocks<'s> {
         }
     }
 
+    /// Moves the block in a slot to another segment.
+    pub(super) fn set_segment(&mut self, slot: Slot, segment: MapSegment) {
+        if let Some(header) = self.header.get_mut(slot.index()) {
+            header.segment = segment;
+        }
+    }
+
     /// Returns the segment and the coordinates of the block in a slot.
     #[inline]
     pub fn key(&self, slot: Slot) -> Option<BlockKey> {

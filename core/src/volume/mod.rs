@@ -14,6 +14,7 @@
 //! (docs/decisions/0061-segments-by-number.md).
 
 mod allocate;
+mod archived;
 pub(crate) mod block;
 mod config;
 mod erase;
@@ -28,6 +29,7 @@ mod prune;
 mod request;
 mod sampler;
 mod store;
+pub(crate) mod submaps;
 mod surroundings;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -72,6 +74,7 @@ pub struct Volume<'s> {
     lru: LruList<'s>,
     segment: MapSegment,
     digest: u64,
+    submaps: submaps::Submaps<'s>,
 }
 
 impl<'s> Volume<'s> {
@@ -84,6 +87,7 @@ impl<'s> Volume<'s> {
             + request::RequestedCache::bytes()
             + VisibleHistory::bytes(capacity)
             + LruList::bytes(capacity.blocks)
+            + submaps::Submaps::bytes(capacity)
     }
 
     /// Bytes of it that belong in large memory: voxels and their colour.
@@ -104,6 +108,7 @@ impl<'s> Volume<'s> {
             lru: LruList::new_in(capacity.blocks, carver),
             segment: MapSegment::FIRST,
             digest: 0,
+            submaps: submaps::Submaps::new_in(capacity, carver),
         }
     }
 

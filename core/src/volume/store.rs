@@ -89,12 +89,23 @@ impl Volume<'_> {
         if self.config.when_full == WhenFull::Refuse || self.visible.was_lately(slot) {
             return false;
         }
+        self.evict_block(slot, store, report);
+        true
+    }
+
+    /// Evicts the block in a slot, which is free then.
+    pub(super) fn evict_block<S: BlockStore>(
+        &mut self,
+        slot: Slot,
+        store: &mut S,
+        report: &mut EvictionReport,
+    ) {
         // Still in the window of pruning: it is pruned before it leaves, as it would be later.
         if self.config.prunes() && self.history.covers(self.visible.last_visible(slot)) {
             let (_, freed) = self.prune_block(slot, self.rule());
             if freed {
                 report.empty += 1;
-                return true;
+                return;
             }
         }
         // An empty block is no loss and takes no disk space.
@@ -104,7 +115,6 @@ impl Volume<'_> {
             _ => report.lost += 1,
         }
         self.free_block(slot);
-        true
     }
 
     /// Returns the contents of a slot.

@@ -13,6 +13,7 @@ impl Volume<'_> {
             visible,
             history,
             lru,
+            submaps,
             // Rebuilt, given by the caller, told by the camera, or of one frame only.
             index: _,
             digest: _,
@@ -33,6 +34,7 @@ impl Volume<'_> {
         visible.visit(slots, visitor);
         history.visit(slots, visitor);
         lru.visit(slots, visitor);
+        submaps.visit(slots, visitor);
     }
 
     /// Says what must hold of the volume after a frame.

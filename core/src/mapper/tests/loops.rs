@@ -35,6 +35,7 @@ fn a_full_turn_is_recognised() {
     let counts = mapper.loops();
     assert!(counts.closures > 0 && counts.refused + counts.taken_out == 0, "{counts:?}");
     assert_eq!(moved, counts.moved, "{counts:?}");
+    assert!(moved > 0 && mapper.static_map().is_bent(), "the map moves with its keyframes");
 }
 
 #[test]

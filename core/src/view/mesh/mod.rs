@@ -14,7 +14,9 @@
 //! vertices by the first triangle that has them.
 
 mod cases;
+mod closed;
 mod config;
+mod covered;
 mod names;
 mod sink;
 #[cfg(test)]
@@ -23,8 +25,9 @@ mod tests;
 pub use config::MeshConfig;
 pub use sink::{MeshSink, Triangle, Vertex};
 
-use crate::volume::{BLOCK_SIDE, BlockKey, Blocks, Slot, Volume};
+use crate::volume::{BLOCK_SIDE, BlockCoord, BlockKey, Blocks, Slot, Volume};
 use cases::CASES;
+use covered::{Covers, NotCovered};
 use names::{CellEdge, VertexNames};
 
 /// Lattice points along a block's side, with those of the next block that its last cells need.
@@ -52,11 +55,10 @@ impl Volume<'_> {
         // In the order of the pool, which is the same on every machine.
         for slot in self.pool().live() {
             if let Some(key) = self.blocks().key(slot).filter(|&key| is_selected(key)) {
-                let patch = Patch::load(self, slot, key, config.min_weight);
-                names.clear();
-                patch.cells(|cell, inside| {
-                    count += patch.polygonise(cell, inside, &mut names, sink)
-                });
+                // The block and its seven neighbours on the far sides.
+                let beside = |offset| self.find_key(key.offset(offset)?);
+                let patch = Patch::load(self, slot, key.coord, beside);
+                count += patch.draw(config, &mut names, &NotCovered, sink);
             }
         }
         count
@@ -83,23 +85,45 @@ struct LatticePoint {
 }
 
 impl<'v, 's> Patch<'v, 's> {
-    fn load(volume: &'v Volume<'s>, slot: Slot, key: BlockKey, min_weight: u8) -> Self {
-        // The block and its seven neighbours on the far sides: cubes reach one voxel into them.
+    /// The patch of a block; `beside` tells the block so many blocks away, into which cubes reach
+    /// by a voxel.
+    fn load(
+        volume: &'v Volume<'s>,
+        slot: Slot,
+        coord: BlockCoord,
+        beside: impl Fn([i32; 3]) -> Option<Slot>,
+    ) -> Self {
         let mut slots = [None; 8];
         for (n, entry) in (0i32..).zip(&mut slots) {
-            let beside = || volume.find_key(key.offset([n & 1, n >> 1 & 1, n >> 2])?);
-            *entry = if n == 0 { Some(slot) } else { beside() };
+            *entry = if n == 0 { Some(slot) } else { beside([n & 1, n >> 1 & 1, n >> 2]) };
         }
-        let mut patch = Self {
+        Self {
             blocks: volume.blocks(),
             slots,
-            origin: key.coord.origin(),
+            origin: coord.origin(),
             voxel_size_m: volume.config().voxel_size_m,
             sdf: [UNSEEN; SIDE * SIDE * SIDE],
-        };
+        }
+    }
+
+    /// Hands the triangles that nothing covers to `sink` and returns their number.
+    fn draw<S: MeshSink>(
+        mut self,
+        config: &MeshConfig,
+        names: &mut VertexNames<S::Name>,
+        covers: &impl Covers,
+        sink: &mut S,
+    ) -> u64 {
         // Voxels never observed have weight 0 and are no surface, also where any weight will do.
-        (0..8).for_each(|n| patch.copy(n, if min_weight == 0 { 1 } else { min_weight }));
-        patch
+        let min_weight = if config.min_weight == 0 { 1 } else { config.min_weight };
+        (0..8).for_each(|n| self.copy(n, min_weight));
+        names.clear();
+        let mut count = 0;
+        self.cells(|cell, inside| {
+            let triangles = CellTriangles { patch: &self, cell, inside, covers };
+            count += triangles.polygonise(names, sink);
+        });
+        count
     }
 
     /// Copies what belongs to the patch from block `n` of `slots`.
@@ -176,46 +200,6 @@ impl<'v, 's> Patch<'v, 's> {
         }
     }
 
-    /// Hands the triangles of a cell to `sink` and returns their number.
-    #[expect(clippy::indexing_slicing, reason = "masks keep edges below 16 and cases below 256")]
-    fn polygonise<S: MeshSink>(
-        &self,
-        cell: [usize; 3],
-        inside: usize,
-        names: &mut VertexNames<S::Name>,
-        sink: &mut S,
-    ) -> u64 {
-        let case = &CASES[inside & 0xFF];
-        // As many as an edge's four bits can say.
-        let mut vertices = [Vertex::default(); 16];
-        // Vertices first: triangles of a cell share them.
-        let mut left = case.edges;
-        while left != 0 {
-            let edge = left.trailing_zeros() as usize;
-            left &= left - 1;
-            vertices[edge & 15] = self.vertex(CellEdge::new(cell, edge));
-        }
-        let mut count = 0;
-        for edges in
-            case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from))
-        {
-            // A triangle whose corners coincide has no area and is left out.
-            let triangle = Triangle { vertices: edges.map(|edge| vertices[edge & 15]) };
-            let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
-            if a != b && b != c && c != a {
-                let names = edges.map(|edge| {
-                    let (vertex, edge) = (&vertices[edge & 15], CellEdge::new(cell, edge));
-                    names.name(edge, || {
-                        sink.vertex(vertex, edge.is_at_border() || self.is_on_point(edge))
-                    })
-                });
-                sink.triangle(&triangle, names);
-                count += 1;
-            }
-        }
-        count
-    }
-
     /// The vertex on an edge.
     fn vertex(&self, edge: CellEdge) -> Vertex {
         let [low, high] = edge.ends().map(|point| self.point(point));
@@ -270,6 +254,52 @@ impl<'v, 's> Patch<'v, 's> {
                 .map(|planes| planes.each_ref().map(|plane| plane[voxel]))
                 .filter(|colour| *colour != [0; 3]),
         }
+    }
+}
+
+/// A cell that the surface runs through.
+struct CellTriangles<'p, 'v, 's, C> {
+    patch: &'p Patch<'v, 's>,
+    cell: [usize; 3],
+    /// Bits of its inside corners.
+    inside: usize,
+    covers: &'p C,
+}
+
+impl<C: Covers> CellTriangles<'_, '_, '_, C> {
+    /// Hands the triangles of a cell to `sink` and returns their number.
+    #[expect(clippy::indexing_slicing, reason = "masks keep edges below 16 and cases below 256")]
+    fn polygonise<S: MeshSink>(&self, names: &mut VertexNames<S::Name>, sink: &mut S) -> u64 {
+        let (patch, cell) = (self.patch, self.cell);
+        let case = &CASES[self.inside & 0xFF];
+        // As many as an edge's four bits can say.
+        let mut vertices = [Vertex::default(); 16];
+        // Vertices first: triangles of a cell share them.
+        let mut left = case.edges;
+        while left != 0 {
+            let edge = left.trailing_zeros() as usize;
+            left &= left - 1;
+            vertices[edge & 15] = patch.vertex(CellEdge::new(cell, edge));
+        }
+        let mut count = 0;
+        for edges in
+            case.triangles.iter().take(case.count.into()).map(|edges| edges.map(usize::from))
+        {
+            // A triangle whose corners coincide has no area and is left out.
+            let triangle = Triangle { vertices: edges.map(|edge| vertices[edge & 15]) };
+            let [a, b, c] = triangle.vertices.map(|vertex| vertex.position_m);
+            if a != b && b != c && c != a && !self.covers.covers(&triangle) {
+                let names = edges.map(|edge| {
+                    let (vertex, edge) = (&vertices[edge & 15], CellEdge::new(cell, edge));
+                    names.name(edge, || {
+                        sink.vertex(vertex, edge.is_at_border() || patch.is_on_point(edge))
+                    })
+                });
+                sink.triangle(&triangle, names);
+                count += 1;
+            }
+        }
+        count
     }
 }
 

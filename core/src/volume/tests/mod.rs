@@ -7,6 +7,7 @@ mod fusion;
 mod history;
 mod pruning;
 mod segments;
+mod submaps;
 
 use super::*;
 use crate::{
