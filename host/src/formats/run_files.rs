@@ -6,6 +6,8 @@ pub const SUMMARY_FILE: &str = "summary.json";
 pub const SETTINGS_FILE: &str = "config.toml";
 /// Mesh of the static map and of all objects.
 pub const MAP_FILE: &str = "map.ply";
+/// Mesh of the static map after the loops that were closed.
+pub const CLOSED_MAP_FILE: &str = "map_closed.ply";
 /// Table of the blocks that were made, pruned and evicted.
 pub const BLOCKS_TABLE_FILE: &str = "blocks.csv";
 /// Table of the tracks of a run.

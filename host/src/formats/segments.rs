@@ -12,7 +12,10 @@ pub const SEGMENT_GAP_M: f64 = 100.0;
 
 /// Change of y, which points down, from a segment's frame to the one that files share, m.
 fn shift_m(segment: MapSegment) -> f64 {
-    -SEGMENT_GAP_M * f64::from(segment.get())
+    // Blocks that the camera came back to lie in the lattice of the segment it was in, which their
+    // number does not tell; nearly always it is the first one.
+    let number = if segment.archived_submap().is_some() { 0 } else { segment.get() };
+    -SEGMENT_GAP_M * f64::from(number)
 }
 
 /// Pose in a segment as files show it. Poses of the first segment stay as they are, to the bit.

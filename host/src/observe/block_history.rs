@@ -9,6 +9,7 @@ use super::{EndContext, Finished, FrameContext, GrowingFile, ObserveError, Obser
 use crate::formats::BLOCKS_TABLE_FILE;
 use dynvox_core::geometry::MapSegment;
 use dynvox_core::volume::{BlockCoord, BlockKey, Volume};
+use hashbrown::HashSet;
 use serde::{Deserialize, Serialize};
 use std::io;
 
@@ -52,9 +53,14 @@ impl Observer for BlockHistoryObserver {
         if report.prune.blocks_freed + eviction.stored + eviction.lost + eviction.empty > 0 {
             left.extend(self.take_absent(volume));
         }
+        // Archived blocks were seen under the key they had before.
+        let archived = |key: &&BlockKey| key.segment.archived_submap().is_some();
+        let archived: HashSet<_> =
+            frame.evicted.iter().filter(archived).map(|key| key.coord).collect();
         // A block that eviction did not name was freed by pruning.
         let fate = |saved_key: &SavedKey| {
-            if frame.evicted.contains(&key_of(*saved_key)) {
+            let key = key_of(*saved_key);
+            if frame.evicted.contains(&key) || archived.contains(&key.coord) {
                 BlockFate::Evicted
             } else {
                 BlockFate::Pruned

@@ -24,6 +24,8 @@ pub struct ClosedLoops {
     pub counts: LoopCounts,
     /// Keyframes where the closures put them, oldest first.
     pub keyframes: Vec<CorrectedKeyframe>,
+    /// Triangles of the map after all loops, where it was written.
+    pub triangles: Option<u64>,
 }
 
 /// Loops that a run closed.
@@ -37,6 +39,9 @@ pub struct LoopSection {
     pub taken_out: u32,
     /// Times that poses of keyframes changed.
     pub moved: u32,
+    /// Triangles of the map after all loops; absent where it was not written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub triangles: Option<u64>,
     /// Largest distance from a frame's position as driven to the one after all loops, m.
     pub largest_correction_m: f64,
     /// Distance between both positions of the last frame, m.
@@ -83,6 +88,7 @@ pub(super) fn write(
         refused: counts.refused,
         taken_out: counts.taken_out,
         moved: counts.moved,
+        triangles: loops.triangles,
         largest_correction_m: 0.0,
         end_correction_m: 0.0,
         errors: None,
@@ -197,6 +203,7 @@ mod tests {
         let loops = ClosedLoops {
             keyframes: vec![keyframe(1, 1.0), keyframe(5, 3.0)],
             counts: LoopCounts { closures: 1, moved: 1, ..LoopCounts::default() },
+            triangles: None,
         };
         let parts = [(0, MapSegment::FIRST), (7, MapSegment::new(1))];
         let truth: Vec<Transform> = [0.0, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0].map(ahead).to_vec();

@@ -46,7 +46,9 @@ impl Watched {
             known: HashSet::new(),
         };
         let keys = volume.pool().live().filter_map(|slot| volume.blocks().key(slot));
-        keys.for_each(|key| watched.add(MapRegion::new(key)));
+        // The page shows the map that frames are fused into.
+        keys.filter(|key| key.segment.archived_submap().is_none())
+            .for_each(|key| watched.add(MapRegion::new(key)));
         watched
     }
 

@@ -7,7 +7,8 @@ use super::text::{MIB, lost_because, motion_error, moving_masks, states_in_time}
 use crate::evaluate::reference::{PairFigures, ReferenceFigures};
 use crate::evaluate::trajectory::{TrajectoryErrors, WithoutBoresight};
 use crate::formats::{
-    MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_CLOSED_TRAJECTORY_FILE, TIMED_TRAJECTORY_FILE,
+    CLOSED_MAP_FILE, MAP_FILE, REPORT_FILE, SEGMENT_GAP_M, TIMED_CLOSED_TRAJECTORY_FILE,
+    TIMED_TRAJECTORY_FILE,
 };
 use crate::observe::{LoopSection, MavlinkSection, Sections};
 use crate::run::{Continued, RunRecord};
@@ -44,13 +45,15 @@ fn loop_sentence(loops: &LoopSection) -> String {
     if loops.moved == 0 {
         return format!("{found}; no pose changed");
     }
+    let closed_map = format!(" and {CLOSED_MAP_FILE}");
     let ate = loops.ate_m.map(|ate_m| format!("; absolute trajectory error then {ate_m:.3} m"));
     format!(
         "{found}; positions move by up to {:.3} m, the last one by {:.3} m{}: see \
-         {TIMED_CLOSED_TRAJECTORY_FILE}. The map is as it was driven",
+         {TIMED_CLOSED_TRAJECTORY_FILE}{}. {MAP_FILE} is as it was driven",
         loops.largest_correction_m,
         loops.end_correction_m,
-        ate.unwrap_or_default()
+        ate.unwrap_or_default(),
+        if loops.triangles.is_some() { closed_map.as_str() } else { "" }
     )
 }
 

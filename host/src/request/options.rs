@@ -141,7 +141,8 @@ pub struct Options {
     #[arg(long, value_name = "FILE", help_heading = "Limits")]
     pub capacity: Option<PathBuf>,
     /// Recognise places by so many keyframes, of 11.8 KiB each: a camera that was lost goes on in
-    /// the map where it comes back to it, and loops are closed: trajectory_closed_tum.txt
+    /// the map where it comes back to it, and loops are closed: trajectory_closed_tum.txt,
+    /// map_closed.ply
     /// [default: none]
     #[arg(
         long,

@@ -151,7 +151,7 @@ impl MeshOutput {
                 if let Ok(ply) = &mut ply {
                     for segment in segments {
                         let of_segment = |key: BlockKey| key.segment == segment;
-                        let mut shown = ShownSegment::new(segment, ply);
+                        let mut shown = ShownSegment::new(volume.driven_segment(segment), ply);
                         volume.mesh(&mapper.config().mesh, of_segment, &mut shown);
                     }
                 }

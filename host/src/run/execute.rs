@@ -1,6 +1,7 @@
 //! One run: frames in; map, trajectory and figures out.
 
 use super::checkpoint::Checkpoint;
+use super::closed_map;
 use super::disk_store::MeshOutput;
 use super::ending::Incomplete;
 use super::error::RunError;
@@ -11,7 +12,7 @@ use super::saved::Saved;
 use super::session::Session;
 use super::state::RunState;
 use super::{RunFolder, resident_bytes};
-use crate::formats::{MAP_FILE, Mesh, MeshAxes};
+use crate::formats::{CLOSED_MAP_FILE, MAP_FILE, Mesh, MeshAxes};
 use crate::observe::{
     ClosedLoops, Finished, ObservedRun, Observer, RECORDING_FILE, ReferencePlan, Sections,
 };
@@ -176,6 +177,10 @@ fn map(
     if let Err(error) = places::write(&mut mapper, folder) {
         Incomplete::add_missing(&mut incomplete, PLACES_FILE, &error.to_string());
     }
+    let closed_triangles = closed_map::write(&mapper, folder, axes).unwrap_or_else(|error| {
+        Incomplete::add_missing(&mut incomplete, CLOSED_MAP_FILE, &error.to_string());
+        None
+    });
     Ok(Mapped {
         regions: mapper.footprint().regions().to_vec(),
         blocks: mapper.static_map().pool().len(),
@@ -183,6 +188,7 @@ fn map(
         loops: ClosedLoops {
             counts: mapper.loops(),
             keyframes: mapper.corrected_keyframes().collect(),
+            triangles: closed_triangles,
         },
         output: MeshOutput::begin(
             &mut mapper,

@@ -3,6 +3,7 @@
 
 mod bench;
 mod checkpoint;
+mod closed_map;
 mod disk_store;
 mod ending;
 mod error;
