@@ -51,6 +51,7 @@ mod support;
 mod suppression;
 mod turned;
 
+use crate::parallel::BANDS;
 pub use camera::FeatureCount;
 use circle::Reach;
 pub(crate) use config::MAX_FEATURES;
@@ -63,9 +64,14 @@ pub use report::{FlowReport, FlowStatus, PassCount};
 /// The most descriptors that a frame compares, over both passes.
 pub(crate) fn most_compared(capacity: &crate::Capacity, config: &SceneFlowConfig) -> u64 {
     // The sparse pass keeps a quarter of what the dense one does.
-    let passes = [capacity.features, capacity.features / 4];
-    let most = |features| features as u64 * Reach::most_compared(config, features) as u64;
-    passes.map(most).iter().sum()
+    let [dense, sparse] = [capacity.features, capacity.features / 4];
+    let most = |features| Reach::most_compared(config, features) as u64;
+    // The sparse pass looks everywhere; the dense one does so for a sample of its features, and for
+    // the rest as far as an average allows.
+    let sampled = dense.div_ceil(circle::SAMPLED) + 3 * BANDS;
+    let thinned = sampled as u64 * most(dense) + 2 * dense as u64 * circle::COMPARED_MAX;
+    let whole = dense as u64 * most(dense);
+    sparse as u64 * most(sparse) + if thinned < whole { thinned } else { whole }
 }
 
 #[cfg(test)]

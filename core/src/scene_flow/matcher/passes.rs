@@ -7,7 +7,7 @@ use crate::{
     scene_flow::{
         SceneFlowConfig,
         cells::{CELL_MIN_PX, Shape},
-        circle::Corners,
+        circle::{COMPARED_MAX, Corners},
         prior::Prior,
         refine::RefineSupported,
         report::PassCount,
@@ -48,7 +48,7 @@ impl FlowMatcher<'_> {
         // Nothing is known of the motion yet but a turn: search everywhere around it.
         let turn = self.prior.turn();
         let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
-        let compared = corners.trace(widest, self.traced, executor);
+        let compared = corners.trace(widest, u64::MAX, self.traced, executor);
         let closed = corners.gather(self.traced, self.sparse);
         self.sparse_len = closed.min(self.sparse.len());
         let matches = clipped(self.sparse, ..self.sparse_len);
@@ -92,7 +92,7 @@ impl FlowMatcher<'_> {
         let (prior, turn) = (&self.prior, self.prior.turn());
         let widest = |at: [u16; 2]| Prior::widest(config, turn, at.map(f32::from));
         let reach = |at: [u16; 2]| prior.reach(at).unwrap_or_else(|| widest(at));
-        let compared = corners.trace(reach, self.traced, executor);
+        let compared = corners.trace(reach, COMPARED_MAX, self.traced, executor);
         // More circles than the buffer holds are dropped and counted.
         let closed = corners.gather(self.traced, self.refined);
         let stored = closed.min(self.refined.len());

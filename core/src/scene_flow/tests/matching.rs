@@ -104,7 +104,7 @@ fn only_circles_that_return_to_their_beginning_close() {
     let corners = Corners { previous_left, previous_right, current_right, current_left };
     let mut traced = [[0; 3]; 4];
     let config = SceneFlowConfig::default();
-    corners.trace(|_| Reach::widest(&config), &mut traced, &Serial);
+    corners.trace(|_| Reach::widest(&config), u64::MAX, &mut traced, &Serial);
     let mut matches = [Match::default(); 4];
     // Both features of the first image lead to the same partners, which lead back to one of them.
     assert_eq!(corners.gather(&traced, &mut matches), 1);
@@ -117,8 +117,30 @@ fn only_circles_that_return_to_their_beginning_close() {
         current_right,
         current_left,
     };
-    corners.trace(|_| Reach::widest(&config), &mut traced, &Serial);
+    corners.trace(|_| Reach::widest(&config), u64::MAX, &mut traced, &Serial);
     assert_eq!(corners.gather(&traced, &mut matches), 0);
+}
+
+#[test]
+fn a_search_too_wide_follows_fewer_features_to_equal_partners() {
+    let mut slab = slab();
+    let mut carver = Carver::new(&mut slab.0, BYTES).unwrap();
+    let mut random = Random::new(4);
+    let images: [_; 4] = core::array::from_fn(|_| scatter(&mut carver, &mut random, 300).0);
+    let [previous_left, previous_right, current_right, current_left] = &images;
+    let corners = Corners { previous_left, previous_right, current_right, current_left };
+    let config = SceneFlowConfig::default();
+    let mut trace = |most: u64| {
+        let mut traced = [[0; 3]; 300];
+        let compared = corners.trace(|_| Reach::widest(&config), most, &mut traced, &Serial);
+        (compared, traced)
+    };
+    let ((all, partners), (few, thinned)) = (trace(u64::MAX), trace(8));
+    assert!(few < all / 3 && few > 0, "{few} of {all} descriptors");
+    for (partner, thinned) in partners.iter().zip(&thinned) {
+        assert!(thinned == partner || *thinned == [u32::MAX; 3], "{thinned:?}, {partner:?}");
+    }
+    assert_eq!(trace(all), (all, partners), "an average that suffices changes nothing");
 }
 
 /// Matches on a grid that all move alike.

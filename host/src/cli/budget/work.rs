@@ -26,7 +26,11 @@ const UNITS: [Unit; WorkUnits::COUNT] = [
     unit("support_candidates", "stereo", "lattice points of the image"),
     unit("triangles", "stereo", "2 images x 2 for each lattice point"),
     unit("features", "scene flow", "2 images x (features + features / 4)"),
-    unit("compared_descriptors", "scene flow", "of each pass: features x most within the reach"),
+    unit(
+        "compared_descriptors",
+        "scene flow",
+        "sparse pass: features x reach; dense pass: 600 x features and a sample",
+    ),
     unit("circles", "scene flow", "features + features / 4"),
     unit(
         "cast_pixels",
