@@ -15,6 +15,7 @@ mod resume;
 mod rows;
 mod self_calibration;
 mod set;
+mod tails;
 mod two_slabs;
 mod views;
 mod work;
