@@ -248,9 +248,6 @@ typedef struct {
   uint8_t settings[DYNVOX_SETTINGS_BYTES];
 } DynvoxConfig;
 
-// A capacity by name. Numbers as in dynvox's own table of profiles.
-typedef uint32_t DynvoxProfile;
-
 // Every bound of a mapper. Bytes follow from them alone. dynvox_capacity_of_profile and
 // dynvox_capacity_for_budget fill it.
 typedef struct {
@@ -299,6 +296,35 @@ typedef struct {
   // 1 if voxels have colour, else 0.
   uint8_t colour;
 } DynvoxCapacity;
+
+// Units of work by kind: of one step in a report, the most of any step from dynvox_work_bound.
+typedef struct {
+  // Pixels that got or were given a disparity, or were looked at for one.
+  uint64_t stereo_pixels;
+  // Support points looked for, each over the whole range of disparities.
+  uint64_t support_candidates;
+  // Triangles of the support points of both images.
+  uint64_t triangles;
+  // Features kept in both images.
+  uint64_t features;
+  // Descriptors compared with that of a feature.
+  uint64_t compared_descriptors;
+  // Circles of matches that closed.
+  uint64_t circles;
+  // Pixels of pictures of the map that the step itself takes.
+  uint64_t cast_pixels;
+  // Blocks looked up because a ray ran through them.
+  uint64_t block_requests;
+  // Blocks that left the pool for others, and blocks loaded from the store.
+  uint64_t moved_blocks;
+  // Voxels of the blocks that a frame was fused into.
+  uint64_t fused_voxels;
+  // Voxels of the blocks that pruning visited.
+  uint64_t pruned_voxels;
+} DynvoxWork;
+
+// A capacity by name. Numbers as in dynvox's own table of profiles.
+typedef uint32_t DynvoxProfile;
 
 // A number of bytes and what they are to hold. In `colour` and `objects` 0 leaves the answer to
 // the rules: colour where 20,000 blocks with colour fit, objects in a fifth of what the image
@@ -520,6 +546,16 @@ typedef struct {
   uint64_t digest;
   // The inertial unit.
   DynvoxInertialReport inertial;
+  // Work of the step.
+  DynvoxWork work;
+  // Visible blocks that the frame was not fused into because of "mapper.work_budget", all of
+  // them farther than those it was.
+  uint32_t fused_blocks_deferred;
+  // Blocks that pruning leaves to a later frame because of it.
+  uint32_t pruned_blocks_deferred;
+  // True if loops that were closed changed poses of keyframes in this frame. The camera and the
+  // map go on in the world as it was driven.
+  bool world_moved;
 } DynvoxReport;
 
 // An object that leaves. Valid during the call.
@@ -778,6 +814,15 @@ const char *dynvox_status_text(uint32_t status);
 // `unit` is null or points to a unit, `config` is null or points to a configuration from
 // dynvox_config_default or dynvox_config_raw.
 DynvoxStatus dynvox_config_inertial(const DynvoxInertialUnit *unit, DynvoxConfig *config);
+
+// Writes the most units of work that any step of such a mapper does on any input.
+//
+// # Safety
+// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+// `bound` is null or points to units of work.
+DynvoxStatus dynvox_work_bound(const DynvoxCapacity *capacity,
+                               const DynvoxConfig *config,
+                               DynvoxWork *bound);
 
 // Writes all defaults for a rig.
 //

@@ -28,6 +28,7 @@ mod step;
 mod tracks;
 mod two_buffers;
 mod types;
+mod work;
 
 pub use callback::{
     DynvoxBlock, DynvoxLoadedBlock, DynvoxStore, DynvoxTriangle, DynvoxTriangleSink, DynvoxVertex,
@@ -72,3 +73,4 @@ pub use types::{
     DynvoxFrame, DynvoxImage, DynvoxPose, DynvoxPoseOrigin, DynvoxReport, DynvoxSampleLayout,
     DynvoxSeverity,
 };
+pub use work::{DynvoxWork, dynvox_work_bound};

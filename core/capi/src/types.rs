@@ -1,6 +1,6 @@
 //! Plain values of the interface.
 
-use crate::{DynvoxInertialReport, DynvoxInertialSample, DynvoxStatus};
+use crate::{DynvoxInertialReport, DynvoxInertialSample, DynvoxStatus, DynvoxWork};
 use dynvox_core::{PoseOrigin, Report, Severity, geometry::Transform};
 
 /// Pose of a camera: a rotation as a quaternion of length 1 and a translation, camera to world.
@@ -189,6 +189,16 @@ pub struct DynvoxReport {
     pub digest: u64,
     /// The inertial unit.
     pub inertial: DynvoxInertialReport,
+    /// Work of the step.
+    pub work: DynvoxWork,
+    /// Visible blocks that the frame was not fused into because of "mapper.work_budget", all of
+    /// them farther than those it was.
+    pub fused_blocks_deferred: u32,
+    /// Blocks that pruning leaves to a later frame because of it.
+    pub pruned_blocks_deferred: u32,
+    /// True if loops that were closed changed poses of keyframes in this frame. The camera and the
+    /// map go on in the world as it was driven.
+    pub world_moved: bool,
 }
 
 impl From<&Report> for DynvoxReport {
@@ -225,6 +235,10 @@ impl From<&Report> for DynvoxReport {
             input_digest: report.digests.input,
             digest: report.digest,
             inertial: report.into(),
+            work: report.work.into(),
+            fused_blocks_deferred: report.deferred.fused_blocks,
+            pruned_blocks_deferred: report.deferred.pruned_blocks,
+            world_moved: report.world_moved,
         }
     }
 }

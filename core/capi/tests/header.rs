@@ -13,6 +13,7 @@ fn the_header_is_what_the_source_says() {
         "status",
         "types",
         "inertial",
+        "work",
         "config",
         "capacity",
         "callback",
