@@ -138,3 +138,25 @@ fn a_stream_and_a_data_set_without_poses_are_refused_with_a_sentence() {
         output_text(&run)
     );
 }
+
+/// Frames of the short form that are wrong and unreported today, at most: docs/faults.md says so.
+const STILL_WRONG: [(&str, u64); 2] = [("late camera", 1), ("person ahead", 5)];
+
+/// Rows of the short form, in few frames.
+#[test]
+fn a_few_scenes_are_right_or_reported_but_for_those_known() {
+    let root = TempDir::new().unwrap();
+    let asked = ["evaluate", "faults", "--json", "--short", "--at", "8", "--frames", "16"];
+    let run = dynvox(root.path(), &asked);
+    assert!(run.status.success(), "{}", output_text(&run));
+    let table = serde_json::from_slice::<Vec<serde_json::Value>>(&run.stdout).unwrap();
+    for of in &table {
+        let known = STILL_WRONG.iter().find(|(kind, _)| of["kind"].as_str() == Some(*kind));
+        let most = known.map_or(0, |&(_, most)| most);
+        assert!(of["unreported_frames"].as_u64() <= Some(most), "{of}");
+    }
+    let sum = |key: &str| table.iter().filter_map(|of| of[key].as_u64()).sum::<u64>() as f64;
+    assert!(table.len() > 5 && sum("compared") > 200.0, "{table:?}");
+    let share = sum("within") / sum("compared");
+    assert!(share > 0.6, "{share} of the errors lie within two sigma");
+}
