@@ -128,7 +128,8 @@ impl Covers for OtherSubmaps<'_, '_> {
         let [a, b, c] = corners;
         let (center_m, normal) = ((a + b + c) / 3.0, (b - a).cross(&(c - a)));
         let length = libm::sqrt(normal.dot(&normal));
-        if !(length > 0.0) {
+        // A triangle without area has no side, nor has one that is not finite.
+        if length.is_nan() || length <= 0.0 {
             return false;
         }
         self.others.iter().take(self.len).any(|(number, t_other_drawn)| {
