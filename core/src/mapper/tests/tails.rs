@@ -215,7 +215,7 @@ fn no_made_up_input_costs_twice_what_a_walk_does() {
     println!("{:<26}{:>6}{:>14}{:>12}{:>8}", "input", "cost", "descriptors", "cast", "moved");
     for clip in &clips {
         let (frames, bound) = (run(clip, &config), clip.capacity.work(&config));
-        let cost = frames.iter().map(cost_ms).fold(0.0, f64::max) / usual_ms;
+        let cost = frames.iter().map(cost_ms).max_by(f64::total_cmp).unwrap() / usual_ms;
         let [compared, cast, moved] =
             ["compared_descriptors", "cast_pixels", "moved_blocks"].map(|unit| most(&frames, unit));
         let descriptors = compared as f64 / usual[COMPARED];

@@ -130,7 +130,7 @@ fn a_search_too_wide_follows_fewer_features_to_equal_partners() {
     let [previous_left, previous_right, current_right, current_left] = &images;
     let corners = Corners { previous_left, previous_right, current_right, current_left };
     let config = SceneFlowConfig::default();
-    let mut trace = |most: u64| {
+    let trace = |most: u64| {
         let mut traced = [[0; 3]; 300];
         let compared = corners.trace(|_| Reach::widest(&config), most, &mut traced, &Serial);
         (compared, traced)

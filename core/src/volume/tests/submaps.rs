@@ -52,7 +52,8 @@ fn walls(t_world_camera: &Transform) -> Vec<f32> {
         let ray: [f64; 3] = t_world_camera.rotate(ray);
         let walls = [(0, WALL_M), (0, -WALL_M), (2, WALL_M), (2, -WALL_M)];
         let depths = walls.map(|(axis, wall_m)| (wall_m - from[axis]) / ray[axis]);
-        depths.into_iter().filter(|depth| *depth > 0.0).fold(f64::MAX, f64::min) as f32
+        depths.into_iter().filter(|depth| *depth > 0.0).min_by(f64::total_cmp).unwrap_or(f64::MAX)
+            as f32
     };
     (0..WIDTH * HEIGHT).map(depth_m).collect()
 }
@@ -107,9 +108,16 @@ fn met(triangles: &[Triangle]) -> (f64, f64, f64) {
         let angle_rad =
             side + 0.7 * (f64::from(ray) + 0.3 - f64::from(RAYS / 2)) * 2.0 / f64::from(RAYS);
         let hits = hits_m(triangles, angle_rad);
-        let facing = f64::max(libm::sin(angle_rad).abs(), libm::cos(angle_rad).abs());
+        let facing = [libm::sin(angle_rad), libm::cos(angle_rad)]
+            .map(f64::abs)
+            .into_iter()
+            .max_by(f64::total_cmp)
+            .unwrap();
         for hit_m in &hits {
-            worst_m = f64::max(worst_m, (hit_m * facing - WALL_M).abs());
+            let off_m = (hit_m * facing - WALL_M).abs();
+            if off_m > worst_m {
+                worst_m = off_m;
+            }
         }
         number += hits.len();
         single += u32::from(hits.len() == 1);
