@@ -100,10 +100,9 @@ impl Bounds {
             raw_image: [raw_width, raw_height],
             ..BudgetOptions::default()
         };
-        // A budget's 64 tracks have a box each in the window.
-        let images =
-            Capacity { image_width: size.0, image_height: size.1, tracks: 64, ..Capacity::TINY };
-        let extras = self.with_extras(images).bytes() - images.bytes();
+        // Extras grow with the map: those of the largest are more than enough for what is left.
+        let largest = solve(memory, size, &options)?;
+        let extras = self.with_extras(largest).bytes() - largest.bytes();
         let left = Bytes(memory.0.saturating_sub(extras));
         Ok((memory.to_string(), self.with_extras(solve(left, size, &options)?)))
     }
