@@ -33,7 +33,7 @@ pub struct TrajectorySection {
     pub source: &'static str,
     /// Positions of the camera, thinned for a chart.
     pub path: ThinnedPath,
-    /// True poses of the frames of the first segment, the first at the origin, where they are known.
+    /// True poses of the first segment's frames, the first at the origin, where they are known.
     pub truth: Option<Vec<Transform>>,
     /// Errors against them, of the map's first segment: where another one stands is not known.
     pub errors: Option<TrajectoryErrors>,
