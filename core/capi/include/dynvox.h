@@ -1103,7 +1103,9 @@ DynvoxStatus dynvox_bytes_in_two(const DynvoxCapacity *capacity, size_t *hot, si
 // until dynvox_destroy.
 //
 // # Safety
-// As dynvox_create; `buffers` is null or points to two buffers that are as long as it says.
+// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+// `buffers` is null or points to two buffers that are as long as it says and used by nothing else,
+// `mapper` is null or points to a pointer.
 DynvoxStatus dynvox_create_in_two(const DynvoxCapacity *capacity,
                                   const DynvoxConfig *config,
                                   const DynvoxTwoBuffers *buffers,
@@ -1112,7 +1114,9 @@ DynvoxStatus dynvox_create_in_two(const DynvoxCapacity *capacity,
 // Restores a mapper like dynvox_restore in two buffers, wherever the saved one lay.
 //
 // # Safety
-// As dynvox_create_in_two.
+// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+// `buffers` is null or points to two buffers that are as long as it says and used by nothing else,
+// `mapper` is null or points to a pointer.
 DynvoxStatus dynvox_restore_in_two(const DynvoxCapacity *capacity,
                                    const DynvoxConfig *config,
                                    const DynvoxTwoBuffers *buffers,

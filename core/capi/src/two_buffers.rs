@@ -58,7 +58,9 @@ pub unsafe extern "C" fn dynvox_bytes_in_two(
 /// until dynvox_destroy.
 ///
 /// # Safety
-/// As dynvox_create; `buffers` is null or points to two buffers that are as long as it says.
+/// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+/// `buffers` is null or points to two buffers that are as long as it says and used by nothing else,
+/// `mapper` is null or points to a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_create_in_two(
     capacity: *const DynvoxCapacity,
@@ -78,7 +80,9 @@ pub unsafe extern "C" fn dynvox_create_in_two(
 /// Restores a mapper like dynvox_restore in two buffers, wherever the saved one lay.
 ///
 /// # Safety
-/// As dynvox_create_in_two.
+/// `capacity` is null or points to a capacity, `config` is null or points to a configuration,
+/// `buffers` is null or points to two buffers that are as long as it says and used by nothing else,
+/// `mapper` is null or points to a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dynvox_restore_in_two(
     capacity: *const DynvoxCapacity,

@@ -16,20 +16,27 @@ fn bound(config: &DynvoxConfig) -> Result<DynvoxWork, DynvoxStatus> {
     }
 }
 
-#[test]
-fn a_steps_work_is_counted_and_lies_within_the_bound() {
-    let (mut buffer, config) = (Buffer::new(), config());
-    let most = bound(&config).unwrap();
-    let mapper = create(&mut buffer, &config).unwrap();
+/// Report of the last of some frames of a pair with a disparity of 8 px.
+fn stepped(config: &DynvoxConfig, frames: usize) -> DynvoxReport {
+    let mut buffer = Buffer::new();
+    let mapper = create(&mut buffer, config).unwrap();
     let (left, mut right) = (pixels(), pixels());
     right.rotate_left(8);
     let mut given = frame(&left);
     given.right.pixels = right.as_ptr();
     let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
-    for _ in 0..3 {
+    for _ in 0..frames {
         let status = unsafe { dynvox_step(mapper, &raw const given, ptr::null(), &raw mut report) };
         assert_eq!(status, DynvoxStatus::Ok);
     }
+    report
+}
+
+#[test]
+fn a_steps_work_is_counted_and_lies_within_the_bound() {
+    let config = config();
+    let most = bound(&config).unwrap();
+    let report = stepped(&config, 3);
     let done = report.work;
     assert_eq!(done.stereo_pixels, (WIDTH * HEIGHT) as u64);
     let pairs = [
@@ -49,16 +56,9 @@ fn a_steps_work_is_counted_and_lies_within_the_bound() {
 
 #[test]
 fn a_budget_of_work_defers_what_is_far_and_says_so() {
-    let (mut buffer, mut config) = (Buffer::new(), config());
+    let mut config = config();
     assert_eq!(set(&mut config, c"mapper.work_budget", c"0.001"), DynvoxStatus::Ok);
-    let mapper = create(&mut buffer, &config).unwrap();
-    let (left, mut right) = (pixels(), pixels());
-    right.rotate_left(8);
-    let mut given = frame(&left);
-    given.right.pixels = right.as_ptr();
-    let mut report: DynvoxReport = unsafe { std::mem::zeroed() };
-    let status = unsafe { dynvox_step(mapper, &raw const given, ptr::null(), &raw mut report) };
-    assert_eq!(status, DynvoxStatus::Ok);
+    let report = stepped(&config, 1);
     assert!(report.fused_blocks_deferred > 0, "{report:?}");
     assert_eq!(
         unsafe { dynvox_work_bound(ptr::null(), ptr::null(), ptr::null_mut()) },
