@@ -13,6 +13,8 @@
 
 mod checksum;
 mod hash;
+#[cfg(test)]
+pub(crate) mod in_memory;
 mod read;
 #[cfg(test)]
 mod tests;

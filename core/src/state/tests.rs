@@ -106,12 +106,7 @@ fn written(value: &mut Everything) -> Vec<u8> {
 }
 
 fn read(mut bytes: &[u8], into: &mut Everything) -> Result<(), ReadError<&'static str>> {
-    let mut source = |piece: &mut [u8]| {
-        let (taken, rest) = bytes.split_at_checked(piece.len()).ok_or("ended")?;
-        piece.copy_from_slice(taken);
-        bytes = rest;
-        Ok(())
-    };
+    let mut source = |piece: &mut [u8]| super::in_memory::take(&mut bytes, piece).ok_or("ended");
     let mut reader = Reader::new(&mut source);
     into.visit(&mut reader);
     reader.finish()

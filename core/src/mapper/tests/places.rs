@@ -155,10 +155,7 @@ fn with_loaded<R>(
     let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab).unwrap();
     let mut rest = bytes;
     let loaded = mapper.load_places(&mut |piece: &mut [u8]| {
-        let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
-        piece.copy_from_slice(taken);
-        rest = behind;
-        Ok(())
+        crate::state::in_memory::take(&mut rest, piece).ok_or(())
     });
     test(&mut mapper, loaded)
 }

@@ -35,12 +35,8 @@ pub(super) fn restored<R>(
     let mut slab = vec![0xA5u8; capacity.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
     let mut rest = bytes;
-    let mut source = |piece: &mut [u8]| {
-        let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(Ended)?;
-        piece.copy_from_slice(taken);
-        rest = behind;
-        Ok(())
-    };
+    let mut source =
+        |piece: &mut [u8]| crate::state::in_memory::take(&mut rest, piece).ok_or(Ended);
     let mut mapper = Mapper::restore(capacity, config, &mut slab[start..], &mut source)?;
     assert!(rest.is_empty(), "all of it is read");
     Ok(go_on(&mut mapper))
@@ -324,10 +320,7 @@ fn a_flip_of_any_byte_is_refused_by_name() {
     let mut refusal = |bytes: &[u8]| {
         let mut rest = bytes;
         let mut source = |piece: &mut [u8]| -> Result<(), Ended> {
-            let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(Ended)?;
-            piece.copy_from_slice(taken);
-            rest = behind;
-            Ok(())
+            crate::state::in_memory::take(&mut rest, piece).ok_or(Ended)
         };
         Mapper::restore(&Window::CAPACITY, &config, &mut slab[start..], &mut source).err()
     };

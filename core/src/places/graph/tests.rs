@@ -251,12 +251,8 @@ fn equal_loops_give_equal_bits_wherever_they_are_interrupted() {
             writer.finish().unwrap();
             with_graph(KEYFRAMES, |other| {
                 let mut rest = &bytes[..];
-                let mut source = |piece: &mut [u8]| {
-                    let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
-                    piece.copy_from_slice(taken);
-                    rest = behind;
-                    Ok::<(), ()>(())
-                };
+                let mut source =
+                    |piece: &mut [u8]| crate::state::in_memory::take(&mut rest, piece).ok_or(());
                 let mut reader = Reader::new(&mut source);
                 other.visit(KEYFRAMES, &mut reader);
                 reader.finish().unwrap();

@@ -146,10 +146,7 @@ fn a_snapshot_keeps_the_ring_what_is_due_and_when_blocks_were_made() {
     with_history(|history| {
         let mut rest = &bytes[..];
         let mut source = |piece: &mut [u8]| -> Result<(), ()> {
-            let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
-            piece.copy_from_slice(taken);
-            rest = behind;
-            Ok(())
+            crate::state::in_memory::take(&mut rest, piece).ok_or(())
         };
         let mut reader = Reader::new(&mut source);
         history.visit(141, &mut reader);

@@ -222,12 +222,8 @@ fn a_snapshot_holds_the_submaps_and_the_blocks_that_were_come_back_to() {
         });
         with_volume(&WITH_SUBMAPS, &config(), |volume| {
             let mut rest = &bytes[..];
-            let mut source = |piece: &mut [u8]| {
-                let (taken, behind) = rest.split_at_checked(piece.len()).ok_or(())?;
-                piece.copy_from_slice(taken);
-                rest = behind;
-                Ok::<(), ()>(())
-            };
+            let mut source =
+                |piece: &mut [u8]| crate::state::in_memory::take(&mut rest, piece).ok_or(());
             let mut reader = Reader::new(&mut source);
             volume.visit(&mut reader);
             assert_eq!(reader.finish().err(), None);
