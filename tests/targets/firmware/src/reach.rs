@@ -5,7 +5,7 @@ use crate::fixture;
 use core::hint::black_box;
 use dynvox_clip::{Clip, Frame};
 use dynvox_core::{
-    Capacity, Mapper, Serial, StereoFrame,
+    Capacity, Mapper, Serial,
     digest::Digest,
     image::View,
     memory::Slabs,
