@@ -18,6 +18,7 @@ use crate::{
     inertial::InertialPrior,
     invariants::Invariants,
     objects::{NoSink, ObjectSink},
+    planning::Watched,
     rectify::Pair,
     scene_flow::{FlowReport, FlowStatus, Match},
     segmentation::SegmentationReport,
@@ -205,7 +206,8 @@ impl Mapper<'_> {
             }
             static_map.take_depth(&seen, &mut tracked, executor);
             shows_depth = static_map.has_depth(frame.left.width() * frame.left.height());
-            allocation = static_map.fuse(&seen, &camera, executor, store);
+            allocation =
+                static_map.fuse(&seen, &camera, executor, &mut Watched { planning, store });
         }
         let shown = seen.of_objects(&rig, &camera.t_world_camera);
         executor.stage(Stage::Objects, || {

@@ -27,7 +27,7 @@ pub(super) const GHOST_FRAMES: u8 = 5;
 
 /// The bits of a cell that a frame saw through as a whole.
 pub(super) fn seen_through(bits: u8) -> u8 {
-    let count = bits >> THROUGH_SHIFT;
+    let count = if is_lost(bits) { 0 } else { bits >> THROUGH_SHIFT };
     let more = if count < MAX_THROUGH { count + 1 } else { count };
     more << THROUGH_SHIFT | bits & (OCCUPIED | OBJECT) | FREE
 }
@@ -35,6 +35,14 @@ pub(super) fn seen_through(bits: u8) -> u8 {
 /// The bits of a cell that a frame saw a surface in, or about it.
 pub(super) fn seen_surface(bits: u8) -> u8 {
     bits & (OCCUPIED | OBJECT | FREE)
+}
+
+/// The bits of a cell whose block left the map: a count without [`FREE`], which no frame leaves.
+const LOST: u8 = 1 << THROUGH_SHIFT;
+
+/// Returns true if the cell's block left the map, and no frame has seen the cell since.
+pub(super) fn is_lost(bits: u8) -> bool {
+    bits & FREE == 0 && bits >> THROUGH_SHIFT != 0
 }
 
 /// Returns true if the map has a surface in the cell that is not believed any more.
@@ -262,6 +270,27 @@ impl<'s> Cells<'s> {
                     }
                 }
             }
+        }
+    }
+
+    /// Returns true if cells from the first to the last along each axis lie in the window.
+    pub fn meets(&self, [first, last]: [Cell; 2]) -> bool {
+        self.origin.iter().zip(self.size).zip(first.iter().zip(last)).all(
+            |((origin, size), (first, last))| {
+                *first < origin.saturating_add(size as i32) && last >= *origin
+            },
+        )
+    }
+
+    /// Makes a cell unknown whose block left the map. Nothing outside the window.
+    pub fn lose(&mut self, cell: Cell) {
+        let Some(position) = self.local(cell).and_then(|local| self.position(local)) else {
+            return;
+        };
+        if let (Some(observed_at), Some(bits)) =
+            (self.observed_at.get_mut(position), self.bits.get_mut(position))
+        {
+            (*observed_at, *bits) = (0, LOST);
         }
     }
 

@@ -77,6 +77,17 @@ impl Grid {
         self.turn.map(|[a, b, c]| (a * x + b * y + c * z) / self.cell_m())
     }
 
+    /// The middle of a cube of the map in the grid, and how far the cube reaches from there along
+    /// each axis, in cells. Its middle and side are given in voxels.
+    pub(super) fn of_cube(&self, middle: [f64; 3], side: f64) -> ([f64; 3], [f64; 3]) {
+        let cell = f64::from(self.cell_voxels);
+        let half = self.turn.map(|row| {
+            let reach = row.iter().fold(0.0, |sum, along| sum + libm::fabs(*along));
+            0.5 * side * reach / cell
+        });
+        (self.turn.map(|row| dot(row, middle) / cell), half)
+    }
+
     /// A point of the grid, in cells, in the world, m.
     ///
     /// ```

@@ -12,7 +12,8 @@
 //!
 //! Free space is marked in every frame that is fused ([`Planning::observe`]); all else is read from
 //! the map on request ([`Planning::update`]), so a mapper whose planner asks at 5 Hz pays for 5 Hz.
-//! The window moves with the camera by whole cells, and what leaves it is forgotten.
+//! The window moves with the camera by whole cells, and what leaves it is forgotten. Cells whose
+//! blocks leave a full map are unknown until they are seen again.
 //!
 //! Memory: nothing where [`Capacity::planning_width`] or another side is 0. Else 2 bytes for every
 //! third pixel, 6 bytes a cell, 42 bytes a column and 16 for the longest side, and with
@@ -28,6 +29,7 @@ mod fields;
 mod free_space;
 mod grid;
 mod height_map;
+mod lost;
 mod plane_fit;
 mod pyramid;
 mod query;
@@ -46,6 +48,7 @@ pub use free_space::DepthView;
 pub(crate) use free_space::MARGIN_PX;
 pub use grid::{Cell, Grid};
 pub use height_map::Column;
+pub(crate) use lost::Watched;
 pub use query::{FreePath, PathEnd, RobotCylinder};
 pub(crate) use surface::crossings;
 

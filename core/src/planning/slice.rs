@@ -2,7 +2,7 @@
 
 use super::{
     PlanningConfig,
-    cells::{CellState, Cells},
+    cells::{CellState, Cells, is_lost},
     height_map::{Column, HeightMap},
 };
 
@@ -11,7 +11,7 @@ use super::{
 /// A column is occupied where a cell between the limits is, or where the ground steps by more than
 /// `climb_m` or is steeper than `slope_max`. It is free where none is and at least one of these
 /// cells was seen free, or where its ground was seen and the cells were not looked into. Else it is
-/// unknown.
+/// unknown, as it is where a block that left the map may have held an obstacle.
 pub(super) fn reduce(
     config: &PlanningConfig,
     cell_m: f32,
@@ -33,21 +33,20 @@ pub(super) fn reduce(
             let [from, to] = [from, to].map(|at| usize::try_from(at).unwrap_or(0).min(height));
             let first = cells.column(x, y);
             // Every cell of the robot's height counts: one occupied cell blocks the column.
-            let states_above = (from..to).map(|z| {
-                CellState::from_bits(
-                    cells.bits.get(first + cells.level(z)).copied().unwrap_or_default(),
-                )
-            });
-            let (mut free, mut occupied) = (false, false);
-            for state in states_above {
+            let bits_above = (from..to)
+                .map(|z| cells.bits.get(first + cells.level(z)).copied().unwrap_or_default());
+            let (mut free, mut occupied, mut lost) = (false, false, false);
+            for bits in bits_above {
+                let state = CellState::from_bits(bits);
                 free |= state == CellState::Free;
                 occupied |= state == CellState::Occupied;
+                lost |= is_lost(bits);
             }
             // A column is blocked by what stands in it, or by its own slope or step.
             let is_steep = column.slope().is_some_and(|slope| slope > config.slope_max);
             let state = if occupied || is_steep || column.step_m > config.climb_m {
                 CellState::Occupied
-            } else if free || column.has(Column::GROUND) {
+            } else if !lost && (free || column.has(Column::GROUND)) {
                 CellState::Free
             } else {
                 CellState::Unknown

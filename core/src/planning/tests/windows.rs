@@ -1,7 +1,7 @@
 //! The window: what is free, occupied and unknown, and what moving does to it.
 
 use super::*;
-use crate::planning::cells::{Cells, FREE};
+use crate::planning::cells::{Cells, FREE, is_lost};
 
 /// Ground 1.5 m below the camera, a wall 8 m ahead, a pole as thin as a few centimetres.
 fn wall_and_pole(camera: [f64; 3], ray: [f64; 3]) -> Option<f64> {
@@ -179,6 +179,53 @@ fn an_object_that_left_is_no_obstacle_and_a_thin_pole_stays_one() {
     // A ray through where the car stood.
     let through = scene.planning.ray(&scene.volume, [-1.1, 0.6, 2.0], [0.0, 0.0, 1.0], 5.0);
     assert_eq!(through.end, PathEnd::Free, "{through:?}");
+}
+
+#[test]
+fn what_left_the_map_is_unknown_until_it_is_seen_through() {
+    let mut scene = Scene::new(&CONFIG());
+    let street = |with_car: bool| {
+        move |camera: [f64; 3], ray: [f64; 3]| {
+            let car = solid([-1.9, 0.0, 5.0], [-0.4, 1.4, 7.0])(camera, ray).filter(|_| with_car);
+            nearest([wall_and_pole(camera, ray), car])
+        }
+    };
+    let state = |scene: &Scene, at: [f64; 3]| scene.planning.slice_state(scene.cell_of(at));
+    let (car, far_from_it) = ([-1.1, 0.0, 5.05], [0.3, 0.0, 3.0]);
+    // The way is free, then a car stands in it, then its blocks leave the map.
+    scene.observe(at(0.0, 0.0), street(false));
+    scene.planning.update(&scene.volume);
+    assert_eq!(state(&scene, car), CellState::Free);
+    (0..3).for_each(|_| scene.observe(at(0.0, 0.0), street(true)));
+    scene.planning.update(&scene.volume);
+    assert_eq!(state(&scene, car), CellState::Occupied);
+    scene.volume.stream_out(&mut Watched { planning: &mut scene.planning, store: &mut NoStore });
+    scene.planning.update(&scene.volume);
+    assert_eq!(state(&scene, car), CellState::Unknown);
+    // Where no block was, nothing stood: what was seen free there stays so.
+    assert_eq!(state(&scene, far_from_it), CellState::Free);
+    scene.observe(at(0.0, 0.0), street(false));
+    scene.planning.update(&scene.volume);
+    assert_eq!(state(&scene, car), CellState::Free);
+}
+
+/// Every cell that the surface of a block marks is among those that its leaving clears.
+#[test]
+fn no_cell_that_a_block_marks_is_left_out_when_it_leaves() {
+    for up in [[0.0, -1.0, 0.0], [0.3, -0.9, 0.2], [0.6, 0.1, -0.8]] {
+        let [up_x, up_y, up_z] = up;
+        let mut scene = Scene::new(&PlanningConfig { up_x, up_y, up_z, ..CONFIG() });
+        (0..3).for_each(|_| scene.observe(at(0.0, 0.0), wall_and_pole));
+        let marked = scene.planning.update(&scene.volume).occupied;
+        assert!(marked > 100, "{marked} cells occupied with up {up:?}");
+        let before = scene.planning.cells.bits.to_vec();
+        scene
+            .volume
+            .stream_out(&mut Watched { planning: &mut scene.planning, store: &mut NoStore });
+        let after = scene.planning.cells.bits.iter();
+        let kept = before.iter().zip(after).filter(|(b, a)| **b & OCCUPIED != 0 && !is_lost(**a));
+        assert_eq!(kept.count(), 0, "with up {up:?}");
+    }
 }
 
 #[test]
