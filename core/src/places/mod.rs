@@ -37,7 +37,7 @@ pub use table::{KEYFRAME_POINTS, SegmentPose};
 /// Most keyframes of a mapper.
 pub const MAX_KEYFRAMES: usize = 1 << 16;
 
-pub use graph::LoopCounts;
+pub use graph::{HeldLoop, LoopCounts};
 
 use graph::{Graph, Measured, Recognized};
 use index::Index;
@@ -350,6 +350,11 @@ impl<'s> Places<'s> {
     /// Counts of the loops.
     pub(crate) fn loops(&self) -> LoopCounts {
         self.graph.counts()
+    }
+
+    /// Loops that the graph holds.
+    pub(crate) fn held_loops(&self) -> impl Iterator<Item = HeldLoop> {
+        self.graph.held()
     }
 
     /// Tells that loops changed the poses of keyframes in this frame.

@@ -3,7 +3,7 @@
 
 use crate::formats::calibration::RectifiedSize;
 use crate::request::{Settings, Worlds, leaves};
-use crate::synth::{RoomConfig, StreetConfig};
+use crate::synth::{RoomConfig, StreetConfig, TownConfig};
 use anyhow::bail;
 use clap::Args;
 use dynvox_core::Config;
@@ -89,7 +89,9 @@ fn rows() -> anyhow::Result<Vec<Row>> {
     let rectify = RectifiedSize::SETTINGS.iter().map(Setting::about);
     let street = StreetConfig::SETTINGS.iter().map(Setting::about);
     let room = RoomConfig::SETTINGS.iter().map(Setting::about);
-    let all = rig.into_iter().chain(rectify).chain(others).chain(street).chain(room);
+    let town = TownConfig::SETTINGS.iter().map(Setting::about);
+    let worlds = street.chain(room).chain(town);
+    let all = rig.into_iter().chain(rectify).chain(others).chain(worlds);
     Ok(all.map(|about| Row { default: default(defaults.get(about.key)), about }).collect())
 }
 
@@ -251,10 +253,11 @@ mod tests {
     }
 
     #[test]
-    fn there_are_at_most_158_settings_but_for_the_room_and_some_60_for_users() {
-        // The second synthetic world says what it shows, and nothing of how it is mapped.
+    fn there_are_at_most_158_settings_but_for_room_and_town_and_60_for_users() {
+        // Further synthetic worlds say what they show, and nothing of how it is mapped.
         let rows: Vec<_> = rows().unwrap();
-        let rows: Vec<_> = rows.iter().filter(|row| !row.about.key.starts_with("room.")).collect();
+        let of_world = |row: &&Row| ["room", "town"].contains(&section(row.about.key));
+        let rows: Vec<_> = rows.iter().filter(|row| !of_world(row)).collect();
         let users = rows.iter().filter(|row| row.about.tier == Tier::User).count();
         assert!(rows.len() <= 158 && (50..=70).contains(&users), "{} and {users}", rows.len());
     }

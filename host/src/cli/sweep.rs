@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct SweepArgs {
-    /// Data sets: street, room, yard, PATH or PATH:SEQUENCE [default: street]
+    /// Data sets: street, room, yard, town, PATH or PATH:SEQUENCE [default: street]
     data: Vec<Data>,
     /// Settings to vary
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Kind::PruneWeight, Kind::FrameRate, Kind::Scale])]

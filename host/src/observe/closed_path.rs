@@ -11,7 +11,7 @@ use crate::formats::{
 };
 use crate::owned;
 use dynvox_core::geometry::{MapSegment, Transform};
-use dynvox_core::places::{CorrectedKeyframe, LoopCounts};
+use dynvox_core::places::{CorrectedKeyframe, HeldLoop, LoopCounts};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Serialize;
 use std::fs;
@@ -24,6 +24,8 @@ pub struct ClosedLoops {
     pub counts: LoopCounts,
     /// Keyframes where the closures put them, oldest first.
     pub keyframes: Vec<CorrectedKeyframe>,
+    /// Loops that hold them there.
+    pub held: Vec<HeldLoop>,
     /// Triangles of the map after all loops, where it was written.
     pub triangles: Option<u64>,
 }
@@ -52,6 +54,39 @@ pub struct LoopSection {
     /// Absolute trajectory error of that path, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ate_m: Option<f64>,
+    /// Loops that hold the path at the end of the run.
+    pub held: Vec<LoopRow>,
+}
+
+/// Loop between two frames that show one place.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LoopRow {
+    /// Earlier frame, by its row in the trajectory.
+    pub from: u32,
+    /// Later frame.
+    pub to: u32,
+    /// Distance between its motion and the true one, m, where true poses are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_m: Option<f64>,
+    /// Angle between both, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_deg: Option<f64>,
+}
+
+impl LoopRow {
+    fn new(held: &HeldLoop, truth: Option<&[Transform]>) -> Self {
+        let pose = |frame: u32| truth.and_then(|truth| truth.get(frame as usize));
+        let error = pose(held.from_frame).zip(pose(held.to_frame)).map(|(from, to)| {
+            let t_from_to = from.inverse() * *to;
+            t_from_to.inverse() * held.t_from_to
+        });
+        Self {
+            from: held.from_frame,
+            to: held.to_frame,
+            error_m: error.map(|error| error.distance_m()),
+            error_deg: error.map(|error| error.angle_rad().to_degrees()),
+        }
+    }
 }
 
 /// Keyframe's motion from where it was driven to where loops put it.
@@ -93,6 +128,7 @@ pub(super) fn write(
         end_correction_m: 0.0,
         errors: None,
         ate_m: None,
+        held: loops.held.iter().map(|held| LoopRow::new(held, truth)).collect(),
     };
     if counts.moved == 0 {
         return Ok(Some(section));
@@ -204,6 +240,8 @@ mod tests {
             keyframes: vec![keyframe(1, 1.0), keyframe(5, 3.0)],
             counts: LoopCounts { closures: 1, moved: 1, ..LoopCounts::default() },
             triangles: None,
+            // The true way from frame 1 to frame 5 is 2 m; the loop says 2.1 m.
+            held: vec![HeldLoop { from_frame: 1, to_frame: 5, t_from_to: ahead(2.1) }],
         };
         let parts = [(0, MapSegment::FIRST), (7, MapSegment::new(1))];
         let truth: Vec<Transform> = [0.0, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0].map(ahead).to_vec();
@@ -215,6 +253,8 @@ mod tests {
         }
         assert_eq!(closed[7], driven[7], "nothing is known of another segment");
         assert!(section.ate_m.unwrap() < 1e-9 && section.largest_correction_m == 2.0);
+        let row = section.held[0];
+        assert!((row.from, row.to) == (1, 5) && (row.error_m.unwrap() - 0.1).abs() < 1e-9);
         let timed = fs::read_to_string(folder.path().join(TIMED_CLOSED_TRAJECTORY_FILE)).unwrap();
         assert!(timed.lines().nth(5).unwrap().starts_with("5.5 0.0 0.0 3.0"), "{timed}");
     }

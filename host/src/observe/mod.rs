@@ -38,7 +38,7 @@ pub use block_history::BlockHistoryObserver;
 pub use blocks::{BlockTotals, BlocksObserver, BlocksSection, StoreStats};
 pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::ChartValues;
-pub use closed_path::{ClosedLoops, LoopSection};
+pub use closed_path::{ClosedLoops, LoopRow, LoopSection};
 pub use depth_census::{DepthCensus, DepthTotals};
 pub use frame::{FrameRow, STAGES, StageTime, StepTimes};
 pub use frame_log::{FrameLog, StageStatistics};

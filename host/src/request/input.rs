@@ -79,7 +79,7 @@ pub fn open(request: &Request, stop: &StopRequest) -> Result<Box<dyn FrameSource
                 "--dataset and --sequence need a data set. Give its path: `dynvox run PATH`",
             ));
         }
-        Source::Street | Source::Room | Source::Yard => {
+        Source::Street | Source::Room | Source::Yard | Source::Town => {
             let world = SyntheticWorld::of_source(source).unwrap_or_default();
             let without_unit = request.input.inertial == InertialChoice::None;
             let change = Change { without_unit, ..Change::default() };

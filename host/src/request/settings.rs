@@ -4,7 +4,7 @@
 use crate::formats::bounds::SETTINGS_TEXT;
 use crate::formats::calibration::RectifiedSize;
 use crate::formats::read_text_within;
-use crate::synth::{RoomConfig, StreetConfig};
+use crate::synth::{RoomConfig, StreetConfig, TownConfig};
 use anyhow::{Context, bail};
 use dynvox_core::MapperConfig;
 use dynvox_core::egomotion::EgomotionConfig;
@@ -66,6 +66,9 @@ pub struct Settings {
     /// The synthetic room or yard, likewise.
     #[serde(skip_serializing_if = "Option::is_none")]
     room: Option<RoomConfig>,
+    /// The synthetic town, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    town: Option<TownConfig>,
     /// Keys that somebody set to their defaults: what follows from the rig does not replace them.
     /// Other values tell by themselves that somebody set them.
     #[serde(skip)]
@@ -142,6 +145,7 @@ impl Settings {
             planning,
             street: _,
             room: _,
+            town: _,
             asked: _,
         } = self;
         Config {
@@ -217,12 +221,23 @@ impl Settings {
         self.room.get_or_insert_default()
     }
 
+    /// The configuration of the synthetic town.
+    pub fn town(&self) -> TownConfig {
+        self.town.unwrap_or_default()
+    }
+
+    /// The configuration of the synthetic town, to be changed.
+    pub fn town_mut(&mut self) -> &mut TownConfig {
+        self.town.get_or_insert_default()
+    }
+
     /// All settings as a file that `--config` takes, those of the worlds that are shown among
     /// them.
     pub fn to_toml(&self, worlds: Worlds) -> anyhow::Result<String> {
         let street = worlds.street.then(|| self.street());
         let room = worlds.room.then(|| self.room());
-        Ok(toml::to_string(&Self { street, room, ..self.clone() })?)
+        let town = worlds.town.then(|| self.town());
+        Ok(toml::to_string(&Self { street, room, town, ..self.clone() })?)
     }
 }
 
@@ -231,17 +246,20 @@ impl Settings {
 pub struct Worlds {
     street: bool,
     room: bool,
+    town: bool,
 }
 
 impl Worlds {
     /// None.
-    pub const NONE: Self = Self { street: false, room: false };
+    pub const NONE: Self = Self { street: false, room: false, town: false };
     /// The street.
-    pub const STREET: Self = Self { street: true, room: false };
+    pub const STREET: Self = Self { street: true, ..Self::NONE };
     /// The room or yard.
-    pub const ROOM: Self = Self { street: false, room: true };
+    pub const ROOM: Self = Self { room: true, ..Self::NONE };
+    /// The town, and the street for its cameras and houses.
+    pub const TOWN: Self = Self { street: true, town: true, ..Self::NONE };
     /// All.
-    pub const ALL: Self = Self { street: true, room: true };
+    pub const ALL: Self = Self { street: true, room: true, town: true };
 }
 
 /// Settings under construction: as a table and as values.
@@ -252,16 +270,24 @@ struct Layers {
 }
 
 impl Layers {
+    /// The defaults with those of all synthetic worlds.
+    fn all_worlds() -> Settings {
+        Settings {
+            street: Some(StreetConfig::default()),
+            room: Some(RoomConfig::default()),
+            town: Some(TownConfig::default()),
+            ..Settings::default()
+        }
+    }
+
     /// The defaults, those of the synthetic worlds among them.
     fn defaults() -> anyhow::Result<Self> {
-        let (street, room) = (Some(StreetConfig::default()), Some(RoomConfig::default()));
-        Self::over(Settings { street, room, ..Settings::default() })
+        Self::over(Self::all_worlds())
     }
 
     /// Layers over settings that are there.
     fn over(settings: Settings) -> anyhow::Result<Self> {
-        let (street, room) = (Some(StreetConfig::default()), Some(RoomConfig::default()));
-        let defaults = Table::try_from(Settings { street, room, ..Settings::default() })?;
+        let defaults = Table::try_from(Self::all_worlds())?;
         Ok(Self { table: Table::try_from(&settings)?, settings, defaults })
     }
 
@@ -269,6 +295,7 @@ impl Layers {
     fn finish(mut self) -> Settings {
         self.settings.street.take_if(|street| *street == StreetConfig::default());
         self.settings.room.take_if(|room| *room == RoomConfig::default());
+        self.settings.town.take_if(|town| *town == TownConfig::default());
         self.settings
     }
 

@@ -15,6 +15,8 @@ pub enum Source {
     Room,
     /// A synthetic yard, as the settings below `room` say.
     Yard,
+    /// A synthetic town, as the settings below `town` and `street` say.
+    Town,
     /// PGM or PPM images on standard input, left and right in turn.
     Stream,
     /// A recording: a folder, or a file of ROS.
@@ -24,7 +26,7 @@ pub enum Source {
 impl Source {
     /// Returns true for what is rendered: it knows what it shows.
     pub fn is_synthetic(&self) -> bool {
-        matches!(self, Self::Street | Self::Room | Self::Yard)
+        matches!(self, Self::Street | Self::Room | Self::Yard | Self::Town)
     }
 
     /// Worlds whose settings belong to a run on this source.
@@ -32,6 +34,7 @@ impl Source {
         match self {
             Self::Street => Worlds::STREET,
             Self::Room | Self::Yard => Worlds::ROOM,
+            Self::Town => Worlds::TOWN,
             Self::Stream | Self::Recording(_) => Worlds::NONE,
         }
     }

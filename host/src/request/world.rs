@@ -3,7 +3,7 @@
 use super::Settings;
 use super::source::Source;
 use crate::input::InputError;
-use crate::synth::{Room, RoomKind, Street, World};
+use crate::synth::{Room, RoomKind, Street, Town, World};
 use serde::Deserialize;
 
 /// A synthetic world.
@@ -17,6 +17,8 @@ pub enum SyntheticWorld {
     Room,
     /// A yard with houses, a hedge, trees and people
     Yard,
+    /// A town whose drive closes a loop
+    Town,
 }
 
 impl SyntheticWorld {
@@ -26,6 +28,7 @@ impl SyntheticWorld {
             Self::Street => Source::Street,
             Self::Room => Source::Room,
             Self::Yard => Source::Yard,
+            Self::Town => Source::Town,
         }
     }
 
@@ -35,6 +38,7 @@ impl SyntheticWorld {
             Source::Street => Some(Self::Street),
             Source::Room => Some(Self::Room),
             Source::Yard => Some(Self::Yard),
+            Source::Town => Some(Self::Town),
             Source::Stream | Source::Recording(_) => None,
         }
     }
@@ -52,6 +56,15 @@ impl SyntheticWorld {
                 config.frames = change.frames.unwrap_or(config.frames);
                 config.inertial = config.inertial.filter(|_| !change.without_unit);
                 return Ok(Box::new(Street::new(config).map_err(failed)?));
+            }
+            Self::Town => {
+                let mut street = settings.street();
+                street.inertial = street.inertial.filter(|_| !change.without_unit);
+                let town = Town::new(street, settings.town()).map_err(failed)?;
+                return Ok(Box::new(match change.frames {
+                    Some(frames) => town.with_frames(frames),
+                    None => town,
+                }));
             }
             Self::Room => RoomKind::Room,
             Self::Yard => RoomKind::Yard,

@@ -188,6 +188,7 @@ fn map(
         loops: ClosedLoops {
             counts: mapper.loops(),
             keyframes: mapper.corrected_keyframes().collect(),
+            held: mapper.held_loops().collect(),
             triangles: closed_triangles,
         },
         output: MeshOutput::begin(

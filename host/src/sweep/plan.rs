@@ -68,12 +68,13 @@ impl FromStr for Data {
 
     fn from_str(text: &str) -> Result<Self, String> {
         if text.is_empty() {
-            return Err("give street, room, yard, PATH or PATH:SEQUENCE".to_owned());
+            return Err("give street, room, yard, town, PATH or PATH:SEQUENCE".to_owned());
         }
         let world = match text {
             "street" => Some(Source::Street),
             "room" => Some(Source::Room),
             "yard" => Some(Source::Yard),
+            "town" => Some(Source::Town),
             _ => None,
         };
         if let Some(source) = world {
@@ -103,6 +104,7 @@ impl Data {
             (Source::Street, _) => "street".to_owned(),
             (Source::Room, _) => "room".to_owned(),
             (Source::Yard, _) => "yard".to_owned(),
+            (Source::Town, _) => "town".to_owned(),
             (Source::Stream, _) => "stream".to_owned(),
             (Source::Recording(_), Some(sequence)) => sequence.clone(),
             (Source::Recording(path), None) => name(path),

@@ -64,7 +64,7 @@ fn results(plan: &Plan) -> Results {
 #[test]
 fn data_is_the_street_a_path_or_a_path_and_a_sequence() {
     let data = |text: &str| text.parse::<Data>().unwrap();
-    for world in ["street", "room", "yard"] {
+    for world in ["street", "room", "yard", "town"] {
         assert_eq!(data(world).label(), world);
         assert!(data(world).path().is_none());
     }

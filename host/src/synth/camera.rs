@@ -29,6 +29,18 @@ pub fn along_m(config: &StreetConfig, time_s: f64) -> f64 {
 
 /// Returns the camera's pose on the street at a time.
 pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) -> Transform {
+    carried(config, time_s, |right_m, yaw_rad| {
+        span.t_street_local(along_m(config, time_s), right_m, yaw_rad)
+    })
+}
+
+/// Returns the camera's pose at a time. `on_road` gives the car's frame on the road for a shift, m,
+/// and a turn, rad, both to the right.
+pub fn carried(
+    config: &StreetConfig,
+    time_s: f64,
+    on_road: impl FnOnce(f64, f64) -> Transform,
+) -> Transform {
     // One generator for all waves: their phases depend on the seed only, not on the time.
     let mut rng = Rng::new(config.seed, 0x00CA_3E2A, 0);
     let mut wave = |parts: [(f64, f64); 2]| {
@@ -44,9 +56,8 @@ pub fn t_street_camera(config: &StreetConfig, span: &RoadSpan<'_>, time_s: f64) 
     // A street without sway keeps the bits it had before there was any.
     let yaw = if config.sway_deg_s == 0.0 { yaw } else { yaw + sway_rad(config, time_s) };
     // Rotations in the order yaw, pitch, roll, as a car's body moves on its springs.
-    let on_road = span.t_street_local(along_m(config, time_s), drift, yaw);
     let height = Vector3::new(0.0, bounce - CAMERA_HEIGHT_M, 0.0);
-    on_road
+    on_road(drift, yaw)
         * Transform::new(Vector3::zeros(), height)
         * Transform::new(Vector3::new(pitch, 0.0, 0.0), Vector3::zeros())
         * Transform::new(Vector3::new(0.0, 0.0, roll), Vector3::zeros())

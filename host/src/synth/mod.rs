@@ -55,6 +55,7 @@ mod raster;
 mod raw;
 #[cfg(test)]
 mod raw_tests;
+mod recent;
 mod render;
 mod room;
 mod room_paint;
@@ -70,6 +71,7 @@ mod surface;
 #[cfg(test)]
 mod tests;
 mod texture;
+mod town;
 mod traffic;
 mod window_paint;
 mod world;
@@ -86,5 +88,6 @@ pub use lens::{RigError, StreetLens};
 pub use path::SEGMENT_M;
 pub use room::{Room, RoomConfig, RoomKind, RoomPath};
 pub use street::Street;
+pub use town::{Town, TownConfig, TownTwins};
 pub use world::World;
 pub use writer::write_kitti;

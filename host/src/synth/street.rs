@@ -1,7 +1,6 @@
 //! The street itself: what stays from frame to frame, and how a frame is made.
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::rectify::Rectification;
@@ -18,6 +17,7 @@ use super::mesh::Mesh;
 use super::paint::Painter;
 use super::path::{Centerline, RoadSpan, SEGMENT_M};
 use super::random::Rng;
+use super::recent::Recent;
 use super::scene::Scene;
 use super::segment::{Segment, segment};
 use super::shadow::SunAxes;
@@ -41,7 +41,7 @@ pub struct Street {
     studio: Studio,
     sun: SunAxes,
     bodies: [Arc<Mesh>; 5],
-    segments: Mutex<VecDeque<(i64, Arc<Segment>)>>,
+    segments: Recent<i64, Segment>,
     t_camera0_street: Transform,
 }
 
@@ -89,7 +89,7 @@ impl Street {
             centerline,
             sun: SunAxes::new(to_sun),
             bodies: CarKind::ALL.map(|kind| Arc::new(car::body(kind))),
-            segments: Mutex::new(VecDeque::new()),
+            segments: Recent::new(CACHED_SEGMENTS),
             t_camera0_street: t_street_camera.inverse(),
             config,
         })
@@ -221,24 +221,7 @@ impl Street {
 
     /// A segment, from the few that are cached or made anew: either way the same.
     fn segment(&self, number: i64) -> Arc<Segment> {
-        let find = |cached: &VecDeque<(i64, Arc<Segment>)>| {
-            cached
-                .iter()
-                .find(|(known, _)| *known == number)
-                .map(|(_, segment)| Arc::clone(segment))
-        };
-        let lock = || self.segments.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(known) = find(&lock()) {
-            return known;
-        }
-        // Outside the lock: another thread may make the same one meanwhile, which is equal.
-        let made = Arc::new(segment(&self.config, &self.centerline, &self.sun, number));
-        let mut cached = lock();
-        if cached.len() >= CACHED_SEGMENTS {
-            cached.pop_front();
-        }
-        cached.push_back((number, Arc::clone(&made)));
-        made
+        self.segments.get(number, || segment(&self.config, &self.centerline, &self.sun, number))
     }
 
     /// Painter, for the LiDAR.

@@ -46,6 +46,17 @@ impl Closure {
     }
 }
 
+/// Loop that the pose graph holds: two keyframes that show one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldLoop {
+    /// Number of the earlier keyframe's frame, from 0.
+    pub from_frame: u32,
+    /// Number of the later one's.
+    pub to_frame: u32,
+    /// Pose of the later camera in the earlier one, by what both see.
+    pub t_from_to: Transform,
+}
+
 /// Place that the camera recognises.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::places) struct Recognized<'a> {
@@ -62,6 +73,18 @@ pub(in crate::places) struct Recognized<'a> {
 }
 
 impl Graph<'_> {
+    /// Closures that the graph holds.
+    pub(in crate::places) fn held(&self) -> impl Iterator<Item = HeldLoop> {
+        self.closures.iter().take(self.closure_len).filter_map(|closure| {
+            let [from, to] = [closure.from, closure.to].map(|slot| self.used(slot as usize));
+            Some(HeldLoop {
+                from_frame: from?.frame,
+                to_frame: to?.frame,
+                t_from_to: closure.t_from_to,
+            })
+        })
+    }
+
     /// Takes a closure from a keyframe to the last one of the chain of `slots`. Returns whether it
     /// was taken.
     #[inline(never)]

@@ -32,6 +32,7 @@ use crate::{
 };
 use bytemuck::{Pod, Zeroable};
 use closures::Closure;
+pub use closures::HeldLoop;
 pub(super) use closures::Recognized;
 use dense::entries;
 use twist::{Twist, isotropic};
