@@ -184,6 +184,33 @@ impl MotionCovariance {
         Self::from_matrix(&sum)
     }
 
+    /// Joins the motion with a turn that something else measured: `error_rad` is that turn less the
+    /// motion's, in the current camera's frame, `variance` that of an axis, rad². Returns the step
+    /// (rotation vector, translation) to the likeliest motion, and its covariance (three
+    /// corrections of a Kalman filter).
+    #[inline(never)]
+    pub(super) fn with_turn(&self, error_rad: [f64; 3], variance: f64) -> ([f64; N], Self) {
+        let (mut step, mut joined) = ([0.0; N], *self);
+        for (axis, error_rad) in error_rad.into_iter().enumerate() {
+            let column = joined.row(axis);
+            let sum = joined.entry(axis, axis) + variance;
+            // False for NaN as well.
+            if !(sum > 0.0 && sum < f64::INFINITY) {
+                continue;
+            }
+            // The step so far has corrected a part of the error.
+            let left_rad = error_rad - step.get(axis).copied().unwrap_or_default();
+            step.iter_mut().zip(column).for_each(|(step, own)| *step += own / sum * left_rad);
+            let matrix = joined.matrix().map(|row| {
+                let gain = row.get(axis).copied().unwrap_or_default() / sum;
+                let mut columns = row.into_iter().zip(column);
+                core::array::from_fn(|_| columns.next().map_or(0.0, |(old, own)| old - gain * own))
+            });
+            joined = Self::from_matrix(&matrix);
+        }
+        (step, joined)
+    }
+
     fn entry(&self, row: usize, column: usize) -> f64 {
         let (high, low) = if row < column { (column, row) } else { (row, column) };
         self.lower.get(high * (high + 1) / 2 + low).copied().unwrap_or_default()

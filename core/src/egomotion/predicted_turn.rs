@@ -38,6 +38,8 @@ pub(crate) struct PredictedTurn {
     pub last: Turned,
     /// Since the frame that matches are sought with; `None` if one between was not covered.
     pub whole: Option<Turned>,
+    /// Standard deviation of the way of `last` along one axis, m; `None` where forces tell no way.
+    pub way_sigma_m: Option<f64>,
 }
 
 impl PredictedTurn {

@@ -2,6 +2,7 @@ mod camera;
 mod clip;
 mod rivals;
 mod slow;
+mod turned;
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MAX_REFERENCE_FRAMES, MotionEstimate, MotionHypotheses,

@@ -19,7 +19,8 @@ use crate::{
 
 mod turn;
 
-use turn::RefusedMotion;
+pub(crate) use turn::SeenMotion;
+use turn::Sight;
 
 /// Seed of the camera's own draws.
 const SEED: u64 = 0x6361_6D65_7261;
@@ -79,8 +80,8 @@ pub struct Egomotion {
     random: Random,
     /// Turn that an inertial unit predicts for this frame.
     predicted: Option<PredictedTurn>,
-    /// Motion since the reference that was refused because it contradicts that.
-    contradicting: Option<RefusedMotion>,
+    /// Motion that images showed, where a turn is predicted.
+    seen: Option<SeenMotion>,
 }
 
 impl Default for Egomotion {
@@ -99,7 +100,7 @@ impl Default for Egomotion {
             newest_segment: MapSegment::FIRST,
             random: Random::new(SEED),
             predicted: None,
-            contradicting: None,
+            seen: None,
         }
     }
 }
@@ -126,7 +127,8 @@ impl Egomotion {
         self.reference_s += f64::from(interval_s);
         let contest = Contest { camera: self, config, rig };
         let winner = contest.choose(matches.clone(), estimator, &found);
-        let found = contest.estimate(winner, matches, estimator, found);
+        let found = contest.estimate(winner, matches.clone(), estimator, found);
+        let found = self.hold_to_turn(Sight { config, rig, matches }, estimator, found);
         let found = self.hold_weak_directions(found);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.
@@ -135,10 +137,7 @@ impl Egomotion {
             .t_current_previous
             .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
         // A motion that no camera can make is not taken, however many matches agree.
-        self.contradicting = self.contradiction(&estimate);
-        let refused = self.contradicting.map(|_| MotionStatus::Implausible);
-        let doubt = || motion.and_then(|motion| self.doubt(config, &motion, &estimate));
-        if let Some(status) = refused.or_else(doubt) {
+        if let Some(status) = motion.and_then(|motion| self.doubt(config, &motion, &estimate)) {
             estimate =
                 MotionEstimate { status, t_current_previous: None, covariance: None, ..estimate };
         }
@@ -397,7 +396,7 @@ impl Egomotion {
             random,
             // Belong to one frame.
             predicted: _,
-            contradicting: _,
+            seen: _,
         } = self;
         // Two halves of one word.
         let mut segments = u32::from(newest_segment.get()) << 16 | u32::from(segment.get());

@@ -224,6 +224,17 @@ impl Transform {
         2.0 * libm::atan2(libm::sqrt(x * x + y * y + z * z), libm::fabs(w))
     }
 
+    /// The rotation as a vector: axis times angle, of at most half a turn, rad.
+    pub(crate) fn rotation_vector(&self) -> [f64; 3] {
+        let [x, y, z, w] = self.rotation;
+        let sine = libm::sqrt(x * x + y * y + z * z);
+        // Of a quaternion and its negative the one with the smaller angle.
+        let half_angle = libm::atan2(if w < 0.0 { -sine } else { sine }, libm::fabs(w));
+        // The limit is 2 at angle 0.
+        let scale = if sine > 1e-12 { 2.0 * half_angle / sine } else { 2.0 };
+        [x * scale, y * scale, z * scale]
+    }
+
     /// The motion of one of `parts` equal parts of a motion in which rotation and translation run
     /// side by side; 1 and more.
     #[must_use]

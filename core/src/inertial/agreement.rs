@@ -25,6 +25,8 @@ const CONTRADICTIONS_DOUBTED: u32 = 3;
 const REPEATS_STUCK: u32 = 10;
 /// Samples at the end of the range in a row from which on they are saturated.
 const SATURATED_SAMPLES: u32 = 2;
+/// Turn rate over the sensor's range from which on no sensor of it showed it, in rad/s.
+const BEYOND_RANGE: f64 = 1.05;
 /// Part of the sums over turns that stays from frame to frame.
 const MEMORY: f64 = 0.95;
 
@@ -130,6 +132,8 @@ impl Agreement {
         self.saturated = if is_saturated { self.saturated.saturating_add(1) } else { 0 };
         if self.repeats >= REPEATS_STUCK {
             self.lose_trust(InertialDoubt::Stuck);
+        } else if beyond(sample.turn_rate, BEYOND_RANGE * unit.turn_range) {
+            self.lose_trust(InertialDoubt::Degrees);
         } else if self.saturated >= SATURATED_SAMPLES {
             self.lose_trust(InertialDoubt::Saturated);
         }

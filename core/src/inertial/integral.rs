@@ -153,16 +153,5 @@ impl Integrator {
     }
 }
 
-/// Rotation vector (axis times angle, rad) of a rotation by at most half a turn.
-pub(super) fn rotation_vector(rotation: &Transform) -> Vector3<f64> {
-    let [x, y, z, w] = rotation.rotation;
-    let sine = libm::sqrt(x * x + y * y + z * z);
-    // Of a quaternion and its negative the one with the smaller angle.
-    let half_angle = libm::atan2(if w < 0.0 { -sine } else { sine }, libm::fabs(w));
-    // The limit is 2 at angle 0.
-    let scale = if sine > 1e-12 { 2.0 * half_angle / sine } else { 2.0 };
-    Vector3::new(x, y, z) * scale
-}
-
 #[cfg(test)]
 mod tests;

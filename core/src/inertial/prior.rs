@@ -6,7 +6,7 @@ use super::{
     INERTIAL_SAMPLES_PER_FRAME, InertialDoubt, InertialReport, InertialSample, InertialUnit,
     agreement::{Agreement, TurnPair},
     errors::{TurnError, UnitErrors},
-    integral::{Integral, Reading, integrate, rotation_vector},
+    integral::{Integral, Reading, integrate},
     recent::{RecentSamples, seconds_after},
     turn::{MeasuredMotion, PendingTurn},
     velocity::Velocity,
@@ -18,6 +18,7 @@ use crate::{
     memory::{Carver, region_bytes},
     state::{Hasher, Visitor},
 };
+use nalgebra::Vector3;
 
 /// Time between a frame and the nearest sample from which on they are on two clocks, s.
 const APART_S: f64 = 1.0;
@@ -26,6 +27,9 @@ const REGION: &str = "inertial";
 /// Least standard deviation of a turn, rad, and its part: scale and mounting are not perfect.
 const SIGMA_MIN_RAD: f64 = 0.0005;
 const SIGMA_PART: f64 = 0.01;
+/// Turn that may go unseen between samples, one sigma, rad, beyond which a turn is compared only
+/// once the samples after it are there: a clock ahead by a frame leaves a frame's end open.
+const UNSEEN_MAX_RAD: f64 = 0.003;
 
 /// An inertial unit over time.
 #[derive(Clone, Debug)]
@@ -132,7 +136,10 @@ impl InertialPrior {
         self.push(read);
         let mut predicted = self.predicted_turn(since_reference)?;
         // A guess goes on by forces where they tell its way.
-        predicted.last.t_before_now.translation_m = self.way_m(t_world_camera).unwrap_or_default();
+        if let Some((way_m, sigma_m)) = self.way_m(t_world_camera) {
+            predicted.last.t_before_now.translation_m = way_m;
+            predicted.way_sigma_m = Some(sigma_m);
+        }
         Some(predicted)
     }
 
@@ -154,9 +161,19 @@ impl InertialPrior {
         let Some(pending) = self.pending.take() else { return };
         let Some(integral) = self.integrate(read, pending.start_ns, pending.span_s) else { return };
         let measured = Transform::new(pending.turn_rad, [0.0; 3]);
-        let error = rotation_vector(&(integral.t_start_end.inverse() * measured));
+        let error = (integral.t_start_end.inverse() * measured).rotation_vector().into();
         let noise = self.noise_rad(&measured, pending.span_s);
         let sigma_rad = libm::sqrt(noise * noise + pending.sigma_rad * pending.sigma_rad);
+        if pending.open != 0 {
+            let unit = self.errors.turn_sigma_rad(&integral, pending.span_s);
+            self.compare(&TurnPair {
+                measured: pending.turn_rad.into(),
+                predicted: integral.t_start_end.rotation_vector().into(),
+                raw: Some(integral.rate_sum + self.errors.bias() * pending.span_s),
+                sigma_rad: libm::sqrt(sigma_rad * sigma_rad + unit * unit),
+                strong: true,
+            });
+        }
         self.errors.update(&TurnError {
             error,
             sigma_rad,
@@ -219,8 +236,7 @@ impl InertialPrior {
             t_before_now: self.in_camera(&integral.t_start_end),
             variance: noise * noise + unit * unit,
         };
-        self.report.turn_rad =
-            Some(<[f64; 3]>::from(rotation_vector(&last.t_before_now)).map(|rad| rad as f32));
+        self.report.turn_rad = Some(last.t_before_now.rotation_vector().map(|rad| rad as f32));
         self.report.turn_sigma_rad = libm::sqrt(last.variance) as f32;
         self.since_reference = match before {
             None if since_reference > 0 => None,
@@ -228,7 +244,7 @@ impl InertialPrior {
             Some(before) => Some(before.then(&last)),
         };
         let whole = self.since_reference;
-        self.agreement.is_trusted().then_some(PredictedTurn { last, whole })
+        self.agreement.is_trusted().then_some(PredictedTurn { last, whole, way_sigma_m: None })
     }
 
     /// A rotation of the unit in the camera's axes.
@@ -252,7 +268,9 @@ impl InertialPrior {
             return;
         };
         let mounting = Transform { translation_m: [0.0; 3], ..self.unit.t_camera_unit };
-        let in_unit = |turn: &Transform| rotation_vector(&(mounting.inverse() * *turn * mounting));
+        let in_unit = |turn: &Transform| {
+            Vector3::from((mounting.inverse() * *turn * mounting).rotation_vector())
+        };
         let sigma_rad = measured.sigma_rad;
         let turn_rad = in_unit(motion);
         let predicted_rad = in_unit(&predicted.t_before_now);
@@ -266,12 +284,15 @@ impl InertialPrior {
             sigma_rad: libm::sqrt(predicted.variance + sigma_rad * sigma_rad),
             strong: measured.strong,
         };
-        if self.agreement.compare(&pair) {
-            // The errors may have changed: they are to be found anew.
-            self.errors.widen(&self.unit);
-        }
         // Turns over several frames are compared, but not learned from.
-        if !measured.over_several && measured.strong {
+        let is_learned = !measured.over_several && measured.strong;
+        // A turn says little of the unit while no sample reaches its end.
+        let is_open = |integral: Integral| integral.unseen_rad > UNSEEN_MAX_RAD;
+        let is_compared_later = is_learned && self.integral.is_some_and(is_open);
+        if !is_compared_later {
+            self.compare(&pair);
+        }
+        if is_learned {
             let start_ns =
                 self.frame_ns.map(|end_ns| end_ns.wrapping_sub((self.span_s * 1e9) as u64));
             self.pending = start_ns.map(|start_ns| PendingTurn {
@@ -279,7 +300,15 @@ impl InertialPrior {
                 span_s: self.span_s,
                 turn_rad: turn_rad.into(),
                 sigma_rad,
+                open: u32::from(is_compared_later),
             });
+        }
+    }
+
+    fn compare(&mut self, pair: &TurnPair) {
+        if self.agreement.compare(pair) {
+            // The errors may have changed: they are to be found anew.
+            self.errors.widen(&self.unit);
         }
     }
 

@@ -4,7 +4,6 @@ use super::*;
 use crate::{
     egomotion::PredictedTurn,
     geometry::{MapSegment, Transform},
-    inertial::integral::rotation_vector,
 };
 use nalgebra::Vector3;
 use std::vec::Vec;
@@ -20,6 +19,8 @@ struct Flaws {
     /// Added to the samples' stamps, s.
     late_s: f64,
     scale: f64,
+    /// One of so many samples is there.
+    every: usize,
     /// Axes that readings come from.
     axes: [usize; 3],
     /// Frames from which on and until which readings are the first of them.
@@ -31,6 +32,7 @@ const SOUND: Flaws = Flaws {
     bias: [0.0; 3],
     late_s: 0.0,
     scale: 1.0,
+    every: 1,
     axes: [0, 1, 2],
     stuck: [usize::MAX; 2],
     range: f64::MAX,
@@ -53,7 +55,8 @@ fn mounting() -> Transform {
 fn exact(t: f64) -> ([f64; 3], [f64; 3]) {
     let unit = |t: f64| pose(t) * mounting();
     let h = 1e-4;
-    let turn = rotation_vector(&(unit(t - h).inverse() * unit(t + h))) / (2.0 * h);
+    let turn = (unit(t - h).inverse() * unit(t + h)).rotation_vector();
+    let turn = Vector3::from(turn) / (2.0 * h);
     let at = |t: f64| unit(t).translation();
     let acceleration = (at(t + h) - at(t) * 2.0 + at(t - h)) / (h * h);
     let felt = acceleration + Vector3::new(0.0, -9.81, 0.0);
@@ -85,6 +88,7 @@ impl Sim {
         let is_stuck = (flaws.stuck[0]..flaws.stuck[1]).contains(&frame);
         // Stamps since the frame before; the first frame is at 10 s.
         (1..=per_frame)
+            .step_by(flaws.every)
             .map(|at| {
                 let stamp_s = (frame as f64 - 1.0) * FRAME_S + at as f64 * SAMPLE_S;
                 let (turn, force) = exact(if is_stuck { 0.0 } else { stamp_s - flaws.late_s });
@@ -200,6 +204,45 @@ fn a_camera_in_the_dark_goes_on_by_forces_once_up_is_known() {
 }
 
 #[test]
+fn a_way_of_what_moves_is_not_believed_once_and_is_if_it_repeats() {
+    let mut sim = Sim::new(SOUND);
+    sim.run(60);
+    // Somebody who walks by carries the camera 0.3 m to the right in a frame.
+    let mut aside_m = 0.0;
+    let mut frame = || {
+        let before = Transform::from_translation([aside_m, 0.0, 0.0])
+            * pose(sim.frame as f64 * FRAME_S - FRAME_S);
+        aside_m += 0.3;
+        let t = sim.frame as f64 * FRAME_S;
+        let now = Transform::from_translation([aside_m, 0.0, 0.0]) * pose(t);
+        let samples = sim.samples();
+        let time_ns = ((10.0 + t) * 1e9).round() as u64;
+        let predicted = sim.prior.predict(Some(time_ns), &samples, 0, &before).unwrap();
+        sim.prior.observe(&MeasuredMotion {
+            t_reference_now: Some(pose(t - FRAME_S).inverse() * pose(t)),
+            sigma_rad: 0.0005,
+            way_sigma_m: 0.005,
+            strong: true,
+            over_several: false,
+            turned: false,
+            refused: false,
+            t_world_before: Some(before),
+            t_world_camera: now,
+            segment: MapSegment::FIRST,
+        });
+        sim.frame += 1;
+        // Way in the world that forces led to, less the true one.
+        let led = before * predicted.last.t_before_now;
+        let way = led.translation() - before.translation();
+        (way - (pose(t).translation() - pose(t - FRAME_S).translation())).x
+    };
+    let first = [frame(), frame()];
+    assert!(first.iter().all(|off_m: &f64| off_m.abs() < 0.01), "{first:?}");
+    let last = (0..10).map(|_| frame()).last().unwrap();
+    assert!((last - 0.3).abs() < 0.05, "{last}");
+}
+
+#[test]
 fn stamps_late_or_early_by_30_ms_are_found() {
     for late_s in [0.03, -0.03, 0.012] {
         let report = Sim::new(Flaws { late_s, ..SOUND }).run(80);
@@ -207,6 +250,21 @@ fn stamps_late_or_early_by_30_ms_are_found() {
         assert!(report.trusted && off < 0.003, "{late_s}: {report:?}");
         assert!(off < 4.0 * f64::from(report.clock_offset_sigma_s), "{late_s}: {report:?}");
     }
+}
+
+#[test]
+fn few_samples_of_a_clock_a_frame_ahead_earn_trust_once_they_cover_a_turn() {
+    // Ten samples a second that come a frame late: none ever reaches a frame's own end.
+    let mut sim = Sim::new(Flaws { late_s: 0.1, every: 20, ..SOUND });
+    let report = sim.run(80);
+    assert!(report.trusted && report.doubt.is_none(), "{report:?}");
+    let off = (f64::from(report.clock_offset_s) + 0.1).abs();
+    assert!(off < 2.0 * f64::from(report.clock_offset_sigma_s), "{report:?}");
+    // A turn whose end is open is known that badly.
+    assert!(report.turn_sigma_rad > 0.005, "{report:?}");
+    // The same with axes exchanged is never trusted.
+    let mut sim = Sim::new(Flaws { late_s: 0.1, every: 20, axes: [2, 0, 1], ..SOUND });
+    assert_eq!((0..80).filter(|_| sim.step().0.is_some()).count(), 0);
 }
 
 #[test]

@@ -37,12 +37,15 @@ pub(super) struct PendingTurn {
     /// Rotation vector, rad.
     pub turn_rad: [f64; 3],
     pub sigma_rad: f64,
+    /// 1 if it was not compared with the unit's yet.
+    pub open: u32,
 }
 
 impl PendingTurn {
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { start_ns, span_s, turn_rad, sigma_rad } = self;
+        let Self { start_ns, span_s, turn_rad, sigma_rad, open } = self;
         visitor.u64(start_ns);
+        visitor.u32(open);
         visitor.f64s(turn_rad);
         visitor.f64s([span_s, sigma_rad]);
     }

@@ -268,15 +268,17 @@ impl<'s> Localization<'s> {
     #[inline(never)]
     fn observe_turn(&mut self, found: &Found, from: &LastPose) {
         let Some(inertial) = &mut self.inertial else { return };
-        let (refused, estimate) = (self.camera.contradicting(), found.egomotion.as_ref());
+        let (seen, estimate) = (self.camera.seen(), found.egomotion.as_ref());
         let estimated = estimate.and_then(|estimate| estimate.t_current_previous);
-        let motion = refused.map(|refused| refused.t_current_reference).or(estimated);
+        // A unit learns from what images show, not from what it had a part in itself.
+        let motion = seen.map(|seen| seen.t_current_reference).or(estimated);
         let motion = motion.map(|motion| motion.inverse());
-        let sigma_rad = match (refused, estimate) {
-            (Some(refused), _) => refused.sigma_rad,
+        let sigma_rad = match (seen, estimate) {
+            (Some(seen), _) => seen.sigma_rad,
             (None, Some(estimate)) => estimate.turn_sigma_rad(),
             (None, None) => 0.0,
         };
+        let is_strong = |estimate: &MotionEstimate| 2 * estimate.inliers >= estimate.matches;
         let covariance = estimate.and_then(|estimate| estimate.covariance.as_ref());
         let way_sigma_m = covariance.map_or(0.0, |covariance| covariance.distance_sigma_m());
         let is_known = |origin| {
@@ -291,10 +293,10 @@ impl<'s> Localization<'s> {
             t_reference_now: motion.or(given),
             sigma_rad,
             way_sigma_m,
-            strong: estimate.is_none_or(|estimate| 2 * estimate.inliers >= estimate.matches),
+            strong: seen.map_or_else(|| estimate.is_none_or(is_strong), |seen| seen.strong),
             over_several: from.over_several,
             turned: found.origin == PoseOrigin::Extrapolated && self.camera.is_turned(),
-            refused: refused.is_some(),
+            refused: seen.is_some_and(|seen| seen.refused),
             t_world_before: follows.then_some(from.t_world_camera),
             t_world_camera: *self.camera.t_world_camera(),
             segment: self.camera.segment(),

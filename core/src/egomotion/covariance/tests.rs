@@ -121,3 +121,26 @@ fn a_turn_carries_the_uncertain_direction_along() {
     assert!((right_m - 0.2).abs() < 1e-9 && down_m < 1e-9 && ahead_m < 1e-9);
     assert!((pose.distance_sigma_m() - 0.2).abs() < 1e-9);
 }
+
+#[test]
+fn a_turn_measured_otherwise_moves_the_way_that_errs_with_it() {
+    // Yaw and the way to the right err together, as far points make them.
+    let mut matrix = [[0.0; N]; N];
+    for (axis, sigma) in [0.01, 0.01, 0.01, 0.1, 0.1, 0.1].into_iter().enumerate() {
+        matrix[axis][axis] = sigma * sigma;
+    }
+    (matrix[1][3], matrix[3][1]) = (0.0009, 0.0009);
+    let covariance = MotionCovariance::from_matrix(&matrix);
+    let (step, joined) = covariance.with_turn([0.0, 0.004, 0.0], 0.01 * 0.01);
+    // Both errors are alike, so that half of the difference is each one's.
+    assert!((step[1] - 0.002).abs() < 1e-12 && (step[3] - 0.018).abs() < 1e-12, "{step:?}");
+    assert!([0, 2, 4, 5].iter().all(|&axis| step[axis] == 0.0), "{step:?}");
+    let [_, yaw, _] = joined.rotation_sigma_rad();
+    let [right, down, _] = joined.translation_sigma_m();
+    assert!((yaw - 0.01 / 2f64.sqrt()).abs() < 1e-12, "{yaw}");
+    assert!(right < 0.08 && (down - 0.1).abs() < 1e-12, "{right} {down}");
+    // One that tells nothing changes nothing.
+    let (step, same) = covariance.with_turn([0.0, 0.004, 0.0], 1e9);
+    assert!(step.iter().all(|step| step.abs() < 1e-9), "{step:?}");
+    assert!((same.rotation_sigma_rad()[1] - 0.01).abs() < 1e-9);
+}

@@ -9,7 +9,7 @@ fn reading(at_s: f64, turn_rate: [f64; 3]) -> Reading {
 
 fn turned(readings: &[Reading], span_s: f64) -> Option<Vector3<f64>> {
     let integral = integrate(readings.iter().copied(), span_s, &Vector3::zeros())?;
-    Some(rotation_vector(&integral.t_start_end))
+    Some(integral.t_start_end.rotation_vector().into())
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn the_bias_is_taken_out() {
     let bias = Vector3::new(0.1, -0.05, 0.02);
     let readings = (0..12).map(|at| reading(f64::from(at) * 0.01, [0.1, -0.05, 0.52]));
     let integral = integrate(readings, 0.1, &bias).unwrap();
-    let turn = rotation_vector(&integral.t_start_end);
+    let turn = Vector3::from(integral.t_start_end.rotation_vector());
     assert!((turn - Vector3::new(0.0, 0.0, 0.05)).norm() < 1e-12, "{turn}");
 }
 
@@ -51,7 +51,8 @@ fn a_quarter_of_a_second_is_bridged_and_counted_and_no_more() {
     };
     let bridged = integral(0.24).unwrap();
     assert_eq!(bridged.bridged, 2, "and the one to the reading after the interval");
-    assert!((rotation_vector(&bridged.t_start_end).z - 0.09).abs() < 1e-12);
+    let [.., turned] = bridged.t_start_end.rotation_vector();
+    assert!((turned - 0.09).abs() < 1e-12);
     assert!(bridged.unseen_rad > 0.008, "what happened in it is not known");
     assert!(integral(0.26).is_none());
 }

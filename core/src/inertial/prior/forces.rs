@@ -19,15 +19,15 @@ impl InertialPrior {
         Some(Acceleration { mean, sigma, span_s: self.span_s })
     }
 
-    /// Position of the camera after the frame's interval in its axes before it, m; `None` where
-    /// forces or the velocity are known too little.
-    pub(super) fn way_m(&self, t_world_camera: &Transform) -> Option<[f64; 3]> {
+    /// Position of the camera after the frame's interval in its axes before it, and the standard
+    /// deviation of an axis, m; `None` where forces or the velocity are known too little.
+    pub(super) fn way_m(&self, t_world_camera: &Transform) -> Option<([f64; 3], f64)> {
         let from = *t_world_camera * self.unit.t_camera_unit;
-        let way_m = self.velocity.way_m(&self.acceleration(&from)?)?;
+        let (way_m, sigma_m) = self.velocity.way_m(&self.acceleration(&from)?)?;
         let turned = from * self.integral.as_ref()?.t_start_end;
         let to = Transform { translation_m: (from.translation() + way_m).into(), ..turned };
         let camera = to * self.unit.t_camera_unit.inverse();
-        Some((t_world_camera.inverse() * camera).translation_m)
+        Some(((t_world_camera.inverse() * camera).translation_m, sigma_m))
     }
 
     /// Learns the vertical and the velocity.
@@ -51,7 +51,11 @@ impl InertialPrior {
         self.velocity.pass(acceleration.as_ref());
         if let Some(acceleration) = &acceleration {
             let way_m: Vector3<f64> = to.translation() - from.translation();
-            self.velocity.measure(&way_m, measured.way_sigma_m, acceleration);
+            if !self.velocity.measure(&way_m, measured.way_sigma_m, acceleration) {
+                // Nor would its acceleration tell what is up.
+                self.vertical.interrupt();
+                return;
+            }
         }
         self.vertical.add(&UnitMotion {
             force_world: from.rotate(integral.mean_force),
