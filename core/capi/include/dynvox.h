@@ -299,7 +299,7 @@ typedef struct {
 
 // Units of work by kind: of one step in a report, the most of any step from dynvox_work_bound.
 typedef struct {
-  // Pixels that got or were given a disparity, or were looked at for one.
+  // Pixels of the rows that are matched densely; none where disparities are given.
   uint64_t stereo_pixels;
   // Support points looked for, each over the whole range of disparities.
   uint64_t support_candidates;

@@ -11,7 +11,7 @@ use dynvox_core::WorkUnits;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct DynvoxWork {
-    /// Pixels that got or were given a disparity, or were looked at for one.
+    /// Pixels of the rows that are matched densely; none where disparities are given.
     pub stereo_pixels: u64,
     /// Support points looked for, each over the whole range of disparities.
     pub support_candidates: u64,

@@ -289,7 +289,7 @@ impl Report {
         let voxels = |blocks: u32| u64::from(blocks) * BLOCK_VOXELS as u64;
         let eviction = &allocate.eviction;
         let work = WorkUnits {
-            stereo_pixels: u64::from(stereo.pixels),
+            stereo_pixels: u64::from(stereo.row_pixels),
             support_candidates: u64::from(stereo.candidates),
             triangles: sum(&[stereo.triangles_left, stereo.triangles_right]),
             features: sum(&[

@@ -34,7 +34,7 @@ pub(super) const PICTURE_EVERY: usize = 2;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct WorkUnits {
-    /// Pixels that got or were given a disparity, or were looked at for one.
+    /// Pixels of the rows that are matched densely; none where disparities are given.
     pub stereo_pixels: u64,
     /// Support points looked for, each over the whole range of disparities.
     pub support_candidates: u64,
@@ -148,7 +148,7 @@ impl Capacity {
             MotionSource::Icp => self.pixels(),
         };
         WorkUnits {
-            stereo_pixels: self.pixels() as u64,
+            stereo_pixels: stereo::most_pixels(self, &config.stereo) as u64,
             support_candidates: points as u64,
             // Of both images.
             triangles: (2 * TRIANGLES_PER_POINT * points) as u64,

@@ -1,5 +1,6 @@
 //! Every parameter of the stereo matcher, with the values of the published presets.
 
+use super::MAX_IMAGE_SIZE;
 use crate::settings::{
     Problems, Range, Rule, Setting,
     Value::{Bool, Choice, F32, U8, U16, U32, Usize},
@@ -76,6 +77,9 @@ pub struct StereoConfig {
     pub gamma: f32,
     /// Disparities searched to each side of the prior plane, px: sigma is 1 px.
     pub plane_radius_sigmas: f32,
+    /// Height from which on images are matched densely on every second row only, px; the rows
+    /// between are interpolated. 0: every row of any image.
+    pub second_rows_from: usize,
     /// Refinement of disparities to fractions of a pixel before they are smoothed.
     pub subpixel: bool,
     /// Largest difference between the disparities of left and right image, px.
@@ -108,6 +112,7 @@ impl StereoConfig {
             grid_size: 20,
             gamma: 3.0,
             plane_radius_sigmas: 2.0,
+            second_rows_from: 0,
             subpixel: true,
             consistency_threshold: 2,
             speckle_similarity: 1,
@@ -201,6 +206,14 @@ impl StereoConfig {
             .range(Range::Within(0.0, MAX_PLANE_RADIUS as f32))
             .published("2")
             .text("Disparities searched to each side of the prior plane; sigma is 1 px."),
+        Row::user("stereo.second_rows_from", "px", |c| Usize(&mut c.second_rows_from))
+            .range(Range::Within(0.0, MAX_IMAGE_SIZE as f32))
+            .published("0")
+            .text(
+                "Height from which on images are matched densely on every second row only; the \
+                 rows between are interpolated. 0 matches every row of any image \
+                 ([decision 100](decisions/0100-every-second-row.md)).",
+            ),
         Row::expert("stereo.subpixel", "", |c| Bool(&mut c.subpixel)).published("false").text(
             "Refinement of disparities to fractions of a pixel before they are smoothed. On KITTI \
              2012 it takes the median error from 0.268 to 0.257 px and the share off by more than \

@@ -19,6 +19,7 @@ use super::{
     StereoConfig,
     descriptor::{Descriptor, Gradients, MARGIN, describe_rows},
     prior::{CellGrid, DisparitySet, NO_PLANE, PlaneCost},
+    rows::MatchedRows,
 };
 use crate::{
     lanes::{Eight, LANES},
@@ -39,6 +40,8 @@ pub(super) const FILLED: i16 = 1 << 14;
 pub(super) struct DenseMatching<'a> {
     /// Parameters.
     pub config: &'a StereoConfig,
+    /// Rows to be matched.
+    pub rows: MatchedRows,
     /// Gradients of the left and the right image.
     pub gradients: [Gradients<'a>; 2],
     /// Grid priors of the left and the right image.
@@ -49,7 +52,7 @@ pub(super) struct DenseMatching<'a> {
 
 /// Buffers that one band writes.
 pub(super) struct DenseBand<'a> {
-    /// First image row.
+    /// First matched row.
     pub first: usize,
     /// The left planes, to become the disparities in 1/64 px.
     pub left: &'a mut [i16],
@@ -85,7 +88,7 @@ impl DenseMatching<'_> {
         let Some(right_row) = right_row.get_mut(..width) else { return };
         let rows = band.left.chunks_exact_mut(width).zip(band.right.chunks_exact_mut(width));
         for (i, (left, right)) in rows.enumerate() {
-            let v = band.first + i;
+            let v = self.rows.row(band.first + i);
             let [left_image, right_image] = self.gradients;
             // Rows in the margin have no descriptors, and hence no disparity.
             if describe_rows([(left_image, v, &mut *left_row), (right_image, v, &mut *right_row)]) {

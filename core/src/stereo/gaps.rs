@@ -7,6 +7,7 @@
 use super::{
     GapEnds, MAX_IMAGE_SIZE,
     dense::{FILLED, NONE},
+    rows::MatchedRows,
 };
 use crate::{
     flags::for_each_set,
@@ -24,6 +25,8 @@ pub(super) struct Filling {
     pub discontinuity: u16,
     /// Content of a gap between two surfaces.
     pub ends: GapEnds,
+    /// Rows of the image that there are.
+    pub rows: MatchedRows,
 }
 
 impl Filling {
@@ -129,7 +132,7 @@ impl Work for FillColumns<'_> {
         // Rows are walked once: each column remembers its last row with a disparity.
         last_row.fill(NEVER);
         let mut filled = 0;
-        let (width, widest) = (width.max(1), filling.width as u16);
+        let (width, widest) = (width.max(1), (filling.width / filling.rows.step.max(1)) as u16);
         for v in 0..image.len() / width {
             let (above, here) = image.split_at_mut_checked(v * width).unwrap_or_default();
             for ((end, &last), &here) in ends.iter_mut().zip(&*last_row).zip(&*here) {
@@ -190,7 +193,9 @@ mod tests {
             [(40, 23, 2), (17, 60, 5), (1, 30, 3), (30, 1, 3)].repeat(6).into_iter().enumerate()
         {
             let ends = if i % 3 == 0 { GapEnds::Farther } else { GapEnds::Surface };
-            let filling = Filling { width: random.below(9) as usize, discontinuity: 192, ends };
+            let rows = MatchedRows { step: 1, count: height };
+            let filling =
+                Filling { width: random.below(9) as usize, discontinuity: 192, ends, rows };
             let pixel = |random: &mut Random| {
                 if random.below(none) > 0 { NONE } else { random.below(500) as i16 }
             };
@@ -227,7 +232,8 @@ mod tests {
     fn one_surface_gets_the_mean_and_two_nothing_or_the_farther() {
         // 640 and 700 differ by less than the discontinuity and are one surface; 700 and 100 are
         // two.
-        let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther };
+        let rows = MatchedRows { step: 1, count: 1 };
+        let filling = Filling { width: 3, discontinuity: 192, ends: GapEnds::Farther, rows };
         // Gaps of two, of one, of four, and one that reaches the end.
         let image = [640, NONE, NONE, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE];
         let [surface, farther] = [670, 100].map(|disparity| disparity | FILLED);
@@ -244,5 +250,18 @@ mod tests {
         let mut row = image;
         assert_eq!(fill(&mut row, GapEnds::Surface), 2);
         assert_eq!(row, [640, surface, surface, 700, NONE, 100, NONE, NONE, NONE, NONE, 100, NONE]);
+    }
+
+    #[test]
+    fn a_gap_along_a_column_is_as_wide_as_its_rows_of_the_image() {
+        let gap = |step: usize, width: usize| {
+            let rows = MatchedRows { step, count: 5 };
+            let filling = Filling { width, discontinuity: 192, ends: GapEnds::Surface, rows };
+            let mut image = [640, NONE, NONE, NONE, 700];
+            FillColumns { image: &mut image, width: 1, filling, last_row: &mut [0], ends: &mut [0] }
+                .run()
+        };
+        assert_eq!([gap(1, 2), gap(1, 3)], [0, 3]);
+        assert_eq!([gap(2, 5), gap(2, 6)], [0, 3], "three of every second row span five to seven");
     }
 }

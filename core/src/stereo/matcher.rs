@@ -9,6 +9,7 @@ use super::{
     descriptor::Descriptor,
     prior,
     prior::DisparitySet,
+    rows::MatchedRows,
     support,
 };
 use crate::{
@@ -219,6 +220,7 @@ impl<'s> StereoMatcher<'s> {
         let mut report = StereoReport {
             status,
             pixels: (self.width * self.height) as u32,
+            row_pixels: (self.width * MatchedRows::new(config, self.height).count) as u32,
             ..StereoReport::default()
         };
         if report.status != StereoStatus::Matched {
@@ -244,6 +246,7 @@ impl<'s> StereoMatcher<'s> {
         self.remove_speckles(config, executor, &mut report);
         done(StereoStep::Speckles);
         self.fill_gaps(config, executor, &mut report);
+        self.spread_rows(config, executor);
         done(StereoStep::Gaps);
         self.smooth(config, executor);
         done(StereoStep::Smoothing);

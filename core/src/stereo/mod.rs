@@ -70,8 +70,10 @@ mod matcher;
 mod median;
 mod prior;
 mod report;
+mod rows;
 mod smooth;
 mod speckle;
+mod spread;
 mod support;
 #[cfg(test)]
 mod tests;
@@ -82,6 +84,7 @@ pub use config::{
 pub use matcher::StereoMatcher;
 pub(crate) use matcher::max_points;
 pub use report::{StereoReport, StereoStatus, StereoStep};
+pub(crate) use rows::most_pixels;
 
 /// Least width and height of an image, px.
 pub const MIN_IMAGE_SIZE: usize = 16;

@@ -14,6 +14,7 @@ use super::{
     StereoConfig,
     config::{DISPARITY_LIMIT, MAX_PLANE_RADIUS},
     delaunay::{SupportPoint, Triangulation},
+    rows::MatchedRows,
 };
 
 /// No triangle covers the pixel.
@@ -24,12 +25,13 @@ pub(super) const STEEP: i16 = 256;
 /// Disparities about a plane, at most.
 pub(super) const PLANE_WIDTH: usize = 2 * MAX_PLANE_RADIUS + 1;
 
-/// Rasterises the planes into image rows `first..` of `out`, `width` wide: the disparity in whole
-/// px, plus [`STEEP`], or [`NO_PLANE`]. Triangles are rasterised to the pixels beyond their edges;
-/// the later one wins.
+/// Rasterises the planes into the matched rows `first..`, which `out` holds, `width` wide: the
+/// disparity in whole px, plus [`STEEP`], or [`NO_PLANE`]. Triangles are rasterised to the pixels
+/// beyond their edges; the later one wins.
 pub(super) struct RasterisePlanes<'a, 'm> {
     pub mesh: &'a Triangulation<'m>,
     pub slope_max: f32,
+    pub rows: MatchedRows,
     pub first: usize,
     pub width: usize,
     pub out: &'a mut [i16],
@@ -46,17 +48,19 @@ impl Work for RasterisePlanes<'_, '_> {
 
 #[inline(always)]
 fn rasterise_planes(
-    RasterisePlanes { mesh, slope_max, first, width, out }: RasterisePlanes<'_, '_>,
+    RasterisePlanes { mesh, slope_max, rows, first, width, out }: RasterisePlanes<'_, '_>,
 ) {
     out.fill(NO_PLANE);
     let width = width.max(1);
-    let rows = out.len() / width;
+    // The band's rows are `step` apart, from this one on.
+    let (top_row, step, count) = (rows.row(first), rows.step.max(1), out.len() / width);
     // A slope of 1000 fits.
     let slope_max = (slope_max * ONE as f32) as i64;
     for mut corners in mesh.triangles() {
         let [a, b, c] = corners.map(|point| usize::from(point.v));
-        // Rows of the triangle that lie in this band.
-        let (from, to) = (a.min(b).min(c).max(first), (a.max(b).max(c) + 1).min(first + rows));
+        // Rows of the triangle that lie in this band, counted in it.
+        let from = a.min(b).min(c).saturating_sub(top_row).div_ceil(step);
+        let to = (a.max(b).max(c) + 1).saturating_sub(top_row).div_ceil(step).min(count);
         if from >= to {
             continue;
         }
@@ -66,7 +70,7 @@ fn rasterise_planes(
         let Some(plane) = Plane::through(corners, slope_max) else { continue };
         let (long, upper, lower) =
             (Edge::new(top, bottom), Edge::new(top, middle), Edge::new(middle, bottom));
-        for v in from..to {
+        for (i, v) in (from..to).zip((top_row + from * step..).step_by(step)) {
             let at = v as i32;
             let (a, b) = (
                 long.column(at),
@@ -75,12 +79,7 @@ fn rasterise_planes(
             // Pixels whose centre lies between the edges, one column wider to leave no seam.
             let (left, right) = ((a.min(b) >> SHIFT) as usize, (a.max(b) >> SHIFT) as usize + 1);
             let count = width.min(right + 1).saturating_sub(left);
-            plane.rasterise(
-                left as i64,
-                at.into(),
-                clipped_mut(out, (v - first) * width + left..),
-                count,
-            );
+            plane.rasterise(left as i64, at.into(), clipped_mut(out, i * width + left..), count);
         }
     }
 }

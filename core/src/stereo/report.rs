@@ -46,7 +46,8 @@ pub struct StereoReport {
     pub triangles_left: u32,
     /// Triangles in the right image.
     pub triangles_right: u32,
-    /// Pixels matched densely in the left image.
+    /// Pixels matched densely in the left image: of every second row only in images of many rows,
+    /// like all counts of pixels up to `filled`.
     pub matched: u32,
     /// Matched pixels that the right image contradicts.
     pub inconsistent: u32,
@@ -60,6 +61,8 @@ pub struct StereoReport {
     pub valid: u32,
     /// Pixels of the image.
     pub pixels: u32,
+    /// Pixels of the rows that are matched densely; 0 if disparities are given.
+    pub row_pixels: u32,
 }
 
 impl StereoReport {

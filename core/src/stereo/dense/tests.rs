@@ -65,11 +65,12 @@ impl Scene {
         Self { config, width, height, gradients, planes, cells }
     }
 
-    fn matching(&self) -> DenseMatching<'_> {
+    fn matching(&self, step: usize) -> DenseMatching<'_> {
         let [left_du, left_dv, right_du, right_dv] = &self.gradients;
         let gradients = |du, dv| Gradients { du, dv, width: self.width, height: self.height };
         DenseMatching {
             config: &self.config,
+            rows: MatchedRows { step, count: self.height / step },
             gradients: [gradients(left_du, left_dv), gradients(right_du, right_dv)],
             cells: self
                 .cells
@@ -79,9 +80,14 @@ impl Scene {
         }
     }
 
+    /// Rows of an image that are matched if that many are one step.
+    fn rows(&self, image: &[i16], step: usize) -> Vec<i16> {
+        image.chunks(self.width).skip(step - 1).step_by(step).flatten().copied().collect()
+    }
+
     /// The disparities and the counts that a level of vector instructions gives.
-    fn matched(&self, vectors: Vectors) -> (Vec<i16>, [u32; 2]) {
-        let [mut left, mut right] = self.planes.clone();
+    fn matched(&self, vectors: Vectors, step: usize) -> (Vec<i16>, [u32; 2]) {
+        let [mut left, mut right] = self.planes.each_ref().map(|planes| self.rows(planes, step));
         let mut scratch = vec![Descriptor([0; 16]); 2 * self.width];
         let mut band = DenseBand {
             first: 0,
@@ -90,14 +96,14 @@ impl Scene {
             scratch: &mut scratch,
             counts: [0; 2],
         };
-        compare(vectors, MatchBand { matching: &self.matching(), band: &mut band });
+        compare(vectors, MatchBand { matching: &self.matching(step), band: &mut band });
         let counts = band.counts;
         (left, counts)
     }
 
     /// The twin.
     fn plain(&self) -> (Vec<i16>, [u32; 2]) {
-        let matching = self.matching();
+        let matching = self.matching(1);
         let (mut disparities, mut counts) = (vec![NONE; self.width * self.height], [0; 2]);
         let mut rows = [(); 2].map(|()| vec![Descriptor([0; 16]); self.width]);
         for v in MARGIN..self.height - MARGIN {
@@ -215,8 +221,10 @@ fn every_vector_level_equals_one_pixel_at_a_time() {
             let scene = Scene::random(&mut random, width, config);
             let (plain, counts) = scene.plain();
             for vectors in Vectors::available() {
-                let (matched, counted) = scene.matched(vectors);
+                let (matched, counted) = scene.matched(vectors, 1);
                 assert!(matched == plain && counted == counts, "{} at {width} px", vectors.name());
+                let (seconds, _) = scene.matched(vectors, 2);
+                assert!(seconds == scene.rows(&plain, 2), "{} at {width} px", vectors.name());
             }
         }
     }

@@ -17,8 +17,10 @@ use crate::{
         gradient::GradientRows,
         invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
+        rows::MatchedRows,
         smooth::{Along, Smooth},
         speckle::{Blanked, RemoveSpeckles, Scratch},
+        spread::SpreadRows,
         support,
         support::{MatchRows, NO_MATCH, SupportMatching},
     },
@@ -139,10 +141,12 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let (width, bands) = (self.width, Bands::new(self.height));
+        let (width, rows) = (self.width, MatchedRows::new(config, self.height));
+        let bands = Bands::new(rows.count);
         let columns = prior::cells(width, config.grid_size);
         let matching = DenseMatching {
             config,
+            rows,
             gradients: gradients(self.gradients, width, self.height),
             cells: [
                 CellGrid { cells: self.left_cells, columns },
@@ -170,6 +174,7 @@ impl StereoMatcher<'_> {
                     executor.vectors().run(RasterisePlanes {
                         mesh,
                         slope_max: MAX_PLANE_SLOPE,
+                        rows,
                         first: band.first,
                         width,
                         out,
@@ -191,15 +196,19 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        report.speckles = self.remove_segments(config, config.speckle_size, executor).measured;
+        let rows = MatchedRows::new(config, self.height);
+        // Sizes are of whole images: every second row has half of a segment's pixels.
+        let smallest = config.speckle_size.div_ceil(rows.step as u32);
+        report.speckles = self.remove_segments(config, smallest, executor).measured;
         // The second pass removes larger islands. Gaps within a surface are filled first, so that a
         // surface with holes is one segment.
-        let lone_size = (config.lone_share * (self.width * self.height) as f32) as u32;
+        let lone_size = (config.lone_share * (self.width * rows.count) as f32) as u32;
         if lone_size > 1 {
             let filling = Filling {
                 width: config.lone_gap.min(config.gap_width),
                 discontinuity: working(config.speckle_similarity) as u16 + 1,
                 ends: GapEnds::Surface,
+                rows,
             };
             report.filled = self.fill(filling, executor);
             let blanked = self.remove_segments(config, lone_size, executor);
@@ -219,6 +228,7 @@ impl StereoMatcher<'_> {
             width: config.gap_width,
             discontinuity: working(GAP_DISCONTINUITY) as u16,
             ends: config.gap_ends,
+            rows: MatchedRows::new(config, self.height),
         };
         report.filled += self.fill(filling, executor);
     }
@@ -237,7 +247,8 @@ impl StereoMatcher<'_> {
             ends: bytemuck::cast_slice_mut(self.other),
             flags: bytemuck::cast_slice_mut(self.columns),
         };
-        let disparity = image_of(self.disparity, self.width * self.height);
+        let rows = MatchedRows::new(config, self.height).count;
+        let disparity = image_of(self.disparity, self.width * rows);
         let similarity = working(config.speckle_similarity);
         executor.vectors().run(RemoveSpeckles {
             disparity,
@@ -250,11 +261,11 @@ impl StereoMatcher<'_> {
 
     /// Fills gaps along rows, then along columns; returns the pixels filled.
     fn fill<E: Executor>(&mut self, filling: Filling, executor: &E) -> u32 {
-        let (width, vectors) = (self.width, executor.vectors());
-        let image = image_of(self.disparity, width * self.height);
+        let (width, rows, vectors) = (self.width, filling.rows.count, executor.vectors());
+        let image = image_of(self.disparity, width * rows);
         // Buffers that other steps use as well, cut to what the bands need.
         let edges = Bands::new(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
-        let bands = zip2(Bands::new(self.height).split_mut(image, width), edges);
+        let bands = zip2(Bands::new(rows).split_mut(image, width), edges);
         let along_rows = each(executor, bands, |(rows, edges)| {
             vectors.run(FillRows { rows, width, filling, edges })
         });
@@ -265,6 +276,13 @@ impl StereoMatcher<'_> {
         let ends = bytemuck::cast_slice_mut(ends);
         along_rows.iter().sum::<u32>()
             + vectors.run(FillColumns { image, width, filling, last_row, ends })
+    }
+
+    /// Puts the matched rows where they belong, and others between them.
+    pub(super) fn spread_rows<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
+        let rows = MatchedRows::new(config, self.height);
+        let image = image_of(self.disparity, self.width * self.height);
+        executor.vectors().run(SpreadRows { image, width: self.width, rows });
     }
 
     pub(super) fn smooth<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {

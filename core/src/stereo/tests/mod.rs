@@ -3,6 +3,7 @@
 
 mod clips;
 mod scenes;
+mod second_rows;
 mod trouble;
 
 use super::*;

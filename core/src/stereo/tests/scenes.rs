@@ -4,13 +4,13 @@ use super::*;
 use crate::random::Random;
 
 /// A random texture, smooth enough to be shifted by fractions of a pixel: noise of two sizes.
-struct Texture {
+pub(super) struct Texture {
     width: usize,
     noise: Vec<f32>,
 }
 
 impl Texture {
-    fn new(width: usize, height: usize, seed: u64) -> Self {
+    pub(super) fn new(width: usize, height: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let raw: Vec<f32> = (0..width * height).map(|_| random.below(256) as f32).collect();
         let smooth =
@@ -18,7 +18,7 @@ impl Texture {
         Self { width, noise: (0..raw.len()).map(smooth).collect() }
     }
 
-    fn at(&self, u: f32, v: usize) -> f32 {
+    pub(super) fn at(&self, u: f32, v: usize) -> f32 {
         let u = crate::geometry::scalar::clamp_f32(u, 0.0, (self.width - 2) as f32);
         let (i, f) = (u as usize, u - (u as usize) as f32);
         self.noise[v * self.width + i] * (1.0 - f) + self.noise[v * self.width + i + 1] * f
@@ -45,7 +45,11 @@ pub(super) fn surface(
 
 /// Share of pixels within 1 px of the truth, among those that the right image sees too and whose
 /// window fits both images.
-fn share_within_one_px(disparity: &[u16], width: usize, truth: impl Fn(f32, f32) -> f32) -> f64 {
+pub(super) fn share_within_one_px(
+    disparity: &[u16],
+    width: usize,
+    truth: impl Fn(f32, f32) -> f32,
+) -> f64 {
     let height = disparity.len() / width;
     let (mut good, mut all) = (0, 0);
     for (i, &d) in disparity.iter().enumerate() {

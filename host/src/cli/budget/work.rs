@@ -22,7 +22,7 @@ const fn unit(name: &'static str, stage: &'static str, formula: &'static str) ->
 
 /// Every unit, in the order of [`WorkUnits::named`].
 const UNITS: [Unit; WorkUnits::COUNT] = [
-    unit("stereo_pixels", "stereo", "image_width x image_height"),
+    unit("stereo_pixels", "stereo", "image_width x matched rows (stereo.second_rows_from)"),
     unit("support_candidates", "stereo", "lattice points of the image"),
     unit("triangles", "stereo", "2 images x 2 for each lattice point"),
     unit("features", "scene flow", "2 images x (features + features / 4)"),

@@ -256,7 +256,7 @@ static OBJECTS: &[FrameColumn] = &[
 
 /// Units of work, the same on every machine.
 static WORK: &[FrameColumn] = &[
-    column("work_stereo_pixels", "", "pixels that stereo matched or took", |row| {
+    column("work_stereo_pixels", "", "pixels of the rows that stereo matched", |row| {
         row.report.work.stereo_pixels.into()
     }),
     column(
