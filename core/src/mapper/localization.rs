@@ -365,6 +365,8 @@ impl<'s> Localization<'s> {
         let excluded = seen.scene_flow.selection().len() - matches.clone().count();
         // The rig with the baseline that is in use, not the calibrated one.
         let (rig, was_lost) = (seen.config.scaled_rig(), self.camera.is_lost());
+        // Without a way and a map before it, the guess is as good as any pose.
+        let is_new = !self.camera.has_moved() && static_map.volume.pool().is_empty();
         let estimate = self.camera.step(
             &seen.config.egomotion,
             &rig,
@@ -383,7 +385,7 @@ impl<'s> Localization<'s> {
         }
         // After a long loss the map, not the last pose, has to say where the camera is.
         let is_estimated = self.camera.extrapolated_frames() == 0;
-        if was_lost && is_estimated {
+        if was_lost && is_estimated && !is_new {
             self.search = Search::Guess;
         }
         let origin = if is_estimated {

@@ -58,7 +58,7 @@ const REGISTRATION: IcpConfig = IcpConfig {
 impl Localization<'_> {
     /// Takes the next step of the search for a camera that was lost, in a frame whose motion was
     /// estimated. Returns the origin of the pose that follows: the camera is searched for on, is
-    /// found, or begins a segment. Where no map is yet, the guess is as good as any pose.
+    /// found, or begins a segment, as it does where the map is still empty.
     pub(super) fn search_on<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
@@ -66,7 +66,7 @@ impl Localization<'_> {
         executor: &E,
     ) -> PoseOrigin {
         let step = core::mem::take(&mut self.search);
-        if step == Search::Off || static_map.volume.pool().is_empty() {
+        if step == Search::Off {
             return self.origin(true);
         }
         let guess = *self.camera.t_world_camera();

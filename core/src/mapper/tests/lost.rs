@@ -3,7 +3,7 @@
 use super::resume::{restored, saved};
 use super::*;
 use crate::{
-    PoseOrigin,
+    PoseOrigin, Severity,
     egomotion::MAX_REFERENCE_FRAMES,
     geometry::MapSegment,
     objects::{ObjectSink, RetiredObject, Retirement},
@@ -41,9 +41,18 @@ fn step(mapper: &mut Mapper<'_>, at: usize, given: Option<Transform>) -> Report 
 
 /// Hands a mapper that was lost, with the report of frame [`BEGAN`], to `test`.
 fn with_lost<R>(capacity: &Capacity, test: impl FnOnce(&mut Mapper<'_>, Report) -> R) -> R {
+    with_lost_by(capacity, &Walk::config(), test)
+}
+
+/// Does so with settings of one's own.
+fn with_lost_by<R>(
+    capacity: &Capacity,
+    config: &Config,
+    test: impl FnOnce(&mut Mapper<'_>, Report) -> R,
+) -> R {
     let mut slab = vec![0u8; capacity.bytes() + SLAB_ALIGN];
     let start = slab.as_ptr().align_offset(SLAB_ALIGN);
-    let mut mapper = Mapper::new(capacity, &Walk::config(), &mut slab[start..]).unwrap();
+    let mut mapper = Mapper::new(capacity, config, &mut slab[start..]).unwrap();
     let mut last = Report::default();
     for at in 0..=BEGAN {
         last = step(&mut mapper, at, None);
@@ -133,6 +142,19 @@ fn a_camera_that_was_lost_begins_a_segment_at_its_origin() {
         let motion = pose(BEGAN).inverse() * pose(BEGAN + 1);
         let off_m = (next.t_world_camera.inverse() * motion).distance_m();
         assert!(off_m < 0.02 && next.segment == SECOND, "{off_m} m");
+    });
+}
+
+#[test]
+fn a_camera_that_was_lost_where_nothing_is_mapped_does_not_guess_its_way() {
+    // All that is seen lies beyond the map's range, as a yard does for a rig meant for a desk.
+    let mut config = Walk::config();
+    (config.volume.near_m, config.volume.far_m) = (0.1, 0.5);
+    with_lost_by(&CAPACITY, &config, |mapper, report| {
+        assert_eq!((report.pose, report.segment), (PoseOrigin::Estimated, SECOND));
+        let next = step(mapper, BEGAN + 1, None);
+        assert_eq!(next.blocks.used, 0, "nothing is mapped");
+        assert_eq!(next.severity(), Severity::MapAffected);
     });
 }
 
