@@ -227,6 +227,16 @@ impl SinglePrecision {
         })
     }
 
+    /// Distance between where the motion puts a match and where it is seen, px; infinite for one
+    /// that cannot be triangulated.
+    pub(super) fn distance_px(&self, m: &Match, rig: &StereoRig) -> f32 {
+        let squared = triangulate(m, rig).map(|Point { xyz, left, right }| {
+            let [left, right] = [left, right].map(|at| at.map(|x| x as f32));
+            self.error(xyz.map(|x| x as f32), left, right)
+        });
+        squared.map_or(f32::INFINITY, libm::sqrtf)
+    }
+
     #[inline(always)]
     fn error(&self, [x, y, z]: [f32; 3], left: [f32; 2], right: [f32; 2]) -> f32 {
         // A row of the rotation times the point.

@@ -125,7 +125,7 @@ impl Egomotion {
         let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
         let found = estimator.estimate(config, rig, matches.clone(), hypotheses);
         self.reference_s += f64::from(interval_s);
-        let contest = Contest { camera: self, config, rig };
+        let contest = Contest { camera: self, config, rig, expected: &expected };
         let winner = contest.choose(matches.clone(), estimator, &found);
         let found = contest.estimate(winner, matches.clone(), estimator, found);
         let found = self.hold_to_turn(Sight { config, rig, matches }, estimator, found);

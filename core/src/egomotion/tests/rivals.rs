@@ -108,3 +108,33 @@ fn witnesses_that_disagree_leave_the_pose_a_guess() {
     let way_m = poses[4].0.translation_m[2];
     assert!((way_m - 7.5).abs() < 0.1, "the motion goes on: {way_m} m");
 }
+
+#[test]
+fn a_truck_that_cuts_in_before_a_slow_camera_does_not_carry_it() {
+    // Most of the world flows by less than the distance within which a match counts as an inlier.
+    let poses = travel(16, |frame, scene| {
+        let truck = if frame < 6 { 0 } else { 260 };
+        scene.add(truck, [5.9, 6.1], [0.2, 0.8], &Transform::IDENTITY);
+        scene.add(400 - truck, WORLD_M, ALL, &ahead(0.2));
+    });
+    let way_m = poses[15].0.translation_m[2];
+    assert!((way_m - 3.2).abs() < 0.1, "{way_m} m of 3.2");
+}
+
+#[test]
+fn a_person_who_walks_as_the_camera_does_is_no_world() {
+    // A hand turns the camera; the person ahead stays where they are in the view.
+    let turning = Transform::new(Vector3::new(0.0, 0.02, 0.0), Vector3::new(0.0, 0.0, -0.03));
+    let poses = travel(14, |frame, scene| {
+        let person = if frame < 6 { 0 } else { 270 };
+        scene.add(person, [1.45, 1.55], [0.3, 0.7], &Transform::IDENTITY);
+        scene.add(400 - person, [2.0, 6.0], ALL, &turning);
+    });
+    for (frame, (_, estimate)) in poses.iter().enumerate() {
+        let Some(motion) = estimate.t_current_previous else { continue };
+        let (off_m, off_deg) = between(&motion, &turning);
+        assert!(off_m < 0.01 && off_deg < 0.2, "frame {frame}: {off_m} m, {off_deg} degrees");
+    }
+    let held = poses.iter().filter(|(_, estimate)| estimate.t_current_previous.is_none()).count();
+    assert!(held <= 2, "{held} frames of 14 were guessed");
+}

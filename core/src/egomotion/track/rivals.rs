@@ -1,18 +1,20 @@
 //! Motions that compete for what carries the camera.
 //!
 //! A truck ahead that drives at our speed, or the car's own bonnet, moves rigidly as the world
-//! does, and may have more matches. Where the motion found explains too few matches, further ones
-//! are sought among the rest. Two witnesses choose between two motions:
+//! does, and may have more matches. Where the motion found leaves enough matches unexplained,
+//! further ones are sought among them. A motion explains matches exactly, or it is one between two:
+//! where flow is slow, that has more inliers than either. Two witnesses choose between two motions:
 //!
 //! - *structure*: the world reaches over many columns of the image and many depths; a vehicle has
 //!   few of one of them, a bonnet or a bus across the view few depths;
-//! - *the last motion*: a camera can accelerate only so much.
+//! - *the last motion*: a camera can accelerate only so much, and if it can go on by both motions,
+//!   the world is where it was expected, and what moves by itself surprises.
 //!
 //! Where both witnesses disagree there is no motion ([`MotionStatus::Contested`]); where neither
 //! says anything, more matches win.
 //!
-//! **Time.** Nothing where [`UNCONTESTED_SHARE`] of the matches agree; else one or two estimates
-//! more, on the matches that are left.
+//! **Time.** A look at each match; where [`RIVAL_SHARE_MIN`] of them are left, one or two estimates
+//! more, on those.
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus,
@@ -24,27 +26,36 @@ use crate::{
     scene_flow::Match,
 };
 
-/// Share of the matches from which on no other motion is sought.
-const UNCONTESTED_SHARE: f32 = 0.8;
+/// Distance within which a motion explains a match, px over four coordinates. It is a third of an
+/// inlier's: where flow is slow, a motion between two has the inliers of both.
+const EXACT_PX: f32 = 0.7;
 /// Motions that compete at most.
 const MAX_RIVALS: usize = 3;
 /// Least share of all matches that only a rival explains, and the fewest.
 const RIVAL_SHARE_MIN: f32 = 0.12;
 const RIVAL_MATCHES_MIN: u32 = 24;
-/// Distance from which on a motion does not explain a match, as a multiple of an inlier's.
+/// Distance from which on a motion does not explain a match, as a multiple of [`EXACT_PX`].
 const APART: f32 = 1.5;
 /// Columns that the image is divided into, and half octaves of disparity.
 const COLUMNS: usize = 16;
 const DEPTHS: usize = 20;
 /// Factor by which one structure must exceed another.
 const CLEARLY: u32 = 2;
+/// Mean distance between the matches of a motion and where the last motion puts them from which on
+/// they contradict it, px over four coordinates, and factor by which it must exceed another.
+const SURPRISE_PX: f32 = 0.5;
+const SURPRISE_FACTOR: f32 = 1.5;
+/// Distance beyond which a match surprises no more, px.
+const SURPRISE_MOST_PX: f32 = 20.0;
 
 /// Extent of the matches that one of two motions explains, and the other does not.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Structure {
     matches: u32,
     /// Columns of the image that have some of them, times half octaves of disparity that have.
     cells: u32,
+    /// Mean distance from where the camera's last motion puts them, px.
+    surprise_px: f32,
 }
 
 /// Motion that a witness prefers.
@@ -58,16 +69,17 @@ impl Structure {
     fn new<'m>(
         rig: &StereoRig,
         matches: impl Iterator<Item = &'m Match>,
-        [own, other]: [&SinglePrecision; 2],
-        within_px: f32,
+        [own, other, last]: [&SinglePrecision; 3],
     ) -> Self {
         let (mut columns, mut depths) = ([0u32; COLUMNS], [0u32; DEPTHS]);
-        let mut count = 0;
+        let (mut count, mut surprise_px) = (0, 0.0);
         for m in matches {
-            if !own.explains(m, rig, within_px) || other.explains(m, rig, APART * within_px) {
+            if !own.explains(m, rig, EXACT_PX) || other.explains(m, rig, APART * EXACT_PX) {
                 continue;
             }
             count += 1;
+            let px = last.distance_px(m, rig);
+            surprise_px += if px < SURPRISE_MOST_PX { px } else { SURPRISE_MOST_PX };
             let disparity_px = m.previous_left[0] - m.previous_right[0];
             // The square's whole logarithm is that of half octaves. Casts hold at the ends.
             let depth = ((disparity_px * disparity_px) as u32).max(1).ilog2() as usize;
@@ -80,7 +92,8 @@ impl Structure {
         // Single wrong matches agree with anything.
         let column_count = columns.iter().filter(|&&found| found >= 2).count();
         let depth_count = depths.iter().filter(|&&found| found >= 2 + count / 32).count();
-        Self { matches: count, cells: (column_count * depth_count) as u32 }
+        let surprise_px = surprise_px / count.max(1) as f32;
+        Self { matches: count, cells: (column_count * depth_count) as u32, surprise_px }
     }
 
     /// The motion whose structure is clearly the larger one.
@@ -110,6 +123,8 @@ pub(super) struct Contest<'a> {
     pub camera: &'a Egomotion,
     pub config: &'a EgomotionConfig,
     pub rig: &'a StereoRig,
+    /// Motion since the reference, if the camera moves on as before.
+    pub expected: &'a Transform,
 }
 
 impl Contest<'_> {
@@ -122,23 +137,26 @@ impl Contest<'_> {
         estimator: &mut Estimator<'_>,
         found: &MotionEstimate,
     ) -> Winner {
-        let Self { camera, config, rig } = *self;
+        let Self { camera, rig, expected, .. } = *self;
         let Some(first) = found.t_current_previous else { return Winner::Found };
-        if found.inliers as f32 >= UNCONTESTED_SHARE * found.matches as f32 {
+        // No rival can have enough matches where few are left.
+        let view = SinglePrecision::new(&first, rig);
+        let is_left = |m: &&Match| !view.explains(m, rig, APART * EXACT_PX);
+        if !is_enough(matches.clone().filter(is_left).count() as u32, found.matches) {
             return Winner::Found;
         }
+        let exact = self.exact();
         let (mut champion, mut known) = (first, [first; MAX_RIVALS]);
         let mut contested = false;
         // The camera's own draws stay as they are: a contest must not change what comes after it.
         let mut random: Random = camera.random.clone();
         for round in 1..MAX_RIVALS {
             let views = known.map(|motion| SinglePrecision::new(&motion, rig));
-            let is_left = |m: &&Match| {
-                views.iter().all(|view| !view.explains(m, rig, APART * config.inlier_px))
-            };
-            let hypotheses = MotionHypotheses { random: &mut random, initial: None };
+            let is_left =
+                |m: &&Match| views.iter().all(|view| !view.explains(m, rig, APART * EXACT_PX));
+            let hypotheses = MotionHypotheses { random: &mut random, initial: Some(expected) };
             let rest = matches.clone().filter(is_left);
-            let rival = estimator.find(config, rig, rest, hypotheses);
+            let rival = estimator.find(&exact, rig, rest, hypotheses);
             let Some(motion) = rival.t_current_previous else { break };
             // A slot that is not filled yet repeats the first motion.
             known.iter_mut().skip(round).for_each(|slot| *slot = motion);
@@ -177,11 +195,16 @@ impl Contest<'_> {
             // Far matches agree with several motions, and hold the rotation: all of them count
             // again.
             Winner::Rival(motion) => {
-                let config = EgomotionConfig { inlier_share_min: RIVAL_SHARE_MIN, ..*self.config };
+                let config = EgomotionConfig { inlier_share_min: RIVAL_SHARE_MIN, ..self.exact() };
                 let estimate = estimator.estimate_near(&config, self.rig, matches, &motion);
                 MotionEstimate { samples: found.samples, ..estimate }
             }
         }
+    }
+
+    /// Settings of an estimate that exact matches make.
+    fn exact(&self) -> EgomotionConfig {
+        EgomotionConfig { inlier_px: EXACT_PX, refined_inlier_px: EXACT_PX, ..*self.config }
     }
 
     /// Asks the witnesses about two motions.
@@ -190,18 +213,20 @@ impl Contest<'_> {
         matches: impl Iterator<Item = &'m Match> + Clone,
         motions: [&Transform; 2],
     ) -> Verdict {
-        let Self { config, rig, .. } = *self;
+        let Self { rig, expected, .. } = *self;
         let [first, second] = motions.map(|motion| SinglePrecision::new(motion, rig));
-        let count = matches.clone().count() as f32;
-        let structures = [[&first, &second], [&second, &first]]
-            .map(|views| Structure::new(rig, matches.clone(), views, config.inlier_px));
+        let last = SinglePrecision::new(expected, rig);
+        let count = matches.clone().count() as u32;
+        let structures = [[&first, &second, &last], [&second, &first, &last]]
+            .map(|views| Structure::new(rig, matches.clone(), views));
         let [_, of_second] = structures;
-        let needed = RIVAL_SHARE_MIN * count;
-        if of_second.matches < RIVAL_MATCHES_MIN || (of_second.matches as f32) < needed {
+        if !is_enough(of_second.matches, count) {
             return Verdict::TooFew;
         }
         let by_structure = Structure::preferred(structures);
-        match (by_structure, self.preferred_by_last(motions)) {
+        let by_last = self.preferred_by_last(motions);
+        let by_last = by_last.or_else(|| self.unsurprising(structures));
+        match (by_structure, by_last) {
             (Some(Preferred::First), Some(Preferred::Second))
             | (Some(Preferred::Second), Some(Preferred::First)) => Verdict::Disagreed,
             (Some(Preferred::Second), _) | (None, Some(Preferred::Second)) => Verdict::Second,
@@ -224,6 +249,25 @@ impl Contest<'_> {
             _ => None,
         }
     }
+
+    /// The motion whose matches clearly lie nearer to where the last motion puts them; `None`
+    /// without a last motion.
+    fn unsurprising(&self, [first, second]: [Structure; 2]) -> Option<Preferred> {
+        let is_clear = |less: f32, more: f32| more > SURPRISE_PX && more > SURPRISE_FACTOR * less;
+        let is_known = self.camera.motion_s > 0.0 && !self.camera.is_lost();
+        if is_known && is_clear(first.surprise_px, second.surprise_px) {
+            Some(Preferred::First)
+        } else if is_known && is_clear(second.surprise_px, first.surprise_px) {
+            Some(Preferred::Second)
+        } else {
+            None
+        }
+    }
+}
+
+/// Tells that so many of `matches` may be a motion of their own.
+fn is_enough(count: u32, matches: u32) -> bool {
+    count >= RIVAL_MATCHES_MIN && count as f32 >= RIVAL_SHARE_MIN * matches as f32
 }
 
 /// Result of a contest.
