@@ -157,6 +157,7 @@ impl Default for StereoConfig {
             grid_size: 16,
             gamma: 10.0,
             plane_radius_sigmas: 1.0,
+            second_rows_from: 200,
             consistency_threshold: 1,
             lone_share: 0.002,
             gap_width: 70,

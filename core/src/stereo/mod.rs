@@ -11,7 +11,8 @@
 //!
 //! Own choices, where the paper leaves one: which 16 gradient samples make a descriptor
 //! (`descriptor.rs`); support points are filtered implausible all at once; disparities are refined
-//! to fractions of a pixel ([`StereoConfig::subpixel`], measured there); the mean is centred.
+//! to fractions of a pixel ([`StereoConfig::subpixel`], measured there); the mean is centred;
+//! images of many rows are matched on every second one ([`StereoConfig::second_rows_from`]).
 //! Pixels outside the hull of the support points get no disparity.
 //!
 //! **Memory.** 8 bytes a pixel: the four gradients (1 each; the runs of the speckle filter lie in
