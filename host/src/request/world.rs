@@ -17,7 +17,7 @@ pub enum SyntheticWorld {
     Room,
     /// A yard with houses, a hedge, trees and people
     Yard,
-    /// A town whose drive closes a loop
+    /// A town, and a loop of streets to go round
     Town,
 }
 

@@ -36,6 +36,13 @@ fn a_full_turn_is_recognised() {
     assert!(counts.closures > 0 && counts.refused + counts.taken_out == 0, "{counts:?}");
     assert_eq!(moved, counts.moved, "{counts:?}");
     assert!(moved > 0 && mapper.static_map().is_bent(), "the map moves with its keyframes");
+    // What it holds says where a full turn ends: at its beginning.
+    assert!(mapper.held_loops().count() > 0);
+    for held in mapper.held_loops() {
+        let [from, to] = [held.from_frame, held.to_frame].map(|frame| turning(frame as usize));
+        let off = (from.inverse() * to).inverse() * held.t_from_to;
+        assert!(off.distance_m() < 0.1 && off.angle_rad() < 0.02, "{held:?}");
+    }
 }
 
 #[test]
