@@ -4,9 +4,13 @@ use dynvox_core::egomotion::MotionCovariance;
 use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::{PoseOrigin, Report};
 use serde::{Deserialize, Serialize};
+use std::array;
 
 /// Names of the six directions: rotation about the camera's axes, then translation along them.
 pub const DIRECTIONS: [&str; 6] = ["pitch", "yaw", "roll", "right", "down", "ahead"];
+/// Standard deviation of an error that all motions of a path share, as a share of each motion's
+/// own. Residuals do not show it, and along the path it adds up linearly.
+const SHARED: f64 = 0.3;
 /// Translation of one guessed frame, m, one sigma; it grows with the square of their number.
 const GUESSED_M: f64 = 0.1;
 /// Rotation of one guessed frame, rad, one sigma.
@@ -16,13 +20,11 @@ const GUESSED_RAD: f64 = 0.01;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PathCertainty {
     segment: MapSegment,
-    /// Covariance and pose of the last frame whose pose is not a guess.
-    reference: MotionCovariance,
-    t_world_reference: Transform,
-    /// Covariance and pose of the frame that an anchored motion counts from: the one before the
-    /// last estimate that is not anchored.
-    anchor: MotionCovariance,
-    t_world_anchor: Transform,
+    /// The last frame whose pose is not a guess.
+    reference: CertainPose,
+    /// The frame that an anchored motion counts from: the one before the last estimate that is not
+    /// anchored.
+    anchor: CertainPose,
     /// Frames guessed since.
     guessed: u32,
 }
@@ -32,10 +34,8 @@ impl Default for PathCertainty {
     fn default() -> Self {
         Self {
             segment: MapSegment::FIRST,
-            reference: MotionCovariance::ZERO,
-            t_world_reference: Transform::IDENTITY,
-            anchor: MotionCovariance::ZERO,
-            t_world_anchor: Transform::IDENTITY,
+            reference: CertainPose::known(Transform::IDENTITY),
+            anchor: CertainPose::known(Transform::IDENTITY),
             guessed: 0,
         }
     }
@@ -44,13 +44,8 @@ impl Default for PathCertainty {
 impl PathCertainty {
     /// Begins with a frame whose pose counts as known.
     fn from_first(report: &Report) -> Self {
-        let pose = report.t_world_camera;
-        Self {
-            segment: report.segment,
-            t_world_reference: pose,
-            t_world_anchor: pose,
-            ..Self::default()
-        }
+        let pose = CertainPose::known(report.t_world_camera);
+        Self { segment: report.segment, reference: pose, anchor: pose, guessed: 0 }
     }
 
     /// Takes a frame, and returns the covariance of its pose against the segment's first frame, in
@@ -59,35 +54,111 @@ impl PathCertainty {
         let begins = report.segment != self.segment || report.pose == PoseOrigin::First;
         if begins || report.pose == PoseOrigin::Given {
             *self = Self::from_first(report);
-            return self.reference;
+            return MotionCovariance::ZERO;
         }
-        let motion = (report.t_world_camera.inverse() * self.t_world_reference).normalized();
         let covariance = report.egomotion.and_then(|motion| motion.covariance);
         match covariance.filter(|_| report.pose == PoseOrigin::Estimated) {
             Some(covariance) => {
                 // An anchored motion replaces those since its anchor; others begin where the last
                 // one ended.
                 if !report.egomotion.is_some_and(|motion| motion.anchored) {
-                    (self.anchor, self.t_world_anchor) = (self.reference, self.t_world_reference);
+                    self.anchor = self.reference;
                 }
-                let motion = (report.t_world_camera.inverse() * self.t_world_anchor).normalized();
-                self.reference = covariance.after(&self.anchor, &motion);
-                (self.t_world_reference, self.guessed) = (report.t_world_camera, 0);
-                self.reference
+                self.reference = self.anchor.moved(report.t_world_camera, &covariance, SHARED);
+                self.guessed = 0;
+                self.reference.covariance()
             }
             None => {
                 self.guessed += 1;
-                let pose = guess(self.guessed).after(&self.reference, &motion);
+                let guessed =
+                    |frames| self.reference.moved(report.t_world_camera, &guess(frames), 0.0);
+                let pose = guessed(self.guessed).covariance();
                 // Depth registration and the map's own word have no covariance, but hold the
                 // camera: the next frame counts from there.
                 if report.pose != PoseOrigin::Extrapolated {
-                    self.reference = guess(1).after(&self.reference, &motion);
-                    (self.t_world_reference, self.guessed) = (report.t_world_camera, 0);
+                    (self.reference, self.guessed) = (guessed(1), 0);
                 }
                 pose
             }
         }
     }
+}
+
+/// Pose with the errors that it may have against the segment's first frame, in the camera's axes.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct CertainPose {
+    t_world_camera: Transform,
+    /// Errors of single motions.
+    own: MotionCovariance,
+    /// Errors that all motions share: each column is the effect of one of six independent ones.
+    shared: [[f64; 6]; 6],
+}
+
+impl CertainPose {
+    /// Pose without an error.
+    fn known(t_world_camera: Transform) -> Self {
+        Self { t_world_camera, own: MotionCovariance::ZERO, shared: [[0.0; 6]; 6] }
+    }
+
+    /// Pose after a motion with this covariance. A share of the motion's deviations is common to
+    /// all motions.
+    fn moved(&self, t_world_camera: Transform, covariance: &MotionCovariance, share: f64) -> Self {
+        let motion = (t_world_camera.inverse() * self.t_world_camera).normalized();
+        let (change, root) = (change(&motion), root(&covariance.matrix()));
+        let shared = array::from_fn(|row| {
+            array::from_fn(|column| {
+                let carried: f64 = (0..6).map(|k| change[row][k] * self.shared[k][column]).sum();
+                carried + share * root[row][column]
+            })
+        });
+        Self { t_world_camera, own: covariance.after(&self.own, &motion), shared }
+    }
+
+    /// Covariance of both kinds of errors.
+    fn covariance(&self) -> MotionCovariance {
+        let mut sum = self.own.matrix();
+        for (row, entries) in sum.iter_mut().enumerate() {
+            for (column, entry) in entries.iter_mut().enumerate() {
+                *entry += (0..6).map(|k| self.shared[row][k] * self.shared[column][k]).sum::<f64>();
+            }
+        }
+        MotionCovariance::from_matrix(&sum)
+    }
+}
+
+/// Errors of a pose after a motion as a linear function of those before it: rotation, then
+/// translation.
+fn change(t_current_previous: &Transform) -> [[f64; 6]; 6] {
+    let rotation = t_current_previous.rotation_matrix();
+    let [x, y, z] = t_current_previous.translation_m;
+    // An error of orientation swings the way driven since.
+    let swing = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    array::from_fn(|row| {
+        array::from_fn(|column| match (row < 3, column < 3) {
+            (true, true) => rotation[row][column],
+            (true, false) => 0.0,
+            (false, true) => (0..3).map(|k| swing[row - 3][k] * rotation[k][column]).sum(),
+            (false, false) => rotation[row - 3][column - 3],
+        })
+    })
+}
+
+/// Lower triangle whose product with its own transpose is the matrix (Cholesky); a direction
+/// without variance stays zero.
+fn root(matrix: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
+    let mut root = [[0.0_f64; 6]; 6];
+    for (row, entries) in matrix.iter().enumerate() {
+        for (column, entry) in entries.iter().enumerate().take(row + 1) {
+            let known: f64 = (0..column).map(|k| root[row][k] * root[column][k]).sum();
+            let (rest, pivot) = (entry - known, root[column][column]);
+            root[row][column] = match (row == column, pivot > 0.0) {
+                (true, _) => rest.max(0.0).sqrt(),
+                (false, true) => rest / pivot,
+                (false, false) => 0.0,
+            };
+        }
+    }
+    root
 }
 
 /// Covariance of a motion that was guessed over some frames.
@@ -201,6 +272,7 @@ impl PathHonesty {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dynvox_core::egomotion::MotionEstimate;
 
     #[test]
     fn errors_count_against_the_sigma_of_their_direction() {
@@ -214,6 +286,53 @@ mod tests {
         assert_eq!(honesty.within, [2, 2, 2, 1, 2, 2]);
         let [errors, sigmas] = honesty.sizes();
         assert!((sigmas[3] - 0.1).abs() < 1e-12 && (errors[3] - 0.2).abs() < 0.001, "{errors:?}");
+    }
+
+    /// Certainty after so many frames of a straight way, each a metre long and known within a
+    /// centimetre ahead.
+    fn straight(frames: u32) -> MotionCovariance {
+        let mut matrix = [[0.0; 6]; 6];
+        matrix[5][5] = 1e-4;
+        let mut motion = MotionEstimate::default();
+        motion.covariance = Some(MotionCovariance::from_matrix(&matrix));
+        let mut certainty = PathCertainty::default();
+        let mut last = MotionCovariance::ZERO;
+        for frame in 0..=frames {
+            let mut report = Report::default();
+            report.t_world_camera = Transform::from_translation([0.0, 0.0, f64::from(frame)]);
+            report.pose = if frame == 0 { PoseOrigin::First } else { PoseOrigin::Estimated };
+            report.egomotion = Some(motion);
+            last = certainty.add(&report);
+        }
+        last
+    }
+
+    #[test]
+    fn what_all_motions_share_adds_up_linearly() {
+        let [one, many] = [1, 400].map(|frames| straight(frames).translation_sigma_m()[2]);
+        // Independent errors of 400 motions are 20 times that of one, shared ones 400 times.
+        let expected = 0.01 * (400.0 + (400.0 * SHARED).powi(2)).sqrt();
+        assert!((many - expected).abs() < 1e-9, "{many} m instead of {expected}");
+        assert!((one - 0.01 * (1.0 + SHARED * SHARED).sqrt()).abs() < 1e-9, "{one}");
+        assert!(many > 80.0 * one);
+    }
+
+    #[test]
+    fn a_root_times_itself_is_the_matrix() {
+        let lower: [[f64; 6]; 6] = array::from_fn(|row| {
+            array::from_fn(|column| match column.cmp(&row) {
+                std::cmp::Ordering::Less => 0.1 * (row as f64 - 2.0 * column as f64),
+                std::cmp::Ordering::Equal => 1.0 + row as f64,
+                std::cmp::Ordering::Greater => 0.0,
+            })
+        });
+        let squared = array::from_fn(|row| {
+            array::from_fn(|column| (0..6).map(|k| lower[row][k] * lower[column][k]).sum())
+        });
+        let found = root(&squared);
+        let off = (0..36).map(|at| (found[at / 6][at % 6] - lower[at / 6][at % 6]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{found:?}");
+        assert_eq!(root(&[[0.0; 6]; 6]), [[0.0; 6]; 6], "a pose that is known");
     }
 
     #[test]
