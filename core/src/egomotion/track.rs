@@ -151,7 +151,10 @@ impl Egomotion {
                 self.extrapolated = 0;
                 self.refer_to_last();
             }
-            _ => self.hold_from_reference(),
+            _ => {
+                self.hold_from_reference();
+                self.follow_turn(config, &estimate);
+            }
         }
         estimate
     }

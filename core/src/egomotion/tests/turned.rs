@@ -122,3 +122,29 @@ fn a_motion_that_contradicts_is_refused_if_there_is_none_near() {
     assert_eq!(estimate.status, MotionStatus::Implausible);
     assert!(estimate.t_current_previous.is_none() && turn_rad < TURN_SIGMA_RAD, "{turn_rad}");
 }
+
+#[test]
+fn after_dark_frames_a_refused_motion_does_not_leave_the_camera_lost() {
+    // Few matches with the frame before the dark, of something else; many from then on.
+    let other = Transform::new([0.0, 0.05, 0.0], [0.0; 3]) * motion();
+    let few = Group { count: 14, depths_m: WORLD_M, columns: [0.0, 1.0], motion: other };
+    let views = [matches(7, &[world(200)]), Vec::new(), Vec::new(), matches(8, &[few])];
+    let mut slab = Box::new(Slab([0; BYTES]));
+    let (mut estimator, mut camera) = (estimator(&mut slab), Egomotion::default());
+    let mut truth = Transform::IDENTITY;
+    let mut since = Vec::new();
+    for view in &views {
+        // The turn since the frame before the dark adds up.
+        let frames = camera.since_reference() + 1;
+        let one = predicted(None);
+        let whole = (1..frames).fold(one.last, |sum, _| sum.then(&one.last));
+        camera.expect_turn(Some(PredictedTurn { whole: Some(whole), ..one }));
+        camera.step(&EgomotionConfig::default(), &RIG, at_10_hz(view), &mut estimator);
+        since.push(camera.since_reference());
+        truth = truth * motion().inverse();
+    }
+    assert_eq!(since, [0, 1, 2, 0], "the guess that images follow is what they are matched with");
+    assert_eq!(camera.extrapolated_frames(), 3, "and stays a guess");
+    let (way_m, turn_degrees) = between(camera.t_world_camera(), &truth);
+    assert!(way_m < 0.05 && turn_degrees < 0.5, "{way_m} m, {turn_degrees} degrees");
+}

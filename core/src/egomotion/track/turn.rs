@@ -93,6 +93,16 @@ impl Egomotion {
         self.share_turn(&predicted, taken)
     }
 
+    /// Makes a guess the frame that matches are sought with, where a unit turned it, the images
+    /// show something, and an older frame did not locate the camera: it turned away from that one,
+    /// which would be out of view ever after.
+    pub(super) fn follow_turn(&mut self, config: &EgomotionConfig, estimate: &MotionEstimate) {
+        let shows_something = estimate.matches >= u32::from(config.matches_min);
+        if self.predicted.is_some() && self.since_reference > 1 && shows_something {
+            self.refer_to_last();
+        }
+    }
+
     /// Estimates the motion near the predicted one; the one that was found where that is none, and
     /// does not contradict the prediction.
     // Never inlined: what it needs of the stack must not lie below the last step.
