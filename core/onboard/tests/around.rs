@@ -27,6 +27,9 @@ const RIG: StereoRig =
 const CAPACITY: Capacity = Capacity {
     image_width: WIDTH,
     image_height: HEIGHT,
+    // What leaves a full map is unknown, and nothing would be free for long.
+    blocks: 20_000,
+    visible_blocks: 20_000,
     planning_width: 60,
     planning_length: 60,
     planning_height: 12,
