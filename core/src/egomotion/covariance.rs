@@ -157,25 +157,7 @@ impl MotionCovariance {
     #[inline(never)]
     #[must_use]
     pub fn after(&self, before: &Self, t_current_previous: &Transform) -> Self {
-        let [a, b, c] = t_current_previous.rotation_matrix();
-        // An error of orientation swings the way driven since; the way starts at the camera before.
-        let [x, y, z] = t_current_previous.translation_m;
-        let swing = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-        let rotation = [a, b, c];
-        let turned: [[f64; 3]; 3] = swing.map(|row| {
-            core::array::from_fn(|to| {
-                row.iter().zip(rotation).map(|(factor, from)| factor * pick(&from, to)).sum()
-            })
-        });
-        // Rows of the change: rotation, then translation.
-        let change: [[f64; N]; N] = core::array::from_fn(|row| {
-            core::array::from_fn(|column| match (row < 3, column < 3) {
-                (true, true) => entry_of(&rotation, row, column),
-                (true, false) => 0.0,
-                (false, true) => entry_of(&turned, row - 3, column),
-                (false, false) => entry_of(&rotation, row - 3, column - 3),
-            })
-        });
+        let change = t_current_previous.adjoint();
         let (before, mut sum) = (before.matrix(), self.matrix());
         for (sums, row) in sum.iter_mut().zip(&change) {
             let carried = before.map(|from| dot(row, &from));
@@ -240,14 +222,6 @@ fn add_outer(sum: &mut [[f64; N]; N], vector: [f64; N], factor: f64) {
 
 fn dot(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn pick(row: &[f64; 3], at: usize) -> f64 {
-    row.get(at).copied().unwrap_or_default()
-}
-
-fn entry_of(matrix: &[[f64; 3]; 3], row: usize, column: usize) -> f64 {
-    matrix.get(row).map_or(0.0, |row| pick(row, column))
 }
 
 #[cfg(test)]

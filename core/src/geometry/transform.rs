@@ -235,6 +235,38 @@ impl Transform {
         [x * scale, y * scale, z * scale]
     }
 
+    /// Errors of a pose after this motion as a linear function of those before it: three rows of
+    /// the rotation vector, rad, then three of the translation, m, in the axes of the frame moved
+    /// to.
+    ///
+    /// ```
+    /// use dynvox_core::geometry::Transform;
+    ///
+    /// // Ten metres after an error of yaw the way to the right is off by ten times as much.
+    /// let ahead = Transform::from_translation([0.0, 0.0, -10.0]);
+    /// assert_eq!(ahead.adjoint()[3][1], 10.0);
+    /// ```
+    #[inline]
+    pub fn adjoint(&self) -> [[f64; 6]; 6] {
+        let rotation = self.rotation_matrix();
+        // An error of orientation swings the way driven since; the way starts at the camera before.
+        let [x, y, z] = self.translation_m;
+        let swing = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+        let turned: [[f64; 3]; 3] = swing.map(|row| {
+            core::array::from_fn(|to| {
+                row.iter().zip(rotation).map(|(factor, from)| factor * pick(&from, to)).sum()
+            })
+        });
+        core::array::from_fn(|row| {
+            core::array::from_fn(|column| match (row < 3, column < 3) {
+                (true, true) => entry_of(&rotation, row, column),
+                (true, false) => 0.0,
+                (false, true) => entry_of(&turned, row - 3, column),
+                (false, false) => entry_of(&rotation, row - 3, column - 3),
+            })
+        })
+    }
+
     /// The motion of one of `parts` equal parts of a motion in which rotation and translation run
     /// side by side; 1 and more.
     #[must_use]
@@ -338,6 +370,14 @@ impl Mul<&Transform> for &Transform {
     fn mul(self, other: &Transform) -> Transform {
         *self * *other
     }
+}
+
+fn pick(row: &[f64; 3], at: usize) -> f64 {
+    row.get(at).copied().unwrap_or_default()
+}
+
+fn entry_of(matrix: &[[f64; 3]; 3], row: usize, column: usize) -> f64 {
+    matrix.get(row).map_or(0.0, |row| pick(row, column))
 }
 
 #[cfg(test)]

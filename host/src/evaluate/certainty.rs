@@ -104,7 +104,7 @@ impl CertainPose {
     /// all motions.
     fn moved(&self, t_world_camera: Transform, covariance: &MotionCovariance, share: f64) -> Self {
         let motion = (t_world_camera.inverse() * self.t_world_camera).normalized();
-        let (change, root) = (change(&motion), root(&covariance.matrix()));
+        let (change, root) = (motion.adjoint(), root(&covariance.matrix()));
         let shared = array::from_fn(|row| {
             array::from_fn(|column| {
                 let carried: f64 = (0..6).map(|k| change[row][k] * self.shared[k][column]).sum();
@@ -124,23 +124,6 @@ impl CertainPose {
         }
         MotionCovariance::from_matrix(&sum)
     }
-}
-
-/// Errors of a pose after a motion as a linear function of those before it: rotation, then
-/// translation.
-fn change(t_current_previous: &Transform) -> [[f64; 6]; 6] {
-    let rotation = t_current_previous.rotation_matrix();
-    let [x, y, z] = t_current_previous.translation_m;
-    // An error of orientation swings the way driven since.
-    let swing = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-    array::from_fn(|row| {
-        array::from_fn(|column| match (row < 3, column < 3) {
-            (true, true) => rotation[row][column],
-            (true, false) => 0.0,
-            (false, true) => (0..3).map(|k| swing[row - 3][k] * rotation[k][column]).sum(),
-            (false, false) => rotation[row - 3][column - 3],
-        })
-    })
 }
 
 /// Lower triangle whose product with its own transpose is the matrix (Cholesky); a direction
