@@ -99,6 +99,11 @@ impl MotionEstimate {
         sigmas.into_iter().fold(TURN_SIGMA_MIN_RAD, |most, one| if one > most { one } else { most })
     }
 
+    /// Tells that half of the matches and more agree with the motion.
+    pub(crate) fn is_strong(&self) -> bool {
+        2 * self.inliers >= self.matches
+    }
+
     fn failed(status: MotionStatus, matches: usize, inliers: usize, samples: u32) -> Self {
         Self {
             status,

@@ -278,7 +278,6 @@ impl<'s> Localization<'s> {
             (None, Some(estimate)) => estimate.turn_sigma_rad(),
             (None, None) => 0.0,
         };
-        let is_strong = |estimate: &MotionEstimate| 2 * estimate.inliers >= estimate.matches;
         let covariance = estimate.and_then(|estimate| estimate.covariance.as_ref());
         let way_sigma_m = covariance.map_or(0.0, |covariance| covariance.distance_sigma_m());
         let is_known = |origin| {
@@ -293,7 +292,8 @@ impl<'s> Localization<'s> {
             t_reference_now: motion.or(given),
             sigma_rad,
             way_sigma_m,
-            strong: seen.map_or_else(|| estimate.is_none_or(is_strong), |seen| seen.strong),
+            strong: seen
+                .map_or_else(|| estimate.is_none_or(MotionEstimate::is_strong), |seen| seen.strong),
             over_several: from.over_several,
             turned: found.origin == PoseOrigin::Extrapolated && self.camera.is_turned(),
             refused: seen.is_some_and(|seen| seen.refused),
@@ -374,9 +374,7 @@ impl<'s> Localization<'s> {
             &mut self.estimator,
         );
         // A motion few matches agree with says nothing about the rig.
-        if let Some(motion) =
-            estimate.t_current_previous.filter(|_| 2 * estimate.inliers >= estimate.matches)
-        {
+        if let Some(motion) = estimate.t_current_previous.filter(|_| estimate.is_strong()) {
             self.self_calibration.update(
                 &rig,
                 matches.filter_map(|m| observations(&rig, m)),

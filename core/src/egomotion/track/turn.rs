@@ -81,7 +81,7 @@ impl Egomotion {
             SeenMotion {
                 t_current_reference: motion,
                 sigma_rad,
-                strong: 2 * found.inliers >= found.matches,
+                strong: found.is_strong(),
                 refused: predicted.contradicts(&motion, sigma_rad),
             }
         });
