@@ -43,10 +43,13 @@ impl<S: BlockStore> BlockStore for Watched<'_, '_, S> {
 impl Planning<'_> {
     /// Makes the cells about a block's surface unknown. Nothing without a window.
     fn lose(&mut self, block: &EvictedBlock<'_>) {
+        if self.is_empty() {
+            return;
+        }
         let origin = block.key.coord.origin().map(f64::from);
         let side = BLOCK_SIDE as f64;
         let whole = cells_of_cube(&self.grid, origin.map(|at| at + 0.5 * side), side + 2.0);
-        if self.is_empty() || !self.cells.meets(whole) {
+        if !self.cells.meets(whole) {
             return;
         }
         let [before, behind] = signs_of_block(block.sdf, block.weight, self.config.min_weight);
