@@ -52,11 +52,9 @@ impl Street {
     /// times, which count from frame 0; none where the street has no unit.
     pub fn inertial(&self) -> Vec<TimedReading> {
         let config = self.config();
-        let Some(unit) = config.inertial.filter(|unit| unit.rate_hz > 0.0) else {
-            return Vec::new();
-        };
+        let Some(unit) = &config.inertial else { return Vec::new() };
         Carried {
-            unit: &unit,
+            unit,
             seed: config.seed,
             last_s: self.time_s(config.frames.saturating_sub(1)),
             pose: &|time_s| self.t_street_camera(time_s),
@@ -66,9 +64,13 @@ impl Street {
 }
 
 impl Carried<'_> {
-    /// Samples from a second before the first frame to the last, in order of their times.
+    /// Samples from a second before the first frame to the last, in order of their times; none of a
+    /// unit without a rate.
     pub fn readings(&self) -> Vec<TimedReading> {
         let Self { unit, last_s, .. } = self;
+        if unit.rate_hz <= 0.0 {
+            return Vec::new();
+        }
         let count = libm::ceil((last_s + BEFORE_S) * unit.rate_hz) as u64 + 1;
         let samples = (0..count).map(|at| (at, at as f64 / unit.rate_hz - BEFORE_S));
         samples

@@ -226,11 +226,9 @@ impl World for Room {
     }
 
     fn inertial(&self) -> Vec<TimedReading> {
-        let Some(unit) = self.config.inertial.filter(|unit| unit.rate_hz > 0.0) else {
-            return Vec::new();
-        };
+        let Some(unit) = &self.config.inertial else { return Vec::new() };
         Carried {
-            unit: &unit,
+            unit,
             seed: self.config.seed,
             last_s: self.time_s(self.config.frames.saturating_sub(1)),
             pose: &|time_s| self.path.t_room_camera(time_s),
