@@ -50,6 +50,7 @@ mod optics;
 mod paint;
 mod path;
 mod pattern;
+mod present;
 mod random;
 mod raster;
 mod raw;

@@ -10,12 +10,13 @@ use super::camera;
 use super::car;
 use super::config::{CarKind, StreetConfig};
 use super::error::SynthError;
-use super::frame::{ObjectTruth, SynthFrame};
+use super::frame::SynthFrame;
 use super::layout;
 use super::light::Light;
 use super::mesh::Mesh;
 use super::paint::Painter;
 use super::path::{Centerline, RoadSpan, SEGMENT_M};
+use super::present::{self, PresentCar};
 use super::random::Rng;
 use super::recent::Recent;
 use super::scene::Scene;
@@ -23,7 +24,6 @@ use super::segment::{Segment, segment};
 use super::shadow::SunAxes;
 use super::street_scene::{StreetView, street_scene};
 use super::studio::{Moment, Studio};
-use super::surface::Tone;
 use super::traffic::{self, Road};
 use crate::formats::calibration::StereoCalibration;
 
@@ -31,8 +31,6 @@ use crate::formats::calibration::StereoCalibration;
 const REACH_M: (f64, f64) = (70.0, 180.0);
 /// Segments cached: more than one frame needs.
 const CACHED_SEGMENTS: usize = 16;
-/// Slower than this a car stands, m/s.
-const STANDS_M_S: f64 = 1e-9;
 
 /// A synthetic street.
 pub struct Street {
@@ -45,22 +43,13 @@ pub struct Street {
     t_camera0_street: Transform,
 }
 
-/// A car near the camera at one frame.
-struct Present {
-    id: u32,
-    kind: CarKind,
-    paint: Tone,
-    t_street_car: Transform,
-    speed_m_s: f64,
-}
-
 /// The street around the camera at one frame.
 pub(super) struct Surroundings {
     /// Objects and shadows.
     pub scene: Scene,
     /// Camera in the street.
     pub t_street_camera: Transform,
-    cars: Vec<Present>,
+    cars: Vec<PresentCar>,
 }
 
 impl Street {
@@ -161,21 +150,10 @@ impl Street {
         t_world_camera: Transform,
     ) -> SynthFrame {
         let scene = core::slice::from_ref(&around.scene);
-        let objects = around.cars.iter().map(|car| self.truth(car)).collect();
+        let truth = |car: &PresentCar| car.truth(&self.bodies, &self.t_camera0_street);
+        let objects = around.cars.iter().map(truth).collect();
         let time_s = self.time_s(index);
         self.studio.frame(scene, Moment { index, time_s, gain: 1.0, t_world_camera, objects })
-    }
-
-    fn truth(&self, car: &Present) -> ObjectTruth {
-        let (low, high) = self.bodies[car.kind as usize].bounds_m();
-        ObjectTruth {
-            id: car.id,
-            class: car.kind.class(),
-            t_world_object: (self.t_camera0_street * car.t_street_car).normalized(),
-            dimensions_m: [2.0 * high.x, -low.y, 2.0 * high.z],
-            moving: car.speed_m_s > STANDS_M_S,
-            speed_m_s: car.speed_m_s,
-        }
     }
 
     /// Builds the scene of a frame.
@@ -206,8 +184,7 @@ impl Street {
         let road = Road { config: &self.config, span: &span, time_s, from_m, to_m };
         let cars = present(&segments, &road);
         let anchor = span.point(libm::floor(along_m / SEGMENT_M) * SEGMENT_M);
-        let posed_cars: Vec<_> =
-            cars.iter().map(|car| (car.kind, car.paint, car.t_street_car)).collect();
+        let posed_cars: Vec<_> = cars.iter().map(PresentCar::posed).collect();
         let view = StreetView { t_street_camera: &t_street_camera, anchor, sun: self.sun };
         let scene = street_scene(&self.bodies, &segments, &posed_cars, view);
         Surroundings { scene, t_street_camera, cars }
@@ -231,25 +208,16 @@ impl Street {
 }
 
 /// Cars of the traffic and parked ones, by id.
-fn present(segments: &[Arc<Segment>], road: &Road<'_>) -> Vec<Present> {
-    let mut cars: Vec<Present> = Vec::new();
+fn present(segments: &[Arc<Segment>], road: &Road<'_>) -> Vec<PresentCar> {
+    let mut cars: Vec<PresentCar> = Vec::new();
     for driver in traffic::drivers(road) {
         let traffic::Driver { id, kind, paint, t_street_car, speed_m_s } = driver;
-        cars.push(Present { id, kind, paint, t_street_car, speed_m_s });
+        cars.push(PresentCar { id, kind, paint, t_street_car, speed_m_s });
     }
-    for car in segments.iter().flat_map(|segment| &segment.parked) {
-        cars.push(Present {
-            id: car.id,
-            kind: car.kind,
-            paint: car.paint,
-            t_street_car: car.t_street_car,
-            speed_m_s: 0.0,
-        });
-    }
-    cars.sort_by_key(|car| car.id);
-    // 8 parking spaces a segment and traffic 30 m apart leave this bound far away; scripts
-    // could reach it.
-    cars.truncate(usize::from(u8::MAX));
+    cars.extend(segments.iter().flat_map(|segment| &segment.parked).map(PresentCar::from));
+    // 8 parking spaces a segment and traffic 30 m apart leave the bound far away; scripts could
+    // reach it.
+    present::number(&mut cars);
     debug_assert!(cars.iter().all(|car| car.id < layout::PARKED_IDS || car.speed_m_s == 0.0));
     cars
 }

@@ -22,6 +22,7 @@ use crate::synth::layout;
 use crate::synth::lidar::Scanner;
 use crate::synth::light::Light;
 use crate::synth::mesh::{Mesh, Parallelogram, Point};
+use crate::synth::present::{self, PresentCar};
 use crate::synth::random::{Rng, hash};
 use crate::synth::recent::Recent;
 use crate::synth::scene::{Scene, SceneObject};
@@ -29,7 +30,7 @@ use crate::synth::segment::{ParkedCar, Segment, choose_car};
 use crate::synth::shadow::SunAxes;
 use crate::synth::street_scene::{StreetView, street_scene};
 use crate::synth::studio::{Moment, Studio};
-use crate::synth::surface::{Kind, Surface, Tone, tone};
+use crate::synth::surface::{Kind, Surface, tone};
 use crate::synth::world::World;
 
 /// Distance from the camera up to which all blocks exist, m.
@@ -63,15 +64,6 @@ pub struct Town {
     land: Arc<Mesh>,
     blocks: Recent<BlockNumber, Segment>,
     t_camera0_town: Transform,
-}
-
-/// A car near the camera at one frame.
-struct Present {
-    id: u32,
-    kind: CarKind,
-    paint: Tone,
-    t_town_car: Transform,
-    speed_m_s: f64,
 }
 
 impl Town {
@@ -158,21 +150,17 @@ impl Town {
         time_s: f64,
         parked: impl Iterator<Item = &'c ParkedCar>,
         eye: Point,
-    ) -> Vec<Present> {
+    ) -> Vec<PresentCar> {
         let mut cars = self.traffic(time_s);
-        for car in parked {
-            let &ParkedCar { id, kind, paint, t_street_car } = car;
-            cars.push(Present { id, kind, paint, t_town_car: t_street_car, speed_m_s: 0.0 });
-        }
-        cars.retain(|car| (Point::from(car.t_town_car.translation_m) - eye).norm() < CARS_M);
-        cars.sort_by_key(|car| car.id);
-        // Some 150 spaces are so near: a bound that is never met.
-        cars.truncate(usize::from(u8::MAX));
+        cars.extend(parked.map(PresentCar::from));
+        cars.retain(|car| (Point::from(car.t_street_car.translation_m) - eye).norm() < CARS_M);
+        // Some 150 spaces are so near: the bound is never met.
+        present::number(&mut cars);
         cars
     }
 
     /// Cars that go round the loop against the camera, all at one speed.
-    fn traffic(&self, time_s: f64) -> Vec<Present> {
+    fn traffic(&self, time_s: f64) -> Vec<PresentCar> {
         let Traffic::Moving(moving) = &self.street.traffic else { return Vec::new() };
         if moving.oncoming_gap_m <= 0.0 {
             return Vec::new();
@@ -184,9 +172,9 @@ impl Town {
             let mut rng = Rng::new(self.camera.seed, 0x70_41, i64::from(number));
             let (kind, paint) = choose_car(&mut rng);
             let from_m = (f64::from(number) + rng.between(0.2, 0.8)) * gap_m;
-            let t_town_car = lane.t_town_local(from_m + TRAFFIC_M_S * time_s, 0.0, 0.0);
+            let t_street_car = lane.t_town_local(from_m + TRAFFIC_M_S * time_s, 0.0, 0.0);
             let id = layout::ONCOMING_IDS + number;
-            Present { id, kind, paint, t_town_car, speed_m_s: TRAFFIC_M_S }
+            PresentCar { id, kind, paint, t_street_car, speed_m_s: TRAFFIC_M_S }
         };
         (0..count).map(car).collect()
     }
@@ -208,12 +196,12 @@ impl Town {
     }
 
     /// Everything near a pose of the camera at a time.
-    fn scene(&self, time_s: f64, t_town_camera: &Transform) -> (Scene, Vec<Present>) {
+    fn scene(&self, time_s: f64, t_town_camera: &Transform) -> (Scene, Vec<PresentCar>) {
         let eye = Point::from(t_town_camera.translation_m);
         let built = |number| self.blocks.get(number, || self.plan().block(number));
         let blocks: Vec<Arc<Segment>> = self.near(eye).map(built).collect();
         let cars = self.cars(time_s, blocks.iter().flat_map(|block| &block.parked), eye);
-        let posed: Vec<_> = cars.iter().map(|car| (car.kind, car.paint, car.t_town_car)).collect();
+        let posed: Vec<_> = cars.iter().map(PresentCar::posed).collect();
         // Texels of shadows stay where they are while the camera moves.
         let anchor = eye.map(|metres| libm::floor(metres / ANCHOR_M) * ANCHOR_M);
         let anchor = Point::new(anchor.x, 0.0, anchor.z);
@@ -237,16 +225,8 @@ impl Town {
         cars.iter().map(|car| self.truth(car)).collect()
     }
 
-    fn truth(&self, car: &Present) -> ObjectTruth {
-        let (low, high) = self.bodies[car.kind as usize].bounds_m();
-        ObjectTruth {
-            id: car.id,
-            class: car.kind.class(),
-            t_world_object: (self.t_camera0_town * car.t_town_car).normalized(),
-            dimensions_m: [2.0 * high.x, -low.y, 2.0 * high.z],
-            moving: car.speed_m_s > 0.0,
-            speed_m_s: car.speed_m_s,
-        }
+    fn truth(&self, car: &PresentCar) -> ObjectTruth {
+        car.truth(&self.bodies, &self.t_camera0_town)
     }
 }
 
@@ -321,11 +301,9 @@ impl World for Town {
     }
 
     fn inertial(&self) -> Vec<TimedReading> {
-        let Some(unit) = self.street.inertial.filter(|unit| unit.rate_hz > 0.0) else {
-            return Vec::new();
-        };
+        let Some(unit) = &self.street.inertial else { return Vec::new() };
         Carried {
-            unit: &unit,
+            unit,
             seed: self.camera.seed,
             last_s: self.time_s(self.frames.saturating_sub(1)),
             pose: &|time_s| self.t_town_camera(time_s),
