@@ -6,4 +6,4 @@ mod trial;
 mod vehicle;
 
 pub use rule::Limits;
-pub use trial::{Conditions, Flight, fly};
+pub use trial::{Conditions, Flight, FlightFrame, fly};

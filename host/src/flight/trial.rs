@@ -6,7 +6,7 @@ use super::vehicle::{FOLLOWS_S, Multirotor};
 use crate::synth::{
     FlownView, MovingTraffic, Street, StreetConfig, StreetPose, SynthError, SynthFrame, Traffic,
 };
-use dynvox_core::geometry::Transform;
+use dynvox_core::geometry::{StereoRig, Transform};
 use dynvox_core::image::View;
 use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::random::Random;
@@ -47,6 +47,8 @@ const REACH_M: f64 = 5.0;
 const CLEAR_M: f64 = 1.2;
 /// Below this speed the vehicle stands, m/s.
 const STANDS_M_S: f64 = 0.3;
+/// Way by which a surface came nearer since the last picture if it moves by itself, m.
+const COMES_M: f64 = 0.1;
 
 /// Conditions of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +68,7 @@ pub struct Conditions {
 pub struct Flight {
     /// The vehicle flew into something.
     pub collided: bool,
-    /// A car drove into the vehicle while it stood.
+    /// A car drove into the vehicle while it stood, or from where its camera does not look.
     pub run_over: bool,
     /// Stops of more than a second with a clear way ahead.
     pub needless_stops: u32,
@@ -78,6 +80,29 @@ pub struct Flight {
     pub extrapolated: u32,
     /// True if the vehicle stood before an obstacle in the end.
     pub stopped: bool,
+}
+
+/// One picture of a flight: where the vehicle was, and what it was told.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FlightFrame {
+    /// Number of the picture.
+    pub frame: u32,
+    /// Distance ahead of the start, m.
+    pub ahead_m: f64,
+    /// Speed when the picture was taken, m/s.
+    pub speed_m_s: f64,
+    /// Speed that the rule allows until the next picture, m/s.
+    pub allowed_m_s: f64,
+    /// Distance told straight ahead, m: negative where it is unknown, infinite where it is free.
+    pub told_m: f32,
+    /// Free way straight ahead in truth, m, up to the reach of the band.
+    pub free_m: f64,
+    /// Least distance to a surface until the next picture, less the vehicle's radius, m.
+    pub clearance_m: f64,
+    /// The picture came black.
+    pub is_black: bool,
+    /// The pose was estimated.
+    pub is_placed: bool,
 }
 
 /// A route drawn from a seed.
@@ -191,11 +216,11 @@ impl Aboard<'_> {
     }
 }
 
-/// Flies once.
+/// Flies once, and hands out what happened at each picture.
 ///
 /// # Errors
 /// A street that cannot be made, or a mapper that cannot be.
-pub fn fly(conditions: &Conditions) -> anyhow::Result<Flight> {
+pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyhow::Result<Flight> {
     let mut route = Route::draw(conditions.seed)?;
     let mut slab = vec![0; CAPACITY.bytes() + SLAB_ALIGN];
     let mapper = Mapper::new(&CAPACITY, &Config::for_rig(route.street.rig()), &mut slab)?;
@@ -212,16 +237,40 @@ pub fn fly(conditions: &Conditions) -> anyhow::Result<Flight> {
         let is_ready = index >= READY_FRAMES;
         let wanted = if is_ready { conditions.speed_m_s } else { 0.0 };
         let allowed = LIMITS.allowed_m_s(&aboard.directions, 0.0, wanted);
-        flight.extrapolated += u32::from(!aboard.map(index, &view.frame(), is_black)?);
-        flight.advance(&mut vehicle, &view, allowed);
+        let told_m = match aboard.directions[0] {
+            Direction::Unknown => -1.0,
+            Direction::Free => f32::INFINITY,
+            Direction::Obstacle { distance_m } => distance_m,
+        };
+        let far_m = f64::from(aboard.band.far_m);
+        let speed_m_s = vehicle.speed_m_s();
+        let is_placed = aboard.map(index, &view.frame(), is_black)?;
+        flight.extrapolated += u32::from(!is_placed);
+        let from = vehicle.position_m;
+        let ahead_m = from[1];
+        let clearance_m = flight.advance(&mut vehicle, &view, allowed);
+        seen(&FlightFrame {
+            frame: index,
+            ahead_m,
+            speed_m_s,
+            allowed_m_s: allowed,
+            told_m,
+            free_m: free_ahead_m(&view, far_m, RADIUS_M),
+            clearance_m,
+            is_black,
+            is_placed,
+        });
         if flight.clearance_m < 0.0 {
-            flight.run_over = vehicle.speed_m_s() < STANDS_M_S;
+            let before = route.street.seen_from(index.saturating_sub(1), &pose);
+            let at = [0, 1].map(|axis| vehicle.position_m[axis] - from[axis]);
+            flight.run_over = vehicle.speed_m_s() < STANDS_M_S
+                || is_met_unseen([&before, &view], at, &route.street.rig());
             flight.collided = !flight.run_over;
             break;
         }
         // A vehicle that stands before nothing is stopped needlessly.
         let stands = is_ready && vehicle.speed_m_s() < STANDS_M_S;
-        let is_needless = stands && is_clear(&view, f64::from(aboard.band.far_m));
+        let is_needless = stands && free_ahead_m(&view, far_m, CLEAR_M) >= far_m;
         stood_s = if is_needless { stood_s + 1.0 / RATE_HZ } else { 0.0 };
         flight.needless_stops += u32::from((stood_s - NEEDLESS_S).abs() < 0.5 / RATE_HZ);
         flight.stopped = stands && !is_needless;
@@ -230,23 +279,50 @@ pub fn fly(conditions: &Conditions) -> anyhow::Result<Flight> {
 }
 
 impl Flight {
-    /// Flies until the next picture, and notes how near anything came.
-    fn advance(&mut self, vehicle: &mut Multirotor, view: &FlownView<'_>, speed_m_s: f64) {
+    /// Flies until the next picture, notes how near anything came and returns it, m.
+    fn advance(&mut self, vehicle: &mut Multirotor, view: &FlownView<'_>, speed_m_s: f64) -> f64 {
         let from = vehicle.position_m;
+        let mut least_m = f64::INFINITY;
         for _ in 0..SUBSTEPS {
             vehicle.fly([0.0, speed_m_s], 1.0 / (RATE_HZ * f64::from(SUBSTEPS)));
             let [right, ahead] = [0, 1].map(|axis| vehicle.position_m[axis] - from[axis]);
             let clearance_m = view.clearance_m([right, 0.0, ahead], REACH_M) - RADIUS_M;
-            self.clearance_m = self.clearance_m.min(clearance_m);
+            least_m = least_m.min(clearance_m);
         }
+        self.clearance_m = self.clearance_m.min(least_m);
         self.flown_m += (vehicle.position_m[0] - from[0]).hypot(vehicle.position_m[1] - from[1]);
+        least_m
     }
 }
 
-/// Returns true if nothing stands beside or on the course, out to `far_m`.
-fn is_clear(view: &FlownView<'_>, far_m: f64) -> bool {
-    (1..=(far_m / 0.25) as u32)
-        .all(|step| view.clearance_m([0.0, 0.0, f64::from(step) * 0.25], REACH_M) > CLEAR_M)
+/// Length of the course on which nothing stands within `clear_m`, out to `far_m`.
+fn free_ahead_m(view: &FlownView<'_>, far_m: f64, clear_m: f64) -> f64 {
+    let steps = (far_m / 0.25) as u32;
+    (1..=steps)
+        .map(|step| f64::from(step) * 0.25)
+        .find(|&at_m| view.clearance_m([0.0, 0.0, at_m], REACH_M) <= clear_m)
+        .unwrap_or(far_m)
+}
+
+/// Tells that what is nearest to a place, right and ahead of the camera, lies outside of the
+/// camera's view, and came there by itself since the picture before. Both views are from one pose.
+fn is_met_unseen(
+    [before, now]: [&FlownView<'_>; 2],
+    [right, ahead]: [f64; 2],
+    rig: &StereoRig,
+) -> bool {
+    let to_nearest = |axis: usize| {
+        let side = |step: f64| {
+            let mut at = [right, 0.0, ahead];
+            at[axis] += step;
+            now.clearance_m(at, REACH_M)
+        };
+        side(-0.02) - side(0.02)
+    };
+    let bearing_rad = libm::atan2(to_nearest(0).abs(), to_nearest(2));
+    let is_seen = bearing_rad < libm::atan2(rig.center_u_px, rig.focal_px);
+    let [was_m, is_m] = [before, now].map(|view| view.clearance_m([right, 0.0, ahead], REACH_M));
+    !is_seen && was_m - is_m > COMES_M
 }
 
 #[cfg(test)]
@@ -256,17 +332,43 @@ mod tests {
     #[test]
     fn a_vehicle_flies_down_the_street_and_touches_nothing() {
         let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 0.0, seconds: 2.5 };
-        let flight = fly(&conditions).unwrap();
+        let flight = fly(&conditions, |_| {}).unwrap();
         assert!(!flight.collided && !flight.run_over && flight.clearance_m > 0.3, "{flight:?}");
         // Let go after half a second, at 4 m/s.
         assert!((2.0..8.5).contains(&flight.flown_m), "{flight:?}");
-        assert_eq!(fly(&conditions).unwrap(), flight, "one seed, one flight");
+        assert_eq!(fly(&conditions, |_| {}).unwrap(), flight, "one seed, one flight");
+    }
+
+    #[dynvox_needs::long("DYNVOX_LONG")]
+    #[dynvox_needs::long]
+    #[test]
+    fn a_car_from_behind_runs_a_vehicle_over() {
+        // The vehicle brakes for a car ahead when another one comes up beside it.
+        let conditions = Conditions { seed: 3018, speed_m_s: 4.0, black: 0.1, seconds: 12.0 };
+        let flight = fly(&conditions, |_| {}).unwrap();
+        assert!(flight.run_over && !flight.collided, "{flight:?}");
+    }
+
+    #[test]
+    fn a_wall_beside_the_camera_did_not_come_by_itself() {
+        let street = Street::new(StreetConfig::static_street()).unwrap();
+        // Towards the houses on the right, seen from beside the road.
+        let pose = street.pose_above_road(30.0, 3.0, HEIGHT_M, 0.0);
+        let view = street.seen_from(0, &pose);
+        let at = (0..400).map(|step| [0.05 * f64::from(step), 0.0]);
+        let touching = at.filter(|[right, _]| view.clearance_m([*right, 0.0, 0.0], 5.0) < 0.3);
+        let mut count = 0;
+        for at in touching {
+            count += 1;
+            assert!(!is_met_unseen([&view, &view], at, &street.rig()), "{at:?}");
+        }
+        assert!(count > 0, "something stands beside the road");
     }
 
     #[test]
     fn a_vehicle_whose_pictures_are_black_does_not_fly_on() {
         let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 1.0, seconds: 2.5 };
-        let flight = fly(&conditions).unwrap();
+        let flight = fly(&conditions, |_| {}).unwrap();
         assert!(flight.flown_m < 1.0 && flight.extrapolated > 15, "{flight:?}");
     }
 }

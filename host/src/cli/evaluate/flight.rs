@@ -1,6 +1,6 @@
 //! `dynvox evaluate flight`.
 
-use crate::flight::{Conditions, Flight, fly};
+use crate::flight::{Conditions, Flight, FlightFrame, fly};
 use anyhow::bail;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -22,6 +22,9 @@ pub struct FlightArgs {
     /// Length of a flight, s
     #[arg(long, default_value_t = 12.0, value_name = "S")]
     seconds: f64,
+    /// Print each picture of the first flight: where the vehicle was, what it was told
+    #[arg(long)]
+    trace: bool,
     /// Write all flights to standard output as JSON
     #[arg(long)]
     json: bool,
@@ -35,6 +38,13 @@ struct FlightRow {
     flight: Flight,
 }
 
+impl FlightArgs {
+    fn conditions(&self, seed: u64) -> Conditions {
+        let &Self { speed: speed_m_s, black, seconds, .. } = self;
+        Conditions { seed, speed_m_s, black, seconds }
+    }
+}
+
 pub fn run(args: &FlightArgs) -> anyhow::Result<()> {
     if !(0.1..=20.0).contains(&args.speed) {
         bail!("--speed {} is no speed for this vehicle. Give 0.1 to 20 m/s", args.speed);
@@ -45,12 +55,14 @@ pub fn run(args: &FlightArgs) -> anyhow::Result<()> {
     if !(1.0..=600.0).contains(&args.seconds) {
         bail!("--seconds {} is out of range. Give 1 to 600 s", args.seconds);
     }
+    if args.trace {
+        return trace(args);
+    }
     // Flights know nothing of each other: any number of threads gives the same.
     let rows: Vec<FlightRow> = (args.seed..args.seed.saturating_add(args.trials))
         .into_par_iter()
         .map(|seed| {
-            let &FlightArgs { speed: speed_m_s, black, seconds, .. } = args;
-            let flight = fly(&Conditions { seed, speed_m_s, black, seconds })?;
+            let flight = fly(&args.conditions(seed), |_| {})?;
             Ok(FlightRow { seed, flight })
         })
         .collect::<anyhow::Result<_>>()?;
@@ -59,6 +71,27 @@ pub fn run(args: &FlightArgs) -> anyhow::Result<()> {
     } else {
         print(&rows);
     }
+    Ok(())
+}
+
+/// Flies once and prints a row for each picture.
+fn trace(args: &FlightArgs) -> anyhow::Result<()> {
+    outln!("| picture | ahead, m | speed, m/s | allowed | told, m | free, m | clearance, m | |");
+    outln!("|---|---|---|---|---|---|---|---|");
+    let flight = fly(&args.conditions(args.seed), |row| {
+        let FlightFrame { frame, ahead_m, speed_m_s, allowed_m_s, .. } = *row;
+        let FlightFrame { told_m, free_m, clearance_m, is_black, is_placed, .. } = *row;
+        let note = match (is_black, is_placed) {
+            (true, _) => "black",
+            (false, false) => "extrapolated",
+            (false, true) => "",
+        };
+        outln!(
+            "| {frame} | {ahead_m:.2} | {speed_m_s:.2} | {allowed_m_s:.2} | {told_m:.2} | \
+             {free_m:.2} | {clearance_m:.2} | {note} |"
+        );
+    })?;
+    print(&[FlightRow { seed: args.seed, flight }]);
     Ok(())
 }
 
@@ -82,7 +115,7 @@ fn print(rows: &[FlightRow]) {
         if flight.collided || flight.run_over || flight.needless_stops > 0 {
             let what = match flight {
                 Flight { collided: true, .. } => "flew into something",
-                Flight { run_over: true, .. } => "was run over while it stood",
+                Flight { run_over: true, .. } => "was run over",
                 _ => "stopped before nothing",
             };
             outln!("seed {seed}: {what} after {:.1} m", flight.flown_m);
