@@ -22,6 +22,10 @@ const SCORE_BITS: u32 = 48;
 const MATCH_BITS: u32 = 72;
 /// A match has at most so many tenths of the next best one's bits.
 const RATIO_TENTHS: u32 = 8;
+/// Bits beyond those of the most similar descriptor in which others may differ to score as well.
+const SCORE_MARGIN_BITS: u32 = 6;
+/// Scores that a point has to give: keyframes that look like it share them.
+const POINT_SCORES: u16 = 64;
 /// Fewest scores of a keyframe that is compared.
 const SCORE_MIN: u16 = 6;
 
@@ -30,7 +34,7 @@ const SCORE_MIN: u16 = 6;
 #[repr(C)]
 struct Score {
     count: u16,
-    /// Number, from 1, of the point that scored last: each scores once.
+    /// Number, from 1, of the point that is about to score: each scores once.
     last: u16,
 }
 
@@ -125,7 +129,8 @@ impl<'s> Query<'s> {
         self.covariance.first().filter(|_| self.has_covariance)
     }
 
-    /// Counts the scores for the keyframes that `may` takes.
+    /// Counts the scores for the keyframes that `may` takes. What looks like a point in many
+    /// keyframes, as windows and kerbs of a street do, says little about any of them.
     pub(super) fn score(
         &mut self,
         table: &Table<'_>,
@@ -135,11 +140,31 @@ impl<'s> Query<'s> {
         let Self { descriptors, scores, len, .. } = self;
         scores.fill(Score { count: 0, last: 0 });
         for (number, descriptor) in (1..).zip(descriptors.iter().take(*len)) {
-            index.candidates(descriptor, |candidate| {
-                let Some((slot, other)) = table.described(candidate) else { return };
-                let Some(scores) = scores.get_mut(slot) else { return };
-                if scores.last != number && descriptor.distance(other) <= SCORE_BITS && may(slot) {
-                    *scores = Score { count: scores.count.saturating_add(1), last: number };
+            // Three passes over at most 64 entries: a list of them would be as long as the stack
+            // of a small machine is short.
+            let mut similar = |most_bits: u32, each: &mut dyn FnMut(usize, u32)| {
+                index.candidates(descriptor, |candidate| {
+                    let Some((slot, other)) = table.described(candidate) else { return };
+                    let bits = descriptor.distance(other);
+                    if bits <= most_bits && may(slot) {
+                        each(slot, bits);
+                    }
+                });
+            };
+            let mut least_bits = SCORE_BITS;
+            similar(SCORE_BITS, &mut |_, bits| least_bits = least_bits.min(bits));
+            let most_bits = (least_bits + SCORE_MARGIN_BITS).min(SCORE_BITS);
+            let mut keyframes = 0;
+            similar(most_bits, &mut |slot, _| {
+                if let Some(score) = scores.get_mut(slot).filter(|score| score.last != number) {
+                    score.last = number;
+                    keyframes += 1;
+                }
+            });
+            let share = POINT_SCORES / keyframes.max(1);
+            similar(most_bits, &mut |slot, _| {
+                if let Some(score) = scores.get_mut(slot).filter(|score| score.last == number) {
+                    *score = Score { count: score.count.saturating_add(share), last: 0 };
                 }
             });
         }
@@ -208,5 +233,75 @@ impl<'s> Query<'s> {
         }
         *match_len = count;
         self.matches.get(..self.match_len).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Transform;
+    use crate::memory::SLAB_ALIGN;
+    use crate::places::SegmentPose;
+    use crate::random::Random;
+    use std::{vec, vec::Vec};
+
+    const KEYFRAMES: usize = 10;
+
+    fn random_descriptor(random: &mut Random) -> Descriptor {
+        Descriptor(core::array::from_fn(|_| {
+            u64::from(random.next_u32()) << 32 | u64::from(random.next_u32())
+        }))
+    }
+
+    fn noisy(descriptor: &Descriptor, bits: u32, random: &mut Random) -> Descriptor {
+        let mut words = descriptor.0;
+        (0..bits).for_each(|_| {
+            let bit = random.below(256) as usize;
+            words[bit / 64] ^= 1 << (bit % 64);
+        });
+        Descriptor(words)
+    }
+
+    #[test]
+    fn windows_of_a_whole_street_do_not_outvote_a_place() {
+        let bytes = Table::bytes(KEYFRAMES)
+            + Index::bytes(KEYFRAMES * KEYFRAME_POINTS)
+            + Query::bytes(KEYFRAMES);
+        let mut slab = vec![0; bytes + SLAB_ALIGN];
+        let mut carver = Carver::new(&mut slab, bytes).unwrap();
+        let mut table = Table::new_in(KEYFRAMES, &mut carver);
+        let mut index = Index::new_in(KEYFRAMES * KEYFRAME_POINTS, &mut carver);
+        let mut query = Query::new_in(KEYFRAMES, &mut carver);
+        let mut random = Random::new(4);
+        let many = |count: usize, random: &mut Random| -> Vec<Descriptor> {
+            (0..count).map(|_| random_descriptor(random)).collect()
+        };
+        let (windows, own) = (many(60, &mut random), many(12, &mut random));
+        let pose = SegmentPose { segment: Default::default(), t_world_camera: Transform::IDENTITY };
+        for slot in 0..KEYFRAMES {
+            // All but one show the windows well; that one shows points of its own, and them badly.
+            let is_place = slot + 1 == KEYFRAMES;
+            let seen: Vec<Descriptor> = if is_place {
+                own.clone()
+            } else {
+                windows.iter().map(|window| noisy(window, 12, &mut random)).collect()
+            };
+            let point = Keypoint::default();
+            table.insert(slot, &pose, seen.iter().map(|descriptor| (&point, descriptor)));
+            for (at, descriptor) in seen.iter().enumerate() {
+                index.insert(descriptor, Table::number(slot, at));
+            }
+        }
+        let frame =
+            windows.iter().map(|window| (window, 12)).chain(own.iter().map(|own| (own, 25)));
+        for (descriptor, bits) in frame {
+            query.descriptors[query.len] = noisy(descriptor, bits, &mut random);
+            query.len += 1;
+        }
+        query.score(&table, &mut index, |_| true);
+        assert_eq!(query.take_best(), Some(KEYFRAMES - 1), "{:?}", query.scores);
+        // Keyframes that may not be found take no scores from others.
+        query.score(&table, &mut index, |slot| slot < 2);
+        assert!(query.take_best().is_some_and(|slot| slot < 2));
     }
 }

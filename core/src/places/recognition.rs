@@ -106,7 +106,8 @@ impl Recognition<'_, '_> {
 }
 
 /// Settings of the motion from a keyframe: of its matches fewer are right than from frame to frame,
-/// and positions are rounded.
+/// and positions are rounded; right ones are off by a pixel or two, and would take turns at the
+/// scale of a frame's motion without coming to rest.
 fn config(of: &EgomotionConfig) -> EgomotionConfig {
     EgomotionConfig {
         samples: 500,
@@ -114,6 +115,7 @@ fn config(of: &EgomotionConfig) -> EgomotionConfig {
         refined_inlier_px: 3.0,
         matches_min: INLIERS_MIN as u16,
         inlier_share_min: 0.3,
+        robust_px: 2.5,
         ..*of
     }
 }
