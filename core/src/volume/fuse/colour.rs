@@ -12,9 +12,12 @@ use crate::{
     },
 };
 use bytemuck::TransparentWrapper;
+use core::ops::Range;
 
 /// Most that a voxel's past weighs when a colour is averaged in (the original's colour weight).
 const MAX_PAST: usize = 5;
+/// Voxels of a quarter of a layer.
+const QUARTER: usize = LAYER_VOXELS / 4;
 /// The shares of a colour seen for each weight of the past, times -32,768.
 const COLOUR_SHARES: [i16; MAX_PAST + 1] = [
     share_of_one(0),
@@ -41,16 +44,14 @@ impl Fusion<'_> {
     ) {
         // Away from the surface the colour would be that of something before or behind it.
         let near = self.near_surface(scratch);
-        // Where none is near, no pixel need be read.
-        if near.iter().fold(0, |any, near| any | near) == 0 {
-            return;
-        }
+        // Where none is near, no pixel need be read: a third of the quarters has none.
+        let Some(shown) = quarters(&near) else { return };
         let (mut reds, mut greens, mut blues) =
             ([0; LAYER_VOXELS], [0; LAYER_VOXELS], [0; LAYER_VOXELS]);
         match self.seen.colour {
             Some(image) => scratch
                 .pixels_at(bits(&near), image, |i, pixel| [reds[i], greens[i], blues[i]] = pixel),
-            None => scratch.pixels(self.seen.grey, &mut reds),
+            None => scratch.pixels(shown, self.seen.grey, &mut reds),
         }
         // In between, bytes stored one by one arrive where vectors read them.
         let share = self.colour_shares(scratch, &near, [red, green, blue], weight);
@@ -116,6 +117,16 @@ impl Fusion<'_> {
         }
         share
     }
+}
+
+/// The voxels from the first quarter of a layer that has any of these to the last. `None` without.
+#[inline(always)]
+fn quarters(voxels: &Layer<u8>) -> Option<Range<usize>> {
+    let (quarters, _) = voxels.as_chunks::<QUARTER>();
+    let has_any = |quarter: &[u8; QUARTER]| *quarter != [0; QUARTER];
+    let first = quarters.iter().position(has_any)?;
+    let last = quarters.iter().rposition(has_any)?;
+    Some(first * QUARTER..(last + 1) * QUARTER)
 }
 
 /// Moves colours towards those seen.

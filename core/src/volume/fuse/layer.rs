@@ -8,12 +8,14 @@ use super::Fusion;
 use crate::{
     geometry::scalar::{clamp_f32, floored_i32, min_f32, rounded_i32},
     image::View,
+    slices::{clipped, clipped_mut},
     volume::{
         BLOCK_SIDE, CLASS_COUNT, NotedDepth,
         block::{LAYER_VOXELS, Layer},
     },
 };
 use bytemuck::TransparentWrapper;
+use core::ops::Range;
 use nalgebra::Vector3;
 
 /// Observation weights run up to this.
@@ -102,11 +104,17 @@ impl Scratch {
         }
     }
 
-    /// The pixels of an image of the depths' size at all voxels. What those show that fall outside
-    /// means nothing.
+    /// The pixels of an image of the depths' size at some voxels, whole rows of them. What those
+    /// show that fall outside means nothing.
     #[inline(always)]
-    pub(super) fn pixels<T: Copy + Default>(&mut self, image: View<'_, T>, shown: &mut Layer<T>) {
+    pub(super) fn pixels<T: Copy + Default>(
+        &mut self,
+        voxels: Range<usize>,
+        image: View<'_, T>,
+        shown: &mut Layer<T>,
+    ) {
         let (pixels, index) = self.indexed(image);
+        let (shown, index) = (clipped_mut(shown, voxels.clone()), clipped(index, voxels));
         // Eight loads in a row: a loop of single ones is all jumps.
         for (shown, index) in shown.as_chunks_mut().0.iter_mut().zip(index.as_chunks().0) {
             *shown = loaded(pixels, index);
