@@ -17,6 +17,9 @@ const RATIO_MAX_Q8: u64 = 4 * 256;
 /// Brightest mean level to which an image is multiplied: beyond it much is saturated.
 const LEVEL_MAX: u64 = 170;
 
+/// Number of levels whose sum 16 bits hold.
+const SUMMED: usize = 256;
+
 /// The image of a pair that is multiplied, and by how much, in 1/256.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Gain {
@@ -30,8 +33,9 @@ pub(super) enum Gain {
 
 /// Sum of an image's levels.
 pub(super) fn brightness(image: View<'_, u8>) -> u64 {
-    let row_sum = |row: &[u8]| row.iter().map(|&level| u64::from(level)).sum::<u64>();
-    image.rows().map(row_sum).sum()
+    // Sums of 16 bits have four times as many lanes as the whole one.
+    let sum = |levels: &[u8]| u64::from(levels.iter().map(|&level| u16::from(level)).sum::<u16>());
+    image.rows().flat_map(|row| row.chunks(SUMMED)).map(sum).sum()
 }
 
 impl Gain {
@@ -74,6 +78,16 @@ mod tests {
         // Hardly anything is left of one, or the other is white.
         assert_eq!([gain(100, 0), gain(0, 100), gain(100, 20)], [Gain::None; 3]);
         assert_eq!(gain(100, 250), Gain::None);
+    }
+
+    #[test]
+    fn the_brightness_is_the_sum_of_all_levels_at_any_width() {
+        for width in [1, 255, 256, 257, 700] {
+            // White, and columns beyond the image that do not count.
+            let levels = std::vec![255; 2 * (width + 3)];
+            let image = View::with_stride(&levels, width, 2, width + 3).unwrap();
+            assert_eq!(brightness(image), 255 * 2 * width as u64);
+        }
     }
 
     #[test]
