@@ -456,6 +456,13 @@ impl<'s> Mapper<'s> {
         self.stereo.disparity_q8()
     }
 
+    /// Confidences of the last frame's disparities, as they were matched: 0 without a disparity,
+    /// else one more than the number of measured pixels in the 16 x 16 about each, at most 255.
+    /// `None` unless `stereo.min_confidence` is above 0 and the core matched the pair.
+    pub fn confidence(&self) -> Option<View<'_, u8>> {
+        self.stereo.confidence()
+    }
+
     /// Every region of the slab, with its use now and at most.
     pub fn footprint(&self) -> Footprint {
         let mut footprint = self.capacity.footprint();

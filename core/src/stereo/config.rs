@@ -71,6 +71,9 @@ pub struct StereoConfig {
     pub support_ratio: f32,
     /// Reach within which a support point between two alike ones is redundant, candidates.
     pub redundant_distance: usize,
+    /// Reach from the image's rim within which a support point's surface is continued up to it,
+    /// candidates; 0 leaves rims empty.
+    pub rim_reach: usize,
     /// Side of a cell of the grid prior, px.
     pub grid_size: usize,
     /// Uniform share of the prior (gamma).
@@ -100,6 +103,8 @@ pub struct StereoConfig {
     pub adaptive_mean: u8,
     /// A 3 x 3 median at the end.
     pub median: bool,
+    /// Least confidence of a disparity that is kept; 0 measures none, 1 keeps all.
+    pub min_confidence: u8,
 }
 
 impl StereoConfig {
@@ -109,6 +114,8 @@ impl StereoConfig {
             disparity_max: 255,
             support_ratio: 0.85,
             redundant_distance: 5,
+            // Not of libelas, and off.
+            rim_reach: 0,
             grid_size: 20,
             gamma: 3.0,
             plane_radius_sigmas: 2.0,
@@ -124,6 +131,7 @@ impl StereoConfig {
             gap_ends: GapEnds::Farther,
             adaptive_mean: 1,
             median: false,
+            min_confidence: 0,
         }
     }
 
@@ -154,6 +162,7 @@ impl Default for StereoConfig {
         Self {
             support_ratio: 0.9,
             redundant_distance: 8,
+            rim_reach: 4,
             grid_size: 16,
             gamma: 10.0,
             plane_radius_sigmas: 1.0,
@@ -192,6 +201,14 @@ impl StereoConfig {
             "A support point between two alike ones at most so far away, on a row or a column, \
                  is redundant; 0 keeps all.",
         ),
+        Row::expert("stereo.rim_reach", "candidates", |c| Usize(&mut c.rim_reach))
+            .range(Range::Within(0.0, 64.0))
+            .published("0")
+            .text(
+                "Surfaces of support points at most so far from the image's rim are continued up \
+                 to it; 0 leaves the rims empty \
+                 ([decision 106](decisions/0106-confidence-by-density.md)).",
+            ),
         Row::expert("stereo.grid_size", "px", |c| Usize(&mut c.grid_size))
             .range(Range::Within(MIN_GRID_SIZE as f32, 256.0))
             .published("20")
@@ -259,6 +276,12 @@ impl StereoConfig {
             ),
         Row::expert("stereo.median", "", |c| Bool(&mut c.median))
             .text("A 3 x 3 median at the end."),
+        Row::user("stereo.min_confidence", "", |c| U8(&mut c.min_confidence)).text(
+            "Disparities of less confidence are removed. A confidence is one more than the number \
+             of measured pixels, neither filled in nor without a disparity, in the 16 x 16 about a \
+             pixel, at most 255. 0 measures none, 1 keeps all \
+             ([decision 106](decisions/0106-confidence-by-density.md)).",
+        ),
     ];
 
     pub(crate) const CHECKS: &'static [Rule<Self>] =

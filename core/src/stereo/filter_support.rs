@@ -9,7 +9,7 @@ use crate::{
     slices::{clipped, clipped_mut, padded},
 };
 
-use super::{StereoConfig, support::NO_MATCH};
+use super::{StereoConfig, rims::Rims, support::NO_MATCH};
 
 /// Candidates looked at together.
 const BLOCK: usize = 64;
@@ -24,25 +24,29 @@ const PLAUSIBLE_MIN: u16 = 5;
 /// Largest difference of disparities that make a point between them redundant, px, as published.
 const REDUNDANT_THRESHOLD: u16 = 1;
 
-/// Removes from a grid of candidates, `columns` wide, the implausible and then the redundant
-/// points; says how many of each went.
+/// Removes from a grid of candidates, `columns` wide, the implausible points, adds those at the rim
+/// and removes the redundant ones; says how many of each there were.
 pub(super) struct FilterSupport<'a> {
     pub config: &'a StereoConfig,
     pub grid: &'a mut [i16],
     pub columns: usize,
+    /// Distance of the last column and the last row of the image from the last candidates, px.
+    pub beyond_px: [usize; 2],
     /// Buffer at least as long as the grid.
     pub scratch: &'a mut [i16],
 }
 
 impl Work for FilterSupport<'_> {
-    type Output = [u32; 2];
+    type Output = [u32; 3];
 
     #[inline(always)]
-    fn run(self) -> [u32; 2] {
-        let Self { config, grid, columns, scratch } = self;
+    fn run(self) -> [u32; 3] {
+        let Self { config, grid, columns, beyond_px, scratch } = self;
         let scratch = clipped_mut(scratch, ..grid.len());
         [
             remove_implausible(grid, columns, scratch),
+            // What is implausible is not to be continued, and rims may have too many points, too.
+            Rims { config, grid: &mut *grid, columns, beyond_px }.extend(),
             remove_redundant(config, grid, columns, scratch),
         ]
     }

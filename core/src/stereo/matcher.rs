@@ -26,7 +26,8 @@ const ROWS: usize = 4;
 
 /// The matcher: its buffers in the slab and the disparities of the last pair.
 pub struct StereoMatcher<'s> {
-    /// Four bytes a pixel: the gradients of both images, later the runs of the speckle filter.
+    /// Four bytes a pixel: the gradients of both images, later the runs of the speckle filter, in
+    /// the end a byte for each pixel's confidence.
     gradients: &'s mut [u32],
     /// Left planes, then left disparities in working units, in the end the result.
     disparity: &'s mut [u16],
@@ -45,6 +46,8 @@ pub struct StereoMatcher<'s> {
     image_height: usize,
     width: usize,
     height: usize,
+    /// True if the gradients' memory holds the confidences of the last pair.
+    has_confidence: bool,
 }
 
 /// Takes a disparity error out of rows, from `first` on.
@@ -148,6 +151,7 @@ impl<'s> StereoMatcher<'s> {
             // No pair yet: one pixel without disparity, so that a view of it is never empty.
             width: 1,
             height: 1,
+            has_confidence: false,
         }
     }
 
@@ -169,6 +173,15 @@ impl<'s> StereoMatcher<'s> {
     pub fn disparity_q8(&self) -> View<'_, u16> {
         // Both sides are at least 1 and their product is at most the region's length, by `begin`.
         View::new(self.disparity, self.width, self.height).unwrap_or(View::ONE_ZERO)
+    }
+
+    /// Confidences of the last pair's disparities, as large as [`StereoMatcher::disparity_q8`]: 0
+    /// where there is none, else one more than the number of measured pixels, neither filled in nor
+    /// without a disparity, in the 16 x 16 about each, at most 255. `None` unless
+    /// [`StereoConfig::min_confidence`] is above 0 and the pair was matched.
+    pub fn confidence(&self) -> Option<View<'_, u8>> {
+        let confidence = bytemuck::cast_slice(self.gradients);
+        View::new(confidence, self.width, self.height).filter(|_| self.has_confidence)
     }
 
     /// Computes the disparities of a rectified pair.
@@ -251,6 +264,7 @@ impl<'s> StereoMatcher<'s> {
         self.smooth(config, executor);
         done(StereoStep::Smoothing);
         self.finish(invalid, &mut report);
+        self.measure_confidence(config, executor, &mut report);
         done(StereoStep::Output);
         report
     }
@@ -263,6 +277,7 @@ impl<'s> StereoMatcher<'s> {
         disparity_q8: View<'_, u16>,
         unused: Option<&InvalidPair<'_>>,
     ) -> StereoReport {
+        self.has_confidence = false;
         self.width = disparity_q8.width().min(self.image_width).max(1);
         self.height = disparity_q8.height().min(self.image_height).max(1);
         self.disparity.fill(0);
@@ -306,6 +321,7 @@ impl<'s> StereoMatcher<'s> {
         left: View<'_, u8>,
         right: View<'_, u8>,
     ) -> StereoStatus {
+        self.has_confidence = false;
         // The size is clipped even if the pair is refused: readers of the result rely on it.
         self.width = left.width().min(self.image_width).max(1);
         self.height = left.height().min(self.image_height).max(1);

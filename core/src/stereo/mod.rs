@@ -12,16 +12,18 @@
 //! Own choices, where the paper leaves one: which 16 gradient samples make a descriptor
 //! (`descriptor.rs`); support points are filtered implausible all at once; disparities are refined
 //! to fractions of a pixel ([`StereoConfig::subpixel`], measured there); the mean is centred;
-//! images of many rows are matched on every second one ([`StereoConfig::second_rows_from`]).
-//! Pixels outside the hull of the support points get no disparity.
+//! images of many rows are matched on every second one ([`StereoConfig::second_rows_from`]);
+//! surfaces are continued up to the image's rim ([`StereoConfig::rim_reach`]). Pixels outside the
+//! hull of the support points get no disparity. Each disparity can have a confidence
+//! ([`StereoMatcher::confidence`]).
 //!
 //! **Memory.** 8 bytes a pixel: the four gradients (1 each; the runs of the speckle filter lie in
-//! the same place later), the left disparities (2) and the right ones (2). Descriptors, 16 bytes
-//! each, are kept for 16 rows only, disparities of the right image only to be compared with. With P
-//! = width x height / 25 candidates for support points, 4 P + 2 x 66 P bytes for them and their
-//! triangulations, and 2 x 32 bytes per 10 x 10 px for the grid prior; in all about 14 bytes a
-//! pixel and 260 a column (14.8 at KITTI size). [`StereoMatcher::bytes`] is exact. No array on the
-//! stack exceeds 600 bytes.
+//! the same place later, and the confidences in the end), the left disparities (2) and the right
+//! ones (2). Descriptors, 16 bytes each, are kept for 16 rows only, disparities of the right image
+//! only to be compared with. With P = width x height / 25 candidates for support points, 4 P + 2 x
+//! 66 P bytes for them and their triangulations, and 2 x 32 bytes per 10 x 10 px for the grid
+//! prior; in all about 14 bytes a pixel and 260 a column (14.8 at KITTI size).
+//! [`StereoMatcher::bytes`] is exact. No array on the stack exceeds 600 bytes.
 //!
 //! **Bounds.** Support points: one per candidate, at least 5 px apart ([`CANDIDATE_STEP`]), so
 //! they always fit, as do their triangles, at most two a point. Two that meet at one pixel of the
@@ -59,6 +61,7 @@
 //! assert_eq!(matcher.disparity_q8().get(40, 20), Some(6 * 256));
 //! ```
 
+mod confidence;
 mod config;
 mod delaunay;
 mod dense;
@@ -71,6 +74,7 @@ mod matcher;
 mod median;
 mod prior;
 mod report;
+mod rims;
 mod rows;
 mod smooth;
 mod speckle;

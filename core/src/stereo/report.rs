@@ -38,6 +38,8 @@ pub struct StereoReport {
     pub implausible: u32,
     /// Support points removed as redundant.
     pub redundant: u32,
+    /// Support points added on the image's rim, before filtering.
+    pub rim_points: u32,
     /// Support points left.
     pub support_points: u32,
     /// Support points dropped in the right image because another lies at the same pixel.
@@ -55,6 +57,8 @@ pub struct StereoReport {
     pub speckles: u32,
     /// Pixels filled between others.
     pub filled: u32,
+    /// Pixels removed because their confidence is too low.
+    pub doubtful: u32,
     /// Given disparities that no pair of this width can have, taken as none.
     pub refused: u32,
     /// Pixels with a disparity in the end.

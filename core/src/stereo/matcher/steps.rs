@@ -8,6 +8,7 @@ use crate::{
     slices::{clipped, clipped_mut},
     stereo::{
         GapEnds, StereoConfig, StereoReport,
+        confidence::MeasureConfidence,
         config::{CANDIDATE_STEP, DISPARITY_LIMIT},
         delaunay::{SupportPoint, Triangulation},
         dense::{DenseBand, DenseMatching, FILLED, MatchBand, NONE, WORKING_ONE_PX},
@@ -98,17 +99,26 @@ impl StereoMatcher<'_> {
         let (columns, rows) =
             (support::candidates(self.width, step), support::candidates(self.height, step));
         let Some(grid) = self.support.get_mut(..columns * rows) else { return };
-        let filter = FilterSupport { config, grid, columns, scratch: self.support_scratch };
-        [report.implausible, report.redundant] = executor.vectors().run(filter);
+        // The last candidates have no window: points there are at the image's rim.
+        let rim = [self.width - 1, self.height - 1];
+        let beyond_px = [rim[0] - (columns - 1) * step, rim[1] - (rows - 1) * step];
+        let filter =
+            FilterSupport { config, grid, columns, beyond_px, scratch: self.support_scratch };
+        [report.implausible, report.rim_points, report.redundant] = executor.vectors().run(filter);
         // Rows from the top: the triangulation takes its points in scan order.
         self.left_mesh.clear();
         self.right_mesh.clear();
         for (j, row) in grid.chunks_exact(columns.max(1)).enumerate() {
             for (i, &disparity) in row.iter().enumerate().filter(|(_, d)| **d != NO_MATCH) {
-                let (u, v, disparity) = ((i * step) as u16, (j * step) as u16, disparity as u16);
+                let u = if i + 1 == columns { rim[0] } else { i * step } as u16;
+                let v = if j + 1 == rows { rim[1] } else { j * step } as u16;
+                let disparity = disparity as u16;
                 self.left_mesh.add(SupportPoint { u, v, disparity });
-                report.occluded_right +=
-                    u32::from(self.right_mesh.add(SupportPoint { u: u - disparity, v, disparity }));
+                // Nearer than the right image shows it, a surface is the left image's only.
+                if let Some(u) = u.checked_sub(disparity) {
+                    report.occluded_right +=
+                        u32::from(self.right_mesh.add(SupportPoint { u, v, disparity }));
+                }
             }
         }
         report.support_points = self.left_mesh.points().len() as u32;
@@ -329,6 +339,37 @@ impl StereoMatcher<'_> {
             invalid::remove(invalid, self.width, disparities);
         }
         report.valid = disparities.iter().filter(|disparity| **disparity != 0).count() as u32;
+    }
+
+    /// Measures confidences, if the settings ask for them, and removes what has too little.
+    pub(super) fn measure_confidence<E: Executor>(
+        &mut self,
+        config: &StereoConfig,
+        executor: &E,
+        report: &mut StereoReport,
+    ) {
+        self.has_confidence = config.min_confidence > 0;
+        if !self.has_confidence {
+            return;
+        }
+        let (width, pixels, bands) =
+            (self.width, self.width * self.height, Bands::new(self.height));
+        let disparity_q8 = clipped_mut(self.disparity, ..pixels);
+        // The gradients are done with.
+        let confidence = clipped_mut(bytemuck::cast_slice_mut(self.gradients), ..pixels);
+        let counts = Bands::new(BANDS).split_mut(bytemuck::cast_slice_mut(self.columns), width);
+        let rows = zip3(bands.first(), bands.split_mut(confidence, width), counts);
+        each(executor, rows, |(first, out, counts)| {
+            let disparity_q8 = &*disparity_q8;
+            executor.vectors().run(MeasureConfidence { disparity_q8, width, first, counts, out })
+        });
+        // Only now: a pixel counts for its neighbours whether it is kept or not.
+        for (disparity, confidence) in disparity_q8.iter_mut().zip(confidence) {
+            let goes = (*disparity != 0) & (*confidence < config.min_confidence);
+            report.doubtful += u32::from(goes);
+            (*disparity, *confidence) = if goes { (0, 0) } else { (*disparity, *confidence) };
+        }
+        report.valid -= report.doubtful;
     }
 }
 

@@ -2,6 +2,7 @@
 //! believed, and real clips.
 
 mod clips;
+mod confidence;
 mod scenes;
 mod second_rows;
 mod trouble;
