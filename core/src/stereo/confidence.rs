@@ -52,13 +52,13 @@ impl Work for MeasureConfidence<'_> {
             count(counts, row(v), |count, measured| count + measured);
         }
         for (v, out) in (first..height).zip(out.chunks_exact_mut(width)) {
-            let enters = v + BEFORE - 1;
-            if enters < height {
-                count(counts, row(enters), |count, measured| count + measured);
+            let next = v + BEFORE - 1;
+            if next < height {
+                count(counts, row(next), |count, measured| count + measured);
             }
             measure_row(row(v), counts, out);
-            if let Some(leaves) = v.checked_sub(BEFORE) {
-                count(counts, row(leaves), |count, measured| count - measured);
+            if let Some(last) = v.checked_sub(BEFORE) {
+                count(counts, row(last), |count, measured| count - measured);
             }
         }
     }

@@ -176,7 +176,7 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Confidences of the last pair's disparities, as large as [`StereoMatcher::disparity_q8`]: 0
-    /// where there is none, else one more than the number of measured pixels, neither filled in nor
+    /// without a disparity, else one more than the number of measured pixels, neither filled in nor
     /// without a disparity, in the 16 x 16 about each, at most 255. `None` unless
     /// [`StereoConfig::min_confidence`] is above 0 and the pair was matched.
     pub fn confidence(&self) -> Option<View<'_, u8>> {

@@ -323,6 +323,17 @@ impl Mapper {
         arrays::image(py, pixels, size)
     }
 
+    /// Confidence of each disparity of the last frame, 0 without one, else 1 to 255: one more than
+    /// the number of measured pixels in the 16 x 16 about it. None unless the setting
+    /// `stereo.min_confidence` is above 0 and the mapper matched the pair itself.
+    #[getter]
+    fn confidence<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<u8>>>> {
+        let found = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| mapper.confidence().map(arrays::copied)))
+        })?;
+        found.map(|(pixels, size)| arrays::image(py, pixels, size)).transpose()
+    }
+
     /// Digest of the last step; None before the first, and after `restore`.
     #[getter]
     fn digest(&self, py: Python<'_>) -> PyResult<Option<u64>> {

@@ -81,6 +81,7 @@ def test_a_frame_has_tracks_triangles_and_a_picture(street):
     assert np.allclose(dynvox.matrix(reports[-1]["t_world_camera"]), mapper.t_world_camera)
     assert np.linalg.norm(mapper.t_world_camera[:3, 3] - dataset.truth[-1][:3, 3]) < 0.1
     assert mapper.disparity_q8.shape == (height, width) and (mapper.disparity_q8 > 0).mean() > 0.5
+    assert mapper.confidence is None
     positions_m, colours = mapper.triangles()
     assert positions_m.shape == colours.shape == (len(positions_m), 3, 3) and len(positions_m) > 100_000
     view = mapper.raycast()

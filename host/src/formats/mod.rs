@@ -49,7 +49,7 @@ pub use picture::{
     declared_maximum, decode_picture, picture_size, read_picture, significant_bits,
 };
 pub use ply::{Axes, Mesh, MeshAxes, PlyMesh, PlyVertex, PlyVertices, PlyWriter};
-pub use png_numbers::{read_png_deep, read_png_u16, write_png_deep};
+pub use png_numbers::{read_png_deep, read_png_u16, write_png_bytes, write_png_deep};
 pub use poses::{
     Trajectory, kitti_line, read_numbered, read_poses, tum_line, tum_row, write_numbered,
 };

@@ -61,10 +61,27 @@ pub fn read_png_deep(path: &Path) -> Result<Image<u16>, FormatError> {
 /// The file cannot be written.
 pub fn write_png_deep(path: &Path, image: &Image<u16>) -> Result<(), FormatError> {
     let bytes: Vec<u8> = image.pixels().iter().copied().flat_map(u16::to_ne_bytes).collect();
+    write_grey(path, [image.width(), image.height()], &bytes, ExtendedColorType::L16)
+}
+
+/// Writes numbers as a grey PNG of 8 bit.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_png_bytes(path: &Path, image: &Image<u8>) -> Result<(), FormatError> {
+    write_grey(path, [image.width(), image.height()], image.pixels(), ExtendedColorType::L8)
+}
+
+fn write_grey(
+    path: &Path,
+    size: [usize; 2],
+    bytes: &[u8],
+    colour: ExtendedColorType,
+) -> Result<(), FormatError> {
     let mut png = Vec::new();
-    let (width, height) = (image.width() as u32, image.height() as u32);
+    let [width, height] = size.map(|size| size as u32);
     PngEncoder::new(&mut png)
-        .write_image(&bytes, width, height, ExtendedColorType::L16)
+        .write_image(bytes, width, height, colour)
         .map_err(|error| plain(&error))
         .and_then(|()| write(path, &png).map_err(|error| error.to_string()))
         .map_err(|reason| {

@@ -16,11 +16,12 @@ fn truth(_: f32, v: f32) -> f32 {
 }
 
 /// Disparities and confidences at a least confidence; the report.
-fn judged<E: Executor>(
+fn computed<E: Executor>(
     min_confidence: u8,
-    (left, right): &(Grey, Grey),
+    pair: &(Grey, Grey),
     executor: &E,
 ) -> (StereoReport, Vec<u16>, Option<Vec<u8>>) {
+    let (left, right) = pair;
     let config = StereoConfig { min_confidence, ..StereoConfig::default() };
     with_matcher(&capacity(WIDTH, 120), |matcher| {
         let report = matcher.compute(&config, left.view(), right.view(), executor);
@@ -33,23 +34,23 @@ fn judged<E: Executor>(
 #[test]
 fn a_least_confidence_of_one_keeps_every_bit_and_says_how_sure_each_is() {
     let pair = road();
-    let (plain, all, none) = judged(0, &pair, &Serial);
+    let (plain, all, none) = computed(0, &pair, &Serial);
     assert!(none.is_none() && plain.doubtful == 0);
-    let (report, same, confidence) = judged(1, &pair, &Serial);
+    let (report, same, confidence) = computed(1, &pair, &Serial);
     let confidence = confidence.unwrap();
     assert_eq!((report, &same), (plain, &all));
     assert!(all.iter().zip(&confidence).all(|(&d, &of)| (d == 0) == (of == 0)));
     // Nearly all is measured in the middle; at the rim a part of the window is outside.
     let at = |u: usize, v: usize| confidence[v * WIDTH + u];
     assert!(at(200, 60) > 200 && (60..190).contains(&at(200, 115)), "{}", at(200, 115));
-    assert_eq!(judged(1, &pair, &TwoThreads).2, Some(confidence));
+    assert_eq!(computed(1, &pair, &TwoThreads).2, Some(confidence));
 }
 
 #[test]
 fn what_is_less_sure_than_asked_is_removed_and_counted() {
     let pair = road();
-    let (_, all, confidence) = judged(1, &pair, &Serial);
-    let (report, left, sure) = judged(180, &pair, &Serial);
+    let (_, all, confidence) = computed(1, &pair, &Serial);
+    let (report, left, sure) = computed(180, &pair, &Serial);
     assert!(report.doubtful > 100 && report.valid > 10_000, "{report:?}");
     assert_eq!(report.valid as usize, left.iter().filter(|&&d| d > 0).count());
     let (confidence, sure) = (confidence.unwrap(), sure.unwrap());

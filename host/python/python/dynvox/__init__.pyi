@@ -329,6 +329,11 @@ class Mapper:
         filled in between measured ones, which are even. It has size 1 x 1 before the first frame."""
 
     @property
+    def confidence(self) -> NDArray[np.uint8] | None:
+        """Confidence of each disparity of the last frame, 0 without one, else 1 to 255: one more than the number of measured pixels in the 16 x 16 about it.
+        None unless the setting `stereo.min_confidence` is above 0 and the mapper matched the pair itself."""
+
+    @property
     def digest(self) -> int | None:
         """Digest of the last step; None before the first, and after `restore`."""
 

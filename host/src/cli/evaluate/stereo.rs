@@ -1,9 +1,12 @@
 //! `dynvox evaluate stereo`.
 
 use crate::evaluate::stereo::{
-    BAD_PX, Estimate, PartFigures, StereoCounts, StereoFigures, StereoPair, filled, find_stereo_set,
+    BAD_PX, Estimate, Frontier, FrontierRow, PartFigures, StereoCounts, StereoFigures, StereoPair,
+    filled, find_stereo_set,
 };
-use crate::formats::{Image, read_picture, read_png_deep, read_png_u16, write_png_deep};
+use crate::formats::{
+    Image, read_picture, read_png_deep, read_png_u16, write_png_bytes, write_png_deep,
+};
 use crate::observe::pictures;
 use crate::owned::{self, create_folder};
 use crate::request::Settings;
@@ -36,8 +39,12 @@ pub struct StereoArgs {
     /// One setting of the matcher, as in --set stereo.texture_min=10; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write the disparities (16-bit PNG, value / 256 px, 0 none; odd values were filled in) and
-    /// pictures of their errors into this folder
+    /// Print coverage and error by least confidence, as stereo.min_confidence would leave them
+    #[arg(long, conflicts_with = "disparity")]
+    frontier: bool,
+    /// Write the disparities (16-bit PNG, value / 256 px, 0 none; odd values were filled in),
+    /// pictures of their errors and, with --frontier or stereo.min_confidence, their confidences
+    /// (8-bit PNG, 0 none) into this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Threads; the result does not depend on them
@@ -54,19 +61,36 @@ struct Found {
     benchmark: &'static str,
     pairs: usize,
     regions: std::collections::BTreeMap<&'static str, StereoFigures>,
+    /// Coverage and error by least confidence; of what both cameras see, where that is known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    frontier: Vec<FrontierRow>,
+}
+
+/// Disparities of a pair and, if they were asked for, their confidences.
+struct Matched {
+    disparity_q8: Image<u16>,
+    confidence: Option<Image<u8>>,
 }
 
 pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
     let set = find_stereo_set(&args.folder)?;
-    let config = Settings::resolve(args.config.as_deref(), &args.set)?.stereo();
+    let mut config = Settings::resolve(args.config.as_deref(), &args.set)?.stereo();
+    if args.frontier {
+        // Of 1, all are kept.
+        config.min_confidence = config.min_confidence.max(1);
+    }
     if args.threads == 0 {
         bail!("--threads begins at 1. Give a larger number");
     }
     let threads = Threads::new(args.threads)?;
     let mut counts = [StereoCounts::default(); REGIONS.len()];
+    let mut frontier = Frontier::default();
     for pair in &set.pairs {
-        let given = match &args.disparity {
-            Some(folder) => read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
+        let Matched { disparity_q8: given, confidence } = match &args.disparity {
+            Some(folder) => Matched {
+                disparity_q8: read_png_deep(&folder.join(format!("{}.png", pair.name)))?,
+                confidence: None,
+            },
             None => threads.run(|| matched(pair, &config, &threads))?,
         };
         let whole = filled(&given);
@@ -77,6 +101,12 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
         )?;
         if let Some(folder) = &args.out {
             write(folder, pair, &given, args.disparity.is_none())?;
+            if let Some(confidence) = &confidence {
+                write_png_bytes(&folder.join(format!("{}_confidence.png", pair.name)), confidence)?;
+            }
+        }
+        if let (Some(confidence), Some(truth)) = (&confidence, pair.truth.iter().flatten().next()) {
+            frontier.add(&read_png_deep(truth)?, &given, confidence);
         }
     }
     let regions = REGIONS
@@ -84,7 +114,8 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
         .zip(counts)
         .filter_map(|(name, counts)| Some((name, counts.figures()?)))
         .collect();
-    let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions };
+    let frontier = if args.frontier { frontier.rows() } else { Vec::new() };
+    let found = Found { benchmark: set.name, pairs: set.pairs.len(), regions, frontier };
     if args.json {
         outln!("{}", serde_json::to_string_pretty(&found)?);
     } else {
@@ -94,11 +125,7 @@ pub fn run(args: &StereoArgs) -> anyhow::Result<()> {
 }
 
 /// The core's own disparity of a pair.
-fn matched(
-    pair: &StereoPair,
-    config: &StereoConfig,
-    threads: &Threads,
-) -> anyhow::Result<Image<u16>> {
+fn matched(pair: &StereoPair, config: &StereoConfig, threads: &Threads) -> anyhow::Result<Matched> {
     let [left, right] = [
         read_picture(&pair.images[0])?.to_8_bit(None).grey,
         read_picture(&pair.images[1])?.to_8_bit(None).grey,
@@ -128,7 +155,10 @@ fn matched(
     };
     // A pair that cannot be matched covers nothing: that shows in the figures.
     matcher.compute(config, left, right, threads);
-    Ok(Image::from_view(&matcher.disparity_q8()))
+    Ok(Matched {
+        disparity_q8: Image::from_view(&matcher.disparity_q8()),
+        confidence: matcher.confidence().as_ref().map(Image::from_view),
+    })
 }
 
 /// Counts a pair in every region it has truth for.
@@ -212,6 +242,13 @@ fn print_figures(found: &Found) {
         outln!("{:>9.3} px{:>7.3} px", of.mean_error_px, of.mean_signed_error_px);
         print_part("  measured", of.measured.as_ref().filter(|_| of.filled_in.is_some()));
         print_part("  filled in", of.filled_in.as_ref());
+    }
+    if !found.frontier.is_empty() {
+        outln!("\n{:<16}{:>11}{:>10}{:>10}", "least confidence", "coverage", "D1", "> 3 px");
+    }
+    for row in &found.frontier {
+        let [coverage, d1, bad] = [row.coverage, row.d1, row.bad].map(|share| 100.0 * share);
+        outln!("{:<16}{coverage:>10.2}%{d1:>9.2}%{bad:>9.2}%", row.min_confidence);
     }
 }
 

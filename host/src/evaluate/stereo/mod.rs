@@ -10,11 +10,13 @@
 //! foreground and background where the benchmark has an `obj_map`.
 
 mod fill;
+mod frontier;
 mod layout;
 #[cfg(test)]
 mod tests;
 
 pub use fill::filled;
+pub use frontier::{Frontier, FrontierRow};
 pub use layout::{StereoPair, StereoSet, StereoSetError, find_stereo_set};
 
 use crate::evaluate::reference::Rule;
