@@ -142,28 +142,32 @@ impl<'s> Query<'s> {
         for (number, descriptor) in (1..).zip(descriptors.iter().take(*len)) {
             // Three passes over at most 64 entries: a list of them would be as long as the stack
             // of a small machine is short.
-            let mut similar = |most_bits: u32, each: &mut dyn FnMut(usize, u32)| {
-                index.candidates(descriptor, |candidate| {
-                    let Some((slot, other)) = table.described(candidate) else { return };
-                    let bits = descriptor.distance(other);
-                    if bits <= most_bits && may(slot) {
-                        each(slot, bits);
-                    }
-                });
+            let bits_of = |candidate| {
+                let (slot, other) = table.described(candidate)?;
+                may(slot).then(|| (slot, descriptor.distance(other)))
             };
             let mut least_bits = SCORE_BITS;
-            similar(SCORE_BITS, &mut |_, bits| least_bits = least_bits.min(bits));
+            index.candidates(descriptor, |candidate| {
+                if let Some((_, bits)) = bits_of(candidate) {
+                    least_bits = least_bits.min(bits);
+                }
+            });
             let most_bits = (least_bits + SCORE_MARGIN_BITS).min(SCORE_BITS);
             let mut keyframes = 0;
-            similar(most_bits, &mut |slot, _| {
-                if let Some(score) = scores.get_mut(slot).filter(|score| score.last != number) {
+            let similar = |candidate| {
+                bits_of(candidate).filter(|(_, bits)| *bits <= most_bits).map(|(slot, _)| slot)
+            };
+            index.candidates(descriptor, |candidate| {
+                let score = similar(candidate).and_then(|slot| scores.get_mut(slot));
+                if let Some(score) = score.filter(|score| score.last != number) {
                     score.last = number;
                     keyframes += 1;
                 }
             });
             let share = POINT_SCORES / keyframes.max(1);
-            similar(most_bits, &mut |slot, _| {
-                if let Some(score) = scores.get_mut(slot).filter(|score| score.last == number) {
+            index.candidates(descriptor, |candidate| {
+                let score = similar(candidate).and_then(|slot| scores.get_mut(slot));
+                if let Some(score) = score.filter(|score| score.last == number) {
                     *score = Score { count: score.count.saturating_add(share), last: 0 };
                 }
             });

@@ -75,7 +75,7 @@ fn continued(
     let rise = (disparity - i32::from(inner)) * (near * CANDIDATE_STEP + beyond) as i32;
     // To the nearest: twice the fraction, and a half.
     let run = ((far - near) * CANDIDATE_STEP) as i32;
-    Some(disparity + (2 * rise + run).div_euclid(2 * run))
+    Some(disparity + (2 * rise + run).checked_div_euclid(2 * run)?)
 }
 
 #[cfg(test)]
