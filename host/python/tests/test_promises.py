@@ -31,6 +31,7 @@ PROMISES = {
     "It belongs to the process": "test_a_forked_child_is_told_whose_mapper_it_has",
     "A file that this mapper did not make is never overwritten": "test_a_file_of_the_user_is_never_overwritten",
     "The first ten pairs are examined": "test_pictures_are_examined_as_on_the_command_line",
+    "None unless the setting `stereo.min_confidence`": "test_confidence_is_there_when_it_is_asked_for",
     "Nothing is copied whose pixels lie": "test_a_view_that_is_not_dense_is_copied",
     "A pose must be a rigid motion": "test_poses_that_are_no_rigid_motion_within_the_map_are_refused",
     "`fused` in the report is true only if": "test_fused_is_true_only_if_something_was_fused",
@@ -376,3 +377,15 @@ def test_odd_options_are_refused(options, sentence):
 def test_numbers_of_numpy_are_numbers():
     made = mapper(set={"volume.voxel_size_m": np.float32(0.125)}, memory=np.int64(32 << 20), image=(WIDTH, HEIGHT))
     assert "voxel_size_m = 0.125" in made.config_toml and made.slab_bytes <= 32 << 20
+
+
+def test_confidence_is_there_when_it_is_asked_for():
+    left, right = pair()
+    plain, asked = mapper(), mapper(set={"stereo.min_confidence": 1})
+    for each in (plain, asked):
+        each.step(left, right)
+    assert plain.confidence is None
+    confidence = asked.confidence
+    assert confidence.shape == (HEIGHT, WIDTH) and np.array_equal(confidence > 0, asked.disparity_q8 > 0) and (confidence > 0).mean() > 0.3
+    asked.step(left, right, disparity_q8=asked.disparity_q8)
+    assert asked.confidence is None
