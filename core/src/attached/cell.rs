@@ -5,6 +5,8 @@ use bytemuck::{Pod, Zeroable};
 
 /// Frames in which a cell stayed, after which it is attached.
 pub(super) const EARNED: i8 = 20;
+/// Frames in which a cell stayed, after which its matches that stay say nothing of the camera.
+const DOUBTED: i8 = 4;
 /// Score below which a cell is let go.
 const LOST: i8 = 8;
 /// Bounds of the score: what was seen longer ago does not count.
@@ -95,6 +97,11 @@ impl Cell {
     /// Tells that the cell has stayed for half of the frames it takes.
     pub fn stays(&self) -> bool {
         self.score >= EARNED / 2
+    }
+
+    /// Tells that the cell has stayed for so long that it may be attached.
+    pub fn is_doubted(&self) -> bool {
+        self.score >= DOUBTED
     }
 
     pub fn is_attached(&self) -> bool {

@@ -3,8 +3,9 @@
 //!
 //! The image is divided into cells. A match counts where the camera moved so far that a static
 //! point would have moved by [`MOVED_PX`]: for its cell where it stays in place at one disparity,
-//! against it where it moves; what stays must be near. A cell that gathers 20 frames is attached,
-//! if its neighbours stay as well, and no stage uses its pixels any more. A hole between attached
+//! against it where it moves; what stays must be near. From four frames on the cell's matches that
+//! stay again have no part in the camera's motion. A cell that gathers 20 frames is attached, if
+//! its neighbours stay as well, and no stage uses its pixels any more. A hole between attached
 //! cells that no match speaks against belongs to them. A camera that stands counts nothing.
 //!
 //! Nothing is matched in an attached cell, so that its pixels decide whether it stays one: they
@@ -126,6 +127,14 @@ impl<'s> AttachedCells<'s> {
             .map(|[column, row]| [column.unwrap_or_default(), row.unwrap_or_default()])
     }
 
+    /// Tells that a match stays in place in a cell that has stayed for some frames. Most matches of
+    /// a frame may be such: a bonnet has more than a world that turns by.
+    #[inline(never)]
+    pub fn doubts(&self, m: &Match) -> bool {
+        let is_doubted = |at| self.cells.get(at).is_some_and(Cell::is_doubted);
+        is_still(m) && self.cell_at(m.current_left).is_some_and(is_doubted)
+    }
+
     /// Counts the matches of a frame. `matches` are with the frame before, without those on objects
     /// that a detector named.
     #[inline(never)]
@@ -170,10 +179,8 @@ impl<'s> AttachedCells<'s> {
         if expected_px.iter().all(|&px| px < MOVED_PX) {
             return None;
         }
-        let [du, dv] = m.flow_px();
-        let disparity_px = m.current_disparity_px();
-        let change = disparity_px - m.previous_disparity_px();
-        let is_still = [du, dv, change].iter().all(|px| px.abs() < STILL_PX);
+        let ([du, dv], disparity_px, is_still) =
+            (m.flow_px(), m.current_disparity_px(), is_still(m));
         // What hardly moves may be either, and what stays and is far may drive: neither counts.
         let has_moved = du.abs() + dv.abs() > 2.0 * STILL_PX;
         let is_near = f64::from(disparity_px) * NEAR_BASELINES > rig.focal_px;
@@ -234,6 +241,13 @@ impl<'s> AttachedCells<'s> {
         let attached = self.cells.iter().take(used).filter(|cell| cell.is_attached()).count();
         self.count = attached as u32;
     }
+}
+
+/// Tells that a match stays in place at its disparity.
+fn is_still(m: &Match) -> bool {
+    let [du, dv] = m.flow_px();
+    let change = m.current_disparity_px() - m.previous_disparity_px();
+    [du, dv, change].iter().all(|px| px.abs() < STILL_PX)
 }
 
 /// Tells whether the pixels of a cell differ between two images by more than half of what their own

@@ -135,6 +135,26 @@ fn a_bonnet_is_masked_after_thirty_frames_and_let_go_when_it_changes() {
 }
 
 #[test]
+fn matches_that_stay_where_others_stayed_are_doubted_long_before() {
+    let mut slab = slab();
+    let mut ride = Ride::new(&mut slab);
+    let (low, high) = ([150.0, 85.0], [150.0, 20.0]);
+    let still = |at| Ride::matched(at, at, [40.0; 2]);
+    for _ in 0..3 {
+        ride.frame(0.9, 40.0, is_bonnet);
+    }
+    assert!(!ride.cells.doubts(&still(low)), "three frames say little");
+    for _ in 0..3 {
+        ride.frame(0.9, 40.0, is_bonnet);
+    }
+    assert!(ride.cells.doubts(&still(low)));
+    assert!(!ride.cells.doubts(&still(high)), "elsewhere");
+    let [u, v] = low;
+    assert!(!ride.cells.doubts(&Ride::matched(low, [u, v - 1.0], [40.0; 2])), "it moves");
+    assert!(!ride.cells.doubts(&Ride::matched(low, low, [39.0, 40.0])), "it comes nearer");
+}
+
+#[test]
 fn nothing_is_attached_to_a_camera_that_stands() {
     let mut slab = slab();
     let mut ride = Ride::new(&mut slab);

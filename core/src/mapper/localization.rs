@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     Capacity,
+    attached::AttachedCells,
     egomotion::{
         Anchor, Egomotion, Estimator, MotionCovariance, MotionEstimate, SlowFrame, TimedMatches,
         icp::{self, IcpReport},
@@ -108,18 +109,29 @@ fn observations(rig: &StereoRig, m: &Match) -> Option<[StereoObservation; 2]> {
     aligned.then(|| pairs.map(|(left, right)| rig.observation(left, right)))
 }
 
+/// Parts of the image that say nothing of the camera's motion.
+#[derive(Debug)]
+pub(super) struct NoWitness<'a, 'i, 's> {
+    /// Objects that may move.
+    pub mask: &'a EgomotionMask<'a, 'i>,
+    /// Cells that may be attached to the camera.
+    pub attached: &'a AttachedCells<'s>,
+}
+
 /// Selected matches that may be used for the camera's motion. Masks are of the frame before: where
 /// matches are with an earlier one, what moves is left to RANSAC.
 fn still<'f>(
     seen: &'f MatchedFrame<'_, '_>,
-    mask: &'f EgomotionMask<'_, '_>,
+    no_witness: &'f NoWitness<'_, '_, '_>,
     over_several: bool,
 ) -> impl Iterator<Item = &'f Match> + Clone {
-    let (selection, refined) = (seen.scene_flow.selection(), seen.scene_flow.refined());
-    selection
-        .iter()
-        .filter(move |&&index| over_several || mask.includes(index))
-        .filter_map(|&index| refined.get(index as usize))
+    // One closure of three small values: the iterator lies on the stack many times over.
+    seen.scene_flow.selection().iter().filter_map(move |&index| {
+        (over_several || no_witness.mask.includes(index))
+            .then(|| seen.scene_flow.refined().get(index as usize))
+            .flatten()
+            .filter(|m| !no_witness.attached.doubts(m))
+    })
 }
 
 impl<'s> Localization<'s> {
@@ -178,7 +190,7 @@ impl<'s> Localization<'s> {
     pub fn locate<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
-        mask: &EgomotionMask<'_, '_>,
+        no_witness: &NoWitness<'_, '_, '_>,
         static_map: &mut StaticMap<'_>,
         executor: &E,
     ) -> Located {
@@ -206,7 +218,7 @@ impl<'s> Localization<'s> {
                     self.hold(seen)
                 }
                 FlowStatus::Matched | FlowStatus::Repeated => {
-                    self.estimate_from_matches(seen, mask, static_map, executor)
+                    self.estimate_from_matches(seen, no_witness, static_map, executor)
                 }
                 FlowStatus::First | FlowStatus::Refused => Found::new(PoseOrigin::First),
             }
@@ -215,9 +227,9 @@ impl<'s> Localization<'s> {
         if over_several || was_lost {
             self.anchor.clear();
         } else {
-            self.correct_slow(seen, mask, &mut found);
+            self.correct_slow(seen, no_witness, &mut found);
         }
-        if self.recognise(seen, still(seen, mask, over_several), &found) {
+        if self.recognise(seen, still(seen, no_witness, over_several), &found) {
             found.origin = PoseOrigin::Relocalized;
             self.search = Search::Off;
             self.anchor.clear();
@@ -357,11 +369,11 @@ impl<'s> Localization<'s> {
     fn estimate_from_matches<E: Executor>(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
-        mask: &EgomotionMask<'_, '_>,
+        no_witness: &NoWitness<'_, '_, '_>,
         static_map: &mut StaticMap<'_>,
         executor: &E,
     ) -> Found {
-        let matches = still(seen, mask, self.camera.since_reference() > 0);
+        let matches = still(seen, no_witness, self.camera.since_reference() > 0);
         let excluded = seen.scene_flow.selection().len() - matches.clone().count();
         // The rig with the baseline that is in use, not the calibrated one.
         let (rig, was_lost) = (seen.config.scaled_rig(), self.camera.is_lost());
@@ -403,7 +415,7 @@ impl<'s> Localization<'s> {
     fn correct_slow(
         &mut self,
         seen: &MatchedFrame<'_, '_>,
-        mask: &EgomotionMask<'_, '_>,
+        no_witness: &NoWitness<'_, '_, '_>,
         found: &mut Found,
     ) {
         // Along a weak direction the last motion went on, and says nothing of an older frame.
@@ -420,7 +432,7 @@ impl<'s> Localization<'s> {
             rig: &rig,
             matcher: seen.scene_flow,
             // Not over several frames: there is no anchor then.
-            matches: still(seen, mask, false),
+            matches: still(seen, no_witness, false),
         };
         self.anchor.step(&frame, &mut self.camera, estimate, &mut self.estimator);
     }

@@ -4,7 +4,7 @@
 use super::{
     BlockCount, DeferredWork, Mapper, ObjectDigest, ObjectDigests, PoseOrigin, Report,
     StageDigests, StepError, StereoFrame, WorkUnits,
-    localization::{Localization, Located},
+    localization::{Localization, Located, NoWitness},
     matched::MatchedFrame,
     search::Search,
     segmentation::Segmentation,
@@ -172,7 +172,8 @@ impl Mapper<'_> {
         });
         // (C.2) The camera's own motion, from what does not move; the first camera is the world.
         let mask = assigned.egomotion_mask();
-        let locate = || localization.locate(&seen, &mask, static_map, executor);
+        let no_witness = NoWitness { mask: &mask, attached };
+        let locate = || localization.locate(&seen, &no_witness, static_map, executor);
         let located = executor.stage(Stage::Egomotion, locate);
         seen.observe_attached(attached, located.estimated_motion(), &assigned);
         // Another segment has its own frame of reference: what was known in the one before is not.
