@@ -11,6 +11,8 @@ mod forbidden;
 #[cfg(feature = "instructions")]
 mod instructions;
 mod line;
+#[cfg(feature = "plain")]
+mod plain;
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "platform/cortex_m.rs")]
 #[cfg_attr(all(target_os = "linux", not(feature = "hosted")), path = "platform/linux.rs")]
 #[cfg_attr(target_arch = "wasm32", path = "platform/wasm.rs")]
@@ -24,7 +26,7 @@ mod snapshots;
 mod stack;
 
 use dynvox_clip::{Bounds, Clip, FrameDigests, replay_with};
-#[cfg(not(feature = "instructions"))]
+#[cfg(not(any(feature = "instructions", feature = "plain")))]
 use dynvox_core::Serial;
 use dynvox_core::memory::Slab;
 use fixture::{CAPACITY, CONFIG};
@@ -52,8 +54,10 @@ fn run() -> u8 {
         Lines(fixture::DIGESTS.as_bytes()).filter(|line| line.first() != Some(&b'#'));
     let mut paint = Paint::below();
     let (mut wrong, mut most, mut step) = (0u32, 0, 0);
-    #[cfg(not(feature = "instructions"))]
+    #[cfg(not(any(feature = "instructions", feature = "plain")))]
     let executor = Serial;
+    #[cfg(feature = "plain")]
+    let executor = plain::Plain;
     #[cfg(feature = "instructions")]
     let executor = instructions::Counting::new();
     let mut bounds = Bounds { capacity: &CAPACITY, config: &CONFIG, slab: &mut slab.0 };

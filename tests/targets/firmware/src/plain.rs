@@ -1,0 +1,12 @@
+//! Ordinary code in place of kernels for the target's vectors.
+
+use dynvox_core::{Executor, parallel::Vectors};
+
+/// Runs everything on one thread, without kernels for vectors.
+pub struct Plain;
+
+impl Executor for Plain {
+    fn vectors(&self) -> Vectors {
+        Vectors::PLAIN
+    }
+}
