@@ -14,7 +14,7 @@
 //! **Memory.** 12 bytes a cell. **Time.** A projection a match, three reads of every fourth pixel
 //! of attached cells.
 //!
-//! **What can go wrong.** A vehicle within [`NEAR_BASELINES`] that keeps its distance to half a
+//! **What can go wrong.** A vehicle within 13 baselines that keeps its distance to half a
 //! pixel of disparity for so many frames, and that no detector names, is taken for a part of the
 //! camera: it is unknown space then, not free. Parts without texture give no match, and are no hole
 //! if they reach far.
@@ -37,11 +37,8 @@ use cell::{Cell, MatchCounts};
 pub(crate) const CELL_PX: usize = 16;
 /// Least way that a static point would have gone in the image and in disparity, px.
 const MOVED_PX: f32 = 2.0;
-/// Largest way of a match that stays in place, px, and largest change of its disparity.
-const STILL_PX: f32 = 0.5;
-/// Farthest distance of a part of the camera, in baselines: what is farther and keeps its distance
-/// is a vehicle.
-const NEAR_BASELINES: f64 = 13.0;
+/// Least way of a match that does not stay, px.
+const LEFT_PX: f32 = 1.0;
 /// Fewest matches that move as the camera says, so that the cells' own pixels are asked.
 const MOVING_MIN: u32 = 40;
 /// Neighbours that must stay as well.
@@ -132,7 +129,7 @@ impl<'s> AttachedCells<'s> {
     #[inline(never)]
     pub fn doubts(&self, m: &Match) -> bool {
         let is_doubted = |at| self.cells.get(at).is_some_and(Cell::is_doubted);
-        is_still(m) && self.cell_at(m.current_left).is_some_and(is_doubted)
+        m.is_still() && self.cell_at(m.current_left).is_some_and(is_doubted)
     }
 
     /// Counts the matches of a frame. `matches` are with the frame before, without those on objects
@@ -179,15 +176,13 @@ impl<'s> AttachedCells<'s> {
         if expected_px.iter().all(|&px| px < MOVED_PX) {
             return None;
         }
-        let ([du, dv], disparity_px, is_still) =
-            (m.flow_px(), m.current_disparity_px(), is_still(m));
+        let ([du, dv], is_still) = (m.flow_px(), m.is_still());
         // What hardly moves may be either, and what stays and is far may drive: neither counts.
-        let has_moved = du.abs() + dv.abs() > 2.0 * STILL_PX;
-        let is_near = f64::from(disparity_px) * NEAR_BASELINES > rig.focal_px;
+        let has_moved = du.abs() + dv.abs() > LEFT_PX;
         let at = self.cell_at(m.current_left)?;
         let counts = self.counts.get_mut(at)?;
-        if is_still && is_near {
-            counts.add_still(disparity_px);
+        if is_still && m.is_near(rig.focal_px) {
+            counts.add_still(m.current_disparity_px());
         } else if has_moved {
             counts.add_moved();
         }
@@ -241,13 +236,6 @@ impl<'s> AttachedCells<'s> {
         let attached = self.cells.iter().take(used).filter(|cell| cell.is_attached()).count();
         self.count = attached as u32;
     }
-}
-
-/// Tells that a match stays in place at its disparity.
-fn is_still(m: &Match) -> bool {
-    let [du, dv] = m.flow_px();
-    let change = m.current_disparity_px() - m.previous_disparity_px();
-    [du, dv, change].iter().all(|px| px.abs() < STILL_PX)
 }
 
 /// Tells whether the pixels of a cell differ between two images by more than half of what their own

@@ -123,9 +123,10 @@ impl Egomotion {
         let (expected, matches) = (self.expected(), matches.into_iter());
         let right_ahead = RightAhead::from_matches(rig, matches.clone());
         let hypotheses = MotionHypotheses { random: &mut self.random, initial: Some(&expected) };
-        let found = estimator.estimate(config, rig, matches.clone(), hypotheses);
+        let mut found = estimator.estimate(config, rig, matches.clone(), hypotheses);
         self.reference_s += f64::from(interval_s);
         let contest = Contest { camera: self, config, rig, expected: &expected };
+        contest.unmix(matches.clone(), estimator, &mut found);
         let winner = contest.choose(matches.clone(), estimator, &found);
         let found = contest.estimate(winner, matches.clone(), estimator, found);
         let found = self.hold_to_turn(Sight { config, rig, matches }, estimator, found);

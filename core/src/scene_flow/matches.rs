@@ -2,6 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// Largest way of a match that stays in place, px, and largest change of its disparity.
+pub(crate) const STILL_PX: f32 = 0.5;
+/// Farthest distance of a part of the camera, in baselines: what is farther and keeps its distance
+/// is a vehicle.
+pub(crate) const NEAR_BASELINES: f32 = 13.0;
+
 /// One scene point seen four times. Positions are (u, v) in px from the centre of the top left
 /// pixel; of a refined match those of the middle of its patch, half a pixel above and to the left
 /// of the feature's pixel.
@@ -55,6 +61,18 @@ impl Match {
     /// image has the match lower.
     pub(crate) fn row_difference(&self) -> ([f64; 2], f64) {
         (self.current_right.map(f64::from), f64::from(self.current_left[1] - self.current_right[1]))
+    }
+
+    /// Tells that it stays in place at its disparity.
+    pub(crate) fn is_still(&self) -> bool {
+        let [du, dv] = self.flow_px();
+        let change = self.current_disparity_px() - self.previous_disparity_px();
+        [du, dv, change].iter().all(|px| px.abs() < STILL_PX)
+    }
+
+    /// Tells that it is so near that it may be a part of the camera, with this focal length, px.
+    pub(crate) fn is_near(&self, focal_px: f64) -> bool {
+        self.current_disparity_px() * NEAR_BASELINES > focal_px as f32
     }
 
     /// Movement in the left image, px.

@@ -59,6 +59,7 @@ pub use config::SceneFlowConfig;
 pub(crate) use matcher::AnchorPoint;
 pub use matcher::FlowMatcher;
 pub use matches::Match;
+pub(crate) use matches::{NEAR_BASELINES, STILL_PX};
 pub use report::{FlowReport, FlowStatus, PassCount};
 
 /// The most descriptors that a frame compares, over both passes.

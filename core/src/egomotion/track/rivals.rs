@@ -13,6 +13,10 @@
 //! Where both witnesses disagree there is no motion ([`MotionStatus::Contested`]); where neither
 //! says anything, more matches win.
 //!
+//! Before that, where what is near stays in the image, as a bonnet does, and the rest moves and is
+//! not explained exactly, the motion of the rest is sought by itself: what stays at one distance
+//! pulls a motion to a turn that a way aside makes up for.
+//!
 //! **Time.** A look at each match; where [`RIVAL_SHARE_MIN`] of them are left, one or two estimates
 //! more, on those.
 
@@ -23,7 +27,7 @@ use crate::{
     egomotion::points::SinglePrecision,
     geometry::{StereoRig, Transform},
     random::Random,
-    scene_flow::Match,
+    scene_flow::{Match, NEAR_BASELINES, STILL_PX},
 };
 
 /// Distance within which a motion explains a match, px over four coordinates. It is a third of an
@@ -128,6 +132,49 @@ pub(super) struct Contest<'a> {
 }
 
 impl Contest<'_> {
+    /// Replaces a motion that near surfaces which stay in the image have pulled to themselves by
+    /// that of the rest, if it explains more of the rest exactly. What stays at one distance agrees
+    /// with every turn that a way aside makes up for, so it is no witness of a camera that moves.
+    #[inline(never)]
+    pub fn unmix<'m>(
+        &self,
+        matches: impl Iterator<Item = &'m Match> + Clone,
+        estimator: &mut Estimator<'_>,
+        found: &mut MotionEstimate,
+    ) {
+        let Self { camera, rig, expected, .. } = *self;
+        let first = found.t_current_previous;
+        // A camera that stands has still surfaces about it.
+        if first.is_some_and(|first| is_at_rest(&first, rig)) {
+            return;
+        }
+        let view = first.map(|first| SinglePrecision::new(&first, rig));
+        let (mut all, mut staying, mut moving, mut exact) = (0, 0, 0, 0);
+        for m in matches.clone() {
+            let (is_still, is_near) = (m.is_still(), m.is_near(rig.focal_px));
+            let is_exact = view.as_ref().is_some_and(|view| view.explains(m, rig, EXACT_PX));
+            all += 1;
+            staying += u32::from(is_still && is_near);
+            moving += u32::from(!is_still);
+            exact += u32::from(!is_still && is_exact);
+        }
+        // Three quarters of the rest: the motion is theirs.
+        if !is_enough(staying, all) || !is_enough(moving, all) || 4 * exact >= 3 * moving {
+            return;
+        }
+        let mut random: Random = camera.random.clone();
+        let hypotheses = MotionHypotheses { random: &mut random, initial: Some(expected) };
+        let rest = matches.clone().filter(|m| !m.is_still());
+        let rest = estimator.find(&self.exact(), rig, rest, hypotheses).t_current_previous;
+        let Some(motion) = rest else { return };
+        let view = SinglePrecision::new(&motion, rig);
+        let is_explained = |m: &&Match| !m.is_still() && view.explains(m, rig, EXACT_PX);
+        let explained = matches.clone().filter(is_explained).count() as u32;
+        if is_enough(explained.saturating_sub(exact), all) {
+            *found = self.estimate(Winner::Rival(motion), matches, estimator, *found);
+        }
+    }
+
     /// Chooses between the motion found and those of the matches that it does not explain. It is
     /// the one found where no other motion has enough matches.
     #[inline(never)]
@@ -263,6 +310,12 @@ impl Contest<'_> {
             None
         }
     }
+}
+
+/// Tells that a motion moves what is near by less than a match that stays.
+fn is_at_rest(motion: &Transform, rig: &StereoRig) -> bool {
+    let by_way = motion.distance_m() / (f64::from(NEAR_BASELINES) * rig.baseline_m);
+    rig.focal_px * (motion.angle_rad() + by_way) < f64::from(STILL_PX)
 }
 
 /// Tells that so many of `matches` may be a motion of their own.
