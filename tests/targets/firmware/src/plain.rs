@@ -1,4 +1,4 @@
-//! Ordinary code in place of kernels for the target's vectors.
+//! Executor that leaves out the kernels for the vectors of the target.
 
 use dynvox_core::{Executor, parallel::Vectors};
 
