@@ -168,9 +168,9 @@ impl Contest<'_> {
         let rest = estimator.find(&self.exact(), rig, rest, hypotheses).t_current_previous;
         let Some(motion) = rest else { return };
         let view = SinglePrecision::new(&motion, rig);
-        let is_explained = |m: &&Match| !m.is_still() && view.explains(m, rig, EXACT_PX);
-        let explained = matches.clone().filter(is_explained).count() as u32;
-        if is_enough(explained.saturating_sub(exact), all) {
+        let is_inlier = |m: &&Match| !m.is_still() && view.explains(m, rig, EXACT_PX);
+        let inliers = matches.clone().filter(is_inlier).count() as u32;
+        if is_enough(inliers.saturating_sub(exact), all) {
             *found = self.estimate(Winner::Rival(motion), matches, estimator, *found);
         }
     }
