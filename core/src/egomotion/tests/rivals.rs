@@ -141,18 +141,16 @@ fn a_person_who_walks_as_the_camera_does_is_no_world() {
 
 #[test]
 fn a_bonnet_at_one_distance_does_not_pull_the_motion_to_a_turn() {
-    // A turn makes up for a way aside there, and the world flows by little more than an inlier's
-    // distance from such a motion.
-    let turning = Transform::new(Vector3::new(0.0, 0.012, 0.0), Vector3::new(0.03, 0.0, -0.02));
-    let poses = travel(12, |_, scene| {
-        scene.add(220, [2.9, 3.1], ALL, &Transform::IDENTITY);
-        scene.add(150, [4.0, 15.0], ALL, &turning);
+    // A turn makes up for a way aside there, and moves the world much as it does move.
+    let turning = Transform::new(Vector3::new(0.0, 0.005, 0.0), Vector3::new(0.08, 0.0, -0.02));
+    let poses = travel(12, |frame, scene| {
+        let bonnet = if frame < 4 { 0 } else { 131 };
+        scene.add(bonnet, [4.0, 4.6], ALL, &Transform::IDENTITY);
+        scene.add(128, [6.0, 40.0], ALL, &turning);
     });
     for (frame, (_, estimate)) in poses.iter().enumerate() {
-        let Some(motion) = estimate.t_current_previous else { continue };
+        let motion = estimate.t_current_previous.expect("a motion is found");
         let (off_m, off_deg) = between(&motion, &turning);
-        assert!(off_m < 0.03 && off_deg < 0.1, "frame {frame}: {off_m} m, {off_deg} degrees");
+        assert!(off_m < 0.06 && off_deg < 0.2, "frame {frame}: {off_m} m, {off_deg} degrees");
     }
-    let held = poses.iter().filter(|(_, estimate)| estimate.t_current_previous.is_none()).count();
-    assert!(held <= 2, "{held} frames of 12 were guessed");
 }
