@@ -14,8 +14,8 @@
 //! **Memory.** 12 bytes a cell. **Time.** A projection a match, three reads of every fourth pixel
 //! of attached cells.
 //!
-//! **What can go wrong.** A vehicle within 13 baselines that keeps its distance to half a
-//! pixel of disparity for so many frames, and that no detector names, is taken for a part of the
+//! **What can go wrong.** A vehicle that is near (`Match::is_near`) and keeps its distance to half
+//! a pixel of disparity for so many frames, and that no detector names, is taken for a part of the
 //! camera: it is unknown space then, not free. Parts without texture give no match, and are no hole
 //! if they reach far.
 

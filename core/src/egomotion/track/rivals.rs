@@ -17,8 +17,8 @@
 //! not explained exactly, the motion of the rest is sought by itself: what stays at one distance
 //! pulls a motion to a turn that a way aside makes up for.
 //!
-//! **Time.** A look at each match; where [`RIVAL_SHARE_MIN`] of them are left, one or two estimates
-//! more, on those.
+//! **Time.** Two looks at each match; where [`RIVAL_SHARE_MIN`] of them are left, one or two
+//! estimates more, on those; two more where the motion of the rest is sought.
 
 use super::{
     Egomotion, EgomotionConfig, Estimator, MotionEstimate, MotionHypotheses, MotionStatus,
