@@ -13,7 +13,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use dynvox_core::{
     memory::Carver,
-    volume::{BlockCoord, BlockIndex, BlockKey, Slot},
+    volume::{BlockCoord, BlockKey, HashedIndex, PlainIndex, Slot},
 };
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -22,7 +22,6 @@ use std::time::{Duration, Instant};
 const BLOCKS: usize = 53_000;
 /// Blocks across the street: a slice of it is inserted while another is removed.
 const SLICE: usize = 1_000;
-const SLOTS: usize = 1 << 17;
 
 /// Operations that an index of blocks needs.
 trait Table {
@@ -31,75 +30,26 @@ trait Table {
     fn remove(&mut self, coords: &[BlockKey], coord: BlockKey);
 }
 
-impl Table for BlockIndex<'_> {
-    fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot> {
-        self.find(coord, |slot| Some(coords[slot.index()]))
-    }
-
-    fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot) {
-        self.insert(coord, slot, |slot| Some(coords[slot.index()])).unwrap();
-    }
-
-    fn remove(&mut self, coords: &[BlockKey], coord: BlockKey) {
-        assert!(self.remove(coord, |slot| Some(coords[slot.index()])));
-    }
-}
-
-/// Slots + 1 by hash; 0 is none.
-struct Plain(Vec<u32>);
-
-fn home(BlockKey { coord, .. }: BlockKey) -> usize {
-    let [x, y, z] = [coord.x, coord.y, coord.z].map(|c| i64::from(c) as u64);
-    let mixed =
-        x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_669) ^ z.wrapping_mul(83_492_791);
-    let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    (mixed ^ (mixed >> 29)) as usize & (SLOTS - 1)
-}
-
-impl Plain {
-    fn seek(&self, coords: &[BlockKey], coord: BlockKey) -> Result<usize, usize> {
-        let mut at = home(coord);
-        while self.0[at] != 0 {
-            if coords[self.0[at] as usize - 1] == coord {
-                return Ok(at);
+macro_rules! is_a_table {
+    ($index:ident) => {
+        impl Table for $index<'_> {
+            fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot> {
+                self.find(coord, |slot| Some(coords[slot.index()]))
             }
-            at = (at + 1) & (SLOTS - 1);
-        }
-        Err(at)
-    }
-}
 
-impl Table for Plain {
-    fn find(&self, coords: &[BlockKey], coord: BlockKey) -> Option<Slot> {
-        self.seek(coords, coord).ok().map(|at| Slot::new(self.0[at] - 1))
-    }
+            fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot) {
+                self.insert(coord, slot, |slot| Some(coords[slot.index()])).unwrap();
+            }
 
-    fn insert(&mut self, coords: &[BlockKey], coord: BlockKey, slot: Slot) {
-        let mut at = home(coord);
-        while self.0[at] != 0 {
-            at = (at + 1) & (SLOTS - 1);
-        }
-        let _ = coords;
-        self.0[at] = slot.get() + 1;
-    }
-
-    fn remove(&mut self, coords: &[BlockKey], coord: BlockKey) {
-        let mut hole = self.seek(coords, coord).unwrap();
-        let mut at = hole;
-        loop {
-            at = (at + 1) & (SLOTS - 1);
-            let Some(slot) = self.0[at].checked_sub(1) else { break };
-            // It may move into the hole unless its own home lies behind the hole.
-            if (at.wrapping_sub(home(coords[slot as usize])) & (SLOTS - 1))
-                >= (at.wrapping_sub(hole) & (SLOTS - 1))
-            {
-                self.0[hole] = self.0[at];
-                hole = at;
+            fn remove(&mut self, coords: &[BlockKey], coord: BlockKey) {
+                assert!(self.remove(coord, |slot| Some(coords[slot.index()])));
             }
         }
-        self.0[hole] = 0;
-    }
+    };
 }
+
+is_a_table!(HashedIndex);
+is_a_table!(PlainIndex);
 
 /// The `number`th block of the street: 25 across, 8 high, 5 deep a slice.
 fn block(number: usize) -> BlockKey {
@@ -178,14 +128,20 @@ impl<T: Table> Drive<T> {
     }
 }
 
-fn bench(criterion: &mut Criterion) {
-    let bytes = BlockIndex::bytes(BLOCKS);
-    assert!(SLOTS * size_of::<u32>() <= bytes, "the plain table has no more bytes");
-    let mut slab = vec![0u8; bytes + 64];
+/// Memory for the index of either table, which begins where a slab's regions do.
+fn slab(bytes: usize) -> &'static mut [u8] {
+    let slab = vec![0u8; bytes + 64].leak();
     let start = slab.as_ptr().align_offset(64);
-    let index = BlockIndex::new_in(BLOCKS, &mut Carver::new(&mut slab[start..], bytes).unwrap());
+    &mut slab[start..start + bytes]
+}
+
+fn bench(criterion: &mut Criterion) {
+    let [hashed, plain] = [HashedIndex::bytes(BLOCKS), PlainIndex::bytes(BLOCKS)];
+    assert!(plain <= hashed, "the plain table has no more bytes");
+    let index = HashedIndex::new_in(BLOCKS, &mut Carver::new(slab(hashed), hashed).unwrap());
     Drive::new(index).bench(criterion, "hashbrown");
-    Drive::new(Plain(vec![0; SLOTS])).bench(criterion, "plain");
+    let index = PlainIndex::new_in(BLOCKS, &mut Carver::new(slab(plain), plain).unwrap());
+    Drive::new(index).bench(criterion, "plain");
 }
 
 criterion_group! { name = benches; config = Criterion::default().sample_size(50); targets = bench }

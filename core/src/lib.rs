@@ -8,6 +8,13 @@
 //! [`scene_flow`] and [`volume`] depend on them; [`egomotion`] on `scene_flow`; [`tracking`] on
 //! `egomotion` and [`masks`]; [`objects`] on `tracking` and `volume`. Only [`mapper`] depends on
 //! every stage.
+//!
+//! | feature | what it does |
+//! |---|---|
+//! | `hashbrown` (default) | The index of blocks is hashbrown's; without it no `alloc` is linked. |
+//! | `plain-index` | The index of blocks is a plain table, also with `hashbrown`. |
+//! | `serde` | Settings and reports can be written and read back. |
+//! | `defmt` | Errors and reports can be printed by defmt. |
 #![no_std]
 #![cfg_attr(
     test,

@@ -68,7 +68,7 @@ hosted() {
   elf=$1/release/dynvox-firmware
 }
 
-# cross TARGET RUSTFLAGS [CARGO-ARGUMENT...]: the firmware for a target, in $elf.
+# cross TARGET RUSTFLAGS [CARGO-ARGUMENT...]: the firmware for a target, in $elf; with cross_library=core without the crate alloc.
 cross() {
   local target=$1 flags=$2
   shift 2
@@ -78,7 +78,7 @@ cross() {
   # Only this one command sees the other compiler.
   env RUSTC="$cross_rustc" RUSTC_BOOTSTRAP=1 PATH="$linkers:$PATH" CARGO_TARGET_DIR="$build" RUSTFLAGS="$flags" \
     "$cross_cargo" build --quiet --release --locked --manifest-path "$targets/firmware/Cargo.toml" --target "$target" \
-    -Zbuild-std=core,alloc,compiler_builtins -Zbuild-std-features=compiler-builtins-mem "$@" || return
+    -Zbuild-std=${cross_library:-core,alloc},compiler_builtins -Zbuild-std-features=compiler-builtins-mem "$@" || return
   elf=$build/$target/release/dynvox-firmware
 }
 

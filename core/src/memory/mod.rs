@@ -6,12 +6,15 @@
 
 mod capacity;
 mod footprint;
+mod in_place;
+#[cfg(feature = "hashbrown")]
 mod one_shot;
 mod placement;
 mod slab;
 
 pub use capacity::Capacity;
 pub use footprint::{Footprint, Region};
+#[cfg(feature = "hashbrown")]
 pub(crate) use one_shot::OneShot;
 pub use placement::Placement;
 pub use slab::{Carver, SLAB_ALIGN, Slab, SlabError, Slabs, TwoSlabs, region_bytes};

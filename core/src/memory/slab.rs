@@ -1,7 +1,6 @@
 //! The slab a caller hands over, and the carver that turns it into typed regions.
 
-use super::{Footprint, OneShot, Placement};
-use allocator_api2::boxed::Box;
+use super::{Footprint, Placement, in_place::in_place};
 use bytemuck::Pod;
 use core::{
     fmt,
@@ -256,9 +255,9 @@ impl<'s> Carver<'s> {
         value: T,
     ) -> Option<&'s mut T> {
         // The size of a value with pointers differs by target; the stated bytes hold it on all.
-        let made = Box::try_new_in(value, OneShot::new(self.alloc_as_found(name, bytes)));
-        self.require_fit(made.is_ok());
-        made.ok().map(Box::leak)
+        let made = in_place(self.alloc_as_found(name, bytes), value);
+        self.require_fit(made.is_some());
+        made
     }
 
     /// Takes `bytes` off the front and records them.

@@ -44,7 +44,9 @@ pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, PruneBy, VolumeC
 pub(crate) use fuse::FusedBlocks;
 pub use fuse::Observation;
 pub use history::VisibleHistory;
-pub use index::BlockIndex;
+#[cfg(feature = "hashbrown")]
+pub use index::HashedIndex;
+pub use index::{BlockIndex, PlainIndex};
 pub(crate) use lru_list::LruList;
 pub use noted_depth::{DepthImage, NotedDepth};
 pub(crate) use observed::ObservedDepth;
