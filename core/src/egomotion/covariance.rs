@@ -31,6 +31,14 @@ const FLOW_PX: f64 = 0.02;
 /// Standard deviation of the rig's scale: baseline and focal length.
 const SCALE_SHARE: f64 = 0.005;
 
+/// Weights of a point in a covariance.
+pub(super) struct PointWeights {
+    /// Weight of its error: what the point pulls at the motion with.
+    pub(super) pull: f64,
+    /// Weight of a further error: how much more it then pulls.
+    pub(super) growth: f64,
+}
+
 /// Covariance of a rotation (rad) and a translation (m), in the current camera's frame: x to the
 /// right, y down, z ahead.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -53,7 +61,7 @@ impl MotionCovariance {
         motion: &Transform,
         rig: &StereoRig,
         points: impl Iterator<Item = Point>,
-        weight: impl Fn(&Point, f64) -> f64,
+        weights: impl Fn(&Point, f64) -> PointWeights,
     ) -> Option<Self> {
         let matrix = RotationMatrix::new(motion);
         let mut sums = NormalEquations::ZERO;
@@ -62,17 +70,17 @@ impl MotionCovariance {
         let mut along_flow = [0.0; N];
         for point in points {
             let Some(rows) = PointRows::new(&point, &matrix, rig) else { continue };
-            let weight = weight(&point, rows.squared);
-            sums.add_rows(&rows, weight);
-            let pull = rows.slope(rows.residuals).map(|slope| weight * slope);
+            let PointWeights { pull, growth } = weights(&point, rows.squared);
+            sums.add_rows(&rows, growth);
+            let pull = rows.slope(rows.residuals).map(|slope| pull * slope);
             // Two matches of one corner err together; the factor stands for that.
             add_outer(&mut spread, pull, SPREAD * SPREAD);
             // A shared error adds to the pulls of all points.
             for (sum, error) in shared.iter_mut().zip(SHARED_PX) {
-                sum.iter_mut().zip(rows.slope(error)).for_each(|(s, slope)| *s += weight * slope);
+                sum.iter_mut().zip(rows.slope(error)).for_each(|(s, slope)| *s += growth * slope);
             }
             let slope = rows.slope(flow_error(&point, rig));
-            along_flow.iter_mut().zip(slope).for_each(|(s, slope)| *s += weight * slope);
+            along_flow.iter_mut().zip(slope).for_each(|(s, slope)| *s += growth * slope);
         }
         add_outer(&mut spread, along_flow, 1.0);
         for pull in shared {

@@ -2,10 +2,11 @@
 
 use super::{
     EgomotionConfig, MotionCovariance, WeakDirections,
+    covariance::PointWeights,
     normal_equations::{NormalEquations, RotationMatrix},
     points::{Point, Points},
     synchrony::RightAhead,
-    weights::{robust_weight, side_weight},
+    weights::{robust_growth, robust_weight, side_weight},
 };
 use crate::{
     geometry::{StereoRig, Transform},
@@ -377,10 +378,14 @@ impl<'s> Estimator<'s> {
         rig: &StereoRig,
         motion: &Transform,
     ) -> Option<MotionCovariance> {
-        let weight = |point: &Point, squared: f64| {
-            side_weight(config, rig, point) * robust_weight(config, squared)
+        let weights = |point: &Point, squared_px: f64| {
+            let side = side_weight(config, rig, point);
+            PointWeights {
+                pull: side * robust_weight(config, squared_px),
+                growth: side * robust_growth(config, squared_px),
+            }
         };
-        MotionCovariance::from_points(motion, rig, self.inlier_points(), weight)
+        MotionCovariance::from_points(motion, rig, self.inlier_points(), weights)
     }
 
     fn inlier_points(&self) -> impl Iterator<Item = Point> {

@@ -1,8 +1,8 @@
 //! The camera's pose in a frame: given, or estimated from matches or from depth.
 
 use super::{
-    Config, MotionSource, PoseOrigin, StereoFrame, matched::MatchedFrame, search::Search,
-    static_map::StaticMap,
+    Config, MotionSource, PoseOrigin, StereoFrame, accumulated::AccumulatedError,
+    matched::MatchedFrame, search::Search, static_map::StaticMap,
 };
 use crate::{
     Capacity,
@@ -36,6 +36,8 @@ pub(super) struct Localization<'s> {
     pub search: Search,
     /// Inertial unit; `None` without one.
     pub inertial: Option<&'s mut InertialPrior>,
+    /// Deviation of the pose from the surfaces in view.
+    pub accumulated: AccumulatedError,
     /// True if the right image's rows are moved otherwise in the next frame than in this one: it
     /// then differs from this one's even where the camera stands.
     pub rows_moved: bool,
@@ -158,6 +160,7 @@ impl<'s> Localization<'s> {
             places: Places::new_in(capacity, carver),
             search: Search::Off,
             inertial: None,
+            accumulated: AccumulatedError::default(),
             rows_moved: false,
         }
     }
@@ -173,6 +176,7 @@ impl<'s> Localization<'s> {
             places,
             search,
             inertial,
+            accumulated,
             rows_moved,
         } = self;
         camera.visit(visitor);
@@ -180,6 +184,7 @@ impl<'s> Localization<'s> {
         self_calibration.visit(visitor);
         search.visit_above(rows_moved, visitor);
         places.visit(visitor);
+        accumulated.visit(visitor);
         // Without a unit the state is what it was before there was any.
         if let Some(inertial) = inertial {
             inertial.visit(visitor);
@@ -253,6 +258,12 @@ impl<'s> Localization<'s> {
         let t_current_previous: Option<Transform> = is_measured.then(last_motion);
         let from = LastPose { t_world_camera: before, segment, over_several };
         self.observe_turn(&found, &from);
+        match (found.origin, found.covariance_of_way()) {
+            (PoseOrigin::Estimated, Some(motion)) => self.accumulated.add(motion),
+            // A guess is not fused: the surfaces in view stay what they are.
+            (PoseOrigin::Estimated | PoseOrigin::Extrapolated, _) => {}
+            _ => self.accumulated = AccumulatedError::default(),
+        }
         let camera =
             CameraMotion { t_world_camera: *self.camera.t_world_camera(), t_current_previous };
         Located { camera, found, enters_segment }

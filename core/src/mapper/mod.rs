@@ -1,5 +1,6 @@
 //! The loop of the paper (Section III), one line per stage.
 
+mod accumulated;
 mod addresses;
 mod budget;
 mod clock;
@@ -28,6 +29,7 @@ mod tests;
 mod two_slabs;
 mod work;
 
+pub use accumulated::AccumulatedSigma;
 pub use budget::{BudgetError, BudgetOptions, CapacityProblem, MAX_SIDE};
 pub use config::Config;
 pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};

@@ -1,6 +1,6 @@
 //! Report of one step, as plain values.
 
-use super::{DeferredWork, StageDigests, WorkUnits, static_map::MapWork};
+use super::{AccumulatedSigma, DeferredWork, StageDigests, WorkUnits, static_map::MapWork};
 use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
@@ -175,6 +175,8 @@ pub struct Report {
     /// True if the standard deviation of the motion estimated from matches is more than half a
     /// voxel: what is fused at this pose is blurred by it.
     pub imprecise: bool,
+    /// Deviation of the pose from the surfaces in view, of all motions since they were fused.
+    pub accumulated: AccumulatedSigma,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
@@ -256,6 +258,7 @@ impl Report {
         if self.pose == PoseOrigin::Extrapolated
             || self.segment > MapSegment::FIRST
             || self.egomotion.is_some_and(|motion| motion.weak.any())
+            || self.accumulated.is_large
             || refused > 0
             || self.self_calibration.is_uncorrected()
         {

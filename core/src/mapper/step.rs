@@ -316,6 +316,10 @@ impl Mapper<'_> {
             segment: self.localization.camera.segment(),
             egomotion: found.egomotion,
             imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
+            accumulated: self
+                .localization
+                .accumulated
+                .report(self.config.volume.truncation_m, self.config.rig.focal_px),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
             inertial: self.localization.inertial.as_deref().map(InertialPrior::report),

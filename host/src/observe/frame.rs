@@ -181,6 +181,13 @@ impl FrameRow {
                 "matches do not hold the camera ({weak}): along these axes its last motion went on"
             )
         });
+        let imprecise = Some(self.report.accumulated).filter(|sigma| sigma.is_large).map(|sigma| {
+            format!(
+                "the pose may be off by {:.2} m and {:.1} degrees: motions are imprecise",
+                sigma.way_sigma_m,
+                sigma.turn_sigma_rad.to_degrees()
+            )
+        });
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
             (allocation.beyond, "points beyond the map's coordinates"),
@@ -204,6 +211,7 @@ impl FrameRow {
             .into_iter()
             .chain(guessed)
             .chain(weak)
+            .chain(imprecise)
             .chain(lost)
             .chain(counted)
             .collect::<Vec<_>>()
