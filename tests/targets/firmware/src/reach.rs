@@ -168,7 +168,8 @@ fn surfaces(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     });
     digest.u64(triangles);
     mapper.tracks().for_each(|track| digest.u64(u64::from(track.id)));
-    digest.u64(mapper.footprint().bytes() as u64);
+    // The bytes themselves depend on the index of blocks.
+    digest.u64(u64::from(mapper.footprint().bytes() == CAPACITY.bytes()));
 }
 
 /// The maps for planners: the window now and later, distances, a ray and a path.
