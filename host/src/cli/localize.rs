@@ -7,8 +7,8 @@ use crate::run::{self, Localized};
 use anyhow::Context as _;
 use std::path::PathBuf;
 
-/// Frames from one that is fused to the next: the map that is asked is the old one.
-const NEVER: u32 = u32::MAX;
+/// Frames from one that is fused to the next where no map is wanted.
+pub(super) const NEVER: u32 = u32::MAX;
 
 /// Arguments of `dynvox localize`.
 #[derive(Debug, clap::Args)]

@@ -42,7 +42,10 @@ pub use folder::{
 };
 pub use frames::{each_frame, with_mapper};
 pub use machine::Machine;
-pub use places::{Continued, Localized, PLACES_FILE, PlacedFrame, keyframes_in, localize};
+pub use places::{
+    Continued, Localized, PLACES_FILE, PlacedFrame, Remembered, keyframes_in, localize,
+    localize_among, remember,
+};
 pub use progress::Progress;
 pub use reader::{AHEAD, ReadFrame, inertial_samples, read_ahead, stereo_frame};
 pub use record::{RunRecord, StageStatistics};

@@ -9,6 +9,7 @@ use crate::request::Plan;
 use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::{Mapper, PoseOrigin, Report, SAVED_PLACES_HEADER_BYTES, saved_keyframes};
 use serde::{Deserialize, Serialize};
+use std::convert::Infallible;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
@@ -85,10 +86,65 @@ impl Localized {
 /// # Errors
 /// The plan cannot be run, the places cannot be used, or a frame cannot be read or mapped.
 pub fn localize(plan: &Plan, old: &Path) -> Result<Localized, RunError> {
-    let threads = Threads::new(plan.threads)
-        .map_err(|source| RunError::Threads { count: plan.threads, source })?;
+    localize_after(plan, |mapper| load(mapper, &old.join(PLACES_FILE), false))
+}
+
+/// Places the frames of a plan among keyframes that were remembered.
+///
+/// # Errors
+/// As those of [`localize`].
+pub fn localize_among(plan: &Plan, remembered: &Remembered) -> Result<Localized, RunError> {
+    localize_after(plan, |mapper| {
+        let mut bytes = remembered.keyframes.as_slice();
+        mapper
+            .load_places(&mut |piece: &mut [u8]| bytes.read_exact(piece))
+            .map_err(|error| RunError::Step { frame: 0, reason: error.to_string() })
+    })
+}
+
+/// Places of a recording that was mapped without a folder.
+#[derive(Clone, Debug, Default)]
+pub struct Remembered {
+    keyframes: Vec<u8>,
+    /// Frames whose poses were estimated in the first segment, with these poses.
+    pub poses: Vec<(usize, Transform)>,
+}
+
+/// Maps the frames of a plan and remembers its keyframes.
+///
+/// # Errors
+/// The plan cannot be run, or a frame cannot be read or mapped.
+pub fn remember(plan: &Plan) -> Result<Remembered, RunError> {
+    let threads = threads_of(plan)?;
     with_mapper(plan, |mapper| {
-        let keyframes = load(mapper, &old.join(PLACES_FILE), false)?;
+        let mut remembered = Remembered::default();
+        each_frame(plan, |index, frame| {
+            let report = mapper.step(frame, &threads).map_err(|error| failed_step(index, error))?;
+            if report.segment == MapSegment::FIRST && report.pose != PoseOrigin::Extrapolated {
+                remembered.poses.push((index, report.t_world_camera));
+            }
+            Ok(())
+        })?;
+        let keyframes = &mut remembered.keyframes;
+        let Ok(()) = mapper.save_places(&mut |piece: &[u8]| {
+            keyframes.extend_from_slice(piece);
+            Ok::<(), Infallible>(())
+        });
+        Ok(remembered)
+    })
+}
+
+fn threads_of(plan: &Plan) -> Result<Threads, RunError> {
+    Threads::new(plan.threads).map_err(|source| RunError::Threads { count: plan.threads, source })
+}
+
+fn localize_after(
+    plan: &Plan,
+    load: impl FnOnce(&mut Mapper<'_>) -> Result<u32, RunError>,
+) -> Result<Localized, RunError> {
+    let threads = threads_of(plan)?;
+    with_mapper(plan, |mapper| {
+        let keyframes = load(mapper)?;
         // Segments begun by this recording come after those of the old map.
         let own = mapper.segment();
         let mut localized = Localized { keyframes, ..Localized::default() };

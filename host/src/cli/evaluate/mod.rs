@@ -5,6 +5,7 @@ mod faults;
 mod flight;
 mod mapped;
 mod masks;
+mod places;
 mod stereo;
 mod trajectory;
 
@@ -28,6 +29,8 @@ enum Subject {
     Faults(faults::FaultsArgs),
     /// Fly through the synthetic street on what the map tells an autopilot, and count collisions
     Flight(flight::FlightArgs),
+    /// Place recordings of another day in the map of a synthetic town, and check each place
+    Places(places::PlacesArgs),
 }
 
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -38,5 +41,6 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         Subject::Certainty(args) => certainty::run(args),
         Subject::Faults(args) => faults::run(args),
         Subject::Flight(args) => flight::run(args),
+        Subject::Places(args) => places::run(args),
     }
 }

@@ -136,6 +136,12 @@ impl Town {
         self.route.length_m()
     }
 
+    /// World of the recording, which is the camera of its frame 0, in the town. Recordings of one
+    /// town share the town.
+    pub fn t_town_world(&self) -> Transform {
+        self.t_camera0_town.inverse()
+    }
+
     /// Camera pose in the town at a time since frame 0, which may lie before it.
     pub(super) fn t_town_camera(&self, time_s: f64) -> Transform {
         let along_m = camera::along_m(&self.camera, time_s);
