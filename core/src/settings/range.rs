@@ -46,13 +46,15 @@ impl Range {
     /// use dynvox_core::settings::Range;
     ///
     /// assert!(Range::SHARE.contains(1.0) && !Range::SHARE.contains(1.1));
+    /// assert!(Range::Within(0.05, 1.0).contains(0.05), "a bound that no float is exactly");
     /// assert!(!Range::Any.contains(f64::NAN), "no setting is NaN");
     /// ```
     pub fn contains(self, number: f64) -> bool {
-        // Bounds are of `f32`, as most settings, and compared in `f64`, which is exact.
-        let at_least = |low: f32| number >= f64::from(low);
-        let above = |low: f32| number > f64::from(low);
-        let at_most = |high: f32| number <= f64::from(high);
+        // Bounds are of `f32`: the bound 0.05 is another number than a setting of 0.05 in `f64`.
+        let rounded = number as f32;
+        let at_least = |low: f32| rounded >= low;
+        let above = |low: f32| rounded > low;
+        let at_most = |high: f32| rounded <= high;
         number.is_finite()
             && match self {
                 Self::Any => true,
@@ -60,7 +62,7 @@ impl Range {
                 Self::AtLeast(low) => at_least(low),
                 Self::Above(low) => above(low),
                 Self::AboveTo(low, high) => above(low) && at_most(high),
-                Self::FromBelow(low, high) => at_least(low) && number < f64::from(high),
+                Self::FromBelow(low, high) => at_least(low) && rounded < high,
             }
     }
 }
