@@ -15,7 +15,7 @@ const TURN_PX: f64 = 1.0;
 ///
 /// ```
 /// let report = dynvox_core::Report::default();
-/// assert!(!report.accumulated.is_large && report.accumulated.way_sigma_m == 0.0);
+/// assert!(!report.displaced && report.accumulated.way_sigma_m == 0.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -23,12 +23,17 @@ const TURN_PX: f64 = 1.0;
 #[non_exhaustive]
 pub struct AccumulatedSigma {
     /// Standard deviation of the position, over all directions, m.
-    pub way_sigma_m: f64,
+    pub way_sigma_m: f32,
     /// Standard deviation of the orientation, over all axes, rad.
-    pub turn_sigma_rad: f64,
-    /// True where the position deviates by more than the truncation distance, so that a surface may
-    /// be fused beside itself, or the orientation by more than a pixel.
-    pub is_large: bool,
+    pub turn_sigma_rad: f32,
+}
+
+impl AccumulatedSigma {
+    /// Returns true where the position deviates by more than the truncation distance, so that a
+    /// surface may be fused beside itself, or the orientation by more than a pixel.
+    pub(super) fn is_large(&self, truncation_m: f32, focal_px: f64) -> bool {
+        self.way_sigma_m > truncation_m || f64::from(self.turn_sigma_rad) * focal_px > TURN_PX
+    }
 }
 
 /// Variances of a pose against the surfaces in view.
@@ -46,11 +51,11 @@ impl AccumulatedError {
         self.turn_rad2 = STAYS * self.turn_rad2 + turn_rad * turn_rad;
     }
 
-    /// Deviations, for a map with this truncation distance and images of this focal length.
-    pub(super) fn report(&self, truncation_m: f32, focal_px: f64) -> AccumulatedSigma {
-        let [way_sigma_m, turn_sigma_rad] = [self.way_m2, self.turn_rad2].map(libm::sqrt);
-        let is_large = way_sigma_m > f64::from(truncation_m) || turn_sigma_rad * focal_px > TURN_PX;
-        AccumulatedSigma { way_sigma_m, turn_sigma_rad, is_large }
+    /// Standard deviations.
+    pub(super) fn sigma(&self) -> AccumulatedSigma {
+        let [way_sigma_m, turn_sigma_rad] =
+            [self.way_m2, self.turn_rad2].map(|variance| libm::sqrt(variance) as f32);
+        AccumulatedSigma { way_sigma_m, turn_sigma_rad }
     }
 
     /// Visits the variances.
@@ -77,14 +82,14 @@ mod tests {
         let mut error = AccumulatedError::default();
         let mut add = |way_m: f64, degrees: f64, times: usize| {
             (0..times).for_each(|_| error.add(&motion(way_m, degrees.to_radians())));
-            error.report(0.3, 200.0)
+            error.sigma().is_large(0.3, 200.0)
         };
-        assert!(!add(0.01, 0.05, 100).is_large, "as on a road");
+        assert!(!add(0.01, 0.05, 100), "as on a road");
         // A pixel is 0.29 degrees.
-        assert!(!add(0.0, 0.2, 1).is_large, "one turn that is imprecise");
-        assert!(add(0.0, 0.2, 3).is_large, "four of them");
-        assert!(add(0.0, 0.01, 3).is_large, "the surfaces in view are those of before");
-        assert!(!add(0.0, 0.01, 20).is_large);
-        assert!(add(0.31, 0.0, 1).is_large, "more than the truncation distance");
+        assert!(!add(0.0, 0.2, 1), "one turn that is imprecise");
+        assert!(add(0.0, 0.2, 3), "four of them");
+        assert!(add(0.0, 0.01, 3), "the surfaces in view are those of before");
+        assert!(!add(0.0, 0.01, 20));
+        assert!(add(0.31, 0.0, 1), "more than the truncation distance");
     }
 }

@@ -177,6 +177,9 @@ pub struct Report {
     pub imprecise: bool,
     /// Deviation of the pose from the surfaces in view, of all motions since they were fused.
     pub accumulated: AccumulatedSigma,
+    /// True if that deviation of the position is more than the truncation distance, so that a
+    /// surface may be fused beside itself, or of the orientation more than a pixel.
+    pub displaced: bool,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
@@ -258,7 +261,7 @@ impl Report {
         if self.pose == PoseOrigin::Extrapolated
             || self.segment > MapSegment::FIRST
             || self.egomotion.is_some_and(|motion| motion.weak.any())
-            || self.accumulated.is_large
+            || self.displaced
             || refused > 0
             || self.self_calibration.is_uncorrected()
         {

@@ -304,6 +304,7 @@ impl Mapper<'_> {
             self.observe_free_space(&camera.t_world_camera, ground);
         }
         let digests = self.digests(found.egomotion.as_ref());
+        let accumulated = self.localization.accumulated.sigma();
         let report = Report {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
@@ -316,10 +317,9 @@ impl Mapper<'_> {
             segment: self.localization.camera.segment(),
             egomotion: found.egomotion,
             imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
-            accumulated: self
-                .localization
-                .accumulated
-                .report(self.config.volume.truncation_m, self.config.rig.focal_px),
+            accumulated,
+            displaced: accumulated
+                .is_large(self.config.volume.truncation_m, self.config.rig.focal_px),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
             inertial: self.localization.inertial.as_deref().map(InertialPrior::report),

@@ -181,7 +181,8 @@ impl FrameRow {
                 "matches do not hold the camera ({weak}): along these axes its last motion went on"
             )
         });
-        let imprecise = Some(self.report.accumulated).filter(|sigma| sigma.is_large).map(|sigma| {
+        let imprecise = self.report.displaced.then(|| {
+            let sigma = &self.report.accumulated;
             format!(
                 "the pose may be off by {:.2} m and {:.1} degrees: motions are imprecise",
                 sigma.way_sigma_m,
