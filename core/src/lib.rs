@@ -56,10 +56,10 @@ pub mod view;
 pub mod volume;
 
 pub use mapper::{
-    AccumulatedSigma, BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config,
-    DeferredWork, Digested, LoadPlacesError, Mapper, MapperConfig, MotionSource, NewError,
-    ObjectDigest, ObjectDigests, PoseOrigin, Report, RestoreError, SAVED_PLACES_HEADER_BYTES,
-    Scale, SetError, Severity, StageDigests, StepError, StereoFrame, WorkUnits, saved_keyframes,
+    BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, DeferredWork, Digested,
+    LoadPlacesError, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests,
+    PoseOrigin, PosePrecision, Report, RestoreError, SAVED_PLACES_HEADER_BYTES, Scale, SetError,
+    Severity, StageDigests, StepError, StereoFrame, WorkUnits, saved_keyframes,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial};

@@ -11,29 +11,27 @@ const STAYS: f64 = 0.9;
 /// Deviation of the orientation that is no longer small, px.
 const TURN_PX: f64 = 1.0;
 
-/// Standard deviations of a pose against the surfaces in view.
+/// Precision of a pose.
 ///
 /// ```
-/// let report = dynvox_core::Report::default();
-/// assert!(!report.displaced && report.accumulated.way_sigma_m == 0.0);
+/// use dynvox_core::{PosePrecision, Report};
+///
+/// assert_eq!(Report::default().precision, PosePrecision::Precise);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct AccumulatedSigma {
-    /// Standard deviation of the position, over all directions, m.
-    pub way_sigma_m: f32,
-    /// Standard deviation of the orientation, over all axes, rad.
-    pub turn_sigma_rad: f32,
-}
-
-impl AccumulatedSigma {
-    /// Returns true where the position deviates by more than the truncation distance, so that a
-    /// surface may be fused beside itself, or the orientation by more than a pixel.
-    pub(super) fn is_large(&self, truncation_m: f32, focal_px: f64) -> bool {
-        self.way_sigma_m > truncation_m || f64::from(self.turn_sigma_rad) * focal_px > TURN_PX
-    }
+pub enum PosePrecision {
+    /// The deviations that are known are small.
+    #[default]
+    Precise,
+    /// The standard deviation of the motion is more than half a voxel: what is fused at this pose is
+    /// blurred by it.
+    Imprecise,
+    /// The deviations of the motions since the surfaces in view were fused add up to more than the
+    /// truncation distance, so that a surface may be fused beside itself, or to more than a pixel.
+    Displaced,
 }
 
 /// Variances of a pose against the surfaces in view.
@@ -51,11 +49,12 @@ impl AccumulatedError {
         self.turn_rad2 = STAYS * self.turn_rad2 + turn_rad * turn_rad;
     }
 
-    /// Standard deviations.
-    pub(super) fn sigma(&self) -> AccumulatedSigma {
-        let [way_sigma_m, turn_sigma_rad] =
-            [self.way_m2, self.turn_rad2].map(|variance| libm::sqrt(variance) as f32);
-        AccumulatedSigma { way_sigma_m, turn_sigma_rad }
+    /// Returns true where the position deviates by more than the truncation distance, or the
+    /// orientation by more than a pixel.
+    pub(super) fn is_large(&self, truncation_m: f32, focal_px: f64) -> bool {
+        let truncation_m = f64::from(truncation_m);
+        self.way_m2 > truncation_m * truncation_m
+            || self.turn_rad2 * focal_px * focal_px > TURN_PX * TURN_PX
     }
 
     /// Visits the variances.
@@ -82,7 +81,7 @@ mod tests {
         let mut error = AccumulatedError::default();
         let mut add = |way_m: f64, degrees: f64, times: usize| {
             (0..times).for_each(|_| error.add(&motion(way_m, degrees.to_radians())));
-            error.sigma().is_large(0.3, 200.0)
+            error.is_large(0.3, 200.0)
         };
         assert!(!add(0.01, 0.05, 100), "as on a road");
         // A pixel is 0.29 degrees.

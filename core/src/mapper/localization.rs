@@ -1,8 +1,11 @@
 //! The camera's pose in a frame: given, or estimated from matches or from depth.
 
 use super::{
-    Config, MotionSource, PoseOrigin, StereoFrame, accumulated::AccumulatedError,
-    matched::MatchedFrame, search::Search, static_map::StaticMap,
+    Config, MotionSource, PoseOrigin, StereoFrame,
+    accumulated::{AccumulatedError, PosePrecision},
+    matched::MatchedFrame,
+    search::Search,
+    static_map::StaticMap,
 };
 use crate::{
     Capacity,
@@ -80,7 +83,7 @@ const IMPRECISE_SHARE: f64 = 0.5;
 
 impl Found {
     /// Tells whether the motion may be off by a large share of a voxel.
-    pub fn is_imprecise(&self, voxel_size_m: f32) -> bool {
+    fn is_imprecise(&self, voxel_size_m: f32) -> bool {
         let covariance = self.egomotion.and_then(|motion| motion.covariance);
         let limit_m = IMPRECISE_SHARE * f64::from(voxel_size_m);
         covariance.is_some_and(|covariance| covariance.distance_sigma_m() > limit_m)
@@ -162,6 +165,17 @@ impl<'s> Localization<'s> {
             inertial: None,
             accumulated: AccumulatedError::default(),
             rows_moved: false,
+        }
+    }
+
+    /// Precision of the pose in the frame.
+    pub fn precision(&self, found: &Found, config: &Config) -> PosePrecision {
+        if self.accumulated.is_large(config.volume.truncation_m, config.rig.focal_px) {
+            PosePrecision::Displaced
+        } else if found.is_imprecise(config.volume.voxel_size_m) {
+            PosePrecision::Imprecise
+        } else {
+            PosePrecision::Precise
         }
     }
 

@@ -29,7 +29,7 @@ mod tests;
 mod two_slabs;
 mod work;
 
-pub use accumulated::AccumulatedSigma;
+pub use accumulated::PosePrecision;
 pub use budget::{BudgetError, BudgetOptions, CapacityProblem, MAX_SIDE};
 pub use config::Config;
 pub use digests::{Digested, ObjectDigest, ObjectDigests, StageDigests};

@@ -1,6 +1,6 @@
 //! Report of one step, as plain values.
 
-use super::{AccumulatedSigma, DeferredWork, StageDigests, WorkUnits, static_map::MapWork};
+use super::{DeferredWork, PosePrecision, StageDigests, WorkUnits, static_map::MapWork};
 use crate::{
     digest::Digest,
     egomotion::{MotionEstimate, icp::IcpReport},
@@ -172,14 +172,8 @@ pub struct Report {
     /// The camera's motion from matches; none was looked for in the first frame, nor where the pose
     /// was given.
     pub egomotion: Option<MotionEstimate>,
-    /// True if the standard deviation of the motion estimated from matches is more than half a
-    /// voxel: what is fused at this pose is blurred by it.
-    pub imprecise: bool,
-    /// Deviation of the pose from the surfaces in view, of all motions since they were fused.
-    pub accumulated: AccumulatedSigma,
-    /// True if that deviation of the position is more than the truncation distance, so that a
-    /// surface may be fused beside itself, or of the orientation more than a pixel.
-    pub displaced: bool,
+    /// Precision of the pose, by the covariances of the motions that led to it.
+    pub precision: PosePrecision,
     /// The camera's motion from depth, where that is asked for; none in the first frame.
     pub icp: Option<IcpReport>,
     /// Report of the self-calibration.
@@ -261,13 +255,13 @@ impl Report {
         if self.pose == PoseOrigin::Extrapolated
             || self.segment > MapSegment::FIRST
             || self.egomotion.is_some_and(|motion| motion.weak.any())
-            || self.displaced
+            || self.precision == PosePrecision::Displaced
             || refused > 0
             || self.self_calibration.is_uncorrected()
         {
             Severity::MapAffected
         } else if self.pose == PoseOrigin::Relocalized
-            || self.imprecise
+            || self.precision == PosePrecision::Imprecise
             || self.dropped_features() + self.prune.early + self.deferred.fused_blocks > 0
             || self.self_calibration.state() > CalibrationState::Sound
         {

@@ -304,7 +304,6 @@ impl Mapper<'_> {
             self.observe_free_space(&camera.t_world_camera, ground);
         }
         let digests = self.digests(found.egomotion.as_ref());
-        let accumulated = self.localization.accumulated.sigma();
         let report = Report {
             frame: self.frame,
             t_world_camera: camera.t_world_camera,
@@ -316,10 +315,7 @@ impl Mapper<'_> {
             pose: found.origin,
             segment: self.localization.camera.segment(),
             egomotion: found.egomotion,
-            imprecise: found.is_imprecise(self.config.volume.voxel_size_m),
-            accumulated,
-            displaced: accumulated
-                .is_large(self.config.volume.truncation_m, self.config.rig.focal_px),
+            precision: self.localization.precision(&found, &self.config),
             icp: found.icp,
             self_calibration: self.localization.self_calibration.report(),
             inertial: self.localization.inertial.as_deref().map(InertialPrior::report),

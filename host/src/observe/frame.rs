@@ -8,7 +8,7 @@ use dynvox_core::egomotion::{MotionCovariance, MotionStatus, RightAhead, WeakDir
 use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::rectify::self_calibration::SelfCalibrationReport;
 use dynvox_core::view::RaycastView;
-use dynvox_core::{PoseOrigin, Report, Severity, Stage};
+use dynvox_core::{PoseOrigin, PosePrecision, Report, Severity, Stage};
 use serde::{Deserialize, Serialize};
 
 /// Stages whose time is taken.
@@ -181,13 +181,8 @@ impl FrameRow {
                 "matches do not hold the camera ({weak}): along these axes its last motion went on"
             )
         });
-        let imprecise = self.report.displaced.then(|| {
-            let sigma = &self.report.accumulated;
-            format!(
-                "the pose may be off by {:.2} m and {:.1} degrees: motions are imprecise",
-                sigma.way_sigma_m,
-                sigma.turn_sigma_rad.to_degrees()
-            )
+        let displaced = (self.report.precision == PosePrecision::Displaced).then(|| {
+            "motions are imprecise, and surfaces may lie beside those of before".to_owned()
         });
         let counts = [
             (allocation.refused, "block requests refused, the pool is full"),
@@ -212,7 +207,7 @@ impl FrameRow {
             .into_iter()
             .chain(guessed)
             .chain(weak)
-            .chain(imprecise)
+            .chain(displaced)
             .chain(lost)
             .chain(counted)
             .collect::<Vec<_>>()

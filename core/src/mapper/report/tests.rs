@@ -28,7 +28,10 @@ fn nothing_that_took_place_is_nothing_to_say() {
 fn a_guessed_pose_and_all_that_rests_on_it_affect_the_map() {
     assert_eq!(severity_of(|report| report.pose = PoseOrigin::Extrapolated), Severity::MapAffected);
     assert_eq!(severity_of(|report| report.segment = MapSegment::new(1)), Severity::MapAffected);
-    assert_eq!(severity_of(|report| report.displaced = true), Severity::MapAffected);
+    assert_eq!(
+        severity_of(|report| report.precision = PosePrecision::Displaced),
+        Severity::MapAffected
+    );
     assert_eq!(severity_of(|report| report.pose = PoseOrigin::Relocalized), Severity::Recovered);
 }
 

@@ -91,12 +91,6 @@ static POSE: &[FrameColumn] = &[
     column("residual_px", "px", "RMS error of the inliers", |row| {
         Cell::rounded(row.matches().2, 4)
     }),
-    column("accumulated_sigma_m", "m", "deviation of the pose from the surfaces in view", |row| {
-        Cell::rounded(f64::from(row.report.accumulated.way_sigma_m), 4)
-    }),
-    column("accumulated_sigma_rad", "rad", "deviation of the pose's direction from them", |row| {
-        Cell::rounded(f64::from(row.report.accumulated.turn_sigma_rad), 6)
-    }),
     column("weak_directions", "", "directions in which matches do not hold the camera", |row| {
         row.report.egomotion.map_or(Cell::Unknown, |motion| match motion.weak.any() {
             true => Cell::Text(motion.weak.to_string().replace(", ", "+")),
