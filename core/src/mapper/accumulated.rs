@@ -26,8 +26,8 @@ pub enum PosePrecision {
     /// The deviations that are known are small.
     #[default]
     Precise,
-    /// The standard deviation of the motion is more than half a voxel: what is fused at this pose is
-    /// blurred by it.
+    /// The standard deviation of the motion is more than half a voxel: what is fused at this pose
+    /// is blurred by it.
     Imprecise,
     /// The deviations of the motions since the surfaces in view were fused add up to more than the
     /// truncation distance, so that a surface may be fused beside itself, or to more than a pixel.
