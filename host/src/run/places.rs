@@ -92,7 +92,7 @@ pub fn localize(plan: &Plan, old: &Path) -> Result<Localized, RunError> {
 /// Places the frames of a plan among keyframes that were remembered.
 ///
 /// # Errors
-/// As those of [`localize`].
+/// The plan cannot be run, the keyframes cannot be used, or a frame cannot be read or mapped.
 pub fn localize_among(plan: &Plan, remembered: &Remembered) -> Result<Localized, RunError> {
     localize_after(plan, |mapper| {
         let mut bytes = remembered.keyframes.as_slice();

@@ -15,7 +15,7 @@ const GROUP_BYTES: usize = 64;
 
 /// An index in a table of hashbrown.
 pub struct HashedIndex<'s> {
-    pub(super) table: HashTable<Slot, OneShot<'s>>,
+    table: HashTable<Slot, OneShot<'s>>,
 }
 
 impl core::fmt::Debug for HashedIndex<'_> {
