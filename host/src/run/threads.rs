@@ -135,13 +135,18 @@ impl Executor for Threads {
     }
 }
 
-/// Burns CPU time on this thread.
+/// Burns CPU time on this thread, at least `ms`: a machine that is shared may take it off its
+/// processor and charge that to it. What was burnt is returned.
 #[cfg(test)]
-pub(super) fn burn(ms: u64) {
+pub(super) fn burn(ms: u64) -> Duration {
     let begin = ThreadTime::now();
     let mut sum = 0u64;
-    while begin.elapsed() < Duration::from_millis(ms) {
+    loop {
         sum = std::hint::black_box(sum.wrapping_mul(31).wrapping_add(7));
+        let burnt = begin.elapsed();
+        if burnt >= Duration::from_millis(ms) {
+            return burnt;
+        }
     }
 }
 
@@ -153,34 +158,28 @@ mod tests {
     fn work_of_all_threads_is_charged_once_to_the_stage_it_belongs_to() {
         for count in [1, 2, 3] {
             let threads = Threads::new(count).unwrap();
-            threads.run(|| {
-                burn(5);
-                threads.join(
-                    || {
-                        let four = || dynvox_core::parallel::each(&threads, [10; 4], burn);
-                        threads.stage(Stage::Stereo, four)
-                    },
-                    || threads.stage(Stage::SceneFlow, || threads.join(|| burn(15), || burn(15))),
-                )
+            let (outside, (stereo, (left, right))) = threads.run(|| {
+                let outside = burn(5);
+                let four = || dynvox_core::parallel::each(&threads, [10; 4], burn);
+                let two = || threads.join(|| burn(15), || burn(15));
+                let stages = threads.join(
+                    || threads.stage(Stage::Stereo, four),
+                    || threads.stage(Stage::SceneFlow, two),
+                );
+                (outside, stages)
             });
             let times = threads.take_times();
-            let cpu = |stage: Stage| times.stages[stage as usize].cpu_ms;
-            assert!(
-                (40.0..48.0).contains(&cpu(Stage::Stereo)),
-                "{count} threads: {}",
-                cpu(Stage::Stereo)
-            );
-            assert!(
-                (30.0..38.0).contains(&cpu(Stage::SceneFlow)),
-                "{count} threads: {}",
-                cpu(Stage::SceneFlow)
-            );
-            assert_eq!(cpu(Stage::Fuse), 0.0);
-            assert!(
-                (75.0..91.0).contains(&times.cpu_ms),
-                "{count} threads: {}, and 5 ms of no stage",
-                times.cpu_ms
-            );
+            let charged = |stage: Stage, burnt: Duration| {
+                let more = times.stages[stage as usize].cpu_ms - burnt.as_secs_f64() * 1e3;
+                // Less than any work that could be charged to another stage, or twice.
+                assert!((0.0..5.0).contains(&more), "{count} threads, {stage:?}: {more} ms more");
+            };
+            let stereo = stereo.iter().sum();
+            charged(Stage::Stereo, stereo);
+            charged(Stage::SceneFlow, left + right);
+            assert_eq!(times.stages[Stage::Fuse as usize].cpu_ms, 0.0);
+            let more = times.cpu_ms - (outside + stereo + left + right).as_secs_f64() * 1e3;
+            assert!((0.0..5.0).contains(&more), "{count} threads in all: {more} ms more");
             assert_eq!(threads.take_times(), StepTimes::default(), "taken times are gone");
         }
     }
