@@ -20,6 +20,15 @@ pub struct Limits {
     pub jerk_m_s3: f64,
 }
 
+/// Speed that directions allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allowed {
+    /// Fastest speed, m/s.
+    pub speed_m_s: f64,
+    /// The direction that allows no more; `None` at the speed that is wanted.
+    pub by: Option<usize>,
+}
+
 /// Sectors to each side of the course that must have data.
 const COURSE_SECTORS: i32 = 1;
 
@@ -39,28 +48,35 @@ impl Limits {
         a * ((lag_s * lag_s + 2.0 * way_m / a).sqrt() - lag_s)
     }
 
-    /// Fastest speed on a course `course_deg` clockwise from straight ahead, at most `wanted_m_s`.
+    /// Fastest speed on a course `course_deg` clockwise from straight ahead, at most `wanted_m_s`,
+    /// and the direction that allows no more.
     pub fn allowed_m_s(
         &self,
         directions: &[Direction; SECTORS],
         course_deg: f64,
         wanted_m_s: f64,
-    ) -> f64 {
+    ) -> Allowed {
         let ahead = (course_deg / SECTOR_DEG).round() as i32;
-        let known = (ahead - COURSE_SECTORS..=ahead + COURSE_SECTORS).all(|sector| {
-            directions[sector.rem_euclid(SECTORS as i32) as usize] != Direction::Unknown
-        });
-        if !known {
-            return 0.0;
+        let unknown = (ahead - COURSE_SECTORS..=ahead + COURSE_SECTORS)
+            .map(|sector| sector.rem_euclid(SECTORS as i32) as usize)
+            .find(|sector| directions[*sector] == Direction::Unknown);
+        if unknown.is_some() {
+            return Allowed { speed_m_s: 0.0, by: unknown };
         }
-        directions.iter().enumerate().fold(wanted_m_s, |speed, (sector, direction)| {
-            let Direction::Obstacle { distance_m } = direction else { return speed };
+        let wanted = Allowed { speed_m_s: wanted_m_s, by: None };
+        directions.iter().enumerate().fold(wanted, |allowed, (sector, direction)| {
+            let Direction::Obstacle { distance_m } = direction else { return allowed };
             let towards = (sector as f64 * SECTOR_DEG - course_deg).to_radians().cos();
             // Sideways and behind nothing comes nearer.
             if towards <= 1e-3 {
-                return speed;
+                return allowed;
             }
-            speed.min(self.speed_m_s(f64::from(*distance_m)) / towards)
+            let speed_m_s = self.speed_m_s(f64::from(*distance_m)) / towards;
+            if speed_m_s < allowed.speed_m_s {
+                Allowed { speed_m_s, by: Some(sector) }
+            } else {
+                allowed
+            }
         })
     }
 }
@@ -118,14 +134,17 @@ mod tests {
     #[test]
     fn unknown_stops_and_what_stands_aside_does_not() {
         let mut directions = [Direction::Free; SECTORS];
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 4.0);
+        let free = Allowed { speed_m_s: 4.0, by: None };
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), free);
         directions[18] = Direction::Obstacle { distance_m: 0.5 };
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 4.0);
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), free);
         directions[12] = Direction::Obstacle { distance_m: 3.0 };
         let limited = LIMITS.allowed_m_s(&directions, 0.0, 4.0);
-        assert!((limited - 2.0 * LIMITS.speed_m_s(3.0)).abs() < 1e-9);
+        assert_eq!(limited.by, Some(12));
+        assert!((limited.speed_m_s - 2.0 * LIMITS.speed_m_s(3.0)).abs() < 1e-9);
         directions[71] = Direction::Unknown;
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), 0.0);
-        assert!(LIMITS.allowed_m_s(&directions, -30.0, 4.0) > 0.0, "another course");
+        let stopped = Allowed { speed_m_s: 0.0, by: Some(71) };
+        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), stopped);
+        assert!(LIMITS.allowed_m_s(&directions, -30.0, 4.0).speed_m_s > 0.0, "another course");
     }
 }

@@ -3,6 +3,7 @@
 
 use super::rule::Limits;
 use super::vehicle::{FOLLOWS_S, Multirotor};
+use super::{BODY_M, REACH_M, truth};
 use crate::synth::{
     FlownView, MovingTraffic, Street, StreetConfig, StreetPose, SynthError, SynthFrame, Traffic,
 };
@@ -11,7 +12,7 @@ use dynvox_core::image::View;
 use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::random::Random;
 use dynvox_core::{Capacity, Config, Mapper, PoseOrigin, Serial, StereoFrame};
-use dynvox_onboard::{Band, Direction, SECTORS, Vehicle, sectors};
+use dynvox_onboard::{Band, Direction, SECTOR_DEG, SECTORS, Vehicle, sectors};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -23,8 +24,6 @@ const RATE_HZ: f64 = 10.0;
 const SUBSTEPS: u32 = 5;
 /// Height of the vehicle above the road, m.
 const HEIGHT_M: f64 = 1.6;
-/// Radius of the vehicle, m.
-const RADIUS_M: f64 = 0.3;
 /// Strength of gusts, m/s², 1 sigma.
 const GUSTS_M_S2: f64 = 0.3;
 /// Standing longer than this while the way is clear is a needless stop, s.
@@ -41,10 +40,8 @@ const LIMITS: Limits = Limits {
     deceleration_m_s2: 2.5,
     jerk_m_s3: 15.0,
 };
-/// Farthest surface that is looked for, m.
-const REACH_M: f64 = 5.0;
-/// Room on both sides of a course that is clear, m.
-const CLEAR_M: f64 = 1.2;
+/// Speed that the rule allows on a way that is clear, m/s.
+const CLEAR_M_S: f64 = 1.0;
 /// Below this speed the vehicle stands, m/s.
 const STANDS_M_S: f64 = 0.3;
 /// Way by which a surface came nearer since the last picture if it moves by itself, m.
@@ -70,7 +67,7 @@ pub struct Flight {
     pub collided: bool,
     /// A car drove into the vehicle while it stood, or from where its camera does not look.
     pub run_over: bool,
-    /// Stops of more than a second with a clear way ahead.
+    /// Stops of more than a second where the rule would not stop, had it been told the truth.
     pub needless_stops: u32,
     /// Distance flown, m.
     pub flown_m: f64,
@@ -93,10 +90,12 @@ pub struct FlightFrame {
     pub speed_m_s: f64,
     /// Speed that the rule allows until the next picture, m/s.
     pub allowed_m_s: f64,
-    /// Distance told straight ahead, m: negative where it is unknown, infinite where it is free.
+    /// Direction that allows no more, degrees clockwise from straight ahead, or straight ahead.
+    pub by_deg: f64,
+    /// Distance told in that direction, m: negative where it is unknown, infinite where it is free.
     pub told_m: f32,
-    /// Free way straight ahead in truth, m, up to the reach of the band.
-    pub free_m: f64,
+    /// Free way in that direction in truth, m, up to the reach of the band.
+    pub free_m: f32,
     /// Least distance to a surface until the next picture, less the vehicle's radius, m.
     pub clearance_m: f64,
     /// The picture came black.
@@ -176,11 +175,11 @@ fn band(speed_m_s: f64) -> Band {
         + speed_m_s * LIMITS.delay_s
         + speed_m_s * speed_m_s / (2.0 * LIMITS.deceleration_m_s2);
     Band {
-        body_m: RADIUS_M as f32,
+        body_m: BODY_M as f32,
         near_m: 2.0,
         far_m: (stop_m + speed_m_s).min(11.0) as f32,
-        up_m: RADIUS_M as f32,
-        down_m: RADIUS_M as f32,
+        up_m: BODY_M as f32,
+        down_m: BODY_M as f32,
         stale_frames: (3.0 * RATE_HZ) as u32,
     }
 }
@@ -237,25 +236,23 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
         let is_ready = index >= READY_FRAMES;
         let wanted = if is_ready { conditions.speed_m_s } else { 0.0 };
         let allowed = LIMITS.allowed_m_s(&aboard.directions, 0.0, wanted);
-        let told_m = match aboard.directions[0] {
-            Direction::Unknown => -1.0,
-            Direction::Free => f32::INFINITY,
-            Direction::Obstacle { distance_m } => distance_m,
-        };
-        let far_m = f64::from(aboard.band.far_m);
+        let by = allowed.by.unwrap_or(0);
+        let told_m = distance_m(aboard.directions[by]);
+        let truth = truth::directions(&view, f64::from(aboard.band.far_m));
         let speed_m_s = vehicle.speed_m_s();
         let is_placed = aboard.map(index, &view.frame(), is_black)?;
         flight.extrapolated += u32::from(!is_placed);
         let from = vehicle.position_m;
         let ahead_m = from[1];
-        let clearance_m = flight.advance(&mut vehicle, &view, allowed);
+        let clearance_m = flight.advance(&mut vehicle, &view, allowed.speed_m_s);
         seen(&FlightFrame {
             frame: index,
             ahead_m,
             speed_m_s,
-            allowed_m_s: allowed,
+            allowed_m_s: allowed.speed_m_s,
+            by_deg: (by as f64 * SECTOR_DEG + 180.0) % 360.0 - 180.0,
             told_m,
-            free_m: free_ahead_m(&view, far_m, RADIUS_M),
+            free_m: distance_m(truth[by]).min(aboard.band.far_m),
             clearance_m,
             is_black,
             is_placed,
@@ -268,9 +265,9 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
             flight.collided = !flight.run_over;
             break;
         }
-        // A vehicle that stands before nothing is stopped needlessly.
         let stands = is_ready && vehicle.speed_m_s() < STANDS_M_S;
-        let is_needless = stands && free_ahead_m(&view, far_m, CLEAR_M) >= far_m;
+        let is_clear = LIMITS.allowed_m_s(&truth, 0.0, wanted).speed_m_s >= CLEAR_M_S;
+        let is_needless = stands && is_clear;
         stood_s = if is_needless { stood_s + 1.0 / RATE_HZ } else { 0.0 };
         flight.needless_stops += u32::from((stood_s - NEEDLESS_S).abs() < 0.5 / RATE_HZ);
         flight.stopped = stands && !is_needless;
@@ -286,7 +283,7 @@ impl Flight {
         for _ in 0..SUBSTEPS {
             vehicle.fly([0.0, speed_m_s], 1.0 / (RATE_HZ * f64::from(SUBSTEPS)));
             let [right, ahead] = [0, 1].map(|axis| vehicle.position_m[axis] - from[axis]);
-            let clearance_m = view.clearance_m([right, 0.0, ahead], REACH_M) - RADIUS_M;
+            let clearance_m = view.clearance_m([right, 0.0, ahead], REACH_M) - BODY_M;
             least_m = least_m.min(clearance_m);
         }
         self.clearance_m = self.clearance_m.min(least_m);
@@ -295,13 +292,14 @@ impl Flight {
     }
 }
 
-/// Length of the course on which nothing stands within `clear_m`, out to `far_m`.
-fn free_ahead_m(view: &FlownView<'_>, far_m: f64, clear_m: f64) -> f64 {
-    let steps = (far_m / 0.25) as u32;
-    (1..=steps)
-        .map(|step| f64::from(step) * 0.25)
-        .find(|&at_m| view.clearance_m([0.0, 0.0, at_m], REACH_M) <= clear_m)
-        .unwrap_or(far_m)
+/// Distance to what is told in a direction, m: negative where it is unknown, infinite where it is
+/// free.
+fn distance_m(direction: Direction) -> f32 {
+    match direction {
+        Direction::Unknown => -1.0,
+        Direction::Free => f32::INFINITY,
+        Direction::Obstacle { distance_m } => distance_m,
+    }
 }
 
 /// Tells that what is nearest to a place, right and ahead of the camera, lies outside of the
@@ -339,7 +337,6 @@ mod tests {
         assert_eq!(fly(&conditions, |_| {}).unwrap(), flight, "one seed, one flight");
     }
 
-    #[dynvox_needs::long("DYNVOX_LONG")]
     #[dynvox_needs::long]
     #[test]
     fn a_car_from_behind_runs_a_vehicle_over() {

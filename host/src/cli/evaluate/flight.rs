@@ -76,19 +76,21 @@ pub fn run(args: &FlightArgs) -> anyhow::Result<()> {
 
 /// Flies once and prints a row for each picture.
 fn trace(args: &FlightArgs) -> anyhow::Result<()> {
-    outln!("| picture | ahead, m | speed, m/s | allowed | told, m | free, m | clearance, m | |");
-    outln!("|---|---|---|---|---|---|---|---|");
+    outln!(
+        "| picture | ahead, m | speed, m/s | allowed | by, deg | told, m | free, m | least, m | |"
+    );
+    outln!("|---|---|---|---|---|---|---|---|---|");
     let flight = fly(&args.conditions(args.seed), |row| {
         let FlightFrame { frame, ahead_m, speed_m_s, allowed_m_s, .. } = *row;
-        let FlightFrame { told_m, free_m, clearance_m, is_black, is_placed, .. } = *row;
+        let FlightFrame { by_deg, told_m, free_m, clearance_m, is_black, is_placed, .. } = *row;
         let note = match (is_black, is_placed) {
             (true, _) => "black",
             (false, false) => "extrapolated",
             (false, true) => "",
         };
         outln!(
-            "| {frame} | {ahead_m:.2} | {speed_m_s:.2} | {allowed_m_s:.2} | {told_m:.2} | \
-             {free_m:.2} | {clearance_m:.2} | {note} |"
+            "| {frame} | {ahead_m:.2} | {speed_m_s:.2} | {allowed_m_s:.2} | {by_deg:.0} | \
+             {told_m:.2} | {free_m:.2} | {clearance_m:.2} | {note} |"
         );
     })?;
     print(&[FlightRow { seed: args.seed, flight }]);
