@@ -57,9 +57,9 @@ pub mod volume;
 
 pub use mapper::{
     BlockCount, BudgetError, BudgetOptions, CapacityProblem, Config, DeferredWork, Digested,
-    LoadPlacesError, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest, ObjectDigests,
-    PoseOrigin, PosePrecision, Report, RestoreError, SAVED_PLACES_HEADER_BYTES, Scale, SetError,
-    Severity, StageDigests, StepError, StereoFrame, WorkUnits, saved_keyframes,
+    FixError, LoadPlacesError, Mapper, MapperConfig, MotionSource, NewError, ObjectDigest,
+    ObjectDigests, PoseOrigin, PosePrecision, Report, RestoreError, SAVED_PLACES_HEADER_BYTES,
+    Scale, SetError, Severity, StageDigests, StepError, StereoFrame, WorkUnits, saved_keyframes,
 };
 pub use memory::{Capacity, Footprint, Slab};
 pub use parallel::{Executor, Serial};

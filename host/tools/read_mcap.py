@@ -47,6 +47,9 @@ with open(folder / "run.mcap", "rb") as file:
             require((schema.encoding, channel.message_encoding) == ("jsonschema", "json"), f"{topic} is {channel.message_encoding}")
         for error in validators[schema.id].iter_errors(text):
             failures.append(f"{topic}: {error.message}")
+        if topic == "/tf" and text["child_frame_id"] == "world":
+            # The world as driven in that after all loops, with keyframes.
+            topic = "/tf closed"
         at = counts[topic]
         counts[topic] += 1
         bytes_of[topic] += len(message.data)
@@ -76,6 +79,7 @@ require(counts["/map/seen"] == -(-len(rows) // 10), f"/map/seen has {counts['/ma
 require(counts["/planning/grid"] in (0, counts["/map/seen"]), f"/planning/grid has {counts['/planning/grid']} messages")
 require(counts["/trajectory"] == 1, f"/trajectory has {counts['/trajectory']} messages")
 require(summary.statistics.message_count == sum(counts.values()), "the statistics count other messages")
+require(counts["/tf closed"] <= len(rows), f"the closed world has {counts['/tf closed']} transforms")
 for topic, count in sorted(counts.items()):
     print(f"{topic:<26}{count:>6} messages {bytes_of[topic]:>10} bytes, {times[topic][0] / 1e9:.3f} to {times[topic][-1] / 1e9:.3f} s")
 print("\n".join(failures[:20]) or f"{sum(counts.values())} messages in {len(summary.chunk_indexes)} chunks, as the run folder has it")

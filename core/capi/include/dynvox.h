@@ -84,6 +84,9 @@ typedef enum {
   DYNVOX_STATUS_CALLBACK,
   // A frame's time is not after that of the frame before.
   DYNVOX_STATUS_TIME,
+  // A fix leaves a direction without an error, or no keyframe without a fix leads from the map's
+  // beginning to the camera.
+  DYNVOX_STATUS_FIX,
 } DynvoxStatus;
 
 // Severity of a step's events.
@@ -591,6 +594,26 @@ typedef struct {
   void (*retire)(void *context, const DynvoxRetired *object);
 } DynvoxObjectSink;
 
+// A disparity image: buffers of the caller, either may be null. It has the size of the frames; its
+// rows follow each other without padding.
+typedef struct {
+  // Pixels that each buffer holds, unless it is null.
+  size_t capacity;
+  // Disparity in 1/256 px; 0 where it is unknown. Odd values of a pair that the mapper matched
+  // itself were filled in between measured ones, which are even.
+  uint16_t *disparity_q8;
+  // Confidence, 1 to 255: one more than the number of measured pixels in the 16 x 16 about it; 0
+  // where there is no disparity.
+  uint8_t *confidence;
+  // Written: columns.
+  size_t width;
+  // Written: rows.
+  size_t height;
+  // Written: true if there is a confidence. It needs the setting stereo.min_confidence above 0,
+  // and pairs that the mapper matched itself.
+  bool has_confidence;
+} DynvoxDisparity;
+
 // A rendered view of the map: buffers of the caller, any may be null. The view has the size of the
 // frames; its rows follow each other without padding.
 typedef struct {
@@ -925,6 +948,14 @@ DynvoxStatus dynvox_step_with(DynvoxMapper *mapper,
 // uses it; `pose` is null or points to a pose.
 DynvoxStatus dynvox_pose(DynvoxMapper *mapper, DynvoxPose *pose);
 
+// Copies the disparity of the last frame and its confidence.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `disparity` is null or points to an image whose buffers are as large as it says and
+// overlap nothing.
+DynvoxStatus dynvox_disparity(DynvoxMapper *mapper, DynvoxDisparity *disparity);
+
 // Renders the static map in the camera's segment from a pose in it.
 //
 // # Safety
@@ -978,6 +1009,35 @@ DynvoxStatus dynvox_finish_with(DynvoxMapper *mapper, const DynvoxObjectSink *ob
 // # Safety
 // `pose` is null or points to a pose, `matrix` is null or points to twelve numbers.
 DynvoxStatus dynvox_pose_matrix(const DynvoxPose *pose, double *matrix);
+
+// Writes the change from the world as it is driven to the one after all loops and fixes, at the
+// camera: ROS's transform from `map` to `odom`. Reports, planning maps and objects are in the
+// world as driven, which never jumps.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `change` is null or points to a pose.
+DynvoxStatus dynvox_closed_world(DynvoxMapper *mapper, DynvoxPose *change);
+
+// Takes a pose of the camera in the last frame that something else measured, in the world of the
+// first camera, with its covariance row by row: rotation (rad), then translation (m), in the
+// camera's axes. Like a loop it moves the keyframes, ten frames later; one that all else
+// contradicts is taken out. The camera goes on in the world as driven.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `pose` is null or points to a pose; `covariance` is null or points to 36 numbers.
+DynvoxStatus dynvox_add_fix(DynvoxMapper *mapper, const DynvoxPose *pose, const double *covariance);
+
+// Takes a position of the camera in the last frame, m, with its standard deviations along the axes
+// of the world, m, as dynvox_add_fix takes a pose.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `position_m` and `sigma_m` are null or point to three numbers each.
+DynvoxStatus dynvox_add_position(DynvoxMapper *mapper,
+                                 const double *position_m,
+                                 const double *sigma_m);
 
 // Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there
 // are.

@@ -15,9 +15,11 @@ extern crate std;
 mod callback;
 mod capacity;
 mod config;
+mod disparity;
 mod given;
 mod handle;
 mod inertial;
+mod loops;
 mod map;
 mod plan;
 mod raw;
@@ -42,11 +44,13 @@ pub use config::{
     DYNVOX_SETTINGS_BYTES, DynvoxConfig, DynvoxRig, dynvox_config_default, dynvox_config_problem,
     dynvox_config_set,
 };
+pub use disparity::{DynvoxDisparity, dynvox_disparity};
 pub use handle::{DynvoxMapper, dynvox_alignment, dynvox_bytes, dynvox_create, dynvox_destroy};
 pub use inertial::{
     DynvoxInertialDoubt, DynvoxInertialReport, DynvoxInertialSample, DynvoxInertialUnit,
     dynvox_config_inertial,
 };
+pub use loops::{dynvox_add_fix, dynvox_add_position, dynvox_closed_world};
 pub use map::{
     DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast,
     dynvox_stream_out, dynvox_triangles,

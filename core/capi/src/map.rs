@@ -69,7 +69,7 @@ pub unsafe extern "C" fn dynvox_raycast(
 ///
 /// # Safety
 /// `output` is null or points to as many pixels as the image has, which nothing else uses.
-unsafe fn fill<T: Copy>(
+pub(crate) unsafe fn fill<T: Copy>(
     image: Option<View<'_, T>>,
     output: *mut T,
     mapper: &Owned,

@@ -1,7 +1,7 @@
 //! The result of a call.
 
 use core::ffi::{CStr, c_char};
-use dynvox_core::{NewError, StepError, view::RaycastError};
+use dynvox_core::{FixError, NewError, StepError, view::RaycastError};
 
 /// The result of a call. A call that does not return DYNVOX_STATUS_OK has changed nothing, but for
 /// dynvox_restore with DYNVOX_STATUS_SNAPSHOT or DYNVOX_STATUS_CALLBACK, which leaves no mapper in
@@ -52,6 +52,9 @@ pub enum DynvoxStatus {
     Callback,
     /// A frame's time is not after that of the frame before.
     Time,
+    /// A fix leaves a direction without an error, or no keyframe without a fix leads from the map's
+    /// beginning to the camera.
+    Fix,
 }
 
 impl DynvoxStatus {
@@ -100,6 +103,10 @@ impl DynvoxStatus {
                 c"a frame's time is not after that of the frame before: leave the frame \
                             out"
             }
+            Self::Fix => {
+                c"a fix leaves a direction without an error, or no keyframe without a fix leads \
+                  from the map's beginning to the camera: give keyframes, and fix another frame"
+            }
         }
     }
 }
@@ -143,11 +150,20 @@ impl From<RaycastError> for DynvoxStatus {
     }
 }
 
+impl From<FixError> for DynvoxStatus {
+    fn from(error: FixError) -> Self {
+        match error {
+            FixError::Pose => Self::Pose,
+            _ => Self::Fix,
+        }
+    }
+}
+
 /// A sentence for a status, in static memory; "no such status" for another number.
 #[unsafe(no_mangle)]
 pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
     // In the order of their numbers, which are part of the binary interface.
-    const ALL: [DynvoxStatus; 19] = {
+    const ALL: [DynvoxStatus; 20] = {
         use DynvoxStatus::*;
         [
             Ok,
@@ -169,6 +185,7 @@ pub extern "C" fn dynvox_status_text(status: u32) -> *const c_char {
             Snapshot,
             Callback,
             Time,
+            Fix,
         ]
     };
     ALL.get(status as usize).map_or(c"no such status", |status| status.text()).as_ptr()

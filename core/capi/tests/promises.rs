@@ -90,6 +90,8 @@ const PROMISES: &[(&str, &str)] = &[
         "Hands every triangle of a reconstructed object",
         "a_restored_mapper_continues_and_a_damaged_snapshot_makes_none",
     ),
+    ("A disparity image: buffers of the caller", "a_disparity_is_handed_out_with_its_confidence"),
+    ("Reports, planning maps and objects are in", "a_position_moves_the_closed_world_alone"),
     ("Writes the moving objects of the last", "outputs_that_may_be_null_are_left_out"),
     ("Follows a ray of the world", "a_ray_into_the_unseen_ends_at_an_unknown_cell"),
     ("Hands every triangle of an object that leaves", "outputs_that_may_be_null_are_left_out"),
@@ -230,11 +232,11 @@ fn no_call_allocates_and_a_mapper_moves_between_threads() {
 fn every_status_has_a_sentence_of_its_own() {
     let text =
         |status| unsafe { std::ffi::CStr::from_ptr(dynvox_status_text(status)) }.to_str().unwrap();
-    let texts: Vec<&str> = (0..=DynvoxStatus::Time as u32).map(text).collect();
+    let texts: Vec<&str> = (0..=DynvoxStatus::Fix as u32).map(text).collect();
     for (at, sentence) in texts.iter().enumerate() {
         assert!(!texts[..at].contains(sentence) && *sentence != "no such status", "{sentence}");
     }
-    assert_eq!([text(DynvoxStatus::Time as u32 + 1), text(u32::MAX)], ["no such status"; 2]);
+    assert_eq!([text(DynvoxStatus::Fix as u32 + 1), text(u32::MAX)], ["no such status"; 2]);
 }
 
 #[test]

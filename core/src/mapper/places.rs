@@ -3,7 +3,6 @@
 use super::Mapper;
 use crate::{
     geometry::{MapSegment, StereoRig},
-    places::{CorrectedKeyframe, HeldLoop, LoopCounts},
     state::{ReadError, Reader, Visitor, Writer},
 };
 use core::fmt;
@@ -142,56 +141,6 @@ impl Mapper<'_> {
     /// ```
     pub fn keyframes(&self) -> u32 {
         self.localization.places.len() as u32
-    }
-
-    /// Keyframes of this run after all loops closed so far, oldest first. Where no loop was closed
-    /// they are where the camera was.
-    ///
-    /// ```
-    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
-    ///
-    /// let rig =
-    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
-    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
-    /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
-    /// assert_eq!(mapper.corrected_keyframes().count(), 0);
-    /// # Ok::<(), dynvox_core::NewError>(())
-    /// ```
-    pub fn corrected_keyframes(&self) -> impl Iterator<Item = CorrectedKeyframe> {
-        self.localization.places.corrected()
-    }
-
-    /// Counts of the loops closed so far.
-    ///
-    /// ```
-    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
-    ///
-    /// let rig =
-    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
-    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
-    /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
-    /// assert_eq!(mapper.loops().closures, 0);
-    /// # Ok::<(), dynvox_core::NewError>(())
-    /// ```
-    pub fn loops(&self) -> LoopCounts {
-        self.localization.places.loops()
-    }
-
-    /// Loops that hold the keyframes where [`Mapper::corrected_keyframes`] has them: all that were
-    /// closed so far but those that others contradicted, thinned out where they were too many.
-    ///
-    /// ```
-    /// use dynvox_core::{Capacity, Config, Mapper, geometry::StereoRig, memory::SLAB_ALIGN};
-    ///
-    /// let rig =
-    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
-    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
-    /// let mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
-    /// assert_eq!(mapper.held_loops().count(), 0);
-    /// # Ok::<(), dynvox_core::NewError>(())
-    /// ```
-    pub fn held_loops(&self) -> impl Iterator<Item = HeldLoop> {
-        self.localization.places.held_loops()
     }
 
     /// Writes the keyframes to `sink`, piece by piece, with the rig that saw them and a checksum.

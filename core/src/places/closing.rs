@@ -28,6 +28,10 @@ impl Places<'_> {
 
     /// Change at the newest keyframe of a segment.
     pub(crate) fn newest_closing(&self, segment: MapSegment) -> Transform {
+        // Before the first change both differ by rounding only.
+        if self.graph.counts().moved == 0 {
+            return Transform::IDENTITY;
+        }
         let newest = self.closings().next_back().filter(|newest| newest.segment == segment);
         newest.map_or(Transform::IDENTITY, |newest| newest.t_closed_driven)
     }

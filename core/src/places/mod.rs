@@ -37,7 +37,7 @@ pub use table::{KEYFRAME_POINTS, SegmentPose};
 /// Most keyframes of a mapper.
 pub const MAX_KEYFRAMES: usize = 1 << 16;
 
-pub use graph::{HeldLoop, LoopCounts};
+pub use graph::{HeldLoop, LoopCounts, PoseFix};
 
 use graph::{Graph, Measured, Recognized};
 use index::Index;
@@ -345,6 +345,12 @@ impl<'s> Places<'s> {
             let segment = self.table.pose(slot)?.segment;
             Some(CorrectedKeyframe { frame, pose: SegmentPose { segment, t_world_camera } })
         })
+    }
+
+    /// Takes a pose of the camera of the last frame that the caller knows. Returns whether it was
+    /// taken.
+    pub(crate) fn fix(&mut self, fix: &PoseFix) -> bool {
+        self.graph.fix(self.table.slots(), fix)
     }
 
     /// Counts of the loops.

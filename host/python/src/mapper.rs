@@ -11,8 +11,10 @@ use super::readout::{map_triangles, object_triangles, report_dictionary, track_d
 use super::rig::Rig;
 use super::running::{Recipe, Running, State};
 use super::{options, pose};
-use dynvox_core::StereoFrame;
+use dynvox_core::egomotion::MotionCovariance;
+use dynvox_core::places::PoseFix;
 use dynvox_core::view::RaycastView;
+use dynvox_core::{FixError, StereoFrame};
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
@@ -82,6 +84,23 @@ impl Mapper {
         work: impl FnOnce(&mut Running) -> PyResult<R> + Send,
     ) -> PyResult<R> {
         py.detach(|| work(self.lock()?.running()?))
+    }
+}
+
+impl Mapper {
+    fn take_fix(
+        &self,
+        py: Python<'_>,
+        take: impl FnOnce(&mut dynvox_core::Mapper<'_>) -> Result<(), FixError> + Send,
+    ) -> PyResult<()> {
+        self.with(py, |running| {
+            running.mapper.with_dependent_mut(|_, mapper| take(mapper)).map_err(|error| {
+                refuse(format!(
+                    "the fix is not taken: {error}. Make the mapper with keyframes=1000, and give \
+                     fixes of frames in which the camera is not lost"
+                ))
+            })
+        })
     }
 }
 
@@ -310,6 +329,46 @@ impl Mapper {
             Ok(running.mapper.with_dependent(|_, mapper| *mapper.t_world_camera()))
         })?;
         pose::matrix(py, &of)
+    }
+
+    /// Change from the world as it is driven to the one after all loops and fixes, at the camera,
+    /// 4 x 4: ROS's transform from `map` to `odom`. Reports, plans and objects are in the world as
+    /// driven, which never jumps.
+    #[getter]
+    fn t_closed_driven<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let change = self.with(py, |running| {
+            Ok(running.mapper.with_dependent(|_, mapper| mapper.t_closed_driven()))
+        })?;
+        pose::matrix(py, &change)
+    }
+
+    /// Takes a pose of the camera in the last frame that something else measured, in the world of
+    /// the first camera, with its covariance, 6 x 6: rotation (rad), then translation (m), in the
+    /// camera's axes. Like a loop it moves the keyframes, ten frames later; one that all else
+    /// contradicts is taken out. The camera goes on in the world as driven. An error of a mapper
+    /// made without `keyframes`.
+    fn add_fix(
+        &self,
+        py: Python<'_>,
+        t_world_camera: Bound<'_, PyAny>,
+        covariance: [[f64; 6]; 6],
+    ) -> PyResult<()> {
+        let fix = PoseFix {
+            t_world_camera: pose::given("t_world_camera", &t_world_camera)?,
+            covariance: MotionCovariance::from_matrix(&covariance),
+        };
+        self.take_fix(py, |mapper| mapper.add_fix(&fix))
+    }
+
+    /// Takes a position of the camera in the last frame, m, with its standard deviations along the
+    /// axes of the world, m, as `add_fix` takes a pose.
+    fn add_position(
+        &self,
+        py: Python<'_>,
+        position_m: [f64; 3],
+        sigma_m: [f64; 3],
+    ) -> PyResult<()> {
+        self.take_fix(py, |mapper| mapper.add_position(position_m, sigma_m))
     }
 
     /// Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd

@@ -35,6 +35,7 @@ PROMISES = {
     "Nothing is copied whose pixels lie": "test_a_view_that_is_not_dense_is_copied",
     "A pose must be a rigid motion": "test_poses_that_are_no_rigid_motion_within_the_map_are_refused",
     "`fused` in the report is true only if": "test_fused_is_true_only_if_something_was_fused",
+    "Reports, plans and objects are in the world as driven": "test_a_position_moves_the_closed_world_alone",
     "Frees the memory; every later call": "test_a_closed_mapper_says_so",
     "The mapper must have been made with the same rig": "test_a_mapper_with_a_file_survives_its_own_restore",
     "A file of `stream` that this mapper did not make": "test_a_file_of_the_user_is_never_overwritten",
@@ -389,3 +390,26 @@ def test_confidence_is_there_when_it_is_asked_for():
     assert confidence.shape == (HEIGHT, WIDTH) and np.array_equal(confidence > 0, asked.disparity_q8 > 0) and (confidence > 0).mean() > 0.3
     asked.step(left, right, disparity_q8=asked.disparity_q8)
     assert asked.confidence is None
+
+
+def test_a_position_moves_the_closed_world_alone():
+    made = mapper(keyframes=50)
+    for at in range(12):
+        report = made.step(*pair(6 * at))
+    driven = made.t_world_camera
+    assert np.array_equal(made.t_closed_driven, np.eye(4)) and driven[0, 3] > 2
+    made.add_position(driven[:3, 3] + [0.05, 0, 0], [1e-3] * 3)
+    with pytest.raises(dynvox.Error, match="no keyframe without a fix"):
+        made.add_position([0, 0, 0], [1, 1, 1])
+    assert np.array_equal(made.t_world_camera, driven)
+    moved = 0
+    for at in range(12, 24):
+        report = made.step(*pair(6 * at))
+        moved += report["world_moved"]
+    assert moved == 1 and made.t_closed_driven[0, 3] == pytest.approx(0.05, abs=0.02)
+    # Its own motion is as before: 0.3 m a step.
+    assert made.t_world_camera[0, 3] - driven[0, 3] == pytest.approx(12 * 0.3, abs=0.1)
+    with pytest.raises(dynvox.Error, match="without an error"):
+        made.add_fix(made.t_world_camera, np.zeros((6, 6)))
+    with pytest.raises(dynvox.Error, match="keyframes"):
+        mapper(image=(WIDTH, HEIGHT)).add_position([0, 0, 0], [1, 1, 1])

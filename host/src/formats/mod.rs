@@ -53,6 +53,7 @@ pub use png_numbers::{read_png_deep, read_png_u16, write_png_bytes, write_png_de
 pub use poses::{
     Trajectory, kitti_line, read_numbered, read_poses, tum_line, tum_row, write_numbered,
 };
+pub use rows::number_rows;
 pub use rows_of_file::rows_of_file;
 pub use run_files::{
     BLOCKS_TABLE_FILE, CLOSED_MAP_FILE, CLOSED_TRAJECTORY_FILE, FRAMES_FILE, MAP_FILE, REPORT_FILE,

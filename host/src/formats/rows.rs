@@ -28,6 +28,12 @@ fn is_heading(line: &str) -> bool {
     words().count() > 1 && words().all(is_name)
 }
 
+/// The rows of a table: numbers of lines, from 1, and the numbers in them, if all its words are
+/// finite ones.
+pub fn number_rows(text: &str) -> impl Iterator<Item = (usize, Option<Vec<f64>>)> {
+    lines_of(text).map(|(line, row)| (line, numbers_of(row)))
+}
+
 /// The numbers of a line, if all its words are finite numbers.
 pub(super) fn numbers_of(line: &str) -> Option<Vec<f64>> {
     words_of(line).map(|word| word.parse().ok().filter(|value: &f64| value.is_finite())).collect()

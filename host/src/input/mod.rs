@@ -27,6 +27,7 @@ pub use inertial::choice::InertialChoice;
 pub use layouts::{Sequence, StreetFrames};
 pub use source::{
     AvailableMasks, DepthRefusals, ExactFrame, FrameInfo, FrameMasks, FrameSource, GivenDepth,
-    InertialUnitData, InputError, InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, Scaled,
-    SourceInfo, Stacking, StereoImages, StopRequest, StreamState, TrueObject, read_given_poses,
+    InertialUnitData, InputError, InstanceMask, LidarScan, MaskRefusals, ObjectsTruth, PositionFix,
+    Scaled, SourceInfo, Stacking, StereoImages, StopRequest, StreamState, TrueObject,
+    read_given_poses, read_position_fixes,
 };

@@ -26,6 +26,8 @@ pub struct ClosedLoops {
     pub keyframes: Vec<CorrectedKeyframe>,
     /// Loops that hold them there.
     pub held: Vec<HeldLoop>,
+    /// Positions of --fixes that belong to a frame.
+    pub fixes_given: usize,
     /// Triangles of the map after all loops, where it was written.
     pub triangles: Option<u64>,
 }
@@ -37,7 +39,11 @@ pub struct LoopSection {
     pub closures: u32,
     /// Closures that were farther off than drift explains.
     pub refused: u32,
-    /// Closures that others contradicted.
+    /// Positions of --fixes that belong to a frame.
+    pub fixes_given: usize,
+    /// Number of these that the mapper took.
+    pub fixes: u32,
+    /// Closures and fixes that others contradicted.
     pub taken_out: u32,
     /// Times that poses of keyframes changed.
     pub moved: u32,
@@ -115,12 +121,14 @@ pub(super) fn write(
     truth: Option<&[Transform]>,
 ) -> Result<Option<LoopSection>, ObserveError> {
     let counts = loops.counts;
-    if counts.closures + counts.refused == 0 {
+    if counts.closures + counts.refused == 0 && loops.fixes_given == 0 {
         return Ok(None);
     }
     let section = LoopSection {
         closures: counts.closures,
         refused: counts.refused,
+        fixes_given: loops.fixes_given,
+        fixes: counts.fixes,
         taken_out: counts.taken_out,
         moved: counts.moved,
         triangles: loops.triangles,
@@ -242,6 +250,7 @@ mod tests {
             triangles: None,
             // The true way from frame 1 to frame 5 is 2 m; the loop says 2.1 m.
             held: vec![HeldLoop { from_frame: 1, to_frame: 5, t_from_to: ahead(2.1) }],
+            fixes_given: 0,
         };
         let parts = [(0, MapSegment::FIRST), (7, MapSegment::new(1))];
         let truth: Vec<Transform> = [0.0, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0].map(ahead).to_vec();

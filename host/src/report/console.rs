@@ -38,9 +38,13 @@ fn old_map(old: &Continued) -> String {
 
 /// Sentence on the loops that a run closed.
 fn loop_sentence(loops: &LoopSection) -> String {
-    let LoopSection { closures, refused, taken_out, .. } = loops;
+    let LoopSection { closures, refused, fixes, fixes_given, taken_out, .. } = loops;
+    let fixes = match fixes_given {
+        0 => String::new(),
+        given => format!(", {fixes} of {given} fixes taken"),
+    };
     let found = format!(
-        "{closures} places seen again ({refused} more refused, {taken_out} taken out again)"
+        "{closures} places seen again ({refused} more refused){fixes}, {taken_out} taken out again"
     );
     if loops.moved == 0 {
         return format!("{found}; no pose changed");

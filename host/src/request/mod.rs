@@ -63,6 +63,7 @@ pub use world::{Change, SyntheticWorld};
 
 use crate::input::depth::{DepthChoice, DepthScale};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Everything that is asked of a run. The default maps the synthetic street.
 ///
@@ -103,6 +104,8 @@ pub struct Request {
     pub masks: Masks,
     /// Source of the camera's poses.
     pub poses: Poses,
+    /// Positions of the camera that something else measured.
+    pub fixes: Option<PathBuf>,
     /// Memory of the mapper.
     pub bounds: Bounds,
     /// Settings of the mapper; stored are those that differ from the defaults.

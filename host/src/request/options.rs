@@ -213,6 +213,11 @@ pub struct Options {
     #[arg(long, value_name = "SOURCE", help_heading = "Mapping")]
     #[serde(deserialize_with = "words::parsed")]
     pub egomotion: Option<Egomotion>,
+    /// Positions of the camera that something else measured, in the first camera's axes: rows of
+    /// time (s), x, y, z (m) and one standard deviation or three. They move the closed path and map
+    /// as loops do; needs --keyframes
+    #[arg(long, value_name = "FILE", requires = "keyframes", help_heading = "Mapping")]
+    pub fixes: Option<PathBuf>,
     /// Fuse every K-th frame; the camera is tracked in all [default: 1]
     #[arg(long, value_name = "K", help_heading = "Mapping")]
     pub fuse_every: Option<u32>,
@@ -305,6 +310,7 @@ impl Options {
             depth_scale: self.depth_scale.clone(),
             masks: self.masks(),
             poses: self.poses(),
+            fixes: self.fixes.clone(),
             bounds: self.bounds()?,
             settings: self.settings()?,
             scale: self.scene_scale(),

@@ -37,7 +37,7 @@ impl Request {
     /// Every path that is read.
     fn inputs_mut(&mut self) -> Vec<&mut PathBuf> {
         // A path that is read is added here, and no output may contain it.
-        let Self { input, depth, masks, poses, storage, exports: _, .. } = self;
+        let Self { input, depth, masks, poses, fixes, storage, exports: _, .. } = self;
         let mut paths: Vec<&mut PathBuf> =
             input.calibration.iter_mut().chain(&mut input.inertial_calibration).collect();
         if let InertialChoice::File(path) = &mut input.inertial {
@@ -64,6 +64,7 @@ impl Request {
         if let Poses::File(path) = poses {
             paths.push(path);
         }
+        paths.extend(fixes);
         paths
     }
 }
@@ -82,6 +83,7 @@ mod tests {
         request.depth = "files:depth".parse().unwrap();
         request.masks.source = "files:masks".parse().unwrap();
         request.poses = Poses::File("poses.txt".into());
+        request.fixes = Some("survey.csv".into());
         request.input.ignore_mask = Some("bonnet.png".into());
         request.storage.continues = Some("old".into());
         request.exports.instances = Some("saved".into());
@@ -96,12 +98,13 @@ mod tests {
             "depth",
             "masks",
             "poses.txt",
+            "survey.csv",
             "bonnet.png",
         ] {
             assert!(inputs.iter().any(|path| path.ends_with(name)), "{name}: {inputs:?}");
         }
         // The folder of saved masks is an output.
-        assert_eq!(inputs.len(), 10, "{inputs:?}");
+        assert_eq!(inputs.len(), 11, "{inputs:?}");
         assert_eq!(request.saved_folders().count(), 1);
     }
 }

@@ -1,7 +1,7 @@
 //! A request that is ready to run.
 
 use super::{Request, RequestError, check_bounds};
-use crate::input::{FrameSource, StopRequest};
+use crate::input::{FrameSource, PositionFix, StopRequest};
 use crate::live::LiveView;
 use crate::request::FrameNumbers;
 use dynvox_core::geometry::Transform;
@@ -17,6 +17,8 @@ pub struct Plan {
     pub frames: FrameNumbers,
     /// Given poses of these frames; `None` where the mapper estimates them.
     pub poses: Option<Vec<Transform>>,
+    /// Positions of frames that something else measured, in the frames' order.
+    pub fixes: Vec<PositionFix>,
     /// Name of the bounds.
     pub profile: String,
     /// The bounds.

@@ -4,7 +4,7 @@ use super::examine::{Examined, examine};
 use super::opening;
 use super::resident_limit_bytes;
 use super::{FrameNumbers, Plan, Poses, Request, RequestError, Settings, Worlds, input};
-use crate::input::{InertialUnitData, StopRequest, read_given_poses};
+use crate::input::{InertialUnitData, StopRequest, read_given_poses, read_position_fixes};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::{Capacity, Config, Scale};
 
@@ -62,6 +62,10 @@ impl Request {
             Poses::Estimated => None,
             Poses::File(path) => Some(read_given_poses(path, dataset.as_ref(), frames.listed())?),
         };
+        let fixes = match &self.fixes {
+            None => Vec::new(),
+            Some(path) => read_position_fixes(path, dataset.as_ref(), frames.listed())?,
+        };
         let unit = dataset.info().inertial.as_deref();
         Ok(Plan {
             request: self.clone(),
@@ -76,6 +80,7 @@ impl Request {
             },
             frames,
             poses,
+            fixes,
             profile,
             capacity,
             threads,

@@ -58,6 +58,7 @@ fn of_recordings(request: &Request) -> Option<&'static str> {
         ("--depth", request.depth != DepthChoice::Elas),
         ("--instances with files of masks", !request.masks.fits_stream()),
         ("--egomotion file", matches!(request.poses, Poses::File(_))),
+        ("--fixes", request.fixes.is_some()),
     ]
     .into_iter()
     .find_map(|(option, given)| given.then_some(option))

@@ -189,6 +189,7 @@ fn map(
             counts: mapper.loops(),
             keyframes: mapper.corrected_keyframes().collect(),
             held: mapper.held_loops().collect(),
+            fixes_given: plan.fixes.len(),
             triangles: closed_triangles,
         },
         output: MeshOutput::begin(

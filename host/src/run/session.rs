@@ -12,7 +12,7 @@ use super::{
     Continued, FolderError, Incomplete, Progress, ReadFrame, RunFolder, Threads, inertial_samples,
     read_ahead, resident_bytes, stereo_frame,
 };
-use crate::input::{InputError, InstanceMask, StereoImages};
+use crate::input::{InputError, InstanceMask, PositionFix, StereoImages};
 use crate::observe::{
     DepthCensus, EndContext, FrameContext, FramePictures, FrameRow, ObserveError, ObservedRun,
     Observer, RetiredVolume, StepTimes, from_first, overview,
@@ -347,6 +347,7 @@ impl<'p, 's> Session<'p, 's> {
         let mut retired = RetiredVolumes::default();
         let stepped = threads.run(|| mapper.step_with(&frame, threads, store, &mut retired));
         let mut report = stepped.map_err(|error| refused(step_reason(error)))?;
+        self.take_fix(index);
         self.state.before_last_ns = before_ns;
         let step_ms = begin.elapsed().as_secs_f64() * 1e3;
         report.allocate.eviction.lost += self.store.end_step();
@@ -360,6 +361,16 @@ impl<'p, 's> Session<'p, 's> {
             ..self.row(&images, report)
         };
         Ok((row, retired.0, images))
+    }
+
+    /// Hands the mapper the position that something else measured in a frame. One that is not taken
+    /// (the camera is lost, or its keyframe has one) is missing in the count of those taken.
+    fn take_fix(&mut self, index: usize) {
+        let fixes = &self.plan.fixes;
+        let found = fixes.binary_search_by_key(&index, |fix| fix.frame).ok();
+        if let Some(PositionFix { position_m, sigma_m, .. }) = found.and_then(|at| fixes.get(at)) {
+            self.mapper.add_position(*position_m, *sigma_m).ok();
+        }
     }
 
     /// Makes a frame's row, without its number and times.

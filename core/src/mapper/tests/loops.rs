@@ -2,7 +2,10 @@
 
 use super::resume::{restored, saved};
 use super::*;
-use crate::places::LoopCounts;
+use crate::{
+    FixError,
+    places::{LoopCounts, PoseFix},
+};
 
 const WITH_PLACES: Capacity = Capacity { keyframes: 80, ..CAPACITY };
 /// Frames of a full turn, and a few that go over its beginning again.
@@ -66,4 +69,29 @@ fn a_snapshot_while_a_loop_is_closed_goes_on_closing_it() {
     let expected = go_on(&mut mapper, next);
     let again = |mapper: &mut Mapper<'_>| go_on(mapper, next);
     assert_eq!(restored(&WITH_PLACES, &Walk::config(), &bytes, again), Ok(expected));
+}
+
+#[test]
+fn a_surveyed_pose_moves_the_keyframes_and_not_the_camera() {
+    let mut slab = vec![0u8; WITH_PLACES.bytes() + SLAB_ALIGN];
+    let mut mapper = Mapper::new(&WITH_PLACES, &Walk::config(), &mut slab).unwrap();
+    let mut last = step(&mut mapper, 0);
+    for at in 1..20 {
+        last = step(&mut mapper, at);
+    }
+    assert_eq!(mapper.t_closed_driven(), Transform::IDENTITY);
+    // As if the way so far had been 4 cm too short.
+    let [x, y, z] = last.t_world_camera.translation_m;
+    let fix = PoseFix::of_position([x, y, z + 0.04], [1e-3; 3], &last.t_world_camera);
+    assert_eq!(mapper.add_position([x, y, z + 0.04], [1e-3; 3]), Ok(()));
+    assert_eq!(mapper.add_fix(&fix), Err(FixError::Nowhere), "that keyframe has one");
+    let wild = PoseFix { t_world_camera: Transform::from_translation([1e9, 0.0, 0.0]), ..fix };
+    assert_eq!(mapper.add_fix(&wild), Err(FixError::Pose));
+    let certain = PoseFix::of_position([x, y, z], [0.0; 3], &last.t_world_camera);
+    assert_eq!(mapper.add_fix(&certain), Err(FixError::Covariance));
+    let moved = (20..32).filter(|&at| step(&mut mapper, at).world_moved).count();
+    let counts = mapper.loops();
+    assert_eq!((moved, counts.fixes, counts.taken_out), (1, 1, 0), "{counts:?}");
+    let [_, _, ahead_m] = mapper.t_closed_driven().transform_point([x, y, z]);
+    assert!((ahead_m - z - 0.04).abs() < 0.01, "{ahead_m} m for {z} m");
 }

@@ -1,6 +1,6 @@
 //! Closures: taken, thinned out, moved to neighbours, solved for, and taken out again.
 
-use super::{Graph, LINKED, LOOSE, ROUNDS, UNUSED, twist::isotropic};
+use super::{Graph, LINKED, LOOSE, Node, ROUNDS, UNUSED, twist::isotropic};
 use crate::{egomotion::MotionCovariance, geometry::Transform, state::Visitor};
 use bytemuck::{Pod, Zeroable};
 
@@ -14,6 +14,8 @@ const DRIFT_SHARE: f64 = 0.05;
 const DRIFT_DEPTH_SHARE: f64 = 0.1;
 const DRIFT_RAD: f64 = 0.1;
 const DRIFT_RAD_PER_M: f64 = 2e-3;
+/// Stands for the world where a closure names the slot of a keyframe.
+pub(super) const WORLD: u32 = u32::MAX;
 /// Weight of a closure below which others contradict it: some five standard deviations.
 const WEIGHT_MIN: f64 = 0.1;
 
@@ -25,7 +27,7 @@ pub(super) struct Closure {
     pub t_from_to: Transform,
     /// In the later camera's frame.
     pub covariance: MotionCovariance,
-    /// Slots of the keyframes.
+    /// Slots of the keyframes; the earlier one may be [`WORLD`].
     pub from: u32,
     pub to: u32,
     /// Weight in the last round.
@@ -40,8 +42,17 @@ impl Closure {
         covariance.visit(visitor);
         visitor.u32s([&mut *from, &mut *to]);
         visitor.f64(weight);
-        if *from as usize >= len || *to as usize >= len {
+        let may_be_from = (*from as usize) < len || *from == WORLD;
+        if !may_be_from || *to as usize >= len {
             visitor.refuse();
+        }
+    }
+
+    /// Pose from which the closure is, in the solution under way.
+    pub(super) fn t_world_from(&self, nodes: &[Node]) -> Option<Transform> {
+        match self.from {
+            WORLD => Some(Transform::IDENTITY),
+            slot => nodes.get(slot as usize).map(|node| node.working),
         }
     }
 }
@@ -97,7 +108,7 @@ impl Graph<'_> {
             return false;
         };
         self.closed_at_depths = self.way_depths();
-        let is_last = |closure: &Closure| closure.to == to as u32;
+        let is_last = |closure: &Closure| closure.to == to as u32 && closure.from != WORLD;
         let is_known = self.closures.iter().take(self.closure_len).any(is_last);
         let Some(way) = self.way.as_deref() else { return false };
         if way.is_loose || is_known || self.used(recognized.slot).is_none() || recognized.slot == to
@@ -115,6 +126,13 @@ impl Graph<'_> {
             self.counts.refused = self.counts.refused.saturating_add(1);
             return false;
         }
+        let is_taken = self.take(closure);
+        self.counts.closures = self.counts.closures.saturating_add(u32::from(is_taken));
+        is_taken
+    }
+
+    /// Takes a closure, which is solved for from the next frame on.
+    pub(super) fn take(&mut self, closure: Closure) -> bool {
         // A new closure says more than one of many on an old way.
         if self.closure_len == self.closures.len() {
             self.thin_out();
@@ -122,7 +140,6 @@ impl Graph<'_> {
         let Some(free) = self.closures.get_mut(self.closure_len) else { return false };
         *free = closure;
         self.closure_len += 1;
-        self.counts.closures = self.counts.closures.saturating_add(1);
         self.is_due = true;
         true
     }

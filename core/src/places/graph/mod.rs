@@ -5,6 +5,7 @@
 //! place. A solution moves the keyframes so that links and closures give way by their covariances
 //! (Gauss-Newton, `round`). Closures are few and the chain is a tree, so the equations are solved
 //! for what each closure pulls: six unknowns for each closure instead of six for each keyframe.
+//! A pose that the caller knows is a closure too, from the world itself (`fix`).
 //!
 //! **Robustness.** A closure far from where the way can lead by its drift is refused. Those taken
 //! are weighted anew in each round (Geman-McClure, from a wide scale to the true one), so that the
@@ -17,6 +18,7 @@
 
 mod closures;
 mod dense;
+mod fix;
 mod round;
 mod twist;
 
@@ -35,6 +37,7 @@ use closures::Closure;
 pub use closures::HeldLoop;
 pub(super) use closures::Recognized;
 use dense::entries;
+pub use fix::PoseFix;
 use twist::{Twist, isotropic};
 
 /// Most closures of a graph, and keyframes for each.
@@ -157,7 +160,9 @@ pub struct LoopCounts {
     pub closures: u32,
     /// Closures that were too far from where the way can lead by its drift.
     pub refused: u32,
-    /// Closures that others contradicted and that were taken out again.
+    /// Poses of the caller's that were taken.
+    pub fixes: u32,
+    /// Closures and poses of the caller's that others contradicted and that were taken out again.
     pub taken_out: u32,
     /// Times that the poses of keyframes were changed.
     pub moved: u32,
@@ -376,8 +381,8 @@ impl<'s> Graph<'s> {
         let mut due = u8::from(*is_due);
         visitor.u8(&mut due);
         *is_due = due != 0;
-        let LoopCounts { closures, refused, taken_out, moved, last_moved_m } = counts;
-        visitor.u32s([closures, refused, taken_out, moved]);
+        let LoopCounts { closures, refused, fixes, taken_out, moved, last_moved_m } = counts;
+        visitor.u32s([closures, refused, fixes, taken_out, moved]);
         visitor.f64(last_moved_m);
     }
 

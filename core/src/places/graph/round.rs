@@ -5,7 +5,7 @@
 
 use super::{
     ChainSum, Graph, LOOSE, Node, UNUSED,
-    closures::Closure,
+    closures::{Closure, WORLD},
     dense::{entries, factor, solve},
     twist::{
         Twist, add, difference, in_world, isotropic, spread_in_world, squared, times, twist_of,
@@ -30,10 +30,11 @@ fn pair<T>(of: &[T], a: usize, b: usize) -> Option<[&T; 2]> {
     Some([of.get(a)?, of.get(b)?])
 }
 
-/// Places in the chain of the ends of a closure.
+/// Places in the chain of the ends of a closure. The first keyframe stands for the world.
 fn ends(positions: &[u32], closure: &Closure) -> Option<[usize; 2]> {
-    let ends = pair(positions, closure.from as usize, closure.to as usize)?;
-    Some(ends.map(|&position| position as usize))
+    let position = |slot: u32| positions.get(slot as usize).map(|&position| position as usize);
+    let begin = if closure.from == WORLD { 0 } else { position(closure.from)? };
+    Some([begin, position(closure.to)?])
 }
 
 impl Graph<'_> {
@@ -89,9 +90,10 @@ impl Graph<'_> {
         let Self { nodes, closures, sums, positions, matrix, pulls, .. } = self;
         let (before, rest) = closures.split_at_mut_checked(at)?;
         let closure = rest.first_mut()?;
-        let [from, to] = pair(nodes, closure.from as usize, closure.to as usize)?;
+        let to = nodes.get(closure.to as usize)?;
+        let t_world_to = closure.t_world_from(nodes)? * closure.t_from_to;
         // In the later camera's frame, in which the covariance is.
-        let error = twist_of(&(to.working.inverse() * from.working * closure.t_from_to));
+        let error = twist_of(&(to.working.inverse() * t_world_to));
         let squared = squared(&error, &closure.covariance)?;
         let share = scale / (scale + squared);
         closure.weight = share * share;

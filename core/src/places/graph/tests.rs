@@ -263,3 +263,104 @@ fn equal_loops_give_equal_bits_wherever_they_are_interrupted() {
     };
     assert_eq!(bits(false), bits(true));
 }
+
+/// Takes a fix of the last keyframe.
+fn fix(graph: &mut Graph<'_>, last: usize, fix: &PoseFix) -> bool {
+    graph.fix(0..=last, fix)
+}
+
+#[test]
+fn a_fix_pulls_the_way_there_and_leaves_its_beginning() {
+    let (truth, driven) = drifting();
+    let last = KEYFRAMES - 1;
+    let after_m = |t_world_camera: Transform, rotation_rad: f64| {
+        with_graph(KEYFRAMES, |graph| {
+            walk(graph, &driven);
+            let covariance = twist::isotropic(rotation_rad, 0.02);
+            let surveyed = PoseFix { t_world_camera, covariance };
+            assert!(fix(graph, last, &surveyed) && !fix(graph, last, &surveyed), "one each");
+            assert_eq!(commit(graph, KEYFRAMES), ROUNDS);
+            assert_eq!((graph.counts().fixes, graph.counts().closures), (1, 0));
+            assert_eq!(graph.held().count(), 0, "no loop");
+            assert_eq!(graph.corrected(0).unwrap().1, Transform::IDENTITY);
+            let end = graph.corrected(last).unwrap().1.inverse() * truth[last];
+            assert!(end.distance_m() < 0.05, "{end:?}");
+            worst_m(graph, &truth)
+        })
+    };
+    let before_m = with_graph(KEYFRAMES, |graph| {
+        walk(graph, &driven);
+        worst_m(graph, &truth)
+    });
+    let posed_m = after_m(truth[last], 1e-3);
+    assert!(posed_m < 0.25 * before_m, "{before_m} m, then {posed_m} m");
+    // A position alone, whose turn is the one as driven.
+    let position_m = truth[last].translation_m;
+    let alone = PoseFix::of_position(position_m, [0.02; 3], &driven[last]);
+    let alone_m = after_m(alone.t_world_camera, 10.0);
+    assert!(alone_m < 0.5 * before_m, "{before_m} m, then {alone_m} m");
+}
+
+#[test]
+fn a_wrong_fix_is_overruled_by_the_others() {
+    let (truth, driven) = drifting();
+    with_graph(KEYFRAMES, |graph| {
+        for (at, t_world_camera) in driven.iter().enumerate() {
+            let (pose, covariance) = (pose(*t_world_camera), twist::isotropic(2e-3, 0.02));
+            graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
+            graph.insert(0..=at, t_world_camera, at as u32);
+            if at % 10 == 9 {
+                let [x, y, z] = truth[at].translation_m;
+                let off_m = if at == 49 { 15.0 } else { 0.0 };
+                let received =
+                    PoseFix::of_position([x + off_m, y, z], [0.1, 0.2, 0.1], t_world_camera);
+                assert!(fix(graph, at, &received));
+            }
+        }
+        commit(graph, KEYFRAMES);
+        let counts = graph.counts();
+        assert_eq!((counts.fixes, counts.taken_out), (8, 1), "{counts:?}");
+        let after_m = worst_m(graph, &truth);
+        assert!(after_m < 0.5, "{after_m} m");
+    });
+}
+
+#[test]
+fn a_loop_and_a_fix_hold_one_keyframe() {
+    let (truth, driven) = drifting();
+    let last = KEYFRAMES - 1;
+    with_graph(KEYFRAMES, |graph| {
+        walk(graph, &driven);
+        assert!(close(graph, last, 0, truth[0].inverse() * truth[last]));
+        let covariance = twist::isotropic(1e-3, 0.02);
+        assert!(fix(graph, last, &PoseFix { t_world_camera: truth[last], covariance }));
+        assert!(!close(graph, last, 0, truth[0].inverse() * truth[last]), "known already");
+        commit(graph, KEYFRAMES);
+        assert_eq!(graph.counts().taken_out, 0);
+        assert!(worst_m(graph, &truth) < 0.6);
+    });
+}
+
+#[test]
+fn a_camera_that_is_lost_takes_no_fix() {
+    let (truth, driven) = drifting();
+    with_graph(KEYFRAMES, |graph| {
+        let covariance = twist::isotropic(1e-3, 0.02);
+        let surveyed = PoseFix { t_world_camera: truth[9], covariance };
+        assert!(!fix(graph, 0, &surveyed), "no keyframe");
+        walk(graph, &driven[..10]);
+        let elsewhere = SegmentPose { segment: MapSegment::new(1), t_world_camera: truth[9] };
+        graph.advance(&Measured { pose: &elsewhere, covariance: None, depth_m: 10.0 });
+        assert!(!fix(graph, 9, &surveyed), "another segment");
+    });
+}
+
+#[test]
+fn a_fix_without_an_error_is_refused() {
+    let fix = PoseFix::of_position([1.0, 2.0, 3.0], [0.1; 3], &Transform::IDENTITY);
+    assert!(fix.has_errors());
+    for sigma_m in [[0.1, 0.0, 0.1], [f64::NAN; 3], [f64::INFINITY; 3]] {
+        let fix = PoseFix::of_position([0.0; 3], sigma_m, &Transform::IDENTITY);
+        assert!(!fix.has_errors(), "{sigma_m:?}");
+    }
+}

@@ -324,6 +324,19 @@ class Mapper:
         """Pose of the left camera in the last frame, 4 x 4."""
 
     @property
+    def t_closed_driven(self) -> NDArray[np.float64]:
+        """Change from the world as it is driven to the one after all loops and fixes, at the camera, 4 x 4: ROS's transform from `map` to `odom`. Reports, plans
+        and objects are in the world as driven, which never jumps."""
+
+    def add_fix(self, t_world_camera: ArrayLike | Pose, covariance: Sequence[Sequence[float]] | NDArray[np.float64]) -> None:
+        """Takes a pose of the camera in the last frame that something else measured, in the world of the first camera, with its covariance, 6 x 6: rotation
+        (rad), then translation (m), in the camera's axes. Like a loop it moves the keyframes, ten frames later; one that all else contradicts is taken out. The
+        camera goes on in the world as driven. An error of a mapper made without `keyframes`."""
+
+    def add_position(self, position_m: Sequence[float] | NDArray[np.float64], sigma_m: Sequence[float] | NDArray[np.float64]) -> None:
+        """Takes a position of the camera in the last frame, m, with its standard deviations along the axes of the world, m, as `add_fix` takes a pose."""
+
+    @property
     def disparity_q8(self) -> NDArray[np.uint16]:
         """Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd values of a pair that the mapper matched itself were
         filled in between measured ones, which are even. It has size 1 x 1 before the first frame."""

@@ -2,6 +2,7 @@
 
 mod depth;
 mod error;
+mod fixes;
 mod frames;
 mod given_poses;
 mod inertial;
@@ -15,6 +16,7 @@ mod truth;
 
 pub use depth::{DepthRefusals, GivenDepth, Quantity, to_disparity};
 pub use error::{InputError, read_failed};
+pub use fixes::{PositionFix, read_position_fixes};
 pub use frames::{FrameInfo, FrameSource, SourceInfo};
 pub use given_poses::read_given_poses;
 pub use inertial::{InertialUnitData, OwnUnit, UnitSamples};

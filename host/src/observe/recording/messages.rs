@@ -1,5 +1,5 @@
-//! Messages of a recording. Frames of reference: `world` is the first camera's, `left` the left
-//! camera's.
+//! Messages of a recording. Frames of reference: `world` is the first camera's, in which the camera
+//! drives; `left` is the left camera's; `closed` is the world after all loops and fixes.
 
 use crate::formats::shown_pose;
 use crate::observe::{FrameRow, PlanningLayers, pictures, state_name};
@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 const WORLD: &str = "world";
 const LEFT: &str = "left";
+const CLOSED: &str = "closed";
 /// Every so many pixels of a raycast are points.
 pub const POINT_EVERY: usize = 3;
 /// Bytes of a point: three floats, four bytes of colour.
@@ -43,10 +44,19 @@ fn pose_of(pose: &Transform) -> Value {
 }
 
 /// Makes the transform of the left camera.
-pub fn transform(stamp: Stamp, t_world_camera: &Transform) -> Value {
-    let pose = pose_of(t_world_camera);
+pub fn camera(stamp: Stamp, t_world_camera: &Transform) -> Value {
+    transform(stamp, [WORLD, LEFT], t_world_camera)
+}
+
+/// Makes the transform of the world as driven.
+pub fn driven_world(stamp: Stamp, t_closed_driven: &Transform) -> Value {
+    transform(stamp, [CLOSED, WORLD], t_closed_driven)
+}
+
+fn transform(stamp: Stamp, [parent, child]: [&str; 2], t_parent_child: &Transform) -> Value {
+    let pose = pose_of(t_parent_child);
     json!({
-        "timestamp": stamp.json(), "parent_frame_id": WORLD, "child_frame_id": LEFT,
+        "timestamp": stamp.json(), "parent_frame_id": parent, "child_frame_id": child,
         "translation": pose["position"], "rotation": pose["orientation"],
     })
 }

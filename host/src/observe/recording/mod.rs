@@ -11,7 +11,7 @@ use super::{
 };
 use crate::formats::shown_pose;
 use crate::owned;
-use dynvox_core::geometry::Transform;
+use dynvox_core::geometry::{MapSegment, Transform};
 use dynvox_core::view::RaycastView;
 use mcap::records::MessageHeader;
 use messages::Stamp;
@@ -109,7 +109,11 @@ impl Recording {
         let (stamp, segment) = (Stamp(time_ns), frame.row.report.segment);
         let shown = frame.row.shown_t_world_camera();
         self.note_pose(frame.position, &shown);
-        self.write(Topic::Transform, time_ns, &messages::transform(stamp, &shown))?;
+        self.write(Topic::Transform, time_ns, &messages::camera(stamp, &shown))?;
+        if run.plan.capacity.keyframes > 0 && segment == MapSegment::FIRST {
+            let change = frame.view.mapper().t_closed_driven();
+            self.write(Topic::Transform, time_ns, &messages::driven_world(stamp, &change))?;
+        }
         self.write(Topic::Pose, time_ns, &messages::pose(stamp, &shown))?;
         // The picture may be missing, as in a run on depth only.
         if let Some(left) = frame_pictures::left(frame) {

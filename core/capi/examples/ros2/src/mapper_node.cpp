@@ -109,6 +109,8 @@ class MapperNode : public rclcpp_lifecycle::LifecycleNode {
  private:
   void declare_all() {
     options_.map_frame = declare_parameter<std::string>("map_frame", options_.map_frame);
+    options_.closed_frame = declare_parameter<std::string>("closed_frame", options_.closed_frame);
+    options_.mapper.keyframes = whole("keyframes", 0);
     options_.base_frame = declare_parameter<std::string>("base_frame", options_.base_frame);
     options_.rectified = declare_parameter<bool>("rectified", options_.rectified);
     options_.depth = declare_parameter<bool>("depth", options_.depth);

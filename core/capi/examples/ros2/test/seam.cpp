@@ -476,6 +476,23 @@ void points_are_where_the_wall_is() {
   require(cloud.data.size() == size_t{16} * cloud.width, "16 bytes a point");
 }
 
+void loops_move_the_map_as_a_whole() {
+  NodeOptions options = small();
+  Node without = ready(options);
+  require(look(without, 12, 12).transforms.transforms.size() == 1, "the camera alone");
+  options.mapper.keyframes = 20;
+  Node node = ready(options);
+  const auto transforms = look(node, 12, 12).transforms.transforms;
+  require(transforms.size() == 2, "the camera and the map");
+  require(transforms[0].header.frame_id == "map" &&
+              transforms[1].header.frame_id == "closed_map" &&
+              transforms[1].child_frame_id == "map",
+          "from the closed map to the one as driven");
+  const auto &change = transforms[1].transform;
+  require(near(change.translation.x, 0) && near(std::fabs(change.rotation.w), 1),
+          "both are one before the first loop");
+}
+
 }  // namespace
 
 int main() {
@@ -493,5 +510,6 @@ int main() {
   a_pair_waits_for_its_samples();
   instances_become_tracks_and_ignored_pixels_nothing();
   a_mesh_stands_in_the_map();
+  loops_move_the_map_as_a_whole();
   return failures;
 }

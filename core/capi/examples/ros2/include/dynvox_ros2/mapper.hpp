@@ -35,6 +35,8 @@ struct MapperOptions {
   size_t bytes = size_t{256} << 20;
   // The planner's window: columns to the right and ahead, cells upwards. 0: none.
   std::array<size_t, 3> window{};
+  // Keyframes by which places are recognised and loops closed; 0: none.
+  size_t keyframes = 0;
   // Key and value, as in a run's config.toml.
   std::vector<std::pair<std::string, std::string>> settings;
 };
@@ -157,6 +159,13 @@ class Mapper {
   }
 
   // The moving objects of the last window.
+  // From the world as driven to the one after all loops.
+  DynvoxPose closed_world() {
+    DynvoxPose change;
+    check(dynvox_closed_world(mapper_, &change), "no closed world");
+    return change;
+  }
+
   std::vector<DynvoxMovingBox> moving_boxes() {
     std::vector<DynvoxMovingBox> boxes(64);
     size_t count = 0;
@@ -202,6 +211,7 @@ class Mapper {
     capacity.planning_width = options.window[0];
     capacity.planning_length = options.window[1];
     capacity.planning_height = options.window[2];
+    capacity.keyframes = options.keyframes;
     return capacity;
   }
 

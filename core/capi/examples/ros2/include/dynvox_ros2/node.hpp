@@ -39,6 +39,8 @@ struct NodeOptions {
   MapperOptions mapper;
   // Name of the world; its axes are x ahead, y left, z up at the first picture.
   std::string map_frame = "map";
+  // Name of the world after all loops, where the mapper has keyframes.
+  std::string closed_frame = "closed_map";
   // Frame that the node moves in the map; empty: the left camera's own. /tf_static leads from it
   // to the camera.
   std::string base_frame;
@@ -316,13 +318,26 @@ class Node {
     map_axes.rotation = map_base.rotation;
     odometry.pose.covariance = covariance_message(moved(moved(error_, base_camera), map_axes));
     if (is_continued) describe_velocity(base_camera, motion, error, map_header, odometry);
+    add_transform(map_header, odometry.child_frame_id, map_base, outputs);
+    // The camera drives in a map that never jumps; loops move that map as a whole.
+    if (options_.mapper.keyframes > 0 && report.segment == 0) {
+      Header closed_header = map_header;
+      closed_header.frame_id = options_.closed_frame;
+      const Rigid change =
+          map_world_ * rigid_of(mapper_->closed_world()) * map_world_.inverse();
+      add_transform(closed_header, options_.map_frame, change, outputs);
+    }
+  }
+
+  static void add_transform(const Header &header, const std::string &child, const Rigid &rigid,
+                            Outputs &outputs) {
     geometry_msgs::msg::TransformStamped transform;
-    transform.header = map_header;
-    transform.child_frame_id = odometry.child_frame_id;
-    transform.transform.translation.x = map_base.translation[0];
-    transform.transform.translation.y = map_base.translation[1];
-    transform.transform.translation.z = map_base.translation[2];
-    transform.transform.rotation = odometry.pose.pose.orientation;
+    transform.header = header;
+    transform.child_frame_id = child;
+    transform.transform.translation.x = rigid.translation[0];
+    transform.transform.translation.y = rigid.translation[1];
+    transform.transform.translation.z = rigid.translation[2];
+    transform.transform.rotation = pose_message(rigid).orientation;
     outputs.transforms.transforms.push_back(transform);
   }
 
