@@ -95,7 +95,7 @@ pub struct FlightFrame {
     /// Distance told in that direction, m: negative where it is unknown, infinite where it is free.
     pub told_m: f32,
     /// Free way in that direction in truth, m, up to the reach of the band.
-    pub free_m: f32,
+    pub free_m: f64,
     /// Least distance to a surface until the next picture, less the vehicle's radius, m.
     pub clearance_m: f64,
     /// The picture came black.
@@ -238,7 +238,7 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
         let allowed = LIMITS.allowed_m_s(&aboard.directions, 0.0, wanted);
         let by = allowed.by.unwrap_or(0);
         let told_m = distance_m(aboard.directions[by]);
-        let truth = truth::directions(&view, f64::from(aboard.band.far_m));
+        let far_m = f64::from(aboard.band.far_m);
         let speed_m_s = vehicle.speed_m_s();
         let is_placed = aboard.map(index, &view.frame(), is_black)?;
         flight.extrapolated += u32::from(!is_placed);
@@ -252,7 +252,7 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
             allowed_m_s: allowed.speed_m_s,
             by_deg: (by as f64 * SECTOR_DEG + 180.0) % 360.0 - 180.0,
             told_m,
-            free_m: distance_m(truth[by]).min(aboard.band.far_m),
+            free_m: truth::distance_m(&view, by, far_m),
             clearance_m,
             is_black,
             is_placed,
@@ -266,8 +266,11 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
             break;
         }
         let stands = is_ready && vehicle.speed_m_s() < STANDS_M_S;
-        let is_clear = LIMITS.allowed_m_s(&truth, 0.0, wanted).speed_m_s >= CLEAR_M_S;
-        let is_needless = stands && is_clear;
+        // What the vehicle would have been told of this picture is heeded from now on.
+        let is_needless = stands && {
+            let truth = truth::directions(&view, far_m);
+            LIMITS.allowed_m_s(&truth, 0.0, wanted).speed_m_s >= CLEAR_M_S
+        };
         stood_s = if is_needless { stood_s + 1.0 / RATE_HZ } else { 0.0 };
         flight.needless_stops += u32::from((stood_s - NEEDLESS_S).abs() < 0.5 / RATE_HZ);
         flight.stopped = stands && !is_needless;

@@ -15,6 +15,7 @@ fn unlike_the_default() -> Request {
         "scale": [0.3, "room"], "skip_bad_frames": true, "force": true, "depth": "disparity:depth",
         "depth_scale": "sgbm", "export": ["colmap", "scene"],
         "instances": "onnx:a.onnx,b.onnx", "instances_every": 3, "egomotion": "file:poses.txt",
+        "fixes": "survey.csv",
         "memory": "48MiB", "planning": "200x100x20", "planning_3d": true,
         "set": { "volume.voxel_size_m": 0.1, "street.seed": 7, "volume.observation_weight": "depth" },
         "dynamic": false, "fuse_every": 2, "stream_mib": 9, "keep_blocks": true,
@@ -64,6 +65,7 @@ fn paths_are_absolute() {
     let here = std::env::current_dir().unwrap();
     assert_eq!(request.input.source, Source::Recording(here.join("rig")));
     assert_eq!(request.poses, Poses::File(here.join("poses.txt")));
+    assert_eq!(request.fixes, Some(here.join("survey.csv")));
     let networks = MaskChoice::Networks(vec![here.join("a.onnx"), here.join("b.onnx")]);
     assert_eq!(
         (request.masks.source, request.masks.every),
