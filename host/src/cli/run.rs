@@ -58,7 +58,9 @@ struct ChangeableArgs {
     #[arg(
         long,
         value_name = "N",
-        conflicts_with_all = ["evaluate", "save_instances", "save_map_disparity", "export", "mcap"],
+        conflicts_with_all = [
+            "evaluate", "save_instances", "save_disparity", "save_map_disparity", "export", "mcap"
+        ],
         help_heading = "Results"
     )]
     snapshot_every: Option<usize>,

@@ -7,6 +7,7 @@ mod bounds;
 mod chart_values;
 mod closed_path;
 mod depth_census;
+mod disparity;
 mod frame;
 mod frame_log;
 mod frame_pictures;
@@ -40,6 +41,7 @@ pub use bounds::{BoundUse, BoundUses, BoundsObserver, BoundsSection};
 pub use chart_values::ChartValues;
 pub use closed_path::{ClosedLoops, LoopRow, LoopSection};
 pub use depth_census::{DepthCensus, DepthTotals};
+pub use disparity::DisparityObserver;
 pub use frame::{FrameRow, STAGES, StageTime, StepTimes};
 pub use frame_log::{FrameLog, StageStatistics};
 pub use frame_pictures::FramePictures;
@@ -114,6 +116,8 @@ pub struct ObservedRun<'p> {
     pub folder: PathBuf,
     /// Folder that every frame's instances are saved to, if they are.
     pub instances_folder: Option<PathBuf>,
+    /// Folder that every frame's disparity is saved to, if it is.
+    pub disparity_folder: Option<PathBuf>,
     /// Folder that what the finished map shows at every frame's pose is saved to, if it is.
     pub map_disparity_folder: Option<PathBuf>,
     /// Folder that the scene is exported to, if it is.
@@ -270,6 +274,7 @@ pub struct Observers {
     bounds: BoundsObserver,
     health: HealthObserver,
     instances: InstancesObserver,
+    disparity: DisparityObserver,
     map_disparity: MapDisparityObserver,
     planning: PlanningObserver,
     mavlink: MavlinkObserver,
@@ -359,6 +364,7 @@ impl Observer for Observers {
         self.bounds.frame(run, frame)?;
         self.health.frame(run, frame)?;
         self.instances.frame(run, frame)?;
+        self.disparity.frame(run, frame)?;
         self.map_disparity.frame(run, frame)?;
         self.mavlink.frame(run, frame)?;
         self.inertial.frame(run, frame)?;

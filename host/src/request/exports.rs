@@ -20,6 +20,8 @@ pub struct Exports {
     pub record: bool,
     /// New folder that every frame's instance masks are saved to.
     pub instances: Option<PathBuf>,
+    /// New folder that every frame's disparity is saved to.
+    pub disparity: Option<PathBuf>,
     /// New folder that the disparity which the finished map shows at every frame's pose is saved
     /// to.
     pub map_disparity: Option<PathBuf>,

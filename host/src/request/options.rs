@@ -245,6 +245,10 @@ pub struct Options {
     /// Evaluate the map at a frame's pose N frames later, after pruning [default: 0]
     #[arg(long, value_name = "N", requires = "evaluate", help_heading = "Evaluation")]
     pub evaluation_delay: Option<usize>,
+    /// Save every frame's disparity to a new folder: 16-bit PNG named as the images, 1/256 px, 0 none;
+    /// its confidence to DIR/confidence, with --set stereo.min_confidence=1
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    pub save_disparity: Option<PathBuf>,
     /// Save what the finished map shows at every frame's pose to a new folder: 16-bit PNG named as
     /// the images, disparity in 1/256 px, 0 none
     #[arg(long, value_name = "DIR", help_heading = "Evaluation")]
@@ -330,6 +334,7 @@ impl Options {
                 axes: self.axes.unwrap_or_default(),
                 record: self.mcap,
                 instances: self.save_instances.clone(),
+                disparity: self.save_disparity.clone(),
                 map_disparity: self.save_map_disparity.clone(),
                 mavlink: self.mavlink,
                 mavlink_points: self.mavlink_points,

@@ -15,9 +15,9 @@ impl Request {
         for path in self.inputs_mut() {
             *path = std::path::absolute(&*path)?;
         }
-        let Exports { instances, map_disparity, scene, .. } = &mut self.exports;
+        let Exports { instances, disparity, map_disparity, scene, .. } = &mut self.exports;
         let scene = scene.iter_mut().map(|scene| &mut scene.folder);
-        for path in instances.iter_mut().chain(map_disparity).chain(scene) {
+        for path in instances.iter_mut().chain(disparity).chain(map_disparity).chain(scene) {
             *path = std::path::absolute(&*path)?;
         }
         Ok(self)
@@ -30,8 +30,9 @@ impl Request {
 
     /// Every path that is written besides the run folder.
     pub fn saved_folders(&self) -> impl Iterator<Item = &PathBuf> {
-        let scene = self.exports.scene.iter().map(|scene| &scene.folder);
-        self.exports.instances.iter().chain(&self.exports.map_disparity).chain(scene)
+        let Exports { instances, disparity, map_disparity, scene, .. } = &self.exports;
+        let scene = scene.iter().map(|scene| &scene.folder);
+        instances.iter().chain(disparity).chain(map_disparity).chain(scene)
     }
 
     /// Every path that is read.

@@ -158,6 +158,7 @@ impl Request {
             ("an evaluation", evaluation.reference.is_some()),
             ("a recording as MCAP", exports.record),
             ("saved instances", exports.instances.is_some()),
+            ("saved disparities", exports.disparity.is_some()),
             ("saved disparities of the map", exports.map_disparity.is_some()),
             ("an exported scene", exports.scene.is_some()),
         ];

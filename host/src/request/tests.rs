@@ -21,7 +21,7 @@ fn unlike_the_default() -> Request {
         "dynamic": false, "fuse_every": 2, "stream_mib": 9, "keep_blocks": true,
         "evaluate": "lidar", "evaluation_delay": 5, "map_objects": "all", "axes": "enu",
         "mcap": true, "mavlink": "udp:127.0.0.1:14550", "mavlink_points": true,
-        "save_map_disparity": "shown", "strict": true,
+        "save_disparity": "seen", "save_map_disparity": "shown", "strict": true,
     }))
     .unwrap();
     let limits = Limits { threads: Some(3), rss_mib: Some(700), strict: true };
@@ -71,6 +71,7 @@ fn paths_are_absolute() {
         (request.masks.source, request.masks.every),
         (networks, NonZeroUsize::new(3).unwrap())
     );
+    assert_eq!(request.exports.disparity, Some(here.join("seen")));
     assert_eq!(request.exports.map_disparity, Some(here.join("shown")));
     assert_eq!(request.exports.scene.unwrap().folder, here.join("scene"));
 }

@@ -40,6 +40,7 @@ pub fn run(
     let mut slab = slab_of(&plan)?;
     let exports = &plan.request.exports;
     let instances = Saved::begin(exports.instances.as_deref(), "--save-instances")?;
+    let disparity = Saved::begin(exports.disparity.as_deref(), "--save-disparity")?;
     let map_disparity = Saved::begin(exports.map_disparity.as_deref(), "--save-map-disparity")?;
     let scene =
         Saved::begin(exports.scene.as_ref().map(|scene| scene.folder.as_path()), "--export")?;
@@ -47,6 +48,7 @@ pub fn run(
         plan: &plan,
         folder: folder.path().to_path_buf(),
         instances_folder: instances.path(),
+        disparity_folder: disparity.path(),
         map_disparity_folder: map_disparity.path(),
         scene_folder: scene.path(),
         reference: ReferencePlan::of_run(&plan),
@@ -71,10 +73,12 @@ pub fn run(
     if incomplete.is_none() {
         let options = [
             "the folder of --save-instances",
+            "the folder of --save-disparity",
             "the folder of --save-map-disparity",
             "the folder of --export",
         ];
-        for (saved, option) in [instances, map_disparity, scene].into_iter().zip(options) {
+        for (saved, option) in [instances, disparity, map_disparity, scene].into_iter().zip(options)
+        {
             if let Err(error) = saved.commit() {
                 Incomplete::add_missing(&mut incomplete, option, &error.to_string());
             }

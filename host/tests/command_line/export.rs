@@ -486,3 +486,23 @@ fn what_the_map_shows_is_saved_as_disparities_that_a_run_takes() {
     assert!(output_text(&refused).contains("seen exists"), "{}", output_text(&refused));
     assert!(!root.path().join("two").exists(), "nothing half-written stays");
 }
+
+#[test]
+fn every_disparity_is_saved_with_its_confidence() {
+    let root = TempDir::new().unwrap();
+    let street = [&STREET[..], &["--frames", "2"]].concat();
+    run(root.path(), &[&street[..], &["--out", "one", "--save-disparity", "plain"]].concat());
+    assert_eq!(names(&root.path().join("plain")), ["000000.png", "000001.png"]);
+    let asked = ["--out", "two", "--save-disparity", "both", "--set", "stereo.min_confidence=1"];
+    run(root.path(), &[&street[..], &asked].concat());
+    let both = root.path().join("both");
+    assert_eq!(names(&both), ["000000.png", "000001.png", "confidence"]);
+    let read = |path: &Path| image::open(path).unwrap();
+    let disparity = read(&both.join("000001.png")).into_luma16();
+    let confidence = read(&both.join("confidence/000001.png")).into_luma8();
+    assert_eq!(disparity.dimensions(), confidence.dimensions());
+    let known = disparity.pixels().filter(|pixel| pixel.0[0] > 0).count();
+    assert!(2 * known > disparity.pixels().len(), "{known} pixels");
+    let agree = |(disparity, confidence): (&u16, &u8)| (*disparity > 0) == (*confidence > 0);
+    assert!(disparity.as_raw().iter().zip(confidence.as_raw()).all(agree));
+}
