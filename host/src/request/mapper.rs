@@ -88,6 +88,7 @@ impl Request {
     /// The request without what belongs to a run to its end.
     fn frames_only(&self) -> Self {
         Self {
+            fixes: None,
             storage: Storage::default(),
             evaluation: Evaluation::default(),
             exports: Exports::default(),
