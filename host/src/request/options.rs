@@ -245,8 +245,8 @@ pub struct Options {
     /// Evaluate the map at a frame's pose N frames later, after pruning [default: 0]
     #[arg(long, value_name = "N", requires = "evaluate", help_heading = "Evaluation")]
     pub evaluation_delay: Option<usize>,
-    /// Save every frame's disparity to a new folder: 16-bit PNG named as the images, 1/256 px, 0 none;
-    /// its confidence to DIR/confidence, with --set stereo.min_confidence=1
+    /// Save every frame's disparity to a new folder: 16-bit PNG named as the images, 1/256 px, 0
+    /// none; its confidence to DIR/confidence, with --set stereo.min_confidence=1
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     pub save_disparity: Option<PathBuf>,
     /// Save what the finished map shows at every frame's pose to a new folder: 16-bit PNG named as
