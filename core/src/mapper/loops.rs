@@ -156,6 +156,20 @@ impl Mapper<'_> {
     ///
     /// # Errors
     /// See [`FixError`].
+    ///
+    /// ```
+    /// use dynvox_core::{
+    ///     Capacity, Config, FixError, Mapper, geometry::StereoRig, memory::SLAB_ALIGN,
+    /// };
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let mut slab = vec![0; Capacity::TINY.bytes() + SLAB_ALIGN];
+    /// let mut mapper = Mapper::new(&Capacity::TINY, &Config::for_rig(rig), &mut slab)?;
+    /// let fix = mapper.add_position([0.0; 3], [0.02; 3]);
+    /// assert_eq!(fix, Err(FixError::Nowhere), "profile `tiny` has no keyframes");
+    /// # Ok::<(), dynvox_core::NewError>(())
+    /// ```
     pub fn add_position(
         &mut self,
         position_m: [f64; 3],
