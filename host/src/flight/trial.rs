@@ -266,7 +266,7 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
             break;
         }
         let stands = is_ready && vehicle.speed_m_s() < STANDS_M_S;
-        // What the vehicle would have been told of this picture is heeded from now on.
+        // Told the truth of this picture, the rule would let the vehicle go.
         let is_needless = stands && {
             let truth = truth::directions(&view, far_m);
             LIMITS.allowed_m_s(&truth, 0.0, wanted).speed_m_s >= CLEAR_M_S
