@@ -15,6 +15,7 @@
 
 mod agreement;
 mod errors;
+mod gravity;
 mod integral;
 mod prior;
 mod recent;
@@ -24,7 +25,6 @@ mod sample;
 mod tests;
 mod turn;
 mod unit;
-mod velocity;
 mod vertical;
 
 pub use agreement::InertialDoubt;

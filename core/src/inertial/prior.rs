@@ -6,11 +6,10 @@ use super::{
     INERTIAL_SAMPLES_PER_FRAME, InertialDoubt, InertialReport, InertialSample, InertialUnit,
     agreement::{Agreement, TurnPair},
     errors::{TurnError, UnitErrors},
+    gravity::Gravity,
     integral::{Integral, Reading, integrate},
     recent::{RecentSamples, seconds_after},
     turn::{MeasuredMotion, PendingTurn},
-    velocity::Velocity,
-    vertical::VerticalFilter,
 };
 use crate::{
     egomotion::{PredictedTurn, Turned},
@@ -38,8 +37,7 @@ pub(crate) struct InertialPrior {
     recent: RecentSamples,
     errors: UnitErrors,
     agreement: Agreement,
-    vertical: VerticalFilter,
-    velocity: Velocity,
+    gravity: Gravity,
     segment: MapSegment,
     /// Times of the last frame and of the last sample, ns.
     frame_ns: Option<u64>,
@@ -93,8 +91,7 @@ impl InertialPrior {
             recent: RecentSamples::new(),
             errors: UnitErrors::new(unit),
             agreement: Agreement::default(),
-            vertical: VerticalFilter::default(),
-            velocity: Velocity::default(),
+            gravity: Gravity::default(),
             segment: MapSegment::FIRST,
             frame_ns: None,
             sample_ns: None,
@@ -322,7 +319,7 @@ impl InertialPrior {
             turn_bias_sigma: self.errors.bias_sigma() as f32,
             clock_offset_s: (self.unit.clock_offset_s + self.errors.offset_s()) as f32,
             clock_offset_sigma_s: self.errors.offset_sigma_s() as f32,
-            vertical: self.vertical.vertical(&self.unit),
+            vertical: self.gravity.vertical(&self.unit),
             ..self.report
         }
     }
@@ -338,8 +335,7 @@ impl InertialPrior {
             recent,
             errors,
             agreement,
-            vertical,
-            velocity,
+            gravity,
             segment,
             frame_ns,
             sample_ns,
@@ -355,8 +351,7 @@ impl InertialPrior {
         recent.visit(visitor);
         errors.visit(visitor);
         agreement.visit(visitor);
-        vertical.visit(visitor);
-        velocity.visit(visitor);
+        gravity.visit(visitor);
         let mut number = u32::from(segment.get());
         visitor.u32(&mut number);
         *segment = MapSegment::new(number as u16);

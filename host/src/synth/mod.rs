@@ -74,6 +74,8 @@ mod tests;
 mod texture;
 mod town;
 mod traffic;
+#[cfg(test)]
+mod upright_tests;
 mod window_paint;
 mod world;
 mod writer;

@@ -36,6 +36,9 @@ pub trait World: Send + Sync {
     /// Camera pose at frame `index`; exactly the identity at frame 0.
     fn t_world_camera(&self, index: u32) -> Transform;
 
+    /// Direction that points up in the world of the poses, a unit vector.
+    fn up_in_world(&self) -> [f64; 3];
+
     /// Frame `index` with all its truth.
     fn frame(&self, index: u32) -> SynthFrame;
 
@@ -85,6 +88,10 @@ impl World for Street {
 
     fn t_world_camera(&self, index: u32) -> Transform {
         self.t_world_camera(index)
+    }
+
+    fn up_in_world(&self) -> [f64; 3] {
+        self.up_in_world()
     }
 
     fn frame(&self, index: u32) -> SynthFrame {

@@ -200,6 +200,11 @@ impl World for Room {
         (self.t_camera0_room * self.path.t_room_camera(self.time_s(index))).normalized()
     }
 
+    fn up_in_world(&self) -> [f64; 3] {
+        // The room's y axis points down.
+        self.t_camera0_room.rotate([0.0, -1.0, 0.0])
+    }
+
     fn frame(&self, index: u32) -> SynthFrame {
         let time_s = self.time_s(index);
         let scene = |time_s: f64| self.scene(time_s, &self.path.t_room_camera(time_s));

@@ -283,6 +283,11 @@ impl World for Town {
         (self.t_camera0_town * self.t_town_camera(self.time_s(index))).normalized()
     }
 
+    fn up_in_world(&self) -> [f64; 3] {
+        // The town's y axis points down.
+        self.t_camera0_town.rotate([0.0, -1.0, 0.0])
+    }
+
     fn frame(&self, index: u32) -> SynthFrame {
         let time_s = self.time_s(index);
         let (scene, cars) = self.scene(time_s, &self.t_town_camera(time_s));
