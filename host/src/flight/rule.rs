@@ -2,7 +2,8 @@
 //!
 //! The rule is the one that PX4's guide to collision prevention states: in each direction a vehicle
 //! may be as fast as lets it stop `keep_m` before the obstacle, after a delay, with a bounded jerk
-//! and deceleration; a direction without data stops it.
+//! and deceleration; a direction without data stops it. Within an angle to both sides of the course
+//! the vehicle may leave it for one that is better.
 
 use dynvox_onboard::{Direction, SECTOR_DEG, SECTORS};
 
@@ -18,12 +19,17 @@ pub struct Limits {
     pub deceleration_m_s2: f64,
     /// Jerk counted on, m/s³ (`MPC_JERK_AUTO`).
     pub jerk_m_s3: f64,
+    /// Angle to both sides of the course by which the vehicle may leave it, degrees
+    /// (`CP_GUIDE_ANG`).
+    pub guide_deg: f64,
 }
 
-/// Speed that directions allow.
+/// Speed that directions allow, and the course on which they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowed {
-    /// Fastest speed, m/s.
+    /// Course, degrees clockwise from straight ahead.
+    pub course_deg: f64,
+    /// Fastest speed on it, m/s.
     pub speed_m_s: f64,
     /// The direction that allows no more; `None` at the speed that is wanted.
     pub by: Option<usize>,
@@ -48,9 +54,21 @@ impl Limits {
         a * ((lag_s * lag_s + 2.0 * way_m / a).sqrt() - lag_s)
     }
 
-    /// Fastest speed on a course `course_deg` clockwise from straight ahead, at most `wanted_m_s`,
-    /// and the direction that allows no more.
-    pub fn allowed_m_s(
+    /// The course about straight ahead on which the vehicle comes ahead fastest, at no more than
+    /// `wanted_m_s`; of several the one that turns least.
+    pub fn guided(&self, directions: &[Direction; SECTORS], wanted_m_s: f64) -> Allowed {
+        let straight = self.along(directions, 0.0, wanted_m_s);
+        let turns = (self.guide_deg / SECTOR_DEG) as i32;
+        let courses = (1..=turns).flat_map(|turn| [turn, -turn]);
+        let ahead_m_s = |one: &Allowed| one.speed_m_s * one.course_deg.to_radians().cos();
+        courses.fold(straight, |best, turn| {
+            let other = self.along(directions, f64::from(turn) * SECTOR_DEG, wanted_m_s);
+            if ahead_m_s(&other) > ahead_m_s(&best) { other } else { best }
+        })
+    }
+
+    /// Fastest speed on a course, at most `wanted_m_s`.
+    fn along(
         &self,
         directions: &[Direction; SECTORS],
         course_deg: f64,
@@ -61,9 +79,9 @@ impl Limits {
             .map(|sector| sector.rem_euclid(SECTORS as i32) as usize)
             .find(|sector| directions[*sector] == Direction::Unknown);
         if unknown.is_some() {
-            return Allowed { speed_m_s: 0.0, by: unknown };
+            return Allowed { course_deg, speed_m_s: 0.0, by: unknown };
         }
-        let wanted = Allowed { speed_m_s: wanted_m_s, by: None };
+        let wanted = Allowed { course_deg, speed_m_s: wanted_m_s, by: None };
         directions.iter().enumerate().fold(wanted, |allowed, (sector, direction)| {
             let Direction::Obstacle { distance_m } = direction else { return allowed };
             let towards = (sector as f64 * SECTOR_DEG - course_deg).to_radians().cos();
@@ -73,7 +91,7 @@ impl Limits {
             }
             let speed_m_s = self.speed_m_s(f64::from(*distance_m)) / towards;
             if speed_m_s < allowed.speed_m_s {
-                Allowed { speed_m_s, by: Some(sector) }
+                Allowed { course_deg, speed_m_s, by: Some(sector) }
             } else {
                 allowed
             }
@@ -86,8 +104,13 @@ mod tests {
     use super::super::vehicle::{FOLLOWS_S, Multirotor};
     use super::*;
 
-    const LIMITS: Limits =
-        Limits { keep_m: 2.0, delay_s: 0.4, deceleration_m_s2: 3.0, jerk_m_s3: 10.0 };
+    const LIMITS: Limits = Limits {
+        keep_m: 2.0,
+        delay_s: 0.4,
+        deceleration_m_s2: 3.0,
+        jerk_m_s3: 10.0,
+        guide_deg: 30.0,
+    };
 
     #[test]
     fn a_vehicle_at_the_allowed_speed_stops_where_it_should() {
@@ -115,6 +138,7 @@ mod tests {
             delay_s: 0.2 + FOLLOWS_S,
             deceleration_m_s2: 2.5,
             jerk_m_s3: 15.0,
+            guide_deg: 0.0,
         };
         for seed in 0..60 {
             let mut vehicle = Multirotor::hovering(0.3, seed);
@@ -133,18 +157,38 @@ mod tests {
 
     #[test]
     fn unknown_stops_and_what_stands_aside_does_not() {
+        let limits = Limits { guide_deg: 0.0, ..LIMITS };
         let mut directions = [Direction::Free; SECTORS];
-        let free = Allowed { speed_m_s: 4.0, by: None };
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), free);
+        let free = Allowed { course_deg: 0.0, speed_m_s: 4.0, by: None };
+        assert_eq!(limits.guided(&directions, 4.0), free);
         directions[18] = Direction::Obstacle { distance_m: 0.5 };
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), free);
+        assert_eq!(limits.guided(&directions, 4.0), free);
         directions[12] = Direction::Obstacle { distance_m: 3.0 };
-        let limited = LIMITS.allowed_m_s(&directions, 0.0, 4.0);
+        let limited = limits.guided(&directions, 4.0);
         assert_eq!(limited.by, Some(12));
-        assert!((limited.speed_m_s - 2.0 * LIMITS.speed_m_s(3.0)).abs() < 1e-9);
+        assert!((limited.speed_m_s - 2.0 * limits.speed_m_s(3.0)).abs() < 1e-9);
         directions[71] = Direction::Unknown;
-        let stopped = Allowed { speed_m_s: 0.0, by: Some(71) };
-        assert_eq!(LIMITS.allowed_m_s(&directions, 0.0, 4.0), stopped);
-        assert!(LIMITS.allowed_m_s(&directions, -30.0, 4.0).speed_m_s > 0.0, "another course");
+        let stopped = Allowed { speed_m_s: 0.0, by: Some(71), ..free };
+        assert_eq!(limits.guided(&directions, 4.0), stopped);
+        assert!(limits.along(&directions, -30.0, 4.0).speed_m_s > 0.0, "another course");
+    }
+
+    #[test]
+    fn the_course_turns_from_a_wall_beside_it_and_not_into_what_is_unknown() {
+        let mut directions = [Direction::Free; SECTORS];
+        // 20 degrees to the left, nearer than is kept: straight ahead the vehicle comes nearer.
+        directions[68] = Direction::Obstacle { distance_m: 1.8 };
+        let guided = LIMITS.guided(&directions, 4.0);
+        assert_eq!(LIMITS.along(&directions, 0.0, 4.0).speed_m_s, 0.0);
+        assert_eq!(guided, Allowed { course_deg: 0.0, speed_m_s: 0.0, by: Some(68) });
+        // Along a wall that is a little nearer on the left, 75 degrees away and more.
+        directions[68] = Direction::Free;
+        directions[57] = Direction::Obstacle { distance_m: 1.8 };
+        let guided = LIMITS.guided(&directions, 4.0);
+        assert_eq!((guided.course_deg, guided.speed_m_s), (15.0, 4.0));
+        // To the right nothing is known: the vehicle stays.
+        (1..12).for_each(|right| directions[right] = Direction::Unknown);
+        let guided = LIMITS.guided(&directions, 4.0);
+        assert_eq!((guided.course_deg, guided.speed_m_s), (0.0, 0.0));
     }
 }
