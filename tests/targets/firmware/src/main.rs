@@ -11,6 +11,7 @@ mod forbidden;
 #[cfg(feature = "instructions")]
 mod instructions;
 mod line;
+mod onboard;
 #[cfg(feature = "plain")]
 mod plain;
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "platform/cortex_m.rs")]

@@ -1,7 +1,7 @@
 //! Calls that the fixture does not make: every other way into the core, so that the proofs see it,
 //! and its bits are compared from machine to machine as well.
 
-use crate::fixture;
+use crate::{fixture, onboard};
 use core::hint::black_box;
 use dynvox_clip::{Clip, Frame};
 use dynvox_core::{
@@ -35,6 +35,8 @@ pub const SLAB_BYTES: usize = if CAPACITY.bytes() > fixture::CAPACITY.bytes() {
     fixture::CAPACITY.bytes()
 };
 const PIXELS: usize = CAPACITY.pixels();
+/// Columns of the planners' window.
+pub const COLUMNS: usize = CAPACITY.planning_width * CAPACITY.planning_length;
 
 static COLOUR: [[u8; 3]; PIXELS] = [[200, 100, 50]; PIXELS];
 static DISPARITY_Q8: [u16; PIXELS] = [20 << 8; PIXELS];
@@ -136,6 +138,8 @@ fn step(
 fn inspect(mapper: &mut Mapper<'_>, digest: &mut Digest) {
     views(mapper, digest);
     plan(mapper, digest);
+    onboard::messages(mapper, digest);
+    onboard::columns(mapper, digest);
     surfaces(mapper, digest);
 }
 
