@@ -76,8 +76,10 @@ fn fill<T>(
     let ([width, length, _], [x0, y0, _]) = (planning.size(), planning.origin());
     let cell_m = planning.grid().cell_m();
     let columns = into.get_mut(..width.checked_mul(length)?)?;
-    for (at, entry) in columns.iter_mut().enumerate() {
-        *entry = value([x0 + (at % width) as i32, y0 + (at / width) as i32]);
+    for (y, row) in columns.chunks_mut(width.max(1)).enumerate() {
+        for (x, entry) in row.iter_mut().enumerate() {
+            *entry = value([x0 + x as i32, y0 + y as i32]);
+        }
     }
     Some(Costmap {
         width,
