@@ -24,6 +24,8 @@ const LEAN_WALK_RAD: f64 = 0.0026;
 const FIRST_S: f64 = 1.0;
 /// Size of what holds a unit up, m/s2.
 const GRAVITY: core::ops::Range<f64> = 9.0..10.6;
+/// Size beyond which a force is of no unit, m/s2.
+const FORCE_MAX: f64 = 1_000.0;
 /// Largest standard deviation of a velocity that is used, m/s.
 const VELOCITY_SIGMA_MAX: f64 = 1.0;
 /// Deviations of both from which on a way contradicts the velocity, and the factor by which the
@@ -74,7 +76,7 @@ impl Gravity {
     pub fn pass(&mut self, interval: &Interval, way: Option<(Vector3<f64>, f64)>) {
         let &Interval { span_s, force, turn_sigma_rad } = interval;
         match force {
-            Some(force) if span_s > 0.0 => {
+            Some(force) if span_s > 0.0 && force.norm() < FORCE_MAX => {
                 if let Some((way_m, sigma_m)) = way {
                     self.measure(&force, span_s, &way_m, sigma_m);
                 }

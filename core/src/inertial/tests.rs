@@ -330,6 +330,40 @@ fn the_vertical_is_right_within_its_sigma_on_a_swaying_way() {
 }
 
 #[test]
+fn a_force_of_no_unit_is_forgotten() {
+    let mut sim = Sim::new(SOUND);
+    sim.run(60);
+    let t = sim.frame as f64 * FRAME_S;
+    let mut samples = sim.samples();
+    samples.iter_mut().for_each(|sample| sample.force = [1e300, -1e300, 1e300]);
+    let time_ns = Some(((10.0 + t) * 1e9).round() as u64);
+    sim.prior.predict(time_ns, &samples, 0, &pose(t - FRAME_S));
+    sim.prior.observe(&MeasuredMotion {
+        t_reference_now: None,
+        sigma_rad: 0.0005,
+        way_sigma_m: 0.005,
+        strong: true,
+        over_several: false,
+        turned: false,
+        refused: false,
+        t_world_before: Some(pose(t - FRAME_S)),
+        t_world_camera: pose(t),
+        segment: MapSegment::FIRST,
+    });
+    sim.frame += 1;
+    let vertical = sim.run(30).vertical.expect("it is known still");
+    let up = Vector3::from(vertical.up_world.map(f64::from));
+    let off = up.cross(&Vector3::new(0.0, -1.0, 0.0)).norm().asin();
+    assert!(off.to_degrees() < 0.3, "{}", off.to_degrees());
+    let t = sim.frame as f64 * FRAME_S;
+    let samples = sim.samples();
+    let time_ns = Some(((10.0 + t) * 1e9).round() as u64);
+    let predicted = sim.prior.predict(time_ns, &samples, 0, &pose(t - FRAME_S));
+    let way_sigma_m = predicted.and_then(|predicted| predicted.way_sigma_m);
+    assert!(way_sigma_m.is_some_and(|sigma_m| sigma_m < 0.02), "{way_sigma_m:?}");
+}
+
+#[test]
 fn a_turn_over_several_frames_adds_up_and_ends_where_samples_are_missing() {
     let mut sim = Sim::new(SOUND);
     sim.run(30);
