@@ -6,7 +6,7 @@
 //! `touch tests/needs/build.rs`.
 //!
 //! Time is missing too, mostly: a test that takes long runs where `DYNVOX_LONG` is set, as
-//! `.ci/run` does.
+//! `.ci/long` does.
 
 use proc_macro::{TokenStream, TokenTree};
 use std::ffi::OsString;
