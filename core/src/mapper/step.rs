@@ -23,7 +23,7 @@ use crate::{
     scene_flow::{FlowReport, FlowStatus, Match},
     segmentation::SegmentationReport,
     state::Hasher,
-    stereo::StereoReport,
+    stereo::{self, StereoReport},
     tracking::TrackingReport,
     volume::{AllocationReport, BlockStore, NoStore, PruneReport},
 };
@@ -242,8 +242,8 @@ impl Mapper<'_> {
         frame: &StereoFrame<'_>,
         executor: &E,
     ) -> (StereoReport, FlowReport) {
-        let Self { config, rectifier, ignored, attached, stereo, scene_flow, localization, .. } =
-            self;
+        let Self { capacity, config, rectifier, ignored, attached, .. } = self;
+        let Self { stereo, scene_flow, localization, .. } = self;
         // Pixels that no raw pixel covers take no part, nor do those the caller ignores, nor the
         // camera's own parts.
         let covered = rectifier.invalid();
@@ -255,9 +255,10 @@ impl Mapper<'_> {
             invalid: invalid.as_ref(),
             right_moved: localization.rows_moved,
         };
+        let most = config.mapper.budget_of(stereo::most_pixels(capacity, &config.stereo));
         let compute_disparity = || match frame.disparity_q8 {
             Some(given) => stereo.take(given, invalid.as_ref().filter(|_| ignored.is_used())),
-            None => stereo.compute_within(&config.stereo, &pair, executor),
+            None => stereo.compute_within(&config.stereo, &pair, most, executor),
         };
         let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
         let reports = executor.join(

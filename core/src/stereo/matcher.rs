@@ -46,6 +46,8 @@ pub struct StereoMatcher<'s> {
     image_height: usize,
     width: usize,
     height: usize,
+    /// Rows of the last pair that were matched densely.
+    matched: MatchedRows,
     /// True if the gradients' memory holds the confidences of the last pair.
     has_confidence: bool,
 }
@@ -151,6 +153,7 @@ impl<'s> StereoMatcher<'s> {
             // No pair yet: one pixel without disparity, so that a view of it is never empty.
             width: 1,
             height: 1,
+            matched: MatchedRows { step: 1, count: 0 },
             has_confidence: false,
         }
     }
@@ -196,14 +199,16 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Computes disparities like [`StereoMatcher::compute`], for a pair with invalid pixels: they
-    /// get no disparity, nor do pixels whose partner in the right image is one of them.
+    /// get no disparity, nor do pixels whose partner in the right image is one of them. At most
+    /// `most` pixels are matched densely.
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
         pair: &MaskedPair<'_>,
+        most: usize,
         executor: &E,
     ) -> StereoReport {
-        self.compute_steps(config, pair, executor, |_| ())
+        self.compute_steps(config, pair, most, executor, |_| ())
     }
 
     /// Computes disparities like [`StereoMatcher::compute`], from a left and a right image, calling
@@ -217,23 +222,25 @@ impl<'s> StereoMatcher<'s> {
         done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let pair = MaskedPair { left, right, invalid: None, right_moved: false };
-        self.compute_steps(config, &pair, executor, done)
+        self.compute_steps(config, &pair, usize::MAX, executor, done)
     }
 
     fn compute_steps<E: Executor>(
         &mut self,
         config: &StereoConfig,
         pair: &MaskedPair<'_>,
+        most: usize,
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let &MaskedPair { left, right, invalid, right_moved: _ } = pair;
         // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
+        self.matched = MatchedRows::within(config, self.height, most / self.width.max(1));
         let mut report = StereoReport {
             status,
             pixels: (self.width * self.height) as u32,
-            row_pixels: (self.width * MatchedRows::new(config, self.height).count) as u32,
+            row_pixels: (self.width * self.matched.count) as u32,
             ..StereoReport::default()
         };
         if report.status != StereoStatus::Matched {
@@ -259,7 +266,7 @@ impl<'s> StereoMatcher<'s> {
         self.remove_speckles(config, executor, &mut report);
         done(StereoStep::Speckles);
         self.fill_gaps(config, executor, &mut report);
-        self.spread_rows(config, executor);
+        self.spread_rows(executor);
         done(StereoStep::Gaps);
         self.smooth(config, executor);
         done(StereoStep::Smoothing);

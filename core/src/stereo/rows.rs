@@ -1,16 +1,19 @@
 //! Rows that are matched densely.
 //!
 //! Surfaces seldom change within two rows, so that images of many rows are matched on every second
-//! one ([`StereoConfig::second_rows_from`]). Matched rows lie one behind the other in the working
-//! image, until speckles are removed and gaps filled.
+//! one ([`StereoConfig::second_rows_from`]); on fewer, where a budget of work allows no more. Matched
+//! rows lie one behind the other in the working image, until speckles are removed and gaps filled.
 
-use super::StereoConfig;
+use super::{StereoConfig, dense::WORKING_ONE_PX};
 use crate::memory::Capacity;
+
+/// No limit is wider: as much as any two disparities differ by.
+const WIDEST: usize = 255 * WORKING_ONE_PX.unsigned_abs() as usize;
 
 /// The rows of an image that are matched, evenly spaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct MatchedRows {
-    /// Image rows from one to the next: 1 or 2.
+    /// Image rows from one to the next: 1 or 2, more within a budget.
     pub step: usize,
     /// Number of rows.
     pub count: usize,
@@ -22,6 +25,33 @@ impl MatchedRows {
         let is_thinned = config.second_rows_from > 0 && height >= config.second_rows_from;
         let step = if is_thinned { 2 } else { 1 };
         Self { step, count: height / step }
+    }
+
+    /// The rows of an image of that height, `most` at most: where all are more, others farther
+    /// apart.
+    pub fn within(config: &StereoConfig, height: usize, most: usize) -> Self {
+        let all = Self::new(config, height);
+        if all.count <= most {
+            return all;
+        }
+        // The least step of which no more than that fit into the height.
+        let step = height / (most + 1) + 1;
+        Self { step, count: height / step.max(1) }
+    }
+
+    /// Rows are farther apart than without a budget.
+    pub const fn is_sparse(self) -> bool {
+        self.step > 2
+    }
+
+    /// The most, in working units, that disparities of one surface differ by from a row to the next,
+    /// of a limit for rows that lie at most two apart.
+    pub fn widened(self, limit: i16) -> i16 {
+        if !self.is_sparse() {
+            return limit;
+        }
+        let widened = limit.unsigned_abs() as usize * self.step / 2;
+        widened.min(WIDEST) as i16
     }
 
     /// Image row of matched row `i`: the last of its `step` rows, since the first one of an image
@@ -61,6 +91,24 @@ mod tests {
             let rows = MatchedRows::new(&from(limit), height);
             assert_eq!(rows, MatchedRows { step, count });
             assert!(rows.row(count - 1) < height && rows.row(0) == step - 1);
+        }
+    }
+
+    #[test]
+    fn a_budget_leaves_as_many_rows_as_it_allows_and_no_more() {
+        for limit in [0, 200] {
+            for height in [16, 199, 200, 375, 601] {
+                let all = MatchedRows::new(&from(limit), height);
+                for most in 0..=all.count + 1 {
+                    let rows = MatchedRows::within(&from(limit), height, most);
+                    assert_eq!(rows.count, height / rows.step);
+                    assert!(rows.count <= most && rows.step >= all.step, "{height}: {rows:?}");
+                    assert!(most < all.count || rows == all, "{height}: {rows:?} of {most}");
+                    // One step less would be too many.
+                    let closer = rows.step - 1;
+                    assert!(rows == all || height / closer > most, "{height}: {rows:?} of {most}");
+                }
+            }
         }
     }
 

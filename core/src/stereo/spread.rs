@@ -8,9 +8,9 @@ use super::{
 };
 use crate::parallel::Work;
 
-/// Largest difference of rows that have their mean between them, in working units; other pixels get
-/// the farther disparity.
-const SAME_SURFACE: u16 = 3 * WORKING_ONE_PX.unsigned_abs() / 2;
+/// Largest difference of rows two apart that have their mean between them, in working units; other
+/// pixels get the farther disparity.
+const SAME_SURFACE: i16 = 3 * WORKING_ONE_PX / 2;
 
 /// Spreads matched rows, which lie one behind the other, over an image: in place.
 pub(super) struct SpreadRows<'a> {
@@ -27,27 +27,44 @@ impl Work for SpreadRows<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { image, width, rows: MatchedRows { step, count } } = self;
+        let Self { image, width, rows } = self;
+        let MatchedRows { step, count } = rows;
         if step < 2 {
             return;
         }
         // From the last row on, so that none is overwritten before it is read.
         for i in (0..count).rev() {
             let (matched, rest) = image.split_at_mut_checked((i + 1) * width).unwrap_or_default();
-            let mut places = rest.get_mut(i * width..).unwrap_or_default().chunks_mut(width.max(1));
-            let (Some(own), between) = (places.next(), places.next()) else { return };
+            let above = rows.row(i) - (i + 1);
+            let rest = rest.get_mut(above * width..).unwrap_or_default();
+            let Some((own, rest)) = rest.split_at_mut_checked(width) else { return };
             for (to, from) in own.iter_mut().zip(matched.iter().skip(i * width)) {
                 *to = *from;
             }
-            match (between, places.next()) {
-                (Some(between), Some(next)) => fill_between(own, next, between),
+            match rest.split_at_mut_checked((step - 1) * width) {
+                Some((between, next)) if !next.is_empty() && rows.is_sparse() => {
+                    fill_sparse(own, next, between, rows);
+                }
+                Some((between, next)) if !next.is_empty() => fill_between(own, next, between),
                 // Below the last matched row there is no descriptor.
-                (Some(last), None) => last.fill(NONE),
-                _ => (),
+                _ => rest.fill(NONE),
             }
         }
-        if let Some(first) = image.get_mut(..width) {
-            first.fill(NONE);
+        image.get_mut(..(step - 1) * width).unwrap_or_default().fill(NONE);
+    }
+}
+
+/// Fills the rows between two others that lie farther apart than two: evenly from one to the other
+/// where both are one surface. Elsewhere nothing is known of what lies between.
+#[inline(always)]
+fn fill_sparse(above: &[i16], below: &[i16], between: &mut [i16], rows: MatchedRows) {
+    let (most, step) = (rows.widened(SAME_SURFACE).unsigned_abs(), rows.step.max(1) as i32);
+    for (row, at) in between.chunks_exact_mut(above.len().max(1)).zip(1..) {
+        for (to, (&a, &b)) in row.iter_mut().zip(above.iter().zip(below)) {
+            let (up, down) = (a & !FILLED, b & !FILLED);
+            let is_one = a != NONE && b != NONE && up.abs_diff(down) <= most;
+            let even = i32::from(up) + (i32::from(down) - i32::from(up)) * at / step;
+            *to = if is_one { even as i16 | FILLED } else { NONE };
         }
     }
 }
@@ -62,7 +79,7 @@ fn fill_between(above: &[i16], below: &[i16], out: &mut [i16]) {
         let mean = up.wrapping_add(down.wrapping_sub(up) >> 1) | ((a | b) & FILLED);
         let is_above = (up < down) != ((a == NONE) | (b == NONE));
         let one = if is_above { a } else { b };
-        *to = if up.abs_diff(down) <= SAME_SURFACE { mean } else { one };
+        *to = if up.abs_diff(down) <= SAME_SURFACE.unsigned_abs() { mean } else { one };
     }
 }
 
@@ -111,6 +128,21 @@ mod tests {
             let expected = plain(&image[..width * rows.count], width, height);
             SpreadRows { image: &mut image, width, rows }.run();
             assert_eq!(image, expected, "{width} x {height}");
+        }
+    }
+
+    #[test]
+    fn rows_far_apart_are_joined_where_they_are_one_surface() {
+        let rows = MatchedRows { step: 4, count: 2 };
+        // A slope of 0.5 px a row, a step of 4 px, a hole.
+        let mut image = vec![640, 640, NONE, 768, 896, 640];
+        image.extend([7; 3 * 10 - 6]);
+        SpreadRows { image: &mut image, width: 3, rows }.run();
+        let of = |v: usize| &image[3 * v..3 * v + 3];
+        assert!([0, 1, 2, 8, 9].iter().all(|&v| of(v) == [NONE; 3]), "{image:?}");
+        assert_eq!([of(3), of(7)], [[640, 640, NONE], [768, 896, 640]]);
+        for (v, even) in [(4, 672), (5, 704), (6, 736)] {
+            assert_eq!(of(v), [even | FILLED, NONE, NONE], "row {v}");
         }
     }
 

@@ -127,6 +127,11 @@ fn a_budget_holds_in_every_frame_and_gives_the_same_bits_on_two_threads() {
             assert!(within(work.fused_voxels, bound.fused_voxels), "{share}, frame {frame}");
             assert!(within(work.pruned_voxels, bound.pruned_voxels), "{share}, frame {frame}");
         }
+        for input in [Input::Ramp, Input::Black] {
+            for work in run(input, &config) {
+                assert!(within(work.stereo_pixels, bound.stereo_pixels), "{share}, {input:?}");
+            }
+        }
         // The budget is felt, and something is mapped nevertheless.
         assert!(serial.iter().any(|report| report.deferred.fused_blocks > 0), "{share}");
         assert!(serial.iter().any(|report| report.work.fused_voxels > 0), "{share}");

@@ -18,7 +18,6 @@ use crate::{
         gradient::GradientRows,
         invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
-        rows::MatchedRows,
         smooth::{Along, Smooth},
         speckle::{Blanked, RemoveSpeckles, Scratch},
         spread::SpreadRows,
@@ -151,7 +150,7 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let (width, rows) = (self.width, MatchedRows::new(config, self.height));
+        let (width, rows) = (self.width, self.matched);
         let bands = Bands::new(rows.count);
         let columns = prior::cells(width, config.grid_size);
         let matching = DenseMatching {
@@ -206,7 +205,7 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let rows = MatchedRows::new(config, self.height);
+        let rows = self.matched;
         // Sizes are of whole images: every second row has half of a segment's pixels.
         let smallest = config.speckle_size.div_ceil(rows.step as u32);
         report.speckles = self.remove_segments(config, smallest, executor).measured;
@@ -238,7 +237,7 @@ impl StereoMatcher<'_> {
             width: config.gap_width,
             discontinuity: working(GAP_DISCONTINUITY) as u16,
             ends: config.gap_ends,
-            rows: MatchedRows::new(config, self.height),
+            rows: self.matched,
         };
         report.filled += self.fill(filling, executor);
     }
@@ -257,9 +256,9 @@ impl StereoMatcher<'_> {
             ends: bytemuck::cast_slice_mut(self.other),
             flags: bytemuck::cast_slice_mut(self.columns),
         };
-        let rows = MatchedRows::new(config, self.height).count;
-        let disparity = image_of(self.disparity, self.width * rows);
-        let similarity = working(config.speckle_similarity);
+        let rows = self.matched;
+        let disparity = image_of(self.disparity, self.width * rows.count);
+        let similarity = rows.widened(working(config.speckle_similarity));
         executor.vectors().run(RemoveSpeckles {
             disparity,
             width: self.width,
@@ -289,8 +288,8 @@ impl StereoMatcher<'_> {
     }
 
     /// Puts the matched rows where they belong, and others between them.
-    pub(super) fn spread_rows<E: Executor>(&mut self, config: &StereoConfig, executor: &E) {
-        let rows = MatchedRows::new(config, self.height);
+    pub(super) fn spread_rows<E: Executor>(&mut self, executor: &E) {
+        let rows = self.matched;
         let image = image_of(self.disparity, self.width * self.height);
         executor.vectors().run(SpreadRows { image, width: self.width, rows });
     }

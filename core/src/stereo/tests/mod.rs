@@ -1,6 +1,7 @@
 //! Whole pairs through the matcher: analytic scenes with closed answers, input that must not be
 //! believed, and real clips.
 
+mod budget;
 mod clips;
 mod confidence;
 mod scenes;
