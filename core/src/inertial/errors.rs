@@ -7,6 +7,7 @@
 
 use super::{
     InertialUnit,
+    covariance::{Covariance, root},
     integral::{BRIDGED_MAX_S, Integral},
 };
 use crate::state::Visitor;
@@ -43,14 +44,14 @@ pub(super) struct TurnError<'i> {
 pub(super) struct UnitErrors {
     /// Three biases, rad/s; the offset to add to samples' times, s.
     state: [f64; 4],
-    covariance: [[f64; 4]; 4],
+    covariance: Covariance<4>,
     /// Mean square of the time between samples, s2.
     interval2: f64,
 }
 
 impl UnitErrors {
     pub fn new(unit: &InertialUnit) -> Self {
-        let mut this = Self { state: [0.0; 4], covariance: [[0.0; 4]; 4], interval2: 0.0 };
+        let mut this = Self { state: [0.0; 4], covariance: Covariance::default(), interval2: 0.0 };
         this.widen(unit);
         this
     }
@@ -59,12 +60,7 @@ impl UnitErrors {
     pub fn widen(&mut self, unit: &InertialUnit) {
         let bias = unit.turn_bias_sigma * unit.turn_bias_sigma;
         let offset = OFFSET_SIGMA_S * OFFSET_SIGMA_S;
-        self.covariance = [
-            [bias, 0.0, 0.0, 0.0],
-            [0.0, bias, 0.0, 0.0],
-            [0.0, 0.0, bias, 0.0],
-            [0.0, 0.0, 0.0, offset],
-        ];
+        self.covariance = Covariance::of_variances([bias, bias, bias, offset]);
     }
 
     pub fn bias(&self) -> Vector3<f64> {
@@ -80,7 +76,7 @@ impl UnitErrors {
     /// Standard deviation of the offset, s. Between two samples rates are only interpolated, and
     /// what they miss repeats from turn to turn: many turns do not make up for it.
     pub fn offset_sigma_s(&self) -> f64 {
-        let [.., [.., variance]] = self.covariance;
+        let [.., [.., variance]] = self.covariance.0;
         root(variance + INTERVAL_SHARE * INTERVAL_SHARE * self.interval2)
     }
 
@@ -93,7 +89,7 @@ impl UnitErrors {
 
     /// Standard deviation of the least known bias, rad/s.
     pub fn bias_sigma(&self) -> f64 {
-        let [[x, ..], [_, y, ..], [_, _, z, _], _] = self.covariance;
+        let [[x, ..], [_, y, ..], [_, _, z, _], _] = self.covariance.0;
         root([x, y, z].into_iter().fold(0.0, |most, one| if one > most { one } else { most }))
     }
 
@@ -114,7 +110,7 @@ impl UnitErrors {
     pub fn pass(&mut self, unit: &InertialUnit, span_s: f64) {
         let bias = unit.turn_walk * unit.turn_walk * span_s;
         let offset = OFFSET_WALK * OFFSET_WALK * span_s;
-        let [[x, ..], [_, y, ..], [_, _, z, _], [.., last]] = &mut self.covariance;
+        let [[x, ..], [_, y, ..], [_, _, z, _], [.., last]] = &mut self.covariance.0;
         for variance in [x, y, z] {
             *variance += bias;
         }
@@ -135,7 +131,7 @@ impl UnitErrors {
             turn.sigma_rad * turn.sigma_rad + turn.integral.unseen_rad * turn.integral.unseen_rad;
         // All three axes must pass before one of them counts.
         let passes = rows.iter().all(|(row, error)| {
-            let spread = dot(row, &self.spread(row)) + variance;
+            let spread = self.covariance.variance(row) + variance;
             error * error <= GATE_SIGMAS * GATE_SIGMAS * spread
         });
         if passes {
@@ -150,23 +146,10 @@ impl UnitErrors {
         passes
     }
 
-    fn spread(&self, row: &[f64; 4]) -> [f64; 4] {
-        self.covariance.map(|line| dot(&line, row))
-    }
-
     fn update_axis(&mut self, row: &[f64; 4], error: f64, variance: f64) {
-        let spread = self.spread(row);
-        let sum = dot(row, &spread) + variance;
-        if !(sum.is_finite() && sum > 0.0) {
-            return;
-        }
-        // Gain of the filter for one row.
-        let gain = spread.map(|one| one / sum);
+        let Some(gain) = self.covariance.measured(row, variance) else { return };
         for (state, gain) in self.state.iter_mut().zip(gain) {
             *state += gain * error;
-        }
-        for (line, gain) in self.covariance.iter_mut().zip(gain) {
-            line.iter_mut().zip(spread).for_each(|(entry, other)| *entry -= gain * other);
         }
         // Nothing beyond is corrected: a unit so far off is doubted.
         let [x, y, z, offset] = &mut self.state;
@@ -181,16 +164,8 @@ impl UnitErrors {
         let Self { state, covariance, interval2 } = self;
         visitor.f64s(state);
         visitor.f64s([interval2]);
-        visitor.f64s(covariance.as_flattened_mut());
+        covariance.visit(visitor);
     }
-}
-
-fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn root(variance: f64) -> f64 {
-    libm::sqrt(if variance > 0.0 { variance } else { 0.0 })
 }
 
 fn bounded(value: f64, most: f64) -> f64 {

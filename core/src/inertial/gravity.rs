@@ -6,7 +6,10 @@
 //! of the map's first pose, and a lean that walks away from it. Early ways tell the constant, later
 //! ones the lean.
 
-use super::{InertialUnit, Vertical};
+use super::{
+    InertialUnit, Vertical,
+    covariance::{Covariance, root},
+};
 use crate::state::Visitor;
 use nalgebra::Vector3;
 
@@ -20,6 +23,8 @@ const UNKNOWN: [f64; 2] = [30.0, 10.0];
 const FORCE_WALK: f64 = 0.02;
 /// Lean of the poses beyond that of their turns' own error, rad per square root of a second.
 const LEAN_WALK_RAD: f64 = 0.0026;
+/// What a lean changes in the force that holds a unit up, m/s2 for each rad.
+const LEANS_BY: f64 = 9.0;
 /// Time after which there is a vertical, s.
 const FIRST_S: f64 = 1.0;
 /// Size of what holds a unit up, m/s2.
@@ -55,7 +60,7 @@ pub(super) struct Gravity {
     held: [f64; 3],
     /// Change of that force by the poses' lean, m/s2.
     lean: [f64; 3],
-    covariance: [[f64; N]; N],
+    covariance: Covariance<N>,
     /// Time over which ways were measured, s; 0 before the first.
     time_s: f64,
 }
@@ -66,7 +71,7 @@ impl Gravity {
     pub fn way_m(&self, interval: &Interval) -> Option<(Vector3<f64>, f64)> {
         let (force, span_s) = (interval.force?, interval.span_s);
         let way_m = self.expected_m(&force, span_s);
-        let sigma_m = root(dot(&row(span_s), &self.spread(&row(span_s))));
+        let sigma_m = root(self.covariance.variance(&row(span_s)));
         let is_possible = way_m.iter().all(|part| libm::fabs(*part) < WAY_MAX_M);
         let is_known = self.is_known() && sigma_m <= VELOCITY_SIGMA_MAX * span_s;
         (is_known && is_possible).then_some((way_m, sigma_m))
@@ -85,15 +90,15 @@ impl Gravity {
             _ => self.forget_velocity(),
         }
         let walk = LEAN_WALK_RAD * LEAN_WALK_RAD * span_s + turn_sigma_rad * turn_sigma_rad;
-        let [.., [.., lean]] = &mut self.covariance;
-        *lean += GRAVITY.start * GRAVITY.start * walk;
+        let [.., [.., lean]] = &mut self.covariance.0;
+        *lean += LEANS_BY * LEANS_BY * walk;
     }
 
     /// The vertical, once there is one.
     pub fn vertical(&self, unit: &InertialUnit) -> Option<Vertical> {
         let held = Vector3::from(self.held);
         let size = held.norm();
-        let [_, [_, variance, _], _] = self.covariance;
+        let [_, [_, variance, _], _] = self.covariance.0;
         let sigma = root(variance + unit.force_bias_sigma * unit.force_bias_sigma);
         let up: [f64; 3] = (held / size).into();
         self.is_known().then_some(Vertical {
@@ -124,30 +129,27 @@ impl Gravity {
         if self.time_s <= 0.0 {
             // The first one tells the velocity, its force what holds the unit up.
             let [velocity, held] = UNKNOWN.map(|sigma| sigma * sigma);
-            *self = Self { velocity: (way_m / span_s).into(), held: (*force).into(), ..*self };
-            self.covariance = [[velocity, 0.0, 0.0], [0.0, held, 0.0], [0.0; N]];
+            (self.velocity, self.held) = ((way_m / span_s).into(), (*force).into());
+            self.covariance = Covariance::of_variances([velocity, held, 0.0]);
         }
         let error_m = way_m - self.expected_m(force, span_s);
         let row = row(span_s);
-        let spread = self.spread(&row);
         let sigma_m = if sigma_m > WAY_SIGMA_MIN_M { sigma_m } else { WAY_SIGMA_MIN_M };
-        let sum = dot(&row, &spread) + sigma_m * sigma_m;
-        if !(error_m.iter().all(|part| part.is_finite()) && sum.is_finite()) {
+        let variance = sigma_m * sigma_m;
+        let error2 = error_m.norm_squared();
+        if !error2.is_finite() {
             return;
         }
-        if error_m.norm_squared() > 3.0 * GATE_SIGMAS * GATE_SIGMAS * sum {
-            let [[velocity, ..], ..] = &mut self.covariance;
+        if error2 > 3.0 * GATE_SIGMAS * GATE_SIGMAS * (self.covariance.variance(&row) + variance) {
+            let [[velocity, ..], ..] = &mut self.covariance.0;
             *velocity *= GATE_WIDENS;
             return;
         }
+        let Some(gain) = self.covariance.measured(&row, variance) else { return };
         self.time_s += span_s;
-        let gain = spread.map(|part| part / sum);
         let states = [&mut self.velocity, &mut self.held, &mut self.lean];
         for (state, gain) in states.into_iter().zip(gain) {
             *state = (Vector3::from(*state) + error_m * gain).into();
-        }
-        for (line, gain) in self.covariance.iter_mut().zip(gain) {
-            line.iter_mut().zip(spread).for_each(|(entry, other)| *entry -= gain * other);
         }
     }
 
@@ -156,8 +158,8 @@ impl Gravity {
         let velocity = Vector3::from(self.velocity) + self.acceleration(force) * span_s;
         self.velocity = velocity.into();
         // The velocity now is the one before less what held and lean add to it.
-        let [[_, vh, vl], [_, hh, hl], [_, _, ll]] = self.covariance;
-        let [velocity, held, lean] = &mut self.covariance;
+        let [[_, vh, vl], [_, hh, hl], [_, _, ll]] = self.covariance.0;
+        let [velocity, held, lean] = &mut self.covariance.0;
         let [vv, ..] = velocity;
         let both = hh + 2.0 * hl + ll;
         *vv += span_s * span_s * both - 2.0 * span_s * (vh + vl) + FORCE_WALK * FORCE_WALK * span_s;
@@ -168,21 +170,17 @@ impl Gravity {
 
     /// Nothing is known of the velocity at the end of an interval without forces.
     fn forget_velocity(&mut self) {
-        let [[vv, vh, vl], [hv, ..], [lv, ..]] = &mut self.covariance;
+        let [[vv, vh, vl], [hv, ..], [lv, ..]] = &mut self.covariance.0;
         let [unknown, _] = UNKNOWN;
         *vv = unknown * unknown;
         (*vh, *vl, *hv, *lv) = (0.0, 0.0, 0.0, 0.0);
-    }
-
-    fn spread(&self, row: &[f64; N]) -> [f64; N] {
-        self.covariance.map(|line| dot(&line, row))
     }
 
     /// Visits every field.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { velocity, held, lean, covariance, time_s } = self;
         visitor.f64s(velocity.iter_mut().chain(held).chain(lean));
-        visitor.f64s(covariance.as_flattened_mut());
+        covariance.visit(visitor);
         visitor.f64s([time_s]);
     }
 }
@@ -191,12 +189,4 @@ impl Gravity {
 fn row(span_s: f64) -> [f64; N] {
     let half = -0.5 * span_s * span_s;
     [span_s, half, half]
-}
-
-fn dot(a: &[f64; N], b: &[f64; N]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn root(variance: f64) -> f64 {
-    libm::sqrt(if variance > 0.0 { variance } else { 0.0 })
 }

@@ -14,6 +14,7 @@
 //! [`INERTIAL_SAMPLES_PER_FRAME`] twice a frame. Decision 74 has the rules.
 
 mod agreement;
+mod covariance;
 mod errors;
 mod gravity;
 mod integral;

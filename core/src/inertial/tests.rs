@@ -38,6 +38,22 @@ const SOUND: Flaws = Flaws {
     range: f64::MAX,
 };
 
+/// What images tell of a frame at a pose, but for the motion to it.
+fn seen_at(t_world_camera: Transform) -> MeasuredMotion {
+    MeasuredMotion {
+        t_reference_now: None,
+        sigma_rad: 0.0005,
+        way_sigma_m: 0.005,
+        strong: true,
+        over_several: false,
+        turned: false,
+        refused: false,
+        t_world_before: None,
+        t_world_camera,
+        segment: MapSegment::FIRST,
+    }
+}
+
 /// Camera to world at a time: turns about all three axes, and a swaying way.
 fn pose(t: f64) -> Transform {
     let turn = [0.12 * (2.1 * t).sin(), 0.5 * (1.3 * t).sin(), 0.1 * (1.7 * t).cos()];
@@ -117,15 +133,8 @@ impl Sim {
         let motion = before.inverse() * pose(t) * Transform::new(off, [0.0; 3]);
         self.prior.observe(&MeasuredMotion {
             t_reference_now: (self.frame > 0).then_some(motion),
-            sigma_rad: 0.0005,
-            way_sigma_m: 0.005,
-            strong: true,
-            over_several: false,
-            turned: false,
-            refused: false,
             t_world_before: (self.frame > 0).then_some(before),
-            t_world_camera: pose(t),
-            segment: MapSegment::FIRST,
+            ..seen_at(pose(t))
         });
         self.frame += 1;
         (predicted, self.prior.report())
@@ -180,18 +189,7 @@ fn a_camera_in_the_dark_goes_on_by_forces_once_up_is_known() {
             let predicted = sim.prior.predict(Some(time_ns), &samples, 0, &guess);
             guess = guess * predicted.expect("it is trusted").last.t_before_now;
             way_on = way_on * last;
-            sim.prior.observe(&MeasuredMotion {
-                t_reference_now: None,
-                sigma_rad: 0.0,
-                way_sigma_m: 0.0,
-                strong: false,
-                over_several: false,
-                turned: true,
-                refused: false,
-                t_world_before: None,
-                t_world_camera: guess,
-                segment: MapSegment::FIRST,
-            });
+            sim.prior.observe(&MeasuredMotion { strong: false, turned: true, ..seen_at(guess) });
             sim.frame += 1;
         }
         let truth = pose(begin + 5.0 * FRAME_S);
@@ -220,15 +218,8 @@ fn a_way_of_what_moves_is_not_believed_once_and_is_if_it_repeats() {
         let predicted = sim.prior.predict(Some(time_ns), &samples, 0, &before).unwrap();
         sim.prior.observe(&MeasuredMotion {
             t_reference_now: Some(pose(t - FRAME_S).inverse() * pose(t)),
-            sigma_rad: 0.0005,
-            way_sigma_m: 0.005,
-            strong: true,
-            over_several: false,
-            turned: false,
-            refused: false,
             t_world_before: Some(before),
-            t_world_camera: now,
-            segment: MapSegment::FIRST,
+            ..seen_at(now)
         });
         sim.frame += 1;
         // Way in the world that forces led to, less the true one.
@@ -338,18 +329,8 @@ fn a_force_of_no_unit_is_forgotten() {
     samples.iter_mut().for_each(|sample| sample.force = [1e300, -1e300, 1e300]);
     let time_ns = Some(((10.0 + t) * 1e9).round() as u64);
     sim.prior.predict(time_ns, &samples, 0, &pose(t - FRAME_S));
-    sim.prior.observe(&MeasuredMotion {
-        t_reference_now: None,
-        sigma_rad: 0.0005,
-        way_sigma_m: 0.005,
-        strong: true,
-        over_several: false,
-        turned: false,
-        refused: false,
-        t_world_before: Some(pose(t - FRAME_S)),
-        t_world_camera: pose(t),
-        segment: MapSegment::FIRST,
-    });
+    sim.prior
+        .observe(&MeasuredMotion { t_world_before: Some(pose(t - FRAME_S)), ..seen_at(pose(t)) });
     sim.frame += 1;
     let vertical = sim.run(30).vertical.expect("it is known still");
     let up = Vector3::from(vertical.up_world.map(f64::from));

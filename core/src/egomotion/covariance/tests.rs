@@ -98,7 +98,6 @@ fn sigma_holds_where_noise_reaches_far_beyond_the_robust_weights() {
     assert!(runs.len() >= 60, "{} of 90 are found", runs.len());
     for axis in 0..3 {
         let within = runs.iter().filter(|run| run[axis][0].abs() <= 2.0 * run[axis][1]).count();
-        std::println!("axis {axis}: {within} of {}", runs.len());
         assert!(100 * within >= 87 * runs.len(), "axis {axis}: {within} of {}", runs.len());
     }
 }
