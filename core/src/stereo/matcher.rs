@@ -46,10 +46,10 @@ pub struct StereoMatcher<'s> {
     image_height: usize,
     width: usize,
     height: usize,
-    /// Rows of the last pair that were matched densely.
-    matched: MatchedRows,
     /// True if the gradients' memory holds the confidences of the last pair.
     has_confidence: bool,
+    /// Rows of the last pair from one that was matched densely to the next.
+    row_step: u16,
 }
 
 /// Takes a disparity error out of rows, from `first` on.
@@ -153,8 +153,8 @@ impl<'s> StereoMatcher<'s> {
             // No pair yet: one pixel without disparity, so that a view of it is never empty.
             width: 1,
             height: 1,
-            matched: MatchedRows { step: 1, count: 0 },
             has_confidence: false,
+            row_step: 1,
         }
     }
 
@@ -236,11 +236,12 @@ impl<'s> StereoMatcher<'s> {
         let &MaskedPair { left, right, invalid, right_moved: _ } = pair;
         // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
-        self.matched = MatchedRows::within(config, self.height, most / self.width.max(1));
+        let rows = MatchedRows::within(config, self.height, most / self.width.max(1));
+        self.row_step = rows.step as u16;
         let mut report = StereoReport {
             status,
             pixels: (self.width * self.height) as u32,
-            row_pixels: (self.width * self.matched.count) as u32,
+            row_pixels: (self.width * rows.count) as u32,
             ..StereoReport::default()
         };
         if report.status != StereoStatus::Matched {

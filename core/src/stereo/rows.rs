@@ -35,7 +35,11 @@ impl MatchedRows {
             return all;
         }
         // The least step of which no more than that fit into the height.
-        let step = height / (most + 1) + 1;
+        Self::every(height / (most + 1) + 1, height)
+    }
+
+    /// The rows of an image of that height, so many image rows from one to the next.
+    pub fn every(step: usize, height: usize) -> Self {
         Self { step, count: height / step.max(1) }
     }
 

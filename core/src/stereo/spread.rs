@@ -58,7 +58,7 @@ impl Work for SpreadRows<'_> {
 /// where both are one surface. Elsewhere nothing is known of what lies between.
 #[inline(always)]
 fn fill_sparse(above: &[i16], below: &[i16], between: &mut [i16], rows: MatchedRows) {
-    let (most, step) = (rows.widened(SAME_SURFACE).unsigned_abs(), rows.step.max(1) as i32);
+    let (most, step) = (rows.widened(SAME_SURFACE).unsigned_abs(), (rows.step as i32).max(1));
     for (row, at) in between.chunks_exact_mut(above.len().max(1)).zip(1..) {
         for (to, (&a, &b)) in row.iter_mut().zip(above.iter().zip(below)) {
             let (up, down) = (a & !FILLED, b & !FILLED);

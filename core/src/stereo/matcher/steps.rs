@@ -18,6 +18,7 @@ use crate::{
         gradient::GradientRows,
         invalid, median, prior,
         prior::{CellGrid, DisparitySet, PlaneCost, RasterisePlanes},
+        rows::MatchedRows,
         smooth::{Along, Smooth},
         speckle::{Blanked, RemoveSpeckles, Scratch},
         spread::SpreadRows,
@@ -144,13 +145,18 @@ impl StereoMatcher<'_> {
         report.triangles_right = self.right_mesh.triangle_count() as u32;
     }
 
+    /// Rows of the pair that are matched densely.
+    fn matched(&self) -> MatchedRows {
+        MatchedRows::every(usize::from(self.row_step), self.height)
+    }
+
     pub(super) fn match_densely<E: Executor>(
         &mut self,
         config: &StereoConfig,
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let (width, rows) = (self.width, self.matched);
+        let (width, rows) = (self.width, self.matched());
         let bands = Bands::new(rows.count);
         let columns = prior::cells(width, config.grid_size);
         let matching = DenseMatching {
@@ -205,9 +211,9 @@ impl StereoMatcher<'_> {
         executor: &E,
         report: &mut StereoReport,
     ) {
-        let rows = self.matched;
+        let rows = self.matched();
         // Sizes are of whole images: every second row has half of a segment's pixels.
-        let smallest = config.speckle_size.div_ceil(rows.step as u32);
+        let smallest = config.speckle_size.div_ceil((rows.step as u32).max(1));
         report.speckles = self.remove_segments(config, smallest, executor).measured;
         // The second pass removes larger islands. Gaps within a surface are filled first, so that a
         // surface with holes is one segment.
@@ -237,7 +243,7 @@ impl StereoMatcher<'_> {
             width: config.gap_width,
             discontinuity: working(GAP_DISCONTINUITY) as u16,
             ends: config.gap_ends,
-            rows: self.matched,
+            rows: self.matched(),
         };
         report.filled += self.fill(filling, executor);
     }
@@ -249,6 +255,7 @@ impl StereoMatcher<'_> {
         smallest: u32,
         executor: &E,
     ) -> Blanked {
+        let rows = self.matched();
         // The gradients and the right image's disparities are done with: their memory holds the
         // runs.
         let scratch = Scratch {
@@ -256,7 +263,6 @@ impl StereoMatcher<'_> {
             ends: bytemuck::cast_slice_mut(self.other),
             flags: bytemuck::cast_slice_mut(self.columns),
         };
-        let rows = self.matched;
         let disparity = image_of(self.disparity, self.width * rows.count);
         let similarity = rows.widened(working(config.speckle_similarity));
         executor.vectors().run(RemoveSpeckles {
@@ -289,7 +295,7 @@ impl StereoMatcher<'_> {
 
     /// Puts the matched rows where they belong, and others between them.
     pub(super) fn spread_rows<E: Executor>(&mut self, executor: &E) {
-        let rows = self.matched;
+        let rows = self.matched();
         let image = image_of(self.disparity, self.width * self.height);
         executor.vectors().run(SpreadRows { image, width: self.width, rows });
     }
