@@ -193,6 +193,7 @@ mod tests {
         maps.remove(0)
     }
 
+    #[dynvox_needs::long]
     #[test]
     fn maps_merged_in_any_order_and_tree_by_any_number_of_workers_are_one() {
         let root = tempfile::TempDir::new().unwrap();

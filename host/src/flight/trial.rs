@@ -393,6 +393,7 @@ mod tests {
         assert!(count > 0, "something stands beside the road");
     }
 
+    #[dynvox_needs::long]
     #[test]
     fn a_vehicle_whose_pictures_are_black_does_not_fly_on() {
         let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 1.0, seconds: 2.5 };

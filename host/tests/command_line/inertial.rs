@@ -21,6 +21,7 @@ fn street(root: &Path, out: &str, settings: &[&str], more: &[&str]) -> String {
     output_text(&run) + &String::from_utf8_lossy(&run.stdout)
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_street_s_unit_is_compared_with_the_images_and_a_fault_is_named() {
     let root = TempDir::new().unwrap();

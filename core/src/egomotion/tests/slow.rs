@@ -136,6 +136,7 @@ fn steady(step_m: f64, frames: usize) -> Vec<f64> {
     (0..frames).map(|frame| step_m * frame as f64).collect()
 }
 
+#[dynvox_needs::long]
 #[test]
 fn the_way_of_a_slow_camera_is_right_within_a_hundredth() {
     for (step_m, frames) in [(0.005, 60), (0.015, 30)] {
@@ -230,6 +231,7 @@ fn certainty(ways_m: &[f64], anchored: bool) -> [Within; 3] {
     axes
 }
 
+#[dynvox_needs::long]
 #[test]
 fn errors_of_a_slow_camera_lie_within_two_sigma() {
     let mut all = Vec::new();

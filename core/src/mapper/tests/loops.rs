@@ -48,6 +48,7 @@ fn a_full_turn_is_recognised() {
     }
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_snapshot_while_a_loop_is_closed_goes_on_closing_it() {
     let go_on = |mapper: &mut Mapper<'_>, from: usize| {

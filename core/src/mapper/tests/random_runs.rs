@@ -121,6 +121,7 @@ impl Coverage {
     }
 }
 
+#[dynvox_needs::long]
 #[test]
 fn a_thousand_runs_resumed_anywhere_equal_those_that_never_stopped() {
     let mut coverage = Coverage::default();

@@ -169,6 +169,7 @@ fn faults_planted_into_a_real_clip_are_named() {
     each_fault_is_named(open(&data("kitti-odometry"), &options).unwrap().as_ref());
 }
 
+#[dynvox_needs::long]
 #[test]
 fn ten_streets_give_no_false_alarm() {
     let sizes = [(640, 192), (480, 160), (320, 240), (376, 240), (320, 96)];

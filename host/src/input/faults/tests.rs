@@ -104,6 +104,7 @@ fn a_truck_has_the_disparity_of_its_distance() {
     assert!((best as f64 - disparity_px).abs() <= 0.6, "{best} px instead of {disparity_px}");
 }
 
+#[dynvox_needs::long]
 #[test]
 fn every_scene_changes_both_images_a_little_or_much() {
     for spec in [

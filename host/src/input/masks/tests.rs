@@ -265,6 +265,7 @@ fn the_street_knows_every_car_it_draws_parked_ones_too() {
     assert_eq!(pixels, frame.exact.unwrap().instances.pixels().iter().filter(|&&k| k > 0).count());
 }
 
+#[dynvox_needs::long]
 #[test]
 fn noise_is_a_detectors_and_the_same_again_for_the_same_seed() {
     let exact = attach(street(), &MaskChoice::Exact, EVERY).unwrap();
