@@ -2,7 +2,7 @@
 
 use crate::state::Visitor;
 
-/// Covariance of `N` states. A number depends on them by a row of factors.
+/// Covariance of `N` states. A row of `N` factors makes a number of the states.
 #[derive(Clone, Debug)]
 pub(super) struct Covariance<const N: usize>(pub [[f64; N]; N]);
 

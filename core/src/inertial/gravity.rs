@@ -23,7 +23,7 @@ const UNKNOWN: [f64; 2] = [30.0, 10.0];
 const FORCE_WALK: f64 = 0.02;
 /// Lean of the poses beyond that of their turns' own error, rad per square root of a second.
 const LEAN_WALK_RAD: f64 = 0.0026;
-/// What a lean changes in the force that holds a unit up, m/s2 for each rad.
+/// Change of what holds a unit up with a lean, m/s2 for each rad.
 const LEANS_BY: f64 = 9.0;
 /// Time after which there is a vertical, s.
 const FIRST_S: f64 = 1.0;

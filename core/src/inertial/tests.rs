@@ -38,7 +38,7 @@ const SOUND: Flaws = Flaws {
     range: f64::MAX,
 };
 
-/// What images tell of a frame at a pose, but for the motion to it.
+/// Measurement of a frame at a pose, without the motion to it.
 fn seen_at(t_world_camera: Transform) -> MeasuredMotion {
     MeasuredMotion {
         t_reference_now: None,

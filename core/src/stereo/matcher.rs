@@ -208,7 +208,10 @@ impl<'s> StereoMatcher<'s> {
         most: usize,
         executor: &E,
     ) -> StereoReport {
-        self.compute_steps(config, pair, most, executor, |_| ())
+        let height = pair.left.height();
+        self.row_step =
+            MatchedRows::within(config, height, most / pair.left.width().max(1)).step as u16;
+        self.compute_steps(config, pair, executor, |_| ())
     }
 
     /// Computes disparities like [`StereoMatcher::compute`], from a left and a right image, calling
@@ -222,26 +225,24 @@ impl<'s> StereoMatcher<'s> {
         done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let pair = MaskedPair { left, right, invalid: None, right_moved: false };
-        self.compute_steps(config, &pair, usize::MAX, executor, done)
+        self.row_step = MatchedRows::new(config, left.height()).step as u16;
+        self.compute_steps(config, &pair, executor, done)
     }
 
     fn compute_steps<E: Executor>(
         &mut self,
         config: &StereoConfig,
         pair: &MaskedPair<'_>,
-        most: usize,
         executor: &E,
         mut done: impl FnMut(StereoStep),
     ) -> StereoReport {
         let &MaskedPair { left, right, invalid, right_moved: _ } = pair;
         // A pair that cannot be matched leaves an empty disparity image.
         let status = self.begin(config, left, right);
-        let rows = MatchedRows::within(config, self.height, most / self.width.max(1));
-        self.row_step = rows.step as u16;
         let mut report = StereoReport {
             status,
             pixels: (self.width * self.height) as u32,
-            row_pixels: (self.width * rows.count) as u32,
+            row_pixels: (self.width * self.matched().count) as u32,
             ..StereoReport::default()
         };
         if report.status != StereoStatus::Matched {

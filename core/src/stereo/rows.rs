@@ -1,14 +1,15 @@
 //! Rows that are matched densely.
 //!
 //! Surfaces seldom change within two rows, so that images of many rows are matched on every second
-//! one ([`StereoConfig::second_rows_from`]); on fewer, where a budget of work allows no more. Matched
-//! rows lie one behind the other in the working image, until speckles are removed and gaps filled.
+//! one ([`StereoConfig::second_rows_from`]); on fewer, where a budget of work allows no more.
+//! Matched rows lie one behind the other in the working image, until speckles are removed and gaps
+//! filled.
 
-use super::{StereoConfig, dense::WORKING_ONE_PX};
+use super::StereoConfig;
 use crate::memory::Capacity;
 
-/// No limit is wider: as much as any two disparities differ by.
-const WIDEST: usize = 255 * WORKING_ONE_PX.unsigned_abs() as usize;
+/// Widest limit, in working units: no disparity is so near to the mark of none.
+const WIDEST: usize = i16::MAX as usize / 2;
 
 /// The rows of an image that are matched, evenly spaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ impl MatchedRows {
         if all.count <= most {
             return all;
         }
-        // The least step of which no more than that fit into the height.
+        // The least step with no more rows than that.
         Self::every(height / (most + 1) + 1, height)
     }
 
@@ -48,8 +49,8 @@ impl MatchedRows {
         self.step > 2
     }
 
-    /// The most, in working units, that disparities of one surface differ by from a row to the next,
-    /// of a limit for rows that lie at most two apart.
+    /// The most, in working units, that disparities of one surface differ by from a row to the
+    /// next, of a limit for rows that lie at most two apart.
     pub fn widened(self, limit: i16) -> i16 {
         if !self.is_sparse() {
             return limit;

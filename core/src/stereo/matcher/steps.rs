@@ -146,7 +146,7 @@ impl StereoMatcher<'_> {
     }
 
     /// Rows of the pair that are matched densely.
-    fn matched(&self) -> MatchedRows {
+    pub(super) fn matched(&self) -> MatchedRows {
         MatchedRows::every(usize::from(self.row_step), self.height)
     }
 

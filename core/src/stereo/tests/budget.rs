@@ -23,7 +23,7 @@ fn covered_and_true(found: &[u16]) -> [f32; 2] {
     [all as f32 / found.len() as f32, good as f32 / all as f32]
 }
 
-/// The report and the disparities of a pair of which a share of all pixels is matched.
+/// The report and the disparities of a pair whose pixels are matched to a share.
 fn within<E: Executor>(share: f32, pair: &[Grey; 2], executor: &E) -> (StereoReport, Vec<u16>) {
     let config = StereoConfig { second_rows_from: 100, ..StereoConfig::default() };
     let most = (most_pixels(&capacity(WIDTH, HEIGHT), &config) as f32 * share) as usize;
