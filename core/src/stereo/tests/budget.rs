@@ -41,7 +41,7 @@ fn what_is_left_of_a_pair_is_as_true_and_covers_less() {
     let (left, right) = surface(WIDTH, HEIGHT, 9, truth);
     let pair = [left, right];
     let [whole, true_of_whole] = covered_and_true(&within(1.0, &pair, &Serial).1);
-    for (share, least) in [(0.75, 0.9), (0.5, 0.9), (0.25, 0.8), (0.1, 0.6)] {
+    for (share, least) in [(0.75, 0.9), (0.5, 0.9), (0.25, 0.8), (0.1, 0.2)] {
         let (report, found) = within(share, &pair, &Serial);
         assert!(report.row_pixels as f32 > 0.7 * share * (WIDTH * HEIGHT / 2) as f32, "{report:?}");
         let [covered, true_share] = covered_and_true(&found);
