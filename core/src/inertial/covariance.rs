@@ -7,7 +7,7 @@ use crate::state::Visitor;
 pub(super) struct Covariance<const N: usize>(pub [[f64; N]; N]);
 
 impl<const N: usize> Covariance<N> {
-    /// Of states that know nothing of each other.
+    /// Covariance of states that know nothing of each other.
     pub fn of_variances(variances: [f64; N]) -> Self {
         let mut entries = [[0.0; N]; N];
         let diagonal = entries.as_flattened_mut().iter_mut().step_by(N + 1);
