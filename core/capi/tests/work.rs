@@ -57,9 +57,12 @@ fn a_steps_work_is_counted_and_lies_within_the_bound() {
 #[test]
 fn a_budget_of_work_defers_what_is_far_and_says_so() {
     let mut config = config();
-    assert_eq!(set(&mut config, c"mapper.work_budget", c"0.001"), DynvoxStatus::Ok);
+    let most = bound(&config).unwrap();
+    assert_eq!(set(&mut config, c"mapper.work_budget", c"0.05"), DynvoxStatus::Ok);
     let report = stepped(&config, 1);
     assert!(report.fused_blocks_deferred > 0, "{report:?}");
+    let rows = report.work.stereo_pixels;
+    assert!(rows > 0 && 20 * rows <= most.stereo_pixels, "{report:?}");
     assert_eq!(
         unsafe { dynvox_work_bound(ptr::null(), ptr::null(), ptr::null_mut()) },
         DynvoxStatus::Null
