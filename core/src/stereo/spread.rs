@@ -11,8 +11,6 @@ use crate::parallel::Work;
 /// Largest difference of rows two apart that have their mean between them, in working units; other
 /// pixels get the farther disparity.
 const SAME_SURFACE: i16 = 3 * WORKING_ONE_PX / 2;
-/// Largest difference of rows farther apart: a road seen from a car changes by less within eight.
-const SAME_SURFACE_MAX: i16 = 3 * WORKING_ONE_PX;
 
 /// Spreads matched rows, which lie one behind the other, over an image: in place.
 pub(super) struct SpreadRows<'a> {
@@ -60,8 +58,7 @@ impl Work for SpreadRows<'_> {
 /// where both are one surface. Elsewhere nothing is known of what lies between.
 #[inline(always)]
 fn fill_sparse(above: &[i16], below: &[i16], between: &mut [i16], rows: MatchedRows) {
-    let most = rows.widened(SAME_SURFACE).min(SAME_SURFACE_MAX).unsigned_abs();
-    let step = (rows.step as i32).max(1);
+    let (most, step) = (rows.widened(SAME_SURFACE).unsigned_abs(), (rows.step as i32).max(1));
     for (row, at) in between.chunks_exact_mut(above.len().max(1)).zip(1..) {
         for (to, (&a, &b)) in row.iter_mut().zip(above.iter().zip(below)) {
             let (up, down) = (a & !FILLED, b & !FILLED);

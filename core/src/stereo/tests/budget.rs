@@ -41,11 +41,13 @@ fn what_is_left_of_a_pair_is_as_true_and_covers_less() {
     let (left, right) = surface(WIDTH, HEIGHT, 9, truth);
     let pair = [left, right];
     let [whole, true_of_whole] = covered_and_true(&within(1.0, &pair, &Serial).1);
-    for (share, least) in [(0.75, 0.9), (0.5, 0.9), (0.25, 0.8), (0.1, 0.2)] {
+    for (share, least, lost) in
+        [(0.75, 0.9, 0.02), (0.5, 0.9, 0.02), (0.25, 0.8, 0.03), (0.1, 0.2, 0.07)]
+    {
         let (report, found) = within(share, &pair, &Serial);
         assert!(report.row_pixels as f32 > 0.7 * share * (WIDTH * HEIGHT / 2) as f32, "{report:?}");
         let [covered, true_share] = covered_and_true(&found);
-        assert!(true_share > true_of_whole - 0.03, "{share}: {true_share} of {true_of_whole}");
+        assert!(true_share > true_of_whole - lost, "{share}: {true_share} of {true_of_whole}");
         let left = covered / whole;
         assert!((least..1.0).contains(&left), "{share}: {left} of the pixels");
     }
