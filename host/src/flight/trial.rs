@@ -1,30 +1,20 @@
 //! One flight: pictures are rendered from where the vehicle is, the mapper sees them, and the
 //! autopilot's rule lets the vehicle go as fast as the directions allow.
 
+use super::route::{FlightWorld, Route, RoutePose};
 use super::rule::{Allowed, Limits};
 use super::vehicle::{FOLLOWS_S, Multirotor};
-use super::{BODY_M, REACH_M, truth};
-use crate::synth::{
-    FlownView, MovingTraffic, Street, StreetConfig, StreetPose, SynthError, SynthFrame, Traffic,
-};
-use dynvox_core::geometry::{StereoRig, Transform};
+use super::{BODY_M, IMAGE, RATE_HZ, REACH_M, truth};
+use crate::synth::{FlownView, SynthFrame};
+use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::View;
 use dynvox_core::memory::SLAB_ALIGN;
-use dynvox_core::random::Random;
 use dynvox_core::{Capacity, Config, Mapper, PoseOrigin, Serial, StereoFrame};
 use dynvox_onboard::{Band, Direction, SECTOR_DEG, SECTORS, Vehicle, sectors};
-use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Width and height of the images, px: what stands beside the vehicle's upper and lower ends must
-/// be in view near by, too.
-const IMAGE: [u32; 2] = [320, 192];
-/// Pictures a second.
-const RATE_HZ: f64 = 10.0;
 /// Steps of the vehicle between two pictures.
 const SUBSTEPS: u32 = 5;
-/// Height of the vehicle above the road, m.
-const HEIGHT_M: f64 = 1.6;
 /// Strength of gusts, m/s², 1 sigma.
 const GUSTS_M_S2: f64 = 0.3;
 /// Standing longer than this while the way is clear is a needless stop, s.
@@ -56,7 +46,9 @@ const ANYWAY_FRAMES: usize = 10;
 /// Conditions of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conditions {
-    /// Chooses street, start, course, gusts and black pictures.
+    /// World that is flown through.
+    pub world: FlightWorld,
+    /// Chooses the world, start, course, gusts and black pictures.
     pub seed: u64,
     /// Speed that the vehicle would like to fly at, m/s.
     pub speed_m_s: f64,
@@ -111,82 +103,42 @@ pub struct FlightFrame {
     pub is_placed: bool,
 }
 
-/// A route drawn from a seed.
-struct Route {
-    street: Street,
-    along_m: f64,
-    lateral_m: f64,
-    yaw_rad: f64,
-    random: Random,
+/// Side of the window's cells, m: four voxels of the street's size.
+const CELL_M: f64 = 0.2;
+/// Most cells along a side of the window.
+const SIDE_CELLS: f64 = 200.0;
+
+/// Way in which a vehicle at a speed stops, and a second more, m.
+fn reach_m(speed_m_s: f64) -> f64 {
+    let brakes_m = speed_m_s * speed_m_s / (2.0 * LIMITS.deceleration_m_s2);
+    LIMITS.keep_m + speed_m_s * LIMITS.delay_s + brakes_m + speed_m_s
 }
 
-impl Route {
-    /// Draws a street with or without traffic, a start on it and a direction.
-    fn draw(seed: u64) -> Result<Self, SynthError> {
-        let mut random = Random::new(seed ^ 0xF117);
-        let mut between = |low: f64, high: f64| {
-            low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
-        };
-        let (along_m, lateral_m) = (between(30.0, 300.0), between(-1.0, 1.0));
-        // Half of the flights keep to the street, half leave it for what stands beside it.
-        let yaw_rad = if seed.is_multiple_of(2) { between(-0.1, 0.1) } else { between(-1.2, 1.2) };
-        let traffic = if (seed / 2).is_multiple_of(2) {
-            Traffic::None
-        } else {
-            Traffic::Moving(MovingTraffic { cars: Vec::new(), ..MovingTraffic::default() })
-        };
-        let [width, height] = IMAGE;
-        let config =
-            StreetConfig { seed, width, height, rate_hz: RATE_HZ, traffic, ..Default::default() };
-        Ok(Self { street: Street::new(config)?, along_m, lateral_m, yaw_rad, random })
-    }
-
-    /// Pose of the camera where the vehicle is, at a time.
-    fn pose(&self, vehicle: &Multirotor, time_s: f64) -> StreetPose {
-        let StreetPose { t_street_camera, .. } =
-            self.street.pose_above_road(self.along_m, self.lateral_m, HEIGHT_M, self.yaw_rad);
-        let [right, ahead] = vehicle.position_m;
-        // A gimbal holds the camera level, but for a little.
-        let turn = Vector3::new(
-            0.004 * libm::sin(9.0 * time_s),
-            0.006 * libm::sin(4.0 * time_s + 1.0),
-            0.004 * libm::sin(7.0 * time_s + 2.0),
-        );
-        let moved = Transform::new(turn, Vector3::new(right, 0.0, ahead));
-        StreetPose {
-            along_m: self.along_m + ahead * libm::cos(self.yaw_rad),
-            t_street_camera: (t_street_camera * moved).normalized(),
-        }
-    }
-
-    fn chance(&mut self, share: f64) -> bool {
-        f64::from(self.random.next_u32()) / 4_294_967_296.0 < share
+/// Bounds of a small mapper with a vehicle's window: as far to each side as it looks, 4 m high. The
+/// map must hold all that the window shows: a block that leaves a full map takes its obstacle
+/// along, and the vehicle flies into it.
+fn capacity(speed_m_s: f64) -> Capacity {
+    // To both sides, in steps of 40 cells.
+    let side = (40.0 * (reach_m(speed_m_s) / (20.0 * CELL_M)).ceil()).min(SIDE_CELLS) as usize;
+    Capacity {
+        image_width: IMAGE[0] as usize,
+        image_height: IMAGE[1] as usize,
+        planning_width: side,
+        planning_length: side,
+        planning_height: 20,
+        blocks: 20_000,
+        visible_blocks: 8_000,
+        ..Capacity::TINY
     }
 }
 
-/// Bounds of a small mapper with a vehicle's window: 12 m to each side, 4 m high. The map must hold
-/// all that the window shows: a block that leaves a full map takes its obstacle along, and the
-/// vehicle flies into it.
-const CAPACITY: Capacity = Capacity {
-    image_width: IMAGE[0] as usize,
-    image_height: IMAGE[1] as usize,
-    planning_width: 120,
-    planning_length: 120,
-    planning_height: 20,
-    blocks: 20_000,
-    visible_blocks: 8_000,
-    ..Capacity::TINY
-};
-
-/// Space that the vehicle looks at: as far as it needs to stop, and a second more.
-fn band(speed_m_s: f64) -> Band {
-    let stop_m = LIMITS.keep_m
-        + speed_m_s * LIMITS.delay_s
-        + speed_m_s * speed_m_s / (2.0 * LIMITS.deceleration_m_s2);
+/// Space that the vehicle looks at: as far as it must, and up to a metre from the window's end.
+fn band(speed_m_s: f64, capacity: &Capacity) -> Band {
+    let half_m = 0.5 * capacity.planning_width as f64 * CELL_M;
     Band {
         body_m: BODY_M as f32,
         near_m: 2.0,
-        far_m: (stop_m + speed_m_s).min(11.0) as f32,
+        far_m: reach_m(speed_m_s).min(half_m - 1.0) as f32,
         up_m: BODY_M as f32,
         down_m: BODY_M as f32,
         stale_frames: (3.0 * RATE_HZ) as u32,
@@ -204,14 +156,14 @@ impl Aboard<'_> {
     /// Maps a frame and looks around; returns true if the pose is no guess.
     ///
     /// # Errors
-    /// The pictures have another size than the street's.
+    /// The pictures have another size than the world's.
     fn map(&mut self, index: u32, pictures: &SynthFrame, is_black: bool) -> anyhow::Result<bool> {
         let [width, height] = IMAGE.map(|side| side as usize);
         let black = vec![0; width * height];
         let grey = |image| View::new(if is_black { &black } else { image }, width, height);
         let (Some(left), Some(right)) = (grey(&pictures.left_grey), grey(&pictures.right_grey))
         else {
-            anyhow::bail!("the street gives no pair of {width} x {height} px");
+            anyhow::bail!("the world gives no pair of {width} x {height} px");
         };
         let time_ns = Some((f64::from(index) / RATE_HZ * 1e9) as u64);
         let frame = StereoFrame { time_ns, ..StereoFrame::pair(left, right) };
@@ -227,20 +179,21 @@ impl Aboard<'_> {
 /// Flies once, and hands out what happened at each picture.
 ///
 /// # Errors
-/// A street that cannot be made, or a mapper that cannot be.
+/// A world that cannot be made, or a mapper that cannot be.
 pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyhow::Result<Flight> {
-    let mut route = Route::draw(conditions.seed)?;
-    let mut slab = vec![0; CAPACITY.bytes() + SLAB_ALIGN];
-    let mapper = Mapper::new(&CAPACITY, &Config::for_rig(route.street.rig()), &mut slab)?;
+    let mut route = Route::draw(conditions.world, conditions.seed)?;
+    let capacity = capacity(conditions.speed_m_s);
+    let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    let mapper = Mapper::new(&capacity, &Config::for_rig(route.rig()), &mut slab)?;
     let directions = [Direction::Unknown; SECTORS];
-    let mut aboard = Aboard { mapper, band: band(conditions.speed_m_s), directions };
+    let mut aboard = Aboard { mapper, band: band(conditions.speed_m_s, &capacity), directions };
     let mut vehicle = Multirotor::hovering(GUSTS_M_S2, conditions.seed);
     let mut flight = Flight { clearance_m: f64::INFINITY, ..Flight::default() };
     let (mut stood_s, mut way_m) = (0.0, [vehicle.position_m; ANYWAY_FRAMES]);
     for index in 0..(conditions.seconds * RATE_HZ) as u32 {
         let pose = route.pose(&vehicle, f64::from(index) / RATE_HZ);
         let is_black = index > READY_FRAMES && route.chance(conditions.black);
-        let view = route.street.seen_from(index, &pose);
+        let view = route.view(index, &pose);
         // The vehicle goes by what was told of the frame before: a message takes its time.
         let is_ready = index >= READY_FRAMES;
         let wanted = if is_ready { conditions.speed_m_s } else { 0.0 };
@@ -269,12 +222,12 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
             is_placed,
         });
         if flight.clearance_m < 0.0 {
-            let before = route.street.seen_from(index.saturating_sub(1), &pose);
+            let before = route.view(index.saturating_sub(1), &pose);
             let at = [0, 1].map(|axis| vehicle.position_m[axis] - from[axis]);
             let was_m = [0, 1].map(|axis| way_m[0][axis] - from[axis]);
             flight.run_over = vehicle.speed_m_s() < STANDS_M_S
-                || is_met_unseen([&before, &view], at, &route.street.rig())
-                || is_met_anyway(&route.street, index, &pose, was_m);
+                || is_met_unseen([&before, &view], at, &route.rig())
+                || is_met_anyway(&route, index, &pose, was_m);
             flight.collided = !flight.run_over;
             break;
         }
@@ -348,31 +301,48 @@ fn is_met_unseen(
 
 /// Tells that something comes to a place, right and ahead of the camera, within a second before and
 /// after a picture.
-fn is_met_anyway(street: &Street, index: u32, pose: &StreetPose, [right, ahead]: [f64; 2]) -> bool {
+fn is_met_anyway(route: &Route, index: u32, pose: &RoutePose, [right, ahead]: [f64; 2]) -> bool {
     let frames = ANYWAY_FRAMES as u32;
-    (index.saturating_sub(frames)..=index + frames).any(|index| {
-        street.seen_from(index, pose).clearance_m([right, 0.0, ahead], REACH_M) < BODY_M
-    })
+    (index.saturating_sub(frames)..=index + frames)
+        .any(|index| route.view(index, pose).clearance_m([right, 0.0, ahead], REACH_M) < BODY_M)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::route::HEIGHT_M;
     use super::*;
+    use crate::synth::{Street, StreetConfig};
+
+    const CONDITIONS: Conditions = Conditions {
+        world: FlightWorld::Street,
+        seed: 0,
+        speed_m_s: 4.0,
+        black: 0.0,
+        seconds: 2.5,
+    };
 
     #[test]
     fn a_vehicle_flies_down_the_street_and_touches_nothing() {
-        let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 0.0, seconds: 2.5 };
-        let flight = fly(&conditions, |_| {}).unwrap();
+        let flight = fly(&CONDITIONS, |_| {}).unwrap();
         assert!(!flight.collided && !flight.run_over && flight.clearance_m > 0.3, "{flight:?}");
         // Let go after half a second, at 4 m/s.
         assert!((2.0..8.5).contains(&flight.flown_m), "{flight:?}");
-        assert_eq!(fly(&conditions, |_| {}).unwrap(), flight, "one seed, one flight");
+        assert_eq!(fly(&CONDITIONS, |_| {}).unwrap(), flight, "one seed, one flight");
+    }
+
+    #[test]
+    fn a_vehicle_flies_across_a_yard_and_touches_nobody() {
+        let world = FlightWorld::Yard;
+        let conditions = Conditions { world, speed_m_s: 2.0, seconds: 3.0, ..CONDITIONS };
+        let flight = fly(&conditions, |_| {}).unwrap();
+        assert!(!flight.collided && !flight.run_over && flight.clearance_m > 0.3, "{flight:?}");
+        assert!(flight.flown_m > 1.0, "{flight:?}");
     }
 
     #[dynvox_needs::long]
     #[test]
     fn a_car_that_crosses_runs_a_vehicle_over() {
-        let conditions = Conditions { seed: 3, speed_m_s: 4.0, black: 0.0, seconds: 12.0 };
+        let conditions = Conditions { seed: 3, seconds: 12.0, ..CONDITIONS };
         let flight = fly(&conditions, |_| {}).unwrap();
         assert!(flight.run_over && !flight.collided, "{flight:?}");
     }
@@ -396,7 +366,7 @@ mod tests {
     #[dynvox_needs::long]
     #[test]
     fn a_vehicle_whose_pictures_are_black_does_not_fly_on() {
-        let conditions = Conditions { seed: 0, speed_m_s: 4.0, black: 1.0, seconds: 2.5 };
+        let conditions = Conditions { black: 1.0, ..CONDITIONS };
         let flight = fly(&conditions, |_| {}).unwrap();
         assert!(flight.flown_m < 1.0 && flight.extrapolated > 15, "{flight:?}");
     }

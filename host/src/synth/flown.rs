@@ -5,7 +5,10 @@ use nalgebra::Vector3;
 
 use super::frame::SynthFrame;
 use super::mesh::Point;
+use super::room::Room;
+use super::scene::Scene;
 use super::street::{Street, Surroundings};
+use super::world::World;
 
 /// Position and direction of a camera in the street.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,11 +19,16 @@ pub struct StreetPose {
     pub t_street_camera: Transform,
 }
 
-/// The street around a camera at a time.
+/// The world around a camera at a time.
 pub struct FlownView<'s> {
-    street: &'s Street,
-    around: Surroundings,
+    world: FlownWorld<'s>,
     index: u32,
+}
+
+/// What is around, and the world that it is part of.
+enum FlownWorld<'s> {
+    Street { street: &'s Street, around: Surroundings },
+    Room { room: &'s Room, scene: Scene, t_room_camera: Transform },
 }
 
 impl Street {
@@ -53,14 +61,37 @@ impl Street {
     pub fn seen_from(&self, index: u32, pose: &StreetPose) -> FlownView<'_> {
         let around =
             self.surroundings_of(self.time_s(index), pose.along_m, |_| pose.t_street_camera);
-        FlownView { street: self, around, index }
+        FlownView { world: FlownWorld::Street { street: self, around }, index }
+    }
+}
+
+impl Room {
+    /// The room or yard around a camera at the time of frame `index`.
+    pub fn seen_from(&self, index: u32, t_room_camera: &Transform) -> FlownView<'_> {
+        let scene = self.scene(self.time_s(index), t_room_camera);
+        let world = FlownWorld::Room { room: self, scene, t_room_camera: *t_room_camera };
+        FlownView { world, index }
     }
 }
 
 impl FlownView<'_> {
-    /// The pair with its truth. The world of its poses is the street.
+    /// The pair with its truth. The world of its poses is the street, or the room.
     pub fn frame(&self) -> SynthFrame {
-        self.street.frame_of(self.index, &self.around, self.around.t_street_camera)
+        match &self.world {
+            FlownWorld::Street { street, around } => {
+                street.frame_of(self.index, around, around.t_street_camera)
+            }
+            FlownWorld::Room { room, scene, t_room_camera } => {
+                room.frame_of(self.index, scene, *t_room_camera)
+            }
+        }
+    }
+
+    fn scene(&self) -> &Scene {
+        match &self.world {
+            FlownWorld::Street { around, .. } => &around.scene,
+            FlownWorld::Room { scene, .. } => scene,
+        }
     }
 
     /// Distance from a point, in the camera's coordinates, m, to the nearest surface, at most
@@ -68,7 +99,7 @@ impl FlownView<'_> {
     pub fn clearance_m(&self, point_m: [f64; 3], reach_m: f64) -> f64 {
         let point = Point::from(point_m);
         let mut least = reach_m;
-        for object in &self.around.scene.objects {
+        for object in &self.scene().objects {
             let mesh = &object.mesh;
             if (object.to_camera.point(mesh.middle_m) - point).norm() - mesh.radius_m > least {
                 continue;
@@ -110,7 +141,7 @@ fn distance_m(point: Point, [a, b, c]: [Point; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::StreetConfig;
+    use crate::synth::{RoomConfig, RoomKind, StreetConfig};
 
     #[test]
     fn a_distance_is_that_of_the_nearest_of_many_points() {
@@ -149,6 +180,20 @@ mod tests {
             assert!(view.clearance_m(ray.map(|c| c * z), 5.0) < 1e-3);
             assert!(view.clearance_m(ray.map(|c| c * (z - 0.5)), 5.0) <= 0.5 * 1.3);
         }
+    }
+
+    #[test]
+    fn a_yard_has_its_ground_below_and_the_frame_of_its_own_path() {
+        let config = RoomConfig { width: 96, height: 64, ..RoomConfig::default() };
+        let yard = Room::new(RoomKind::Yard, config).unwrap();
+        let pose = yard.pose_above_floor([0.0, 0.0], 1.5, 0.3);
+        let view = yard.seen_from(0, &pose);
+        assert!(view.clearance_m([0.0; 3], 5.0) <= 1.5 + 1e-6);
+        assert!((view.clearance_m([0.0, 1.4, 0.0], 5.0) - 0.1).abs() < 0.05);
+        // A yard's frame of its own path differs in the world of its poses only.
+        let own = yard.t_camera0_room.inverse() * yard.t_world_camera(7);
+        let (frame, flown) = (yard.frame(7), yard.seen_from(7, &own).frame());
+        assert_eq!((frame.left_grey, frame.right_grey), (flown.left_grey, flown.right_grey));
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! `dynvox evaluate flight`.
 
-use crate::flight::{Conditions, Flight, FlightFrame, fly};
+use crate::flight::{Conditions, Flight, FlightFrame, FlightWorld, fly};
 use anyhow::bail;
 use rayon::prelude::*;
 use serde::Serialize;
 
 #[derive(Debug, clap::Args)]
 pub struct FlightArgs {
-    /// Flights, each through a street of its own
+    /// World that is flown through
+    #[arg(long, value_enum, default_value_t)]
+    world: FlightWorld,
+    /// Flights, each through a world of its own
     #[arg(long, default_value_t = 100, value_name = "N")]
     trials: u64,
     /// Seed of the first flight; the others count on from it
@@ -40,8 +43,8 @@ struct FlightRow {
 
 impl FlightArgs {
     fn conditions(&self, seed: u64) -> Conditions {
-        let &Self { speed: speed_m_s, black, seconds, .. } = self;
-        Conditions { seed, speed_m_s, black, seconds }
+        let &Self { world, speed: speed_m_s, black, seconds, .. } = self;
+        Conditions { world, seed, speed_m_s, black, seconds }
     }
 }
 

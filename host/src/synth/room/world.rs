@@ -42,7 +42,7 @@ pub struct Room {
     meshes: Vec<Arc<Mesh>>,
     people: Vec<Person>,
     sun: Option<Sun>,
-    pub(super) t_camera0_room: Transform,
+    pub(in crate::synth) t_camera0_room: Transform,
 }
 
 /// Sunlight of a yard.
@@ -114,8 +114,48 @@ impl Room {
         &self.config
     }
 
+    /// Pose of a camera above the floor: `at_m` to the right of and ahead of the middle,
+    /// `height_m` above the floor, turned to the right by `yaw_rad`.
+    pub fn pose_above_floor(
+        &self,
+        [right_m, ahead_m]: [f64; 2],
+        height_m: f64,
+        yaw_rad: f64,
+    ) -> Transform {
+        Transform::new(Vector3::new(0.0, yaw_rad, 0.0), Vector3::new(right_m, -height_m, ahead_m))
+    }
+
+    /// Half the width and half the length of what is free of plants and furniture, m.
+    pub fn open_half_m(&self) -> [f64; 2] {
+        Extent::new(self.kind, &self.config).round_m
+    }
+
+    /// Frame of a scene, in which the world of the poses is the room.
+    pub(in crate::synth) fn frame_of(
+        &self,
+        index: u32,
+        scene: &Scene,
+        t_room_camera: Transform,
+    ) -> SynthFrame {
+        let moment = self.moment(index, t_room_camera, &Transform::IDENTITY);
+        self.studio.frame(core::slice::from_ref(scene), moment)
+    }
+
+    /// Time, light and truth of a frame, in a world that the room has a pose in.
+    fn moment(&self, index: u32, t_world_camera: Transform, t_world_room: &Transform) -> Moment {
+        let time_s = self.time_s(index);
+        let truth = |(number, person): (u32, &Standing)| person.truth(number, t_world_room);
+        Moment {
+            index,
+            time_s,
+            gain: self.gain(time_s),
+            t_world_camera,
+            objects: (0..).zip(&self.people_at(time_s)).map(truth).collect(),
+        }
+    }
+
     /// Everything at a time, seen from a pose of the camera.
-    fn scene(&self, time_s: f64, t_room_camera: &Transform) -> Scene {
+    pub(in crate::synth) fn scene(&self, time_s: f64, t_room_camera: &Transform) -> Scene {
         let t_camera_room = t_room_camera.inverse();
         let still = |mesh: &Arc<Mesh>| {
             SceneObject::new(Arc::clone(mesh), &Transform::IDENTITY, &t_camera_room)
@@ -209,14 +249,7 @@ impl World for Room {
         let time_s = self.time_s(index);
         let scene = |time_s: f64| self.scene(time_s, &self.path.t_room_camera(time_s));
         let scenes: Vec<Scene> = self.moments(time_s).map(scene).collect();
-        let truth = |(number, person): (u32, &Standing)| person.truth(number, &self.t_camera0_room);
-        let moment = Moment {
-            index,
-            time_s,
-            gain: self.gain(time_s),
-            t_world_camera: self.t_world_camera(index),
-            objects: (0..).zip(&self.people_at(time_s)).map(truth).collect(),
-        };
+        let moment = self.moment(index, self.t_world_camera(index), &self.t_camera0_room);
         self.studio.frame(&scenes, moment)
     }
 
