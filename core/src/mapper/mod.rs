@@ -28,6 +28,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 mod two_slabs;
+mod within;
 mod work;
 
 pub use accumulated::PosePrecision;

@@ -263,6 +263,7 @@ impl Report {
         } else if self.pose == PoseOrigin::Relocalized
             || self.precision == PosePrecision::Imprecise
             || self.dropped_features() + self.prune.early + self.deferred.fused_blocks > 0
+            || self.stereo.is_left_out()
             || self.self_calibration.state() > CalibrationState::Sound
         {
             Severity::Recovered

@@ -54,7 +54,7 @@ pub struct MapperConfig {
     pub egomotion: MotionSource,
     /// Frames from one that is fused to the next.
     pub fuse_every: u32,
-    /// Share of the bound on work ([`crate::Capacity::work`]) that dense matching, fusion and
+    /// Share of the bound on work ([`crate::Capacity::work`]) that stereo, scene flow, fusion and
     /// pruning may do in a frame.
     pub work_budget: f32,
 }
@@ -84,10 +84,10 @@ impl MapperConfig {
         Row::user("mapper.work_budget", "", |c| F32(&mut c.work_budget))
             .range(Range::AboveTo(0.0, 1.0))
             .text(
-                "Share of the bound on work (`dynvox budget --work`) that dense matching, fusion \
-                 and pruning may do in a frame. Below 1 fewer rows are matched, and the nearest \
-                 blocks are fused first; farther ones are left out and counted, and planners learn \
-                 nothing beyond them.",
+                "Share of the bound on work (`dynvox budget --work`) that stereo, scene flow, \
+                 fusion and pruning may do in a frame. Below 1 fewer rows are matched and fewer \
+                 features kept, and the nearest blocks are fused first; farther ones are left out \
+                 and counted, and planners learn nothing beyond them.",
             ),
     ];
 

@@ -315,7 +315,8 @@ impl<'s> Mapper<'s> {
         self.static_map.volume.enter_segment(self.localization.camera.segment());
         self.tracker.set_frame_interval_s(self.clock.interval_s());
         let unused = self.ignored.pair(self.size.unwrap_or_default(), self.rectifier.invalid());
-        self.scene_flow.rebuild(&self.config.scene_flow, unused.as_ref());
+        let flow = self.config.scene_flow_within(&self.capacity);
+        self.scene_flow.rebuild(&flow, unused.as_ref());
         self.objects.rebuild() && self.static_map.volume.rebuild()
     }
 }

@@ -23,7 +23,7 @@ use crate::{
     scene_flow::{FlowReport, FlowStatus, Match},
     segmentation::SegmentationReport,
     state::Hasher,
-    stereo::{self, StereoReport},
+    stereo::StereoReport,
     tracking::TrackingReport,
     volume::{AllocationReport, BlockStore, NoStore, PruneReport},
 };
@@ -255,12 +255,12 @@ impl Mapper<'_> {
             invalid: invalid.as_ref(),
             right_moved: localization.rows_moved,
         };
-        let most = config.mapper.budget_of(stereo::most_pixels(capacity, &config.stereo));
+        let (most, flow) = (config.stereo_budget(capacity), config.scene_flow_within(capacity));
         let compute_disparity = || match frame.disparity_q8 {
             Some(given) => stereo.take(given, invalid.as_ref().filter(|_| ignored.is_used())),
             None => stereo.compute_within(&config.stereo, &pair, most, executor),
         };
-        let match_features = || scene_flow.push_within(&config.scene_flow, &pair, executor);
+        let match_features = || scene_flow.push_within(&flow, &pair, executor);
         let reports = executor.join(
             || executor.stage(Stage::Stereo, compute_disparity),
             || executor.stage(Stage::SceneFlow, match_features),

@@ -134,8 +134,7 @@ impl Capacity {
     /// ```
     pub fn work(&self, config: &Config) -> WorkUnits {
         let points = stereo::max_points(self);
-        // The sparse pass keeps a quarter of what the dense one does.
-        let features = self.features + self.features / 4;
+        let features: usize = scene_flow::most_features(self).iter().sum();
         let rays = self.image_width.div_ceil(PIXEL_STEP) * self.image_height.div_ceil(PIXEL_STEP);
         let requests = rays * MAX_BLOCKS_PER_RAY;
         let pruned = self.blocks.min(config.volume.prune_blocks_per_frame as usize);

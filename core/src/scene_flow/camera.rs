@@ -75,9 +75,10 @@ pub(super) struct Names {
 /// Rows that the filters work on, and then suppression.
 const WORKING_ROWS: usize = if COLUMN_SUMS > SCRATCH_ROWS { COLUMN_SUMS } else { SCRATCH_ROWS };
 
-/// Features of the sparse pass: its peaks are at most a sixth as dense.
-const fn sparse(capacity: &Capacity) -> usize {
-    capacity.features / 4
+/// The most features of an image, of the dense pass and of the sparse one: its peaks are at most a
+/// sixth as dense.
+pub(crate) const fn most_features(capacity: &Capacity) -> [usize; 2] {
+    [capacity.features, capacity.features / 4]
 }
 
 /// Cuts the first `count` items off `rest`, which has as many by construction.
@@ -88,7 +89,8 @@ fn part<'s, T>(rest: &mut &'s mut [T], count: usize) -> &'s mut [T] {
 impl<'s> Camera<'s> {
     pub(super) const fn bytes(capacity: &Capacity) -> usize {
         let pixels = capacity.pixels();
-        let features = 2 * (capacity.features + sparse(capacity));
+        let [dense, sparse] = most_features(capacity);
+        let features = 2 * (dense + sparse);
         region_bytes::<u8>(2 * pixels)
             + region_bytes::<[u16; 2]>(features)
             + region_bytes::<[Descriptor; 2]>(features)
@@ -102,7 +104,7 @@ impl<'s> Camera<'s> {
 
     pub(super) fn new_in(capacity: &Capacity, carver: &mut Carver<'s>, names: &Names) -> Self {
         let pixels = capacity.pixels();
-        let sets = [capacity.features, sparse(capacity)];
+        let sets = most_features(capacity);
         // Two frames, the current and the previous one, with a dense and a sparse set each.
         let features = 2 * (sets[0] + sets[1]);
         let mut image = carver.alloc(names.pixels, 2 * pixels);

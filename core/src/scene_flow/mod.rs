@@ -53,6 +53,7 @@ mod turned;
 
 use crate::parallel::BANDS;
 pub use camera::FeatureCount;
+pub(crate) use camera::most_features;
 use circle::Reach;
 pub(crate) use config::MAX_FEATURES;
 pub use config::SceneFlowConfig;
@@ -64,8 +65,7 @@ pub use report::{FlowReport, FlowStatus, PassCount};
 
 /// The most descriptors that a frame compares, over both passes.
 pub(crate) fn most_compared(capacity: &crate::Capacity, config: &SceneFlowConfig) -> u64 {
-    // The sparse pass keeps a quarter of what the dense one does.
-    let [dense, sparse] = [capacity.features, capacity.features / 4];
+    let [dense, sparse] = most_features(capacity);
     let most = |features| Reach::most_compared(config, features) as u64;
     // The sparse pass looks everywhere; the dense one does so for a sample of its features, and for
     // the rest as far as an average allows.

@@ -11,6 +11,7 @@ use super::{
     prior::DisparitySet,
     rows::MatchedRows,
     support,
+    support::Lattice,
 };
 use crate::{
     digest::Digest,
@@ -48,6 +49,8 @@ pub struct StereoMatcher<'s> {
     height: usize,
     /// True if the gradients' memory holds the confidences of the last pair.
     has_confidence: bool,
+    /// Candidates for support points of the last pair that were matched.
+    lattice: Lattice,
     /// Rows of the last pair from one that was matched densely to the next.
     row_step: u16,
 }
@@ -79,6 +82,15 @@ impl core::fmt::Debug for StereoMatcher<'_> {
             .field("height", &self.height)
             .finish_non_exhaustive()
     }
+}
+
+/// The most that is looked for in a pair.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StereoBudget {
+    /// Pixels matched densely.
+    pub pixels: usize,
+    /// Candidates for support points.
+    pub points: usize,
 }
 
 /// Support points there can be: one per candidate.
@@ -154,6 +166,7 @@ impl<'s> StereoMatcher<'s> {
             width: 1,
             height: 1,
             has_confidence: false,
+            lattice: Lattice::ALL,
             row_step: 1,
         }
     }
@@ -199,18 +212,19 @@ impl<'s> StereoMatcher<'s> {
     }
 
     /// Computes disparities like [`StereoMatcher::compute`], for a pair with invalid pixels: they
-    /// get no disparity, nor do pixels whose partner in the right image is one of them. At most
-    /// `most` pixels are matched densely.
+    /// get no disparity, nor do pixels whose partner in the right image is one of them. No more is
+    /// looked for than the budget allows.
     pub(crate) fn compute_within<E: Executor>(
         &mut self,
         config: &StereoConfig,
         pair: &MaskedPair<'_>,
-        most: usize,
+        most: StereoBudget,
         executor: &E,
     ) -> StereoReport {
-        let height = pair.left.height();
-        self.row_step =
-            MatchedRows::within(config, height, most / pair.left.width().max(1)).step as u16;
+        let [width, height] = [pair.left.width(), pair.left.height()].map(|side| side.max(1));
+        self.row_step = MatchedRows::within(config, height, most.pixels / width).step as u16;
+        let grid = [width, height].map(|side| support::candidates(side, CANDIDATE_STEP));
+        self.lattice = Lattice::within(grid, most.points);
         self.compute_steps(config, pair, executor, |_| ())
     }
 
@@ -226,6 +240,7 @@ impl<'s> StereoMatcher<'s> {
     ) -> StereoReport {
         let pair = MaskedPair { left, right, invalid: None, right_moved: false };
         self.row_step = MatchedRows::new(config, left.height()).step as u16;
+        self.lattice = Lattice::ALL;
         self.compute_steps(config, &pair, executor, done)
     }
 

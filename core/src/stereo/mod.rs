@@ -87,7 +87,7 @@ pub use config::{
     CANDIDATE_STEP, DISPARITY_LIMIT, GapEnds, MAX_PLANE_RADIUS, MIN_GRID_SIZE, StereoConfig,
 };
 pub use matcher::StereoMatcher;
-pub(crate) use matcher::max_points;
+pub(crate) use matcher::{StereoBudget, max_points};
 pub use report::{StereoReport, StereoStatus, StereoStep};
 pub(crate) use rows::most_pixels;
 

@@ -82,6 +82,21 @@ impl StereoReport {
     pub fn density(&self) -> f32 {
         if self.pixels == 0 { 0.0 } else { self.valid as f32 / self.pixels as f32 }
     }
+
+    /// Returns true if a budget of work left no row to look for support points or to match.
+    ///
+    /// ```
+    /// use dynvox_core::stereo::{StereoReport, StereoStatus};
+    ///
+    /// let mut report = StereoReport::default();
+    /// (report.status, report.candidates) = (StereoStatus::Matched, 100);
+    /// assert!(report.is_left_out());
+    /// ```
+    pub fn is_left_out(&self) -> bool {
+        let is_looked_for =
+            matches!(self.status, StereoStatus::Matched | StereoStatus::TooFewSupportPoints);
+        is_looked_for && (self.row_pixels == 0 || self.candidates == 0)
+    }
 }
 
 /// A step of the matcher, as a name for measurements.

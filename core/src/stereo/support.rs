@@ -49,6 +49,63 @@ pub(super) struct SupportMatching<'a> {
     pub left: Gradients<'a>,
     /// Right gradients.
     pub right: Gradients<'a>,
+    /// Candidates that are matched.
+    pub lattice: Lattice,
+}
+
+/// Candidates that are matched: all, but within a budget. Then every so many rows and columns are,
+/// about as many of both, so that points still have neighbours above and beside them.
+///
+/// Four bits each for the rows and the columns from one that is matched to the next; no rows where
+/// nothing is matched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Lattice(u8);
+
+/// Most rows or columns from one that is matched to the next.
+const SPARSEST: u8 = 15;
+
+impl Lattice {
+    /// Every candidate.
+    pub const ALL: Self = Self::every(1, 1);
+    /// No candidate.
+    const NONE: Self = Self::every(0, 1);
+
+    const fn every(rows: u8, columns: u8) -> Self {
+        Self(rows << 4 | columns)
+    }
+
+    /// Rows and columns from one that is matched to the next.
+    fn steps(self) -> [usize; 2] {
+        [self.0 >> 4, self.0 & 15].map(usize::from)
+    }
+
+    /// The densest lattice with at most `most` of the candidates of a grid, or one without any
+    /// where even the sparsest has more.
+    pub fn within(grid: [usize; 2], most: usize) -> Self {
+        // Rows first: one that is left out needs no descriptors either.
+        let lattices = (1..=SPARSEST).flat_map(|rows| {
+            [rows.saturating_sub(1).max(1), rows].map(|columns| Self::every(rows, columns))
+        });
+        lattices.into_iter().find(|lattice| lattice.count(grid) <= most).unwrap_or(Self::NONE)
+    }
+
+    /// Candidates of a grid of so many columns and rows that are matched.
+    pub fn count(self, [columns, rows]: [usize; 2]) -> usize {
+        let of = |all: usize, step: usize| all.checked_div(step).unwrap_or_default();
+        let [every_row, every_column] = self.steps();
+        of(columns, every_column) * of(rows, every_row)
+    }
+
+    /// Returns true if the candidates of that row are matched.
+    fn has_row(self, row: usize) -> bool {
+        // Of so many rows the last: the first ones have no row above.
+        (row + 1).checked_rem(self.steps()[0]) == Some(0)
+    }
+
+    /// Returns true if the candidates of that column are matched.
+    fn has_column(self, column: usize) -> bool {
+        (column + 1).checked_rem(self.steps()[1]) == Some(0)
+    }
 }
 
 /// Two rows of descriptors, above and below a row of candidates.
@@ -142,6 +199,9 @@ impl SupportMatching<'_> {
         };
         // Descriptors of the two rows a support point is seen in, above and below it.
         for (j, out) in grid.chunks_exact_mut(candidates(width, step).max(1)).enumerate() {
+            if !self.lattice.has_row(first + j) {
+                continue;
+            }
             let v = (first + j) * step;
             let Some(above) = v.checked_sub(CORNER) else { continue };
             let below = v + CORNER;
@@ -175,7 +235,7 @@ impl SupportMatching<'_> {
         let tolerance = usize::from(self.config.consistency_threshold);
         for (i, out) in out.iter_mut().enumerate() {
             let u = i * CANDIDATE_STEP;
-            if u < first || u >= end {
+            if u < first || u >= end || !self.lattice.has_column(i) {
                 continue;
             }
             // From left to right: the partner lies at most disparity_max columns to the left.
@@ -268,10 +328,29 @@ mod tests {
     }
 
     #[test]
+    fn a_lattice_has_as_many_candidates_as_it_may_and_no_more() {
+        for grid in [[0, 0], [1, 1], [7, 3], [64, 20], [246, 74]] {
+            let [columns, rows] = grid;
+            for most in 0..=columns * rows + 1 {
+                let lattice = Lattice::within(grid, most);
+                let found = (0..columns * rows)
+                    .filter(|k| lattice.has_column(k % columns) && lattice.has_row(k / columns));
+                assert_eq!(found.count(), lattice.count(grid), "{grid:?}: {lattice:?}");
+                assert!(lattice.count(grid) <= most, "{grid:?}: {lattice:?} of {most}");
+            }
+            assert_eq!(Lattice::within(grid, columns * rows), Lattice::ALL);
+        }
+        let of = |share: usize| Lattice::within([240, 70], share * 240 * 70 / 100);
+        let steps = [75, 50, 25, 10, 0].map(of).map(Lattice::steps);
+        assert_eq!(steps, [[2, 1], [2, 1], [2, 2], [4, 3], [0, 1]]);
+    }
+
+    #[test]
     fn the_distinct_one_of_whole_blocks_is_that_of_one_cost_at_a_time() {
         let config = StereoConfig::robotics();
         let flat = Gradients { du: &[], dv: &[], width: 0, height: 0 };
-        let matching = SupportMatching { config: &config, left: flat, right: flat };
+        let matching =
+            SupportMatching { config: &config, left: flat, right: flat, lattice: Lattice::ALL };
         let mut random = Random::new(71);
         let mut found = 0;
         // Every count of disparities, twice: lists that end within a block are the delicate ones.

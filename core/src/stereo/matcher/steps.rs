@@ -74,7 +74,7 @@ impl StereoMatcher<'_> {
             support::candidates(self.height, CANDIDATE_STEP),
         );
         let bands = Bands::new(rows);
-        let matching = SupportMatching { config, left, right };
+        let matching = SupportMatching { config, left, right, lattice: self.lattice };
         // Bands run at the same time, each with its own rows of descriptors.
         let jobs = zip3(
             bands.first(),
@@ -85,7 +85,7 @@ impl StereoMatcher<'_> {
             compare(executor.vectors(), MatchRows { matching, first, grid, scratch })
         });
         let grid = clipped(self.support, ..columns * rows);
-        report.candidates = grid.len() as u32;
+        report.candidates = self.lattice.count([columns, rows]) as u32;
         report.support_matches = grid.iter().filter(|&&d| d != NO_MATCH).count() as u32;
     }
 

@@ -26,12 +26,16 @@ fn covered_and_true(found: &[u16]) -> [f32; 2] {
 /// The report and the disparities of a pair whose pixels are matched to a share.
 fn within<E: Executor>(share: f32, pair: &[Grey; 2], executor: &E) -> (StereoReport, Vec<u16>) {
     let config = StereoConfig { second_rows_from: 100, ..StereoConfig::default() };
-    let most = (most_pixels(&capacity(WIDTH, HEIGHT), &config) as f32 * share) as usize;
-    with_matcher(&capacity(WIDTH, HEIGHT), |matcher| {
+    let capacity = capacity(WIDTH, HEIGHT);
+    let [pixels, points] = [most_pixels(&capacity, &config), max_points(&capacity)]
+        .map(|most| (most as f32 * share) as usize);
+    with_matcher(&capacity, |matcher| {
         let [left, right] = pair.each_ref().map(Grey::view);
         let pair = MaskedPair { left, right, invalid: None, right_moved: false };
+        let most = StereoBudget { pixels, points };
         let report = matcher.compute_within(&config, &pair, most, executor);
-        assert!(report.row_pixels as usize <= most, "{share}: {report:?}");
+        assert!(report.row_pixels as usize <= pixels, "{share}: {report:?}");
+        assert!(report.candidates as usize <= points, "{share}: {report:?}");
         (report, matcher.disparity_q8().rows().flatten().copied().collect())
     })
 }
@@ -42,7 +46,7 @@ fn what_is_left_of_a_pair_is_as_true_and_covers_less() {
     let pair = [left, right];
     let [whole, true_of_whole] = covered_and_true(&within(1.0, &pair, &Serial).1);
     for (share, least, lost) in
-        [(0.75, 0.9, 0.02), (0.5, 0.9, 0.02), (0.25, 0.8, 0.03), (0.1, 0.2, 0.07)]
+        [(0.75, 0.9, 0.02), (0.5, 0.9, 0.02), (0.25, 0.8, 0.04), (0.1, 0.2, 0.09)]
     {
         let (report, found) = within(share, &pair, &Serial);
         assert!(report.row_pixels as f32 > 0.7 * share * (WIDTH * HEIGHT / 2) as f32, "{report:?}");
@@ -61,8 +65,10 @@ fn nothing_is_said_between_two_surfaces_and_without_a_row() {
     let tops = found.iter().filter(|&&d| d > 0 && d.abs_diff(8 << 8) > 256);
     assert!(tops.into_iter().all(|&d| d.abs_diff(40 << 8) <= 256));
     let (left, right) = surface(WIDTH, HEIGHT, 9, truth);
-    let (report, none) = within(0.001, &[left, right], &Serial);
-    assert_eq!((report.row_pixels, report.valid), (0, 0));
+    let pair = [left, right];
+    let (report, none) = within(0.001, &pair, &Serial);
+    assert_eq!((report.row_pixels, report.candidates, report.valid), (0, 0, 0));
+    assert!(report.is_left_out() && !within(1.0, &pair, &Serial).0.is_left_out());
     assert!(none.iter().all(|&d| d == 0));
 }
 
