@@ -82,6 +82,31 @@ impl Sectors {
         &self.band
     }
 
+    /// Returns the directions with the nearer of two obstacles in each: what is there now, and what
+    /// will be there `later`, by maps for a time ahead ([`Mapper::update_planning_maps`]). A
+    /// direction that is unknown now stays unknown.
+    ///
+    /// [`Mapper::update_planning_maps`]: dynvox_core::Mapper::update_planning_maps
+    pub fn or_nearer(mut self, later: &Self) -> Self {
+        let now = self.directions.iter_mut().zip(&mut self.points_m);
+        for ((direction, point), (then, to)) in
+            now.zip(later.directions.iter().zip(&later.points_m))
+        {
+            // What is unknown stops a vehicle anyhow, and nothing that is told of later frees it.
+            let is_nearer = match (*direction, *then) {
+                (Direction::Free, Direction::Obstacle { .. }) => true,
+                (Direction::Obstacle { distance_m: now_m }, Direction::Obstacle { distance_m }) => {
+                    distance_m < now_m
+                }
+                _ => false,
+            };
+            if is_nearer {
+                (*direction, *point) = (*then, *to);
+            }
+        }
+        self
+    }
+
     /// Number of directions in which nothing is known.
     pub fn unknown(&self) -> usize {
         self.directions.iter().filter(|direction| **direction == Direction::Unknown).count()

@@ -203,6 +203,39 @@ fn a_pose_that_is_a_guess_and_old_looks_leave_nothing_free() {
 }
 
 #[test]
+fn of_now_and_later_the_nearer_obstacle_counts_and_unknown_stays() {
+    let (mut before, mut nearer) = (None::<Sectors>, 0);
+    each_window(60, |planning, pose, random| {
+        let now = sectors(planning, &Vehicle::new(pose, true), &any_band(random));
+        if let Some(later) = &before {
+            let both = now.clone().or_nearer(later);
+            for sector in 0..SECTORS {
+                let [now, later, both] =
+                    [&now, later, &both].map(|sectors| sectors.directions()[sector]);
+                let to_m = |direction| match direction {
+                    Direction::Obstacle { distance_m } => distance_m,
+                    _ => f32::INFINITY,
+                };
+                assert_eq!(both == Direction::Unknown, now == Direction::Unknown);
+                if now != Direction::Unknown {
+                    assert_eq!(to_m(both), to_m(now).min(to_m(later)));
+                    nearer += usize::from(both != now);
+                }
+            }
+            assert_eq!(
+                points(&both).count(),
+                both.directions()
+                    .iter()
+                    .filter(|direction| matches!(direction, Direction::Obstacle { .. }))
+                    .count()
+            );
+        }
+        before = Some(now);
+    });
+    assert!(nearer > 100, "{nearer}");
+}
+
+#[test]
 fn costs_are_free_only_where_every_cell_was_seen_free() {
     let mut counts = [0; 3];
     each_window(200, |planning, pose, random| {

@@ -31,13 +31,13 @@ pub enum FlightWorld {
 
 /// A route drawn from a seed.
 pub struct Route {
-    place: Place,
+    ground: Ground,
     yaw_rad: f64,
     random: Random,
 }
 
-/// The world with the place where the vehicle starts.
-enum Place {
+/// The world, and the point where the vehicle starts.
+enum Ground {
     Street { street: Box<Street>, along_m: f64, lateral_m: f64 },
     Yard { yard: Box<Room>, at_m: [f64; 2] },
 }
@@ -61,7 +61,7 @@ impl Route {
             low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
         };
         let [width, height] = IMAGE;
-        let (place, yaw_rad) = match world {
+        let (ground, yaw_rad) = match world {
             FlightWorld::Street => {
                 let (along_m, lateral_m) = (between(30.0, 300.0), between(-1.0, 1.0));
                 // Half of the flights keep to the street, half leave it for what stands beside it.
@@ -81,7 +81,7 @@ impl Route {
                     ..Default::default()
                 };
                 let street = Box::new(Street::new(config)?);
-                (Place::Street { street, along_m, lateral_m }, yaw_rad)
+                (Ground::Street { street, along_m, lateral_m }, yaw_rad)
             }
             FlightWorld::Yard => {
                 let config = RoomConfig {
@@ -93,21 +93,22 @@ impl Route {
                     people: PEOPLE,
                     ..Default::default()
                 };
+                // Hedges stand around the open ground, and people walk about on it.
                 let yard = Box::new(Room::new(RoomKind::Yard, config)?);
                 // From one end of the open ground towards the other.
                 let [half_x, half_z] = yard.open_half_m();
                 let at_m = [between(-0.5, 0.5) * half_x, -YARD_START * half_z];
-                (Place::Yard { yard, at_m }, between(-0.5, 0.5))
+                (Ground::Yard { yard, at_m }, between(-0.5, 0.5))
             }
         };
-        Ok(Self { place, yaw_rad, random })
+        Ok(Self { ground, yaw_rad, random })
     }
 
     /// The cameras.
     pub fn rig(&self) -> StereoRig {
-        match &self.place {
-            Place::Street { street, .. } => street.rig(),
-            Place::Yard { yard, .. } => yard.rig(),
+        match &self.ground {
+            Ground::Street { street, .. } => street.rig(),
+            Ground::Yard { yard, .. } => yard.rig(),
         }
     }
 
@@ -126,15 +127,15 @@ impl Route {
 
     /// The world around a pose at the time of a picture.
     pub fn view(&self, index: u32, pose: &RoutePose) -> FlownView<'_> {
-        match &self.place {
-            Place::Street { street, along_m, lateral_m } => {
+        match &self.ground {
+            Ground::Street { street, along_m, lateral_m } => {
                 let start = street.pose_above_road(*along_m, *lateral_m, HEIGHT_M, self.yaw_rad);
                 let mut moved = start;
                 moved.along_m += pose.ahead_m * libm::cos(self.yaw_rad);
                 moved.t_street_camera = (start.t_street_camera * pose.t_start_camera).normalized();
                 street.seen_from(index, &moved)
             }
-            Place::Yard { yard, at_m } => {
+            Ground::Yard { yard, at_m } => {
                 let start = yard.pose_above_floor(*at_m, HEIGHT_M, self.yaw_rad);
                 yard.seen_from(index, &(start * pose.t_start_camera).normalized())
             }

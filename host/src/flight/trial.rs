@@ -37,7 +37,7 @@ const CLEAR_M_S: f64 = 1.0;
 /// Below this speed the vehicle stands, m/s.
 const STANDS_M_S: f64 = 0.3;
 /// Way by which a surface came nearer since the last picture if it moves by itself, m.
-const COMES_M: f64 = 0.1;
+const COMES_M: f64 = 0.02;
 
 /// Pictures before a collision at which a vehicle might have stopped, and after it for which it
 /// would have stood there: a second.
@@ -168,10 +168,14 @@ impl Aboard<'_> {
         let time_ns = Some((f64::from(index) / RATE_HZ * 1e9) as u64);
         let frame = StereoFrame { time_ns, ..StereoFrame::pair(left, right) };
         let report = self.mapper.step(&frame, &Serial)?;
-        self.mapper.update_planning_maps(0.0);
         let is_placed = report.pose != PoseOrigin::Extrapolated;
         let body = Vehicle::new(&report.t_world_camera, is_placed);
-        self.directions = *sectors(self.mapper.planning(), &body, &self.band).directions();
+        // What comes nearer counts where it will be.
+        let [now, later] = [0.0, LIMITS.delay_s as f32].map(|ahead_s| {
+            self.mapper.update_planning_maps(ahead_s);
+            sectors(self.mapper.planning(), &body, &self.band)
+        });
+        self.directions = *now.or_nearer(&later).directions();
         Ok(is_placed)
     }
 }
@@ -184,7 +188,10 @@ pub fn fly(conditions: &Conditions, mut seen: impl FnMut(&FlightFrame)) -> anyho
     let mut route = Route::draw(conditions.world, conditions.seed)?;
     let capacity = capacity(conditions.speed_m_s);
     let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
-    let mapper = Mapper::new(&capacity, &Config::for_rig(route.rig()), &mut slab)?;
+    // No network says what moves: its motion does.
+    let mut config = Config::for_rig(route.rig());
+    config.segmentation.enabled = true;
+    let mapper = Mapper::new(&capacity, &config, &mut slab)?;
     let directions = [Direction::Unknown; SECTORS];
     let mut aboard = Aboard { mapper, band: band(conditions.speed_m_s, &capacity), directions };
     let mut vehicle = Multirotor::hovering(GUSTS_M_S2, conditions.seed);
@@ -331,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_flies_across_a_yard_and_touches_nobody() {
+    fn a_vehicle_flies_across_a_yard_and_touches_no_one() {
         let world = FlightWorld::Yard;
         let conditions = Conditions { world, speed_m_s: 2.0, seconds: 3.0, ..CONDITIONS };
         let flight = fly(&conditions, |_| {}).unwrap();

@@ -16,6 +16,8 @@ const SYSTEM: u8 = 1;
 const BODY_M: f32 = 0.3;
 /// Height above and below the vehicle that must be free, m.
 const HALF_HEIGHT_M: f32 = 0.5;
+/// Time ahead for which moving obstacles are told as well, s: that in which an autopilot reacts.
+const AHEAD_S: f32 = 0.75;
 /// Time after which a look at a free cell is too old, s.
 const STALE_S: f32 = 3.0;
 
@@ -87,16 +89,19 @@ impl Observer for MavlinkObserver {
         frame: &mut FrameContext<'_, '_>,
     ) -> Result<(), ObserveError> {
         let Some(address) = run.plan.request.exports.mavlink else { return Ok(()) };
-        // As it is now: the vehicle plans ahead itself.
-        frame.view.plan(0.0);
-        let mapper = frame.view.mapper();
-        let planning = mapper.planning();
         let report = &frame.row.report;
         // A pose that is extrapolated is none to place obstacles by.
         let is_placed = report.pose != PoseOrigin::Extrapolated;
         let vehicle = Vehicle::new(&report.t_world_camera, is_placed);
-        let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
-        let around = sectors(planning, &vehicle, &band);
+        // As it will be, and as it is: an autopilot's rule takes all obstacles for standing.
+        let [later, now] = [AHEAD_S, 0.0].map(|ahead_s| {
+            frame.view.plan(ahead_s);
+            let mapper = frame.view.mapper();
+            let planning = mapper.planning();
+            let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
+            sectors(planning, &vehicle, &band)
+        });
+        let around = now.or_nearer(&later);
         let time_ns = frame.row.time_ns();
         let message = obstacle_distance(&around, time_ns / 1_000, self.sender());
         self.send(message.bytes(), address.0);

@@ -25,7 +25,7 @@ pub struct FlownView<'s> {
     index: u32,
 }
 
-/// What is around, and the world that it is part of.
+/// World with its surfaces around a camera.
 enum FlownWorld<'s> {
     Street { street: &'s Street, around: Surroundings },
     Room { room: &'s Room, scene: Scene, t_room_camera: Transform },

@@ -27,7 +27,7 @@ enum Subject {
     Certainty(certainty::CertaintyArgs),
     /// Map with one fault after the other and say what is reported of each
     Faults(faults::FaultsArgs),
-    /// Fly through the synthetic street or yard on what the map tells an autopilot, and count collisions
+    /// Fly through a synthetic street or yard on what the map tells an autopilot; count collisions
     Flight(flight::FlightArgs),
     /// Place recordings of another day in the map of a synthetic town, and check each place
     Places(places::PlacesArgs),
