@@ -3,7 +3,7 @@
 use super::Config;
 use crate::{
     Capacity,
-    scene_flow::SceneFlowConfig,
+    scene_flow::{self, SceneFlowConfig},
     stereo::{self, StereoBudget},
 };
 
@@ -18,13 +18,15 @@ impl Config {
 
     /// Scene flow with as many features as the budget leaves.
     pub(super) fn scene_flow_within(&self, capacity: &Capacity) -> SceneFlowConfig {
-        let mut within = self.scene_flow;
-        // All that there is space for may still be fewer than are wanted of each part of an image.
-        if self.mapper.work_budget < 1.0 {
-            let most = self.mapper.budget_of(capacity.features);
-            within.features_max = within.features_max.min(most as u32);
+        let [dense, sparse] = scene_flow::most_features(capacity);
+        if self.mapper.work_budget >= 1.0 {
+            return self.scene_flow;
         }
-        within
+        // Both passes together are within it: every feature may belong to both.
+        let all = self.mapper.budget_of(dense + sparse);
+        let most = (all / 2).max(all.saturating_sub(sparse));
+        let features_max = self.scene_flow.features_max.min(most as u32);
+        SceneFlowConfig { features_max, ..self.scene_flow }
     }
 }
 
@@ -43,8 +45,8 @@ mod tests {
         for share in [0.9, 0.75, 0.5, 0.25, 0.01] {
             config.mapper.work_budget = share;
             let most = config.scene_flow_within(&capacity).features_max as usize;
-            // Of two images; the sparse pass keeps a quarter.
-            let all = 2 * (most + most / 4);
+            // Of two images; the sparse pass keeps no more than a quarter of the capacity.
+            let all = 2 * (most + most.min(capacity.features / 4));
             let share = f64::from(share) * bound;
             assert!(all as f64 <= share && all as f64 > 0.98 * share - 4.0, "{all} of {share}");
         }

@@ -78,18 +78,7 @@ const WORKING_ROWS: usize = if COLUMN_SUMS > SCRATCH_ROWS { COLUMN_SUMS } else {
 /// The most features of an image, of the dense pass and of the sparse one: its peaks are at most a
 /// sixth as dense.
 pub(crate) const fn most_features(capacity: &Capacity) -> [usize; 2] {
-    [capacity.features, sparse_of(capacity.features)]
-}
-
-/// The most features of the sparse pass, of the most of the dense one.
-const fn sparse_of(dense: usize) -> usize {
-    dense / 4
-}
-
-/// Returns true for `most` of the numbers below `found`, evenly spread; for all where they are
-/// fewer.
-fn is_of(i: usize, most: usize, found: usize) -> bool {
-    found <= most || (i * most).checked_rem(found).is_some_and(|rest| rest < most)
+    [capacity.features, capacity.features / 4]
 }
 
 /// Cuts the first `count` items off `rest`, which has as many by construction.
@@ -290,11 +279,12 @@ impl Work for FindFeatures<'_, '_> {
         let (mut dropped, kept) = strongest.finish();
         let candidates = kept.iter().map(|held| held.candidate);
         dropped += frame.dense.fill(candidates.clone(), gradient, width, height);
-        // Of too many every so many go, wherever they are.
-        let sparse = candidates.filter(|candidate| candidate.sparse == 1);
-        let (found, most) = (sparse.clone().count(), sparse_of(wanted));
-        let sparse = sparse.enumerate().filter(|(i, _)| is_of(*i, most, found)).map(|(_, c)| c);
-        dropped += frame.sparse.fill(sparse, gradient, width, height);
+        dropped += frame.sparse.fill(
+            candidates.filter(|candidate| candidate.sparse == 1),
+            gradient,
+            width,
+            height,
+        );
         FeatureCount {
             dense: frame.dense.len() as u32,
             sparse: frame.sparse.len() as u32,
@@ -309,24 +299,6 @@ fn silence(invalid: &InvalidPixels<'_>, width: usize, response: &mut [i16]) {
         for u in invalid.in_row(v) {
             if let Some(response) = row.get_mut(u) {
                 *response = 0;
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn some_of_many_are_as_many_as_wanted_and_evenly_spread() {
-        for found in [0, 1, 7, 100, 1_000] {
-            for most in 0..=found + 1 {
-                let kept =
-                    |i: core::ops::Range<usize>| i.filter(|&i| is_of(i, most, found)).count();
-                assert_eq!(kept(0..found), most.min(found), "{most} of {found}");
-                let half = kept(0..found / 2).abs_diff(kept(found / 2..found));
-                assert!(half <= 1 + found % 2, "{most} of {found}: {half}");
             }
         }
     }

@@ -89,13 +89,13 @@ impl StereoReport {
     /// use dynvox_core::stereo::{StereoReport, StereoStatus};
     ///
     /// let mut report = StereoReport::default();
-    /// (report.status, report.candidates) = (StereoStatus::Matched, 100);
+    /// (report.status, report.pixels, report.candidates) = (StereoStatus::Matched, 1_000, 100);
     /// assert!(report.is_left_out());
     /// ```
     pub fn is_left_out(&self) -> bool {
         let is_looked_for =
             matches!(self.status, StereoStatus::Matched | StereoStatus::TooFewSupportPoints);
-        is_looked_for && (self.row_pixels == 0 || self.candidates == 0)
+        is_looked_for && self.pixels > 0 && (self.row_pixels == 0 || self.candidates == 0)
     }
 }
 
