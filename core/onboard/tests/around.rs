@@ -208,7 +208,7 @@ fn of_now_and_later_the_nearer_obstacle_counts_and_unknown_stays() {
     each_window(60, |planning, pose, random| {
         let now = sectors(planning, &Vehicle::new(pose, true), &any_band(random));
         if let Some(later) = &before {
-            let both = now.clone().or_nearer(later);
+            let both = now.or_nearer(later);
             for sector in 0..SECTORS {
                 let [now, later, both] =
                     [&now, later, &both].map(|sectors| sectors.directions()[sector]);
