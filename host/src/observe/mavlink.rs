@@ -93,13 +93,13 @@ impl Observer for MavlinkObserver {
         // A pose that is extrapolated is none to place obstacles by.
         let is_placed = report.pose != PoseOrigin::Extrapolated;
         let vehicle = Vehicle::new(&report.t_world_camera, is_placed);
+        let mapper = frame.view.mapper();
+        let planning = mapper.planning();
+        let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
         // As it will be, and as it is: an autopilot's rule takes all obstacles for standing.
         let [later, now] = [AHEAD_S, 0.0].map(|ahead_s| {
             frame.view.plan(ahead_s);
-            let mapper = frame.view.mapper();
-            let planning = mapper.planning();
-            let band = band(mapper.config(), planning.size(), planning.grid().cell_m());
-            sectors(planning, &vehicle, &band)
+            sectors(frame.view.mapper().planning(), &vehicle, &band)
         });
         let around = now.or_nearer(&later);
         let time_ns = frame.row.time_ns();
