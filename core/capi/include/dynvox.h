@@ -1039,6 +1039,18 @@ DynvoxStatus dynvox_add_position(DynvoxMapper *mapper,
                                  const double *position_m,
                                  const double *sigma_m);
 
+// Takes the direction that is up in the last frame, in the camera's axes and in those of the first
+// camera, with the standard deviation of its angle, rad, as dynvox_add_fix takes a pose. It holds
+// roll and pitch, and with them the height of a long way.
+//
+// # Safety
+// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+// uses it; `up_camera` and `up_world` are null or point to three numbers each.
+DynvoxStatus dynvox_add_vertical(DynvoxMapper *mapper,
+                                 const double *up_camera,
+                                 const double *up_world,
+                                 double sigma_rad);
+
 // Writes the tracks of the last frame, at most `capacity` of them, and to `count` how many there
 // are.
 //

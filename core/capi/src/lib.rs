@@ -50,7 +50,7 @@ pub use inertial::{
     DynvoxInertialDoubt, DynvoxInertialReport, DynvoxInertialSample, DynvoxInertialUnit,
     dynvox_config_inertial,
 };
-pub use loops::{dynvox_add_fix, dynvox_add_position, dynvox_closed_world};
+pub use loops::{dynvox_add_fix, dynvox_add_position, dynvox_add_vertical, dynvox_closed_world};
 pub use map::{
     DynvoxPicture, dynvox_finish, dynvox_finish_with, dynvox_pose_matrix, dynvox_raycast,
     dynvox_stream_out, dynvox_triangles,

@@ -76,3 +76,27 @@ pub unsafe extern "C" fn dynvox_add_position(
         })
     }
 }
+
+/// Takes the direction that is up in the last frame, in the camera's axes and in those of the first
+/// camera, with the standard deviation of its angle, rad, as dynvox_add_fix takes a pose. It holds
+/// roll and pitch, and with them the height of a long way.
+///
+/// # Safety
+/// `mapper` is null or a handle from dynvox_create whose buffer is still there, and no other thread
+/// uses it; `up_camera` and `up_world` are null or point to three numbers each.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dynvox_add_vertical(
+    mapper: *mut DynvoxMapper,
+    up_camera: *const f64,
+    up_world: *const f64,
+    sigma_rad: f64,
+) -> DynvoxStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        with(mapper, |mapper, _| {
+            let up_camera: [f64; 3] = read(up_camera.cast())?;
+            let up_world: [f64; 3] = read(up_world.cast())?;
+            Ok(mapper.add_vertical(up_camera, up_world, sigma_rad)?)
+        })
+    }
+}

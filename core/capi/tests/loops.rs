@@ -95,6 +95,14 @@ fn fixes_that_cannot_be_taken_are_refused() {
         assert_eq!(add(&pose, &covariance), DynvoxStatus::Pose);
         pose.rotation[1] = 0.0;
         assert_eq!(add(&pose, &covariance), DynvoxStatus::Ok);
+        let up = [0.0, -1.0, 0.0];
+        let level = |up_camera: *const f64, sigma_rad| unsafe {
+            dynvox_add_vertical(mapper, up_camera, up.as_ptr(), sigma_rad)
+        };
+        assert_eq!(level([0.0; 3].as_ptr(), 0.01), DynvoxStatus::Pose);
+        assert_eq!(level(up.as_ptr(), 0.0), DynvoxStatus::Fix, "no angle has an error");
+        assert_eq!(level(up.as_ptr(), 0.01), DynvoxStatus::Fix, "that keyframe has one");
+        assert_eq!(level(ptr::null(), 0.01), DynvoxStatus::Null);
         let without = unsafe { dynvox_add_fix(mapper, &raw const pose, ptr::null()) };
         assert_eq!(without, DynvoxStatus::Null);
         assert_eq!(unsafe { dynvox_closed_world(mapper, ptr::null_mut()) }, DynvoxStatus::Null);

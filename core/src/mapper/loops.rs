@@ -178,4 +178,36 @@ impl Mapper<'_> {
         let about = (self.t_closed_driven() * *self.t_world_camera()).normalized();
         self.add_fix(&PoseFix::of_position(position_m, sigma_m, &about))
     }
+
+    /// Takes the direction that is up in the last frame, in the camera's axes and in those of the
+    /// first camera, with the standard deviation of its angle, rad, as [`Mapper::add_fix`] takes a
+    /// pose. It holds roll and pitch, and with them the height of a long way.
+    ///
+    /// # Errors
+    /// See [`FixError`]. A direction of length 0 is no pose.
+    ///
+    /// ```
+    /// use dynvox_core::{
+    ///     Capacity, Config, FixError, Mapper, geometry::StereoRig, memory::SLAB_ALIGN,
+    /// };
+    ///
+    /// let rig =
+    ///     StereoRig { focal_px: 200.0, center_u_px: 160.0, center_v_px: 48.0, baseline_m: 0.5 };
+    /// let capacity = Capacity { keyframes: 10, ..Capacity::TINY };
+    /// let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
+    /// let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
+    /// let up = [0.0, -1.0, 0.0];
+    /// assert_eq!(mapper.add_vertical(up, up, 0.005), Err(FixError::Nowhere), "it has seen nothing");
+    /// assert_eq!(mapper.add_vertical([0.0; 3], up, 0.005), Err(FixError::Pose));
+    /// # Ok::<(), dynvox_core::NewError>(())
+    /// ```
+    pub fn add_vertical(
+        &mut self,
+        up_camera: [f64; 3],
+        up_world: [f64; 3],
+        sigma_rad: f64,
+    ) -> Result<(), FixError> {
+        let about = (self.t_closed_driven() * *self.t_world_camera()).normalized();
+        self.add_fix(&PoseFix::of_vertical(up_camera, up_world, sigma_rad, &about))
+    }
 }

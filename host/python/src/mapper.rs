@@ -371,6 +371,19 @@ impl Mapper {
         self.take_fix(py, |mapper| mapper.add_position(position_m, sigma_m))
     }
 
+    /// Takes the direction that is up in the last frame, in the camera's axes and in those of the
+    /// first camera, with the standard deviation of its angle, rad, as `add_fix` takes a pose. It
+    /// holds roll and pitch, and with them the height of a long way.
+    fn add_vertical(
+        &self,
+        py: Python<'_>,
+        up_camera: [f64; 3],
+        up_world: [f64; 3],
+        sigma_rad: f64,
+    ) -> PyResult<()> {
+        self.take_fix(py, |mapper| mapper.add_vertical(up_camera, up_world, sigma_rad))
+    }
+
     /// Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd
     /// values of a pair that the mapper matched itself were filled in between measured ones, which
     /// are even. It has size 1 x 1 before the first frame.

@@ -12,8 +12,10 @@ use crate::{
 
 /// Standard deviation of a rotation that was not measured, rad: more than any there is.
 const UNMEASURED_RAD: f64 = 10.0;
+/// Standard deviation of a position that was not measured, m.
+const UNMEASURED_M: f64 = 1e4;
 
-/// Pose of the camera that something else measured: a surveyed mark, a satellite receiver.
+/// Pose of the camera that something else measured: a surveyed mark, a satellite receiver, a level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseFix {
     /// Pose of the left camera, camera to world: the camera of the first frame is the world.
@@ -47,12 +49,67 @@ impl PoseFix {
                 *entry = sigma * sigma;
             }
         }
-        let turn = Transform { translation_m: [0.0; 3], ..*t_world_camera };
-        let in_world = MotionCovariance::from_matrix(&matrix);
-        Self {
-            t_world_camera: Transform { translation_m: position_m, ..*t_world_camera },
-            covariance: MotionCovariance::ZERO.after(&in_world, &turn.inverse()),
+        Self::in_world(Transform { translation_m: position_m, ..*t_world_camera }, &matrix)
+    }
+
+    /// The direction that is up, in the camera's axes and in the world's, with the standard
+    /// deviation of its angle, rad, of a camera that stands about so: the turn about the vertical
+    /// and the position count for nothing. The pose is not a finite one where a direction is
+    /// zero, or the camera stands on its head.
+    ///
+    /// ```
+    /// use dynvox_core::{geometry::Transform, places::PoseFix};
+    ///
+    /// // The world's y points down; the camera takes itself for level, and is rolled by a degree.
+    /// let rolled = Transform::new([0.0, 0.0, 1f64.to_radians()], [0.0; 3]);
+    /// let up_camera = rolled.inverse().rotate([0.0, -1.0, 0.0]);
+    /// let fix =
+    ///     PoseFix::of_vertical(up_camera, [0.0, -1.0, 0.0], 0.002, &Transform::IDENTITY);
+    /// assert!((fix.t_world_camera.inverse() * rolled).angle_rad() < 1e-12);
+    /// let [pitch_rad, yaw_rad, _] = fix.covariance.rotation_sigma_rad();
+    /// assert!((pitch_rad - 0.002).abs() < 1e-9 && yaw_rad > 9.0);
+    /// ```
+    pub fn of_vertical(
+        up_camera: [f64; 3],
+        up_world: [f64; 3],
+        sigma_rad: f64,
+        t_world_camera: &Transform,
+    ) -> Self {
+        let unit = |[x, y, z]: [f64; 3]| {
+            let length = libm::sqrt(x * x + y * y + z * z);
+            [x / length, y / length, z / length]
+        };
+        let (driven, up) = (unit(t_world_camera.rotate(up_camera)), unit(up_world));
+        let ([a, b, c], [x, y, z]) = (driven, up);
+        // The shortest turn from one direction to the other.
+        let shortest = [b * z - c * y, c * x - a * z, a * y - b * x, 1.0 + a * x + b * y + c * z];
+        let upright = Transform { rotation: shortest, translation_m: [0.0; 3] }.normalized();
+        let about = Transform { translation_m: [0.0; 3], ..*t_world_camera };
+        let turn = Transform {
+            translation_m: t_world_camera.translation_m,
+            ..(upright * about).normalized()
+        };
+        let [tilt, unmeasured] = [sigma_rad, UNMEASURED_RAD].map(|sigma| sigma * sigma);
+        let mut matrix = [[0.0; 6]; 6];
+        for (row, entries) in matrix.iter_mut().enumerate() {
+            for (column, entry) in entries.iter_mut().enumerate() {
+                let diagonal = if row == column { 1.0 } else { 0.0 };
+                *entry = match (up.get(row), up.get(column)) {
+                    (Some(a), Some(b)) => tilt * diagonal + (unmeasured - tilt) * a * b,
+                    (None, None) => UNMEASURED_M * UNMEASURED_M * diagonal,
+                    _ => 0.0,
+                };
+            }
         }
+        Self::in_world(turn, &matrix)
+    }
+
+    /// A pose whose covariance is given along the world's axes.
+    fn in_world(t_world_camera: Transform, matrix: &[[f64; 6]; 6]) -> Self {
+        let turn = Transform { translation_m: [0.0; 3], ..t_world_camera };
+        let in_world = MotionCovariance::from_matrix(matrix);
+        let covariance = MotionCovariance::ZERO.after(&in_world, &turn.inverse());
+        Self { t_world_camera, covariance }
     }
 
     /// Tells that each direction has an error, in finite numbers.

@@ -36,11 +36,24 @@ fn pose(t_world_camera: Transform) -> SegmentPose {
 
 /// Takes keyframes of all poses.
 fn walk(graph: &mut Graph<'_>, poses: &[Transform]) {
+    walk_with_fixes(graph, poses, usize::MAX, |_| unreachable!());
+}
+
+/// Takes keyframes of all poses, and a fix of the last of each so many.
+fn walk_with_fixes(
+    graph: &mut Graph<'_>,
+    poses: &[Transform],
+    every: usize,
+    fix_of: impl Fn(usize) -> PoseFix,
+) {
     let covariance = twist::isotropic(2e-3, 0.02);
     for (at, t_world_camera) in poses.iter().enumerate() {
         let pose = pose(*t_world_camera);
         graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
         graph.insert(0..=at, t_world_camera, at as u32);
+        if (at + 1).is_multiple_of(every) {
+            assert!(fix(graph, at, &fix_of(at)));
+        }
     }
 }
 
@@ -60,7 +73,11 @@ fn worst_m(graph: &Graph<'_>, truth: &[Transform]) -> f64 {
     let off = |(at, truth): (usize, &Transform)| {
         (graph.corrected(at).unwrap().1.inverse() * *truth).distance_m()
     };
-    truth.iter().enumerate().map(off).fold(0.0, |a, b| if a > b { a } else { b })
+    largest(truth.iter().enumerate().map(off))
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |a, b| if a > b { a } else { b })
 }
 
 /// Steps until the poses change; returns the frames that took.
@@ -302,21 +319,56 @@ fn a_fix_pulls_the_way_there_and_leaves_its_beginning() {
 }
 
 #[test]
+fn verticals_hold_the_height_of_a_way() {
+    const UP: [f64; 3] = [0.0, -1.0, 0.0];
+    // Pitch and roll drift, and with them the height.
+    let (truth, driven) = square(KEYFRAMES, &Transform::new([0.001, 0.0, 0.0007], [0.0; 3]));
+    let off = |graph: &Graph<'_>| {
+        let corrected: Vec<_> = (0..KEYFRAMES).map(|at| graph.corrected(at).unwrap().1).collect();
+        let pairs = || corrected.iter().zip(&truth);
+        let height_m = |(is, truth): (&Transform, &Transform)| {
+            libm::fabs(is.translation_m[1] - truth.translation_m[1])
+        };
+        let tilt_rad = |(is, truth): (&Transform, &Transform)| {
+            let [x, _, z] = is.rotate(truth.inverse().rotate(UP));
+            libm::hypot(x, z)
+        };
+        [largest(pairs().map(height_m)), largest(pairs().map(tilt_rad))]
+    };
+    with_graph(KEYFRAMES, |graph| {
+        walk_with_fixes(graph, &driven, 8, |at| {
+            PoseFix::of_vertical(truth[at].inverse().rotate(UP), UP, 0.003, &driven[at])
+        });
+        let [height_m, tilt_rad] = off(graph);
+        commit(graph, KEYFRAMES);
+        assert_eq!((graph.counts().fixes, graph.counts().taken_out), (10, 0));
+        let [then_m, then_rad] = off(graph);
+        assert!(height_m > 0.5 && then_m < 0.3 * height_m, "{height_m} m, then {then_m} m");
+        assert!(
+            tilt_rad > 0.02 && then_rad < 0.3 * tilt_rad,
+            "{tilt_rad} rad, then {then_rad} rad"
+        );
+    });
+}
+
+#[test]
+fn a_camera_on_its_head_has_no_vertical() {
+    let up = [0.0, -1.0, 0.0];
+    let of = |up_camera| PoseFix::of_vertical(up_camera, up, 0.003, &Transform::IDENTITY);
+    assert!(of([0.1, -2.0, 0.0]).t_world_camera.is_rotation());
+    assert!(!of([0.0, 1.0, 0.0]).t_world_camera.is_finite());
+    assert!(!of([0.0; 3]).t_world_camera.is_finite());
+}
+
+#[test]
 fn a_wrong_fix_is_overruled_by_the_others() {
     let (truth, driven) = drifting();
     with_graph(KEYFRAMES, |graph| {
-        for (at, t_world_camera) in driven.iter().enumerate() {
-            let (pose, covariance) = (pose(*t_world_camera), twist::isotropic(2e-3, 0.02));
-            graph.advance(&Measured { pose: &pose, covariance: Some(&covariance), depth_m: 10.0 });
-            graph.insert(0..=at, t_world_camera, at as u32);
-            if at % 10 == 9 {
-                let [x, y, z] = truth[at].translation_m;
-                let off_m = if at == 49 { 15.0 } else { 0.0 };
-                let received =
-                    PoseFix::of_position([x + off_m, y, z], [0.1, 0.2, 0.1], t_world_camera);
-                assert!(fix(graph, at, &received));
-            }
-        }
+        walk_with_fixes(graph, &driven, 10, |at| {
+            let [x, y, z] = truth[at].translation_m;
+            let off_m = if at == 49 { 15.0 } else { 0.0 };
+            PoseFix::of_position([x + off_m, y, z], [0.1, 0.2, 0.1], &driven[at])
+        });
         commit(graph, KEYFRAMES);
         let counts = graph.counts();
         assert_eq!((counts.fixes, counts.taken_out), (8, 1), "{counts:?}");

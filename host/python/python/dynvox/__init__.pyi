@@ -336,6 +336,10 @@ class Mapper:
     def add_position(self, position_m: Sequence[float] | NDArray[np.float64], sigma_m: Sequence[float] | NDArray[np.float64]) -> None:
         """Takes a position of the camera in the last frame, m, with its standard deviations along the axes of the world, m, as `add_fix` takes a pose."""
 
+    def add_vertical(self, up_camera: Sequence[float] | NDArray[np.float64], up_world: Sequence[float] | NDArray[np.float64], sigma_rad: float) -> None:
+        """Takes the direction that is up in the last frame, in the camera's axes and in those of the first camera, with the standard deviation of its angle,
+        rad, as `add_fix` takes a pose. It holds roll and pitch, and with them the height of a long way."""
+
     @property
     def disparity_q8(self) -> NDArray[np.uint16]:
         """Disparity of the last frame in 1/256 px, 0 where it is unknown: divide by 256 for pixels. Odd values of a pair that the mapper matched itself were
