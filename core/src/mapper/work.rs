@@ -16,6 +16,11 @@ pub(super) const PICTURES: usize = 3;
 /// Interval of a picture's pixels, px: brightness is compared at every second pixel.
 pub(super) const PICTURE_EVERY: usize = 2;
 
+/// Time of a unit, ps, in the order of [`WorkUnits::named`]: `dynvox bench` on KITTI 06. Where two
+/// units explain one stage, one of them has its time.
+const UNIT_PS: [u64; WorkUnits::COUNT] =
+    [44_000, 0, 0, 160_000, 150, 0, 80_000, 50_000, 1_000_000, 2_700, 200];
+
 /// Units of work, by kind: of one step in a report, the most of any step in [`Capacity::work`].
 ///
 /// Not counted yet, and without a bound here: hypotheses of egomotion and segmentation, searches
@@ -117,6 +122,23 @@ impl WorkUnits {
             ("fused_voxels", fused_voxels),
             ("pruned_voxels", pruned_voxels),
         ]
+    }
+
+    /// About the time of the work, ns: the time of each unit on KITTI 06, one thread of a desktop
+    /// processor, whatever the machine. It compares frames with one another, not machines.
+    ///
+    /// ```
+    /// use dynvox_core::WorkUnits;
+    ///
+    /// let mut work = WorkUnits::default();
+    /// assert_eq!(work.nominal_ns(), 0);
+    /// work.fused_voxels = 512;
+    /// assert_eq!(work.nominal_ns(), 1_382);
+    /// ```
+    pub fn nominal_ns(&self) -> u64 {
+        let ps = self.named().into_iter().zip(UNIT_PS);
+        let ps = ps.map(|((_, units), ps)| units.saturating_mul(ps));
+        ps.fold(0, u64::saturating_add) / 1_000
     }
 }
 

@@ -45,7 +45,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the costs of the stages and of the units of work.
+/// Prints the costs of the stages, of the most expensive steps, and of the units of work.
 fn print(bench: &Bench) {
     outln!("CPU time, ms, medians of {} frames, {} kernels", bench.frames, bench.vectors);
     outln!(
@@ -62,6 +62,27 @@ fn print(bench: &Bench) {
             stage.work_ms,
             stage.two_threads_ms,
             stage.span_ms
+        );
+    }
+    outln!("\nSteps that cost most, ms: by CPU time, and by counted work");
+    outln!(
+        "{:<13}{:>11}{:>9}{:>9}{:>9}{:>19}",
+        "",
+        "median",
+        "p99",
+        "p99.9",
+        "worst",
+        "p99.9 / median"
+    );
+    for tail in &bench.tails {
+        outln!(
+            "{:<13}{:>11.2}{:>9.2}{:>9.2}{:>9.2}{:>19.2}",
+            tail.cost,
+            tail.median_ms,
+            tail.p99_ms,
+            tail.p999_ms,
+            tail.worst_ms,
+            tail.p999_ms / tail.median_ms
         );
     }
     // A few frames tell nothing of a prediction's error.

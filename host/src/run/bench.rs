@@ -5,7 +5,7 @@ use super::error::{RunError, failed_step};
 use super::frames::{each_frame, with_mapper};
 use super::spans::{Cost, Spans};
 use super::unit_times::{FrameWork, UnitTime, fit};
-use crate::evaluate::quantile::median;
+use crate::evaluate::quantile::{ascending, median, quantile};
 use crate::request::Plan;
 use dynvox_core::Stage;
 use dynvox_core::parallel::Vectors;
@@ -25,6 +25,22 @@ pub struct StageBench {
     pub span_ms: f64,
 }
 
+/// Steps that cost most, beside the usual one.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Tail {
+    /// What a step's cost is: `cpu`, the CPU time that it took here; `work`, the time that its
+    /// units stand for ([`dynvox_core::WorkUnits::nominal_ns`]), the same on every machine.
+    pub cost: &'static str,
+    /// Median, ms.
+    pub median_ms: f64,
+    /// One step in a hundred costs more, ms.
+    pub p99_ms: f64,
+    /// One step in a thousand costs more, ms.
+    pub p999_ms: f64,
+    /// The most expensive step, ms.
+    pub worst_ms: f64,
+}
+
 /// Costs of a step, by stage.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bench {
@@ -36,6 +52,8 @@ pub struct Bench {
     pub digest: String,
     /// Each stage that took time, then the step, then a raycast of the map from each frame's pose.
     pub stages: Vec<StageBench>,
+    /// How far steps differ, by CPU time and by counted work.
+    pub tails: [Tail; 2],
     /// Time of a unit of work, for the stages that count any; empty with fewer than five frames.
     pub units: Vec<UnitTime>,
 }
@@ -72,9 +90,21 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
     stages.push(medians("step", counted.iter().map(|(step, _)| *step)));
     stages.push(of_stage(raycast));
     // The first frame does half of the work that its units would tell.
-    let units = fit(work.get(1..).unwrap_or_default(), &plan.capacity.work(&plan.config));
+    let usual = work.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(&work);
+    let tails = [
+        tail("cpu", counted.iter().map(|(step, _)| step.work.as_secs_f64() * 1e3)),
+        tail("work", usual.iter().map(|frame| frame.work.nominal_ns() as f64 / 1e6)),
+    ];
+    let units = fit(usual, &plan.capacity.work(&plan.config));
     let digest = format!("{digest:016x}");
-    Ok(Bench { frames: costs.len(), vectors: vectors.name(), digest, stages, units })
+    Ok(Bench { frames: costs.len(), vectors: vectors.name(), digest, stages, tails, units })
+}
+
+fn tail(cost: &'static str, steps_ms: impl Iterator<Item = f64>) -> Tail {
+    let ascending = ascending(steps_ms);
+    let at = |share| quantile(&ascending, share).unwrap_or_default();
+    let [median_ms, p99_ms, p999_ms, worst_ms] = [0.5, 0.99, 0.999, 1.0].map(at);
+    Tail { cost, median_ms, p99_ms, p999_ms, worst_ms }
 }
 
 fn medians(name: &'static str, costs: impl Iterator<Item = Cost> + Clone) -> StageBench {

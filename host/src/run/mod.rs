@@ -30,7 +30,7 @@ mod unit_times;
 mod version;
 mod view;
 
-pub use bench::{Bench, StageBench, bench};
+pub use bench::{Bench, StageBench, Tail, bench};
 pub use checkpoint::{Checkpoint, ResumeError, RunManifest, fingerprint};
 pub use disk_store::{BLOCKS_FILE, DiskStore, MeshOutput};
 pub use ending::{Incomplete, IncompleteCause, SkippedFrame, SkippedFrames};

@@ -23,11 +23,6 @@ const CROWDED: Capacity = Capacity { blocks: 400, visible_blocks: 400, ..AMPLE }
 /// So few that a frame evicts all that the one before saw.
 const EVICTED: Capacity = Capacity { blocks: 150, visible_blocks: 150, ..AMPLE };
 
-/// Time of a unit, ns, in the order of [`WorkUnits::named`]: `dynvox bench` on KITTI 06, one
-/// thread. If two units explain one stage, one of them has its time.
-const UNIT_NS: [f64; WorkUnits::COUNT] =
-    [44.0, 0.0, 0.0, 160.0, 0.15, 0.0, 80.0, 50.0, 1000.0, 2.7, 0.2];
-
 /// Index of the unit of descriptors.
 const COMPARED: usize = 4;
 
@@ -190,7 +185,7 @@ fn run(clip: &Clip, config: &Config) -> (Vec<WorkUnits>, Vec<f64>) {
 
 /// Time that a frame's units stand for, ms.
 fn cost_ms(work: &WorkUnits) -> f64 {
-    work.named().iter().zip(UNIT_NS).map(|((_, units), ns)| *units as f64 * ns).sum::<f64>() / 1e6
+    work.nominal_ns() as f64 / 1e6
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {

@@ -131,6 +131,11 @@ mod tests {
         assert_eq!(levels.len(), Vectors::available().count());
         assert!(levels.iter().all(|level| level["digest"] == levels[0]["digest"]));
         assert!(levels.iter().all(|level| level["units"][0]["ns"].as_f64() > Some(0.0)));
+        // Counted work is the same at every level, its worst step at least the usual one.
+        assert!(levels.iter().all(|level| level["tails"][1] == levels[0]["tails"][1]));
+        let [median, worst] =
+            ["median_ms", "worst_ms"].map(|name| levels[0]["tails"][1][name].as_f64().unwrap());
+        assert!(0.0 < median && median <= worst);
         // A level with another digest is named, and what to do.
         if let [_, .., last] = &mut report.levels[..] {
             last.digest = "0123456789abcdef".to_owned();
