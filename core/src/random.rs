@@ -46,6 +46,18 @@ impl Random {
         xorshifted.rotate_right((old >> 59) as u32)
     }
 
+    /// Uniform from 0 to below 1, in steps of 2^-32.
+    ///
+    /// ```
+    /// use dynvox_core::random::Random;
+    ///
+    /// let mut random = Random::new(1);
+    /// assert!((0..100).all(|_| (0.0..1.0).contains(&random.fraction())));
+    /// ```
+    pub fn fraction(&mut self) -> f64 {
+        f64::from(self.next_u32()) / 4_294_967_296.0
+    }
+
     /// Uniform in `0..bound`; 0 when `bound` is 0. One draw, by multiplication: the bias is at most
     /// `bound` / 2^32.
     ///

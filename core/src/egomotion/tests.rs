@@ -117,9 +117,7 @@ fn project(point: &Point3<f64>) -> [[f32; 2]; 2] {
 
 /// Exact matches of random points; the first `outliers` of them get random pixels.
 fn matches(count: usize, outliers: usize, motion: &Transform, random: &mut Random) -> Vec<Match> {
-    let uniform = |random: &mut Random, low: f64, high: f64| {
-        low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
-    };
+    let uniform = |random: &mut Random, low: f64, high: f64| low + (high - low) * random.fraction();
     (0..count)
         .map(|i| {
             let z = uniform(random, 4.0, 30.0);

@@ -57,9 +57,7 @@ impl Route {
     /// The world cannot be made.
     pub fn draw(world: FlightWorld, seed: u64) -> Result<Self, SynthError> {
         let mut random = Random::new(seed ^ 0xF117);
-        let mut between = |low: f64, high: f64| {
-            low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0
-        };
+        let mut between = |low: f64, high: f64| low + (high - low) * random.fraction();
         let [width, height] = IMAGE;
         let (ground, yaw_rad) = match world {
             FlightWorld::Street => {
@@ -144,6 +142,6 @@ impl Route {
 
     /// Returns true for a share of the times it is asked.
     pub fn chance(&mut self, share: f64) -> bool {
-        f64::from(self.random.next_u32()) / 4_294_967_296.0 < share
+        self.random.fraction() < share
     }
 }

@@ -86,8 +86,7 @@ impl Multirotor {
 
     /// A sum of twelve uniform numbers: close to normal, with sigma 1.
     fn normal(&mut self) -> f64 {
-        let unit = |random: &mut Random| f64::from(random.next_u32()) / 4_294_967_296.0;
-        (0..12).map(|_| unit(&mut self.random)).sum::<f64>() - 6.0
+        (0..12).map(|_| self.random.fraction()).sum::<f64>() - 6.0
     }
 }
 

@@ -43,7 +43,7 @@ impl Rng {
 
     /// Uniform in 0..1.
     pub fn unit(&mut self) -> f64 {
-        f64::from(self.0.next_u32()) * (1.0 / 4_294_967_296.0)
+        self.0.fraction()
     }
 
     /// Uniform between two figures.

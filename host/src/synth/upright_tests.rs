@@ -1,9 +1,9 @@
 //! The vertical that the mapper finds, against that of the worlds.
 
 use super::*;
-use crate::formats::TimedReading;
+use crate::input::InertialUnitData;
 use dynvox_core::image::View;
-use dynvox_core::inertial::{InertialSample, InertialUnit};
+use dynvox_core::inertial::InertialUnit;
 use dynvox_core::memory::SLAB_ALIGN;
 use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};
 use nalgebra::Vector3;
@@ -32,10 +32,7 @@ fn errors_of(world: &dyn World) -> Vec<[f64; 2]> {
     let unit = InertialUnit::new(t_camera_unit());
     let config = Config { inertial: Some(unit), ..Config::for_rig(world.rig()) };
     let mut mapper = Mapper::new(&capacity, &config, &mut slab).unwrap();
-    let sample = |&TimedReading { time_ns, turn_rate, force }: &TimedReading| {
-        Some(InertialSample { time_ns: u64::try_from(time_ns).ok()?, turn_rate, force })
-    };
-    let samples: Vec<InertialSample> = world.inertial().iter().filter_map(sample).collect();
+    let samples = InertialUnitData::samples_of(&world.inertial());
     let up = Vector3::from(world.up_in_world());
     let (mut given, mut errors) = (0, Vec::new());
     for index in 0..world.frames() {

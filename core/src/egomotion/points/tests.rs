@@ -17,8 +17,7 @@ fn motion() -> Transform {
 /// coordinates.
 fn matches(count: usize) -> Vec<Match> {
     let mut random = Random::new(12);
-    let mut within =
-        |low: f64, high: f64| low + (high - low) * f64::from(random.next_u32()) / 4_294_967_296.0;
+    let mut within = |low: f64, high: f64| low + (high - low) * random.fraction();
     (0..count)
         .map(|index| {
             // Within the field of view: shares of the depth.

@@ -10,7 +10,7 @@ struct Scene<'r> {
 
 impl Scene<'_> {
     fn uniform(&mut self, [low, high]: [f64; 2]) -> f64 {
-        low + (high - low) * f64::from(self.random.next_u32()) / 4_294_967_296.0
+        low + (high - low) * self.random.fraction()
     }
 
     /// Adds points at depths of that range and in columns of that share of the image, seen with

@@ -13,7 +13,7 @@ struct Group {
 
 fn matches(seed: u64, groups: &[Group]) -> Vec<Match> {
     let mut random = Random::new(seed);
-    let mut share = || f64::from(random.next_u32()) / 4_294_967_296.0;
+    let mut share = || random.fraction();
     let mut matches = Vec::new();
     for Group { count, depths_m, columns, motion } in groups {
         for _ in 0..*count {

@@ -104,12 +104,9 @@ impl Graph<'_> {
         slots: impl DoubleEndedIterator<Item = usize> + Clone,
         recognized: &Recognized<'_>,
     ) -> bool {
-        let Some(to) = slots.clone().rev().find(|&slot| self.used(slot).is_some()) else {
-            return false;
-        };
+        let Some(to) = self.newest(slots.clone()) else { return false };
         self.closed_at_depths = self.way_depths();
-        let is_last = |closure: &Closure| closure.to == to as u32 && closure.from != WORLD;
-        let is_known = self.closures.iter().take(self.closure_len).any(is_last);
+        let is_known = self.is_held(to, |from| from != WORLD);
         let Some(way) = self.way.as_deref() else { return false };
         if way.is_loose || is_known || self.used(recognized.slot).is_none() || recognized.slot == to
         {
@@ -129,6 +126,20 @@ impl Graph<'_> {
         let is_taken = self.take(closure);
         self.counts.closures = self.counts.closures.saturating_add(u32::from(is_taken));
         is_taken
+    }
+
+    /// The newest keyframe.
+    pub(super) fn newest(
+        &self,
+        mut slots: impl DoubleEndedIterator<Item = usize>,
+    ) -> Option<usize> {
+        slots.rfind(|&slot| self.used(slot).is_some())
+    }
+
+    /// Tells that a closure from such an end holds a keyframe already.
+    pub(super) fn is_held(&self, slot: usize, is_from: impl Fn(u32) -> bool) -> bool {
+        let holds = |closure: &Closure| closure.to == slot as u32 && is_from(closure.from);
+        self.closures.iter().take(self.closure_len).any(holds)
     }
 
     /// Takes a closure, which is solved for from the next frame on.

@@ -126,14 +126,13 @@ impl Graph<'_> {
     #[inline(never)]
     pub(in crate::places) fn fix(
         &mut self,
-        mut slots: impl DoubleEndedIterator<Item = usize>,
+        slots: impl DoubleEndedIterator<Item = usize>,
         fix: &PoseFix,
     ) -> bool {
-        let Some(to) = slots.rfind(|&slot| self.used(slot).is_some()) else { return false };
+        let Some(to) = self.newest(slots) else { return false };
         let Some(way) = self.way.as_deref().filter(|way| !way.is_loose) else { return false };
         let is_in_world = way.last.is_some_and(|last| last.segment == MapSegment::FIRST);
-        let has_one = |closure: &Closure| closure.to == to as u32 && closure.from == WORLD;
-        if !is_in_world || self.closures.iter().take(self.closure_len).any(has_one) {
+        if !is_in_world || self.is_held(to, |from| from == WORLD) {
             return false;
         }
         let t_node_camera = way.t_camera_node.inverse();

@@ -8,7 +8,7 @@ fn of_point(seed: u64, x: i64, y: i64) -> f64 {
     let mixed = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
         ^ seed.wrapping_mul(0x1656_67B1_9E37_79F9);
-    f64::from(Random::new(mixed).next_u32()) / 4_294_967_296.0
+    Random::new(mixed).fraction()
 }
 
 /// Noise from 0 to 1 that is smooth between whole numbers.

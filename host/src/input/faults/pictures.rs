@@ -105,7 +105,7 @@ fn saturated(value: f64) -> u8 {
 
 /// About normal, of variance 1: the sum of twelve uniform numbers.
 fn gaussian(random: &mut Random) -> f64 {
-    (0..12).map(|_| f64::from(random.next_u32()) / 4_294_967_296.0).sum::<f64>() - 6.0
+    (0..12).map(|_| random.fraction()).sum::<f64>() - 6.0
 }
 
 /// The whole image twice, and one pixel.
