@@ -60,6 +60,17 @@ pack() {
   "$dynvox" fixtures pack "$fixture" --out "$DYNVOX_CLIP" --rust "$DYNVOX_CONSTANTS"
 }
 
+# own_fixture FRAMES MEMORY [SYNTH-ARGUMENT...]: makes the street a fixture of its own, without its first frame, and the one to pack from now on.
+own_fixture() {
+  local own=$build/own frames=$1 memory=$2
+  shift 2
+  rm -rf "$own"
+  mkdir -p "$own"
+  "$dynvox" synth --out "$own/street" --frames "$frames" "$@" >"$own/log"
+  "$dynvox" fixtures new "$own/pinned" --from "$own/street" --frames $((frames - 1)) --start 1 --memory "$memory" --set volume.voxel_size_m=0.1 >>"$own/log"
+  export DYNVOX_FIXTURE=$own/pinned
+}
+
 # hosted FOLDER: the firmware as an ordinary program of this machine, in $elf.
 hosted() {
   pack
