@@ -184,7 +184,7 @@ impl Mapper<'_> {
     /// pose. It holds roll and pitch, and with them the height of a long way.
     ///
     /// # Errors
-    /// See [`FixError`]. A direction of length 0 is no pose.
+    /// See [`FixError`]; [`FixError::Pose`] for a direction of length 0.
     ///
     /// ```
     /// use dynvox_core::{
@@ -197,7 +197,7 @@ impl Mapper<'_> {
     /// let mut slab = vec![0; capacity.bytes() + SLAB_ALIGN];
     /// let mut mapper = Mapper::new(&capacity, &Config::for_rig(rig), &mut slab)?;
     /// let up = [0.0, -1.0, 0.0];
-    /// assert_eq!(mapper.add_vertical(up, up, 0.005), Err(FixError::Nowhere), "it has seen nothing");
+    /// assert_eq!(mapper.add_vertical(up, up, 0.005), Err(FixError::Nowhere), "nothing was seen");
     /// assert_eq!(mapper.add_vertical([0.0; 3], up, 0.005), Err(FixError::Pose));
     /// # Ok::<(), dynvox_core::NewError>(())
     /// ```

@@ -125,7 +125,7 @@ impl WorkUnits {
     }
 
     /// About the time of the work, ns: the time of each unit on KITTI 06, one thread of a desktop
-    /// processor, whatever the machine. It compares frames with one another, not machines.
+    /// processor. It is the same on every machine, and compares frames with one another.
     ///
     /// ```
     /// use dynvox_core::WorkUnits;

@@ -5,8 +5,9 @@
 //! each.
 
 use super::distance_field::{DistanceField, SurfacePoint};
-use super::georeference::{Prior, prior};
+use super::georeference::Prior;
 use super::manifest::{rows_of, transform};
+use super::parts::{LINK_UNCERTAINTY, links, priors};
 use super::pose_graph::{Edge, Node, solve, with_drift};
 use super::register::{Fit, RegisteredMap, Registration, Uncertainty, register};
 use super::submap::Submap;
@@ -86,8 +87,8 @@ impl Alignment {
         uncertainty: &Uncertainty,
     ) -> Result<Self, FleetError> {
         // Poses as given, with what is known of their errors.
-        let priors =
-            manifest.jobs.iter().map(|job| prior(job, folder)).collect::<Result<Vec<_>, _>>()?;
+        let priors = priors(manifest, folder).into_iter().collect::<Result<Vec<_>, _>>()?;
+        let links = links(manifest, folder)?;
         let sampled = manifest
             .jobs
             .iter()
@@ -99,23 +100,35 @@ impl Alignment {
             let share = if at == 0 { FIRST_SHARE } else { 1.0 };
             Node {
                 given: prior.t_world_map,
-                uncertainty: prior.uncertainty.unwrap_or_else(|| uncertainty.times(share)),
+                uncertainty: prior.uncertainty_or(&uncertainty.times(share)),
                 centre_m: of.centre_m,
             }
         };
         let nodes: Vec<Node> = priors.iter().zip(&sampled).enumerate().map(node).collect();
         let allowed: Vec<Uncertainty> =
-            priors.iter().map(|prior| prior.uncertainty.unwrap_or(*uncertainty)).collect();
+            priors.iter().map(|prior| prior.uncertainty_or(uncertainty)).collect();
+        // How two maps should lie to one another, and how far they may be from there.
+        let expected = |b: usize, a: usize| match links.iter().find(|(pair, _)| *pair == [b, a]) {
+            Some((_, link)) => (link.t_part_before.inverse(), LINK_UNCERTAINTY),
+            None => (nodes[b].given.inverse() * nodes[a].given, allowed[a].and(&allowed[b])),
+        };
         let mut poses: Vec<Transform> = nodes.iter().map(|node| node.given).collect();
         let mut pairs: Vec<([usize; 2], AlignedPair)> = Vec::new();
         // Registration begins from the poses of the round before.
         for _ in 0..ROUNDS {
-            let found = register_all(manifest, folder, (&sampled, &nodes, &poses, &allowed))?;
-            let edges: Vec<Edge> = found
+            let found = register_all(manifest, folder, &sampled, |b, a| {
+                let (given, allowed) = expected(b, a);
+                Expected { t_b_a: poses[b].inverse() * poses[a], given, allowed }
+            })?;
+            let accepted = || found.iter().filter(|(_, of)| of.fit.refused.is_none());
+            let registered = accepted().map(|(nodes, of)| registered_edge(*nodes, of));
+            // What two parts share says less than their registration, which errs alike.
+            let linked = links
                 .iter()
-                .filter(|(_, of)| of.fit.refused.is_none())
-                .map(|(nodes, of)| edge(*nodes, of, &sampled))
-                .collect();
+                .filter(|([before, part], _)| accepted().all(|(pair, _)| *pair != [*part, *before]))
+                .map(|(pair, link)| link.edge(*pair));
+            let edges: Vec<Edge> =
+                registered.chain(linked).map(|edge| drifting(edge, &sampled)).collect();
             poses = solve(&nodes, &edges, &poses);
             // Pairs of the last round are those that are reported.
             pairs = found
@@ -159,7 +172,7 @@ pub fn poses(
     let path = folder.join(ALIGNMENT_FILE);
     // Poses as given hold until an alignment of these jobs replaces them.
     let given: Vec<_> =
-        manifest.jobs.iter().map(|job| Ok(prior(job, folder)?.t_world_map)).collect();
+        priors(manifest, folder).into_iter().map(|prior| Ok(prior?.t_world_map)).collect();
     if !path.is_file() {
         return Ok(given);
     }
@@ -211,13 +224,21 @@ fn field(job: &Job, folder: &Path) -> Result<DistanceField, FleetError> {
     Ok(DistanceField::of(&mut map.store, &map.lattice, MIN_WEIGHT))
 }
 
-type Known<'k> = (&'k [Sampled], &'k [Node], &'k [Transform], &'k [Uncertainty]);
+/// Two maps before their registration: the first in the second.
+struct Expected {
+    /// Pose from which registration begins.
+    t_b_a: Transform,
+    /// Given pose, and how far registration may lead away from it.
+    given: Transform,
+    allowed: Uncertainty,
+}
 
-/// All pairs that may overlap, in the order of the jobs.
+/// Registers all pairs that may overlap, in the order of the jobs.
 fn register_all(
     manifest: &Manifest,
     folder: &Path,
-    (sampled, nodes, poses, uncertainties): Known<'_>,
+    sampled: &[Sampled],
+    expected: impl Fn(usize, usize) -> Expected,
 ) -> Result<Vec<([usize; 2], Registration)>, FleetError> {
     let load = |at: usize| -> Result<RegisteredMap, FleetError> {
         Ok(RegisteredMap {
@@ -229,7 +250,7 @@ fn register_all(
     for b in 0..sampled.len() {
         let mut map_b = None;
         for a in b + 1..sampled.len() {
-            let t_b_a = poses[b].inverse() * poses[a];
+            let Expected { t_b_a, given, allowed } = expected(b, a);
             // Maps that lie too far apart share no surface.
             let to_a = t_b_a.transform_point(sampled[a].centre_m);
             if distance_m(&to_a, &sampled[b].centre_m) > sampled[a].radius_m + sampled[b].radius_m {
@@ -239,33 +260,27 @@ fn register_all(
                 map_b = Some(load(b)?);
             }
             let Some(map_b) = &map_b else { continue };
-            // A registration that contradicts the given poses is refused later: they are handed
-            // over.
-            let given = nodes[b].given.inverse() * nodes[a].given;
-            let registration = register(
-                (&load(a)?, map_b),
-                (&given, &t_b_a),
-                &uncertainties[a].and(&uncertainties[b]),
-            );
+            let registration = register((&load(a)?, map_b), (&given, &t_b_a), &allowed);
             found.extend(registration.map(|registration| ([a, b], registration)));
         }
     }
     Ok(found)
 }
 
-/// A registration: where maps overlap, it says how they lie; how their centres lie follows as far
-/// as the maps have no drift from there.
-fn edge([a, b]: [usize; 2], of: &Registration, sampled: &[Sampled]) -> Edge {
+fn registered_edge(nodes: [usize; 2], of: &Registration) -> Edge {
+    let Registration { t_b_a, information, centre_m, .. } = *of;
+    Edge { nodes, t_b_a, information, centre_m }
+}
+
+/// Adds drift to an edge: it says how two maps lie where they overlap; how their centres lie
+/// follows as far as the maps have no drift from there.
+fn drifting(edge: Edge, sampled: &[Sampled]) -> Edge {
+    let [a, b] = edge.nodes;
     // In the other map's frame, where its own centre is.
-    let in_a_m = of.t_b_a.inverse().transform_point(of.centre_m);
-    let way_m = distance_m(&of.centre_m, &sampled[b].centre_m)
+    let in_a_m = edge.t_b_a.inverse().transform_point(edge.centre_m);
+    let way_m = distance_m(&edge.centre_m, &sampled[b].centre_m)
         .hypot(distance_m(&in_a_m, &sampled[a].centre_m));
-    Edge {
-        nodes: [a, b],
-        t_b_a: of.t_b_a,
-        information: with_drift(&of.information, way_m),
-        centre_m: of.centre_m,
-    }
+    Edge { information: with_drift(&edge.information, way_m), ..edge }
 }
 
 fn pair(

@@ -58,6 +58,9 @@ pub struct Prior {
     pub t_world_map: Transform,
     /// One standard deviation, where the fixes tell it.
     pub uncertainty: Option<Uncertainty>,
+    /// Way from where the pose was given to the beginning of the map, m: not 0 for later parts of a
+    /// recording.
+    pub way_m: f64,
 }
 
 /// The antenna in the map and in the world, m.
@@ -94,9 +97,15 @@ pub fn prior(job: &Job, folder: &Path) -> Result<Prior, FleetError> {
             let t_world_map = transform(rows).ok_or_else(|| {
                 FleetError::content(folder, format!("has no rigid motion for {}", job.name))
             })?;
-            return Ok(Prior { t_world_map, uncertainty: None });
+            return Ok(Prior { t_world_map, uncertainty: None, way_m: 0.0 });
         }
-        Given::Gnss { file, antenna_m, origin } => (file, antenna_m, origin),
+        Given::Gnss { file, antenna_m, origin, .. } => (file, antenna_m, origin),
+        Given::Follows(_) => {
+            return Err(FleetError::content(
+                folder,
+                format!("has no pose of its own for {}, a part of a recording", job.name),
+            ));
+        }
         Given::Figures(_) => {
             return Err(FleetError::content(
                 folder,
@@ -412,6 +421,7 @@ fn georeference(frames: &[Observation], antenna_m: [f64; 3]) -> Result<Prior, St
         ));
     }
     Ok(Prior {
+        way_m: 0.0,
         t_world_map: transform_of(&estimate.rotation, &estimate.shift_m),
         // The error of a receiver lasts longer than a recording: its mean over the path is no surer
         // than one fix.

@@ -2,7 +2,7 @@
 //! and a name that is a hash of all that decides its result, so that what is done is known by its
 //! folder.
 
-use super::{FleetError, Recording, Recordings, submap, tile_file};
+use super::{FleetError, Recording, Recordings, part_frames, submap, tile_file};
 use crate::formats::bounds::MANIFEST_TEXT;
 use crate::formats::read_text_within;
 use crate::owned::OwnedFolder;
@@ -48,10 +48,26 @@ pub enum Given {
         antenna_m: [f64; 3],
         /// Latitude and longitude, degrees, and altitude, m, of the world's origin.
         origin: [f64; 3],
+        /// Id of the recording's part before this one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        follows: Option<String>,
     },
+    /// At the end of the recording's part before this one: its id.
+    Follows(String),
     /// Nowhere: the run's figures are wanted, as this file below the folder of the jobs, and no
     /// map.
     Figures(PathBuf),
+}
+
+impl Given {
+    /// Id of the recording's part before this one.
+    pub fn follows(&self) -> Option<&str> {
+        match self {
+            Self::Follows(id) => Some(id),
+            Self::Gnss { follows, .. } => follows.as_deref(),
+            Self::TWorldCamera(_) | Self::Figures(_) => None,
+        }
+    }
 }
 
 /// State of a job.
@@ -74,6 +90,8 @@ pub struct Identity {
     pub bytes: u64,
     /// Pose of the first camera, if poses come from a file.
     pub first_pose: Option<Transform>,
+    /// Frames of the run; 0 where their end is not known.
+    pub frames: usize,
 }
 
 /// All jobs.
@@ -92,37 +110,43 @@ fn program() -> String {
 }
 
 impl Manifest {
-    /// The jobs of recordings. `identify` gives the request of a recording's arguments, and what
-    /// its run is.
+    /// The jobs of recordings. `request_of` gives the request of a recording's arguments,
+    /// `identify` what a request's run is.
     ///
     /// # Errors
-    /// A recording has no pose in the world, or `identify` fails.
+    /// A recording has no pose in the world, or `request_of` or `identify` fails.
     pub fn plan<E: From<FleetError>>(
         path: &Path,
         recordings: &Recordings,
-        identify: impl Fn(&[String]) -> Result<(Request, Identity), E>,
+        request_of: impl Fn(&[String]) -> Result<Request, E>,
+        identify: impl Fn(&Request) -> Result<Identity, E>,
     ) -> Result<Self, E> {
         let mut jobs: Vec<Job> = Vec::new();
         let origin = recordings.origin()?;
         for recording in &recordings.recordings {
-            let Recording { name, arguments, epoch, .. } = recording;
+            let Recording { arguments, epoch, .. } = recording;
             // A recording's own arguments come before those of all.
             let arguments: Vec<String> =
                 arguments.iter().chain(&recordings.arguments).cloned().collect();
-            let (request, identity) = identify(&arguments)?;
-            let given = recording
-                .given(origin, identity.first_pose.as_ref())
-                .map_err(|reason| FleetError::content(path, reason))?;
-            let job = Job { epoch: *epoch, ..Job::new(name, request, &identity, given) };
-            // A job's name follows from what it maps: twice the same would be merged twice.
-            if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
-                return Err(FleetError::content(
-                    path,
-                    format!("has one recording twice: {} is {name}. Remove one", same.name),
-                )
-                .into());
+            let whole = request_of(&arguments)?;
+            let mut before: Option<String> = None;
+            for (name, request) in parts_of(path, recording, whole, &identify)? {
+                let identity = identify(&request)?;
+                let given = recording
+                    .given(origin, identity.first_pose.as_ref(), before.take())
+                    .map_err(|reason| FleetError::content(path, reason))?;
+                let job = Job { epoch: *epoch, ..Job::new(&name, request, &identity, given) };
+                // A job's name follows from what it maps: twice the same would be merged twice.
+                if let Some(same) = jobs.iter().find(|other| other.id == job.id) {
+                    return Err(FleetError::content(
+                        path,
+                        format!("has one recording twice: {} is {name}. Remove one", same.name),
+                    )
+                    .into());
+                }
+                before = Some(job.id.clone());
+                jobs.push(job);
             }
-            jobs.push(job);
         }
         Ok(Self::of(jobs))
     }
@@ -178,6 +202,34 @@ impl Manifest {
     }
 }
 
+/// Names and requests of a recording's parts; of one that does not bend its own.
+fn parts_of<E: From<FleetError>>(
+    path: &Path,
+    recording: &Recording,
+    whole: Request,
+    identify: impl Fn(&Request) -> Result<Identity, E>,
+) -> Result<Vec<(String, Request)>, E> {
+    let Recording { name, part_frames: asked, .. } = recording;
+    let Some(asked) = *asked else { return Ok(vec![(name.clone(), whole)]) };
+    let refuse =
+        |why: String| FleetError::content(path, format!("has part_frames for {name}, {why}"));
+    if asked < part_frames::MIN_FRAMES {
+        let least = part_frames::MIN_FRAMES;
+        return Err(refuse(format!("of {asked} frames. Give {least} or more")).into());
+    }
+    let frames = identify(&whole)?.frames;
+    if frames == 0 {
+        return Err(refuse("whose frames cannot be counted. Remove it".to_owned()).into());
+    }
+    let part = |(nth, [first, most]): (usize, [usize; 2])| {
+        let mut request = whole.clone();
+        request.frames.start += first * request.frames.stride.max(1);
+        request.frames.most = Some(most);
+        (format!("{name}.{nth}"), request)
+    };
+    Ok((1..).zip(part_frames::frames_of_parts(frames, asked)).map(part).collect())
+}
+
 impl Job {
     /// The job of a run, and what is wanted of it.
     pub fn new(name: &str, request: Request, identity: &Identity, given: Given) -> Self {
@@ -223,7 +275,9 @@ impl Job {
         // What the job is for must be there, and not only its run.
         let is_done = match &self.given {
             Given::Figures(file) => folder.join(file).is_file(),
-            Given::TWorldCamera(_) | Given::Gnss { .. } => self.submap(folder).is_dir(),
+            Given::TWorldCamera(_) | Given::Gnss { .. } | Given::Follows(_) => {
+                self.submap(folder).is_dir()
+            }
         };
         match (is_done, started) {
             (true, _) => JobState::Done,
@@ -268,11 +322,42 @@ mod tests {
     use super::*;
     use crate::fleet::RECORDINGS_EXAMPLE;
 
-    fn identify(arguments: &[String]) -> Result<(Request, Identity), FleetError> {
+    fn request_of(arguments: &[String]) -> Result<Request, FleetError> {
         let mut request = Request::default();
         request.input.sequence = Some(arguments.join(" "));
-        let identity = Identity { digest: arguments.len() as u64, bytes: 7, first_pose: None };
-        Ok((request, identity))
+        Ok(request)
+    }
+
+    fn identify(request: &Request) -> Result<Identity, FleetError> {
+        let words = request.input.sequence.iter().flat_map(|words| words.split(' ')).count();
+        let frames = request.frames.most.unwrap_or(100);
+        Ok(Identity { digest: words as u64, bytes: 7, first_pose: None, frames })
+    }
+
+    #[test]
+    fn parts_follow_one_another() {
+        let root = tempfile::TempDir::new().unwrap();
+        let path = root.path().join("recordings.toml");
+        let plan = |lines: &str| {
+            let text = format!(
+                "[[recording]]\nname = \"monday\"\narguments = [\"rig\"]\npart_frames = {lines}\n"
+            );
+            std::fs::write(&path, text).unwrap();
+            Manifest::plan(&path, &Recordings::read(&path).unwrap(), request_of, identify)
+        };
+        let manifest = plan("40\nt_world_camera = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0]").unwrap();
+        let [first, second, third] = &manifest.jobs[..] else { panic!("{manifest:?}") };
+        assert_eq!([&first.name, &third.name], ["monday.1", "monday.3"]);
+        assert!(matches!(first.given, Given::TWorldCamera(rows) if rows[3] == 5.0));
+        assert_eq!(second.given, Given::Follows(first.id.clone()));
+        assert_eq!(third.given.follows(), Some(&second.id[..]));
+        assert_eq!((third.request.frames.start, third.request.frames.most), (60, Some(40)));
+        // What is written is what is read.
+        let folder = root.path().join("fleet");
+        manifest.write(&folder).unwrap();
+        assert_eq!(Manifest::read(&folder).unwrap(), manifest);
+        let refused = plan("5").unwrap_err().to_string();
+        assert!(refused.contains("Give 20 or more"), "{refused}");
     }
 
     #[test]
@@ -280,7 +365,8 @@ mod tests {
         let root = tempfile::TempDir::new().unwrap();
         let path = root.path().join("recordings.toml");
         std::fs::write(&path, RECORDINGS_EXAMPLE).unwrap();
-        let manifest = Manifest::plan(&path, &Recordings::read(&path).unwrap(), identify).unwrap();
+        let manifest =
+            Manifest::plan(&path, &Recordings::read(&path).unwrap(), request_of, identify).unwrap();
         // The folder of the list is the user's own.
         let refused = manifest.write(root.path()).unwrap_err().to_string();
         assert!(refused.contains("has no marker"), "a folder of the user's: {refused}");

@@ -24,6 +24,8 @@ mod georeference;
 mod manifest;
 mod merge;
 mod mesh;
+mod part_frames;
+mod parts;
 mod pose_graph;
 mod recordings;
 mod register;

@@ -52,6 +52,15 @@ pub fn with_drift(information: &Matrix6<f64>, way_m: f64) -> Matrix6<f64> {
     information.try_inverse().and_then(|own| (own + drift).try_inverse()).unwrap_or(*information)
 }
 
+/// Drift that a path may have over some way, one standard deviation: systematic errors add up to
+/// twice those of a single map.
+pub fn drift_over(way_m: f64) -> Uncertainty {
+    Uncertainty {
+        position_m: 2.0 * DRIFT_SHARE * way_m,
+        rotation_rad: 2.0 * DRIFT_RAD_PER_M * way_m,
+    }
+}
+
 /// Solves for the maps' poses in the world, beginning at `start`.
 pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transform> {
     let mut poses = start.to_vec();

@@ -21,6 +21,7 @@ name = \"tuesday\"
 arguments = [\"recordings/tuesday\"]
 t_world_camera = [1, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]   # its first camera in the world, a \
 row of KITTI
+part_frames = 100   # in parts, which bend where other recordings and fixes want it
 epoch = 1   # where it contradicts recordings of epoch 0, a rule decides
 # or where it lies by a receiver of satellites, a line of latitude, longitude, altitude for each \
 frame: gnss = \"gnss.txt\"
@@ -65,6 +66,9 @@ pub struct Recording {
     /// m: x right, y down, z ahead.
     #[serde(default)]
     pub antenna_m: [f64; 3],
+    /// Frames of each of its maps, which overlap and can be moved apart; one rigid map if absent.
+    #[serde(default)]
+    pub part_frames: Option<usize>,
     /// The epoch it belongs to, such as 20261122: maps of different epochs are not averaged where
     /// they contradict one another.
     #[serde(default)]
@@ -109,18 +113,19 @@ impl Recordings {
 }
 
 impl Recording {
-    /// Returns the given pose; `first_pose` is the first of the recording's file of poses. The
-    /// error says why it is missing.
+    /// Returns the given pose; `first_pose` is the first of the recording's file of poses, and
+    /// `follows` the id of the part before. The error says why it is missing.
     pub(super) fn given(
         &self,
         origin: Option<[f64; 3]>,
         first_pose: Option<&Transform>,
+        follows: Option<String>,
     ) -> Result<Given, String> {
         let Self { name, t_world_camera, poses_in_world, gnss, antenna_m, .. } = self;
         // Exactly one of the three ways, or none for the identity.
         match (t_world_camera, poses_in_world, gnss, origin) {
             (None, false, Some(file), Some(origin)) => {
-                Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin })
+                Ok(Given::Gnss { file: file.clone(), antenna_m: *antenna_m, origin, follows })
             }
             (None, true, None, _) => {
                 first_pose.map(|pose| Given::TWorldCamera(rows_of(pose))).ok_or_else(|| {
@@ -129,6 +134,9 @@ impl Recording {
                          `--egomotion`, `file:POSES` among its arguments"
                     )
                 })
+            }
+            (_, false, None, _) if follows.is_some() => {
+                Ok(Given::Follows(follows.unwrap_or_default()))
             }
             (given, false, None, _) => {
                 let rows = given.unwrap_or_else(|| rows_of(&Transform::IDENTITY));
@@ -162,8 +170,9 @@ mod tests {
     #[test]
     fn wrong_lists_and_motions_are_refused() {
         assert!(example("[[drives]]\n").unwrap_err().to_string().contains("[[recording]]"));
-        let given =
-            |list: &str| example(list).unwrap().recordings[0].given(Some([49.0, 8.0, 0.0]), None);
+        let given = |list: &str| {
+            example(list).unwrap().recordings[0].given(Some([49.0, 8.0, 0.0]), None, None)
+        };
         let recording = "[[recording]]\nname = \"tuesday\"\narguments = []\n";
         // A rotation matrix with a 2 is none.
         let turned = "t_world_camera = [2, 0, 0, 5.2, 0, 1, 0, 0, 0, 0, 1, -3.1]\n";
@@ -185,7 +194,7 @@ mod tests {
             let list =
                 example(&format!("[[recording]]\nname = \"tuesday\"\narguments = []\n{lines}\n"))
                     .unwrap();
-            list.recordings[0].given(Some([49.0, 8.0, 110.0]), Some(&pose)).unwrap()
+            list.recordings[0].given(Some([49.0, 8.0, 110.0]), Some(&pose), None).unwrap()
         };
         assert_eq!(given("poses_in_world = true"), Given::TWorldCamera(rows_of(&pose)));
         // Without anything said, the recording begins at the world's origin.
@@ -194,6 +203,7 @@ mod tests {
             file: "fixes".into(),
             antenna_m: [0.0, -1.0, 0.5],
             origin: [49.0, 8.0, 110.0],
+            follows: None,
         };
         assert_eq!(given("gnss = \"fixes\"\nantenna_m = [0, -1, 0.5]"), gnss);
     }

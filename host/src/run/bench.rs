@@ -28,14 +28,14 @@ pub struct StageBench {
 /// Steps that cost most, beside the usual one.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Tail {
-    /// What a step's cost is: `cpu`, the CPU time that it took here; `work`, the time that its
-    /// units stand for ([`dynvox_core::WorkUnits::nominal_ns`]), the same on every machine.
+    /// Kind of cost: `cpu`, the CPU time of a step here; `work`, the time that its units stand for
+    /// ([`dynvox_core::WorkUnits::nominal_ns`]), the same on every machine.
     pub cost: &'static str,
     /// Median, ms.
     pub median_ms: f64,
-    /// One step in a hundred costs more, ms.
+    /// Percentile 99, ms.
     pub p99_ms: f64,
-    /// One step in a thousand costs more, ms.
+    /// Percentile 99.9, ms.
     pub p999_ms: f64,
     /// The most expensive step, ms.
     pub worst_ms: f64,
@@ -52,7 +52,7 @@ pub struct Bench {
     pub digest: String,
     /// Each stage that took time, then the step, then a raycast of the map from each frame's pose.
     pub stages: Vec<StageBench>,
-    /// How far steps differ, by CPU time and by counted work.
+    /// Most expensive steps, by CPU time and by counted work.
     pub tails: [Tail; 2],
     /// Time of a unit of work, for the stages that count any; empty with fewer than five frames.
     pub units: Vec<UnitTime>,

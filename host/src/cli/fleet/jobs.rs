@@ -4,7 +4,8 @@ use super::{Shard, each};
 use crate::cli::run::{request_of, write as run_to};
 use crate::cli::{signals, sweep};
 use crate::fleet::{
-    self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Recordings, Submap,
+    self, Camera, CameraPose, Given, Identity, Job, JobState, Lattice, Manifest, Prior, Recordings,
+    Submap,
 };
 use crate::formats::{
     FRAMES_FILE, TIMED_TRAJECTORY_FILE, TRAJECTORY_FILE, read_poses, rows_of_file,
@@ -34,7 +35,8 @@ fn identify(plan: &Plan) -> anyhow::Result<Identity> {
         digest.u64(stereo_frame(&images, &[]).map_or(0, |frame| frame.digest()));
     }
     let first_pose = plan.poses.iter().flatten().next().copied();
-    Ok(Identity { digest: digest.finish(), bytes: plan.rss_limit_bytes, first_pose })
+    let (bytes, frames) = (plan.rss_limit_bytes, frames.len());
+    Ok(Identity { digest: digest.finish(), bytes, first_pose, frames })
 }
 
 /// A job whose figures are wanted, as a file below the folder of the jobs.
@@ -56,12 +58,9 @@ fn request_of_map(arguments: &[String]) -> anyhow::Result<Request> {
 }
 
 pub fn plan(recordings: &Path, out: &Path) -> anyhow::Result<()> {
-    let of = |arguments: &[String]| {
-        let request = request_of_map(arguments)?;
-        let identity = identify(&request.resolve()?)?;
-        anyhow::Ok((request, identity))
-    };
-    write(&Manifest::plan(recordings, &Recordings::read(recordings)?, of)?, out)
+    let list = Recordings::read(recordings)?;
+    let identify = |request: &Request| identify(&request.resolve()?);
+    write(&Manifest::plan(recordings, &list, request_of_map, identify)?, out)
 }
 
 /// Writes jobs, and says what to do with them.
@@ -83,20 +82,30 @@ pub fn run(folder: &Path, shard: Shard) -> anyhow::Result<()> {
         if job.state(folder) != JobState::Done {
             done(folder, job)?;
             outln!("{} is {}", job.name, state(folder, job));
-            if matches!(job.given, Given::Gnss { .. })
-                && let Some(of) = fleet::prior(job, folder)?.uncertainty
-            {
-                let turn_deg = of.rotation_rad.to_degrees();
-                outln!(
-                    "{} lies along its fixes, with standard deviations of {:.2} m and \
-                     {turn_deg:.2} degrees",
-                    job.name,
-                    of.position_m
-                );
+            if matches!(job.given, Given::Gnss { .. }) {
+                say_fixes(folder, job)?;
             }
         }
         Ok(())
     })
+}
+
+/// Says how well a map lies along its fixes.
+fn say_fixes(folder: &Path, job: &Job) -> anyhow::Result<()> {
+    match (fleet::prior(job, folder), job.given.follows()) {
+        (Ok(Prior { uncertainty: Some(of), .. }), _) => outln!(
+            "{} lies along its fixes, with standard deviations of {:.2} m and {:.2} degrees",
+            job.name,
+            of.position_m,
+            of.rotation_rad.to_degrees()
+        ),
+        // The part before it says where it lies.
+        (Err(error), Some(_)) => outln!("{} lies where it follows: {error}", job.name),
+        (prior, _) => {
+            prior?;
+        }
+    }
+    Ok(())
 }
 
 /// Does one job, of the settings and images it was planned for.
@@ -108,7 +117,7 @@ fn done(folder: &Path, job: &Job) -> anyhow::Result<()> {
     }
     let figures = match &job.given {
         Given::Figures(file) => Some((folder.join(file), sweep::figures_of(folder, job)?)),
-        Given::TWorldCamera(_) | Given::Gnss { .. } => {
+        Given::TWorldCamera(_) | Given::Gnss { .. } | Given::Follows(_) => {
             run_apart(folder, job)?;
             None
         }

@@ -1,9 +1,9 @@
 use super::*;
 use crate::fleet::tile_file::Lattice;
-use crate::fleet::{Camera, Given, keep};
+use crate::fleet::{Camera, CameraPose, Given, keep};
 use crate::request::Request;
 use crate::run::store::BlockFile;
-use dynvox_core::geometry::StereoRig;
+use dynvox_core::geometry::{MapSegment, StereoRig};
 use dynvox_core::volume::{BLOCK_VOXELS, BlockCoord, BlockKey, BlockStore, EvictedBlock};
 
 const LATTICE: Lattice = Lattice { voxel_size_m: 0.2, truncation_m: 0.8, colour: false };
@@ -23,6 +23,11 @@ fn street([x, y, z]: [f64; 3]) -> f64 {
 
 /// Writes the map of a plane 20 m ahead of a recording's pose.
 fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
+    record_with(job, folder, t_world_camera, Vec::new());
+}
+
+/// Writes that map, of a camera that has been at some poses of it.
+fn record_with(job: &Job, folder: &Path, t_world_camera: &Transform, poses: Vec<CameraPose>) {
     let path = folder.join(format!("{}.blocks", job.id));
     let (mut store, _) =
         BlockFile::open(&path, LATTICE.voxel_size_m, LATTICE.truncation_m).unwrap();
@@ -45,13 +50,8 @@ fn record(job: &Job, folder: &Path, t_world_camera: &Transform) {
         assert!(store.store(EvictedBlock { key, sdf: &sdf, weight: &weight, colour: None }));
     }
     let rig = StereoRig { focal_px: 100.0, center_u_px: 50.0, center_v_px: 20.0, baseline_m: 0.5 };
-    keep(
-        &mut store,
-        &LATTICE,
-        &Camera { rig, size: (100, 40), poses: Vec::new() },
-        &job.submap(folder),
-    )
-    .unwrap();
+    keep(&mut store, &LATTICE, &Camera { rig, size: (100, 40), poses }, &job.submap(folder))
+        .unwrap();
 }
 
 fn job(nth: usize, given: &Transform) -> Job {
@@ -144,4 +144,52 @@ fn a_pose_farther_off_than_it_may_be_is_refused_by_name() {
     assert!(why.contains("more than the given poses may be off"), "{why}");
     // A refused registration moves nothing.
     assert!(alignment.recordings.iter().all(|of| of.moved_m < 1e-6), "{alignment:?}");
+}
+
+/// Three parts along a street, which turn by an angle between them that their camera does not
+/// notice, and a recording at the end of the way whose pose is exact. Returns how far the parts are
+/// off as given, and after alignment, m.
+fn parts_off_m(unnoticed_rad: f64) -> [[f64; 3]; 2] {
+    let root = tempfile::TempDir::new().unwrap();
+    std::fs::create_dir_all(root.path().join("submaps")).unwrap();
+    let ahead = |way_m: f64| Transform::from_translation([0.0, 0.0, way_m]);
+    let on = ahead(12.0) * Transform::new([0.0, unnoticed_rad, 0.0], [0.0; 3]);
+    let (truth, exact) = ([Transform::IDENTITY, on, on * on], ahead(26.0));
+    let mut jobs: Vec<Job> = (0..3).map(|nth| job(nth, &Transform::IDENTITY)).collect();
+    for part in 1..3 {
+        jobs[part].given = Given::Follows(jobs[part - 1].id.clone());
+    }
+    jobs.push(job(3, &exact));
+    let manifest = Manifest { program: String::new(), jobs };
+    let camera = |frame: usize, t_map_camera: Transform| CameraPose {
+        frame,
+        time_s: None,
+        segment: MapSegment::FIRST,
+        t_map_camera,
+    };
+    for (part, truth) in truth.iter().enumerate() {
+        // The last frame of a part is the first of the next.
+        let poses = vec![camera(part, Transform::IDENTITY), camera(part + 1, ahead(12.0))];
+        record_with(&manifest.jobs[part], root.path(), truth, poses);
+    }
+    record(&manifest.jobs[3], root.path(), &exact);
+    let off_m = || {
+        let found = poses(&manifest, root.path()).unwrap();
+        std::array::from_fn(|at| (truth[at].inverse() * *found[at].as_ref().unwrap()).distance_m())
+    };
+    let given_m = off_m();
+    Alignment::find(&manifest, root.path(), &UNCERTAINTY).unwrap().write(root.path()).unwrap();
+    [given_m, off_m()]
+}
+
+#[test]
+fn parts_that_fit_are_registered() {
+    let [given_m, found_m] = parts_off_m(0.007);
+    assert!(given_m[2] > 0.08 && found_m.iter().all(|m| *m < 0.03), "{given_m:?}, {found_m:?}");
+}
+
+#[test]
+fn parts_that_do_not_fit_bend_where_they_share_frames() {
+    let [given_m, found_m] = parts_off_m(0.0175);
+    assert!(given_m[2] > 0.2 && found_m[2] < 0.08, "{given_m:?}, {found_m:?}");
 }
