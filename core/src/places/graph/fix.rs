@@ -66,8 +66,8 @@ impl PoseFix {
     /// let fix =
     ///     PoseFix::of_vertical(up_camera, [0.0, -1.0, 0.0], 0.002, &Transform::IDENTITY);
     /// assert!((fix.t_world_camera.inverse() * rolled).angle_rad() < 1e-12);
-    /// let [pitch_rad, yaw_rad, _] = fix.covariance.rotation_sigma_rad();
-    /// assert!((pitch_rad - 0.002).abs() < 1e-9 && yaw_rad > 9.0);
+    /// let [_, yaw_rad, roll_rad] = fix.covariance.rotation_sigma_rad();
+    /// assert!((roll_rad - 0.002).abs() < 1e-9 && yaw_rad > 9.0);
     /// ```
     pub fn of_vertical(
         up_camera: [f64; 3],
