@@ -409,14 +409,15 @@ def test_a_position_moves_the_closed_world_alone():
     assert moved == 1 and made.t_closed_driven[0, 3] == pytest.approx(0.05, abs=0.02)
     # Its own motion is as before: 0.3 m a step.
     assert made.t_world_camera[0, 3] - driven[0, 3] == pytest.approx(12 * 0.3, abs=0.1)
-    # The newest keyframe has no fix yet: a vertical that is 2 degrees off the one as driven tilts the closed world alone.
+    # The newest keyframe has no fix yet: a vertical off the one as driven tilts the closed world alone.
     up = [0, -1, 0]
     with pytest.raises(dynvox.Error, match="no rigid motion"):
         made.add_vertical([0, 0, 0], up, 0.001)
-    made.add_vertical([np.sin(0.035), -np.cos(0.035), 0], up, 0.001)
+    made.add_vertical([np.sin(0.004), -np.cos(0.004), 0], up, 0.0005)
     for at in range(24, 36):
         made.step(*pair(6 * at))
-    assert abs(np.arcsin(made.t_closed_driven[1, 0])) == pytest.approx(0.035, abs=0.01)
+    # Its own motions hold against it, by their errors.
+    assert 0.0002 < abs(made.t_closed_driven[1, 0]) < 0.004
     with pytest.raises(dynvox.Error, match="without an error"):
         made.add_fix(made.t_world_camera, np.zeros((6, 6)))
     with pytest.raises(dynvox.Error, match="keyframes"):
