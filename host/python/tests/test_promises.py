@@ -416,7 +416,7 @@ def test_a_position_moves_the_closed_world_alone():
     made.add_vertical([np.sin(0.004), -np.cos(0.004), 0], up, 0.0005)
     for at in range(24, 36):
         made.step(*pair(6 * at))
-    # Its own motions hold against it, by their errors.
+    # Motions count as well, by their errors.
     assert 0.0002 < abs(made.t_closed_driven[1, 0]) < 0.004
     with pytest.raises(dynvox.Error, match="without an error"):
         made.add_fix(made.t_world_camera, np.zeros((6, 6)))
