@@ -175,8 +175,7 @@ impl Mapper<'_> {
         position_m: [f64; 3],
         sigma_m: [f64; 3],
     ) -> Result<(), FixError> {
-        let about = (self.t_closed_driven() * *self.t_world_camera()).normalized();
-        self.add_fix(&PoseFix::of_position(position_m, sigma_m, &about))
+        self.add_fix(&PoseFix::of_position(position_m, sigma_m, &self.t_closed_camera()))
     }
 
     /// Takes the direction that is up in the last frame, in the camera's axes and in those of the
@@ -207,7 +206,11 @@ impl Mapper<'_> {
         up_world: [f64; 3],
         sigma_rad: f64,
     ) -> Result<(), FixError> {
-        let about = (self.t_closed_driven() * *self.t_world_camera()).normalized();
-        self.add_fix(&PoseFix::of_vertical(up_camera, up_world, sigma_rad, &about))
+        self.add_fix(&PoseFix::of_vertical(up_camera, up_world, sigma_rad, &self.t_closed_camera()))
+    }
+
+    /// The camera of the last frame in the closed world.
+    fn t_closed_camera(&self) -> Transform {
+        (self.t_closed_driven() * *self.t_world_camera()).normalized()
     }
 }

@@ -58,3 +58,8 @@ pub use tile_file::Lattice;
 fn distance_m(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt()
 }
+
+/// Length of a path through points.
+fn path_m(points_m: &[[f64; 3]]) -> f64 {
+    points_m.windows(2).map(|ends| distance_m(&ends[0], &ends[1])).sum()
+}

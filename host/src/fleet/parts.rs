@@ -5,11 +5,10 @@
 //! shares with the one before say, unless it has fixes of its own.
 
 use super::georeference::{Prior, prior};
-use super::pose_graph::{Edge, drift_over};
+use super::pose_graph::{Edge, drift_over, information_of};
 use super::submap::Submap;
-use super::{FleetError, Job, Manifest, Uncertainty, distance_m};
+use super::{FleetError, Job, Manifest, Uncertainty, path_m};
 use dynvox_core::geometry::Transform;
-use nalgebra::{Matrix6, Vector6};
 use std::path::Path;
 
 /// Standard deviation of a part's place by the frames that it shares: stereo odometry over some
@@ -53,30 +52,20 @@ impl Link {
                 ),
             )
         })?;
-        let way_before_m = earlier
-            .windows(2)
-            .map(|pair| {
-                let [from, to] = [0, 1].map(|at| pair[at].t_map_camera.translation_m);
-                distance_m(&from, &to)
-            })
-            .sum();
+        let cameras_m: Vec<_> = earlier.iter().map(|of| of.t_map_camera.translation_m).collect();
         Ok(Self {
             t_part_before: t_part_camera * t_before_camera.inverse(),
             camera_m: t_part_camera.translation_m,
-            way_before_m,
+            way_before_m: path_m(&cameras_m),
         })
     }
 
     /// Returns an edge of the pose graph, known about the shared camera.
     pub fn edge(&self, nodes: [usize; 2]) -> Edge {
-        let Uncertainty { position_m, rotation_rad } = LINK_UNCERTAINTY;
-        let [turn, shift] = [rotation_rad, position_m].map(|sigma| sigma.powi(-2));
         Edge {
             nodes,
             t_b_a: self.t_part_before,
-            information: Matrix6::from_diagonal(&Vector6::new(
-                turn, turn, turn, shift, shift, shift,
-            )),
+            information: information_of(&LINK_UNCERTAINTY),
             centre_m: self.camera_m,
         }
     }

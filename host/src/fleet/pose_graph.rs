@@ -72,7 +72,7 @@ pub fn solve(nodes: &[Node], edges: &[Edge], start: &[Transform]) -> Vec<Transfo
             // Errors are taken about the map's centre, where turn and shift are independent.
             let centre_m = Vector3::from(poses[at].transform_point(node.centre_m));
             let to_centre = about(&centre_m);
-            let information = to_centre.transpose() * prior(&node.uncertainty);
+            let information = to_centre.transpose() * information_of(&node.uncertainty);
             add(&mut matrix, at, at, &(information * to_centre));
             add_vector(
                 &mut vector,
@@ -132,7 +132,8 @@ fn about(centre_m: &Vector3<f64>) -> Matrix6<f64> {
     matrix
 }
 
-fn prior(uncertainty: &Uncertainty) -> Matrix6<f64> {
+/// Information of a pose about its own centre.
+pub fn information_of(uncertainty: &Uncertainty) -> Matrix6<f64> {
     let (turn, shift) = (uncertainty.rotation_rad.powi(-2), uncertainty.position_m.powi(-2));
     Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, shift, shift, shift))
 }

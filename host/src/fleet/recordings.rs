@@ -135,10 +135,10 @@ impl Recording {
                     )
                 })
             }
-            (_, false, None, _) if follows.is_some() => {
-                Ok(Given::Follows(follows.unwrap_or_default()))
-            }
             (given, false, None, _) => {
+                if let Some(before) = follows {
+                    return Ok(Given::Follows(before));
+                }
                 let rows = given.unwrap_or_else(|| rows_of(&Transform::IDENTITY));
                 transform(&rows).ok_or_else(|| {
                     format!(

@@ -4,7 +4,7 @@
 use super::coverage::{Coverage, coverage};
 use super::resolve::{ResolvedMap, resolve};
 use super::submap::Submap;
-use super::{Change, FleetError, Manifest, changes, distance_m, poses};
+use super::{Change, FleetError, Manifest, changes, path_m, poses};
 use crate::owned::{self, DraftFolder};
 use crate::run::write_whole;
 use dynvox_core::volume::BLOCK_SIDE;
@@ -86,7 +86,7 @@ impl Report {
                 name: job.name.clone(),
                 epoch: job.epoch,
                 frames: cameras_m.len(),
-                path_m: cameras_m.windows(2).map(|ends| distance_m(&ends[1], &ends[0])).sum(),
+                path_m: path_m(&cameras_m),
                 cameras_m,
             });
         }

@@ -80,7 +80,7 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
             Ok(())
         })
     })?;
-    let counted = costs.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(&costs);
+    let counted = without_first(&costs);
     let of_stage = |stage: Stage| {
         medians(stage.name(), counted.iter().map(|(_, stages)| stages[stage as usize]))
     };
@@ -90,7 +90,7 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
     stages.push(medians("step", counted.iter().map(|(step, _)| *step)));
     stages.push(of_stage(raycast));
     // The first frame does half of the work that its units would tell.
-    let usual = work.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(&work);
+    let usual = without_first(&work);
     let tails = [
         tail("cpu", counted.iter().map(|(step, _)| step.work.as_secs_f64() * 1e3)),
         tail("work", usual.iter().map(|frame| frame.work.nominal_ns() as f64 / 1e6)),
@@ -98,6 +98,11 @@ pub fn bench(plan: &Plan, vectors: Vectors) -> Result<Bench, RunError> {
     let units = fit(usual, &plan.capacity.work(&plan.config));
     let digest = format!("{digest:016x}");
     Ok(Bench { frames: costs.len(), vectors: vectors.name(), digest, stages, tails, units })
+}
+
+/// All frames but the first, where there are more.
+fn without_first<T>(frames: &[T]) -> &[T] {
+    frames.get(1..).filter(|rest| !rest.is_empty()).unwrap_or(frames)
 }
 
 fn tail(cost: &'static str, steps_ms: impl Iterator<Item = f64>) -> Tail {

@@ -84,10 +84,9 @@ impl PoseFix {
         // The shortest turn from one direction to the other.
         let shortest = [b * z - c * y, c * x - a * z, a * y - b * x, 1.0 + a * x + b * y + c * z];
         let upright = Transform { rotation: shortest, translation_m: [0.0; 3] }.normalized();
-        let about = Transform { translation_m: [0.0; 3], ..*t_world_camera };
-        let turn = Transform {
+        let turned = Transform {
             translation_m: t_world_camera.translation_m,
-            ..(upright * about).normalized()
+            ..(upright * *t_world_camera).normalized()
         };
         let [tilt, unmeasured] = [sigma_rad, UNMEASURED_RAD].map(|sigma| sigma * sigma);
         let mut matrix = [[0.0; 6]; 6];
@@ -101,7 +100,7 @@ impl PoseFix {
                 };
             }
         }
-        Self::in_world(turn, &matrix)
+        Self::in_world(turned, &matrix)
     }
 
     /// A pose whose covariance is given along the world's axes.
