@@ -162,10 +162,11 @@ impl<'s> StaticMap<'s> {
         allocation
     }
 
-    /// Returns true if the depth taken last shows a surface: of its first `pixels` values one is
-    /// above 0.
+    /// Returns true if the depth taken last shows a surface that is fused: of its first `pixels`
+    /// values one is above 0 and not too far.
     pub fn has_depth(&self, pixels: usize) -> bool {
-        self.depth_m.iter().take(pixels).any(|&depth_m| depth_m > 0.0)
+        let far_m = self.volume.config().far_m;
+        self.depth_m.iter().take(pixels).any(|&depth_m| depth_m > 0.0 && depth_m <= far_m)
     }
 
     /// Looks at the map from a pose; whether that could be done.

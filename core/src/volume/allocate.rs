@@ -19,15 +19,19 @@
 //! [`MAX_BLOCKS_PER_RAY`](super::MAX_BLOCKS_PER_RAY).
 
 use super::{
-    BLOCK_SIDE, BlockCoord, BlockKey, BlockStore, EvictionReport, Slot, Viewpoint, Volume,
+    BEFORE_FAR, BLOCK_SIDE, BlockCoord, BlockKey, BlockStore, EvictionReport, Slot, Viewpoint,
+    Volume, VolumeConfig,
     request::{Band, Rays},
 };
 use crate::{
-    geometry::Transform,
+    geometry::{StereoRig, Transform},
     image::View,
     parallel::{Executor, each},
 };
-use nalgebra::Vector3;
+use nalgebra::{Point3, Rotation3, Vector3};
+
+/// Frames over which all blocks of the pool are looked at once, whether they are seen through.
+const LOOK_AGAIN_FRAMES: u32 = 4;
 
 /// Counts of one frame's allocation. Requests refused repeat when several rays ask for the same
 /// block.
@@ -92,6 +96,7 @@ impl Volume<'_> {
         }
         self.requested = requested;
         self.keep_in_view(view, &mut report);
+        self.see_through(view, depth_m, &mut report);
         self.visible.sort(self.pool.high_water());
         report
     }
@@ -165,35 +170,104 @@ impl Volume<'_> {
 
     /// Lists the blocks visible in the last frame that still lie in the picture.
     fn keep_in_view(&mut self, view: &Viewpoint, report: &mut AllocationReport) {
-        let (camera_from_world, camera) = view.camera_from_world();
-        let voxel_m = f64::from(self.config.voxel_size_m);
-        let [width, height] = [view.width as f64, view.height as f64];
-        // Behind the farthest surface the band is observed as well.
-        let farthest = f64::from(self.config.far_m + self.config.truncation_m);
+        let sight = Sight::new(&self.config, view);
         for i in 0.. {
             let Some(slot) = self.visible.before(i) else { break };
             // Listed in this frame already, or evicted meanwhile.
             if self.visible.is_marked(slot) || !self.pool.is_live(slot) {
                 continue;
             }
-            // Blocks of another segment lie in a lattice of their own.
-            let current = |key: &BlockKey| key.segment == self.segment;
-            let Some(key) = self.blocks.key(slot).filter(current) else { continue };
-            let center = Vector3::from(key.coord.origin().map(|c| (f64::from(c) + 3.5) * voxel_m));
-            let at = camera_from_world * (center - camera.coords);
-            let u = view.rig.focal_px * at.x + view.rig.center_u_px * at.z;
-            let v = view.rig.focal_px * at.y + view.rig.center_v_px * at.z;
-            // Inside the picture, without dividing by a depth that may be 0.
-            let inside = at.z > 0.0
-                && at.z <= farthest
-                && u >= 0.0
-                && v >= 0.0
-                && u < width * at.z
-                && v < height * at.z;
-            if inside {
+            if self.current_coord(slot).is_some_and(|coord| sight.pixel(coord).is_some()) {
                 self.list(slot, report);
             }
         }
+    }
+
+    /// Lists blocks that came back into the picture and are seen through: what stood there has
+    /// gone. A share of the pool in each frame. Without pruning nothing: what was evicted cannot be
+    /// looked at, and an unpruned map does not depend on the pool.
+    fn see_through(
+        &mut self,
+        view: &Viewpoint,
+        depth_m: View<'_, f32>,
+        report: &mut AllocationReport,
+    ) {
+        if !self.config.prunes() {
+            return;
+        }
+        let sight = Sight::new(&self.config, view);
+        // In slots that follow each other, whose headers lie together in memory.
+        let share = (self.pool.high_water() as u32).div_ceil(LOOK_AGAIN_FRAMES);
+        let first = self.visible.frame() % LOOK_AGAIN_FRAMES * share;
+        let mut next = first;
+        while let Some(slot) = self.pool.next_live(next).filter(|slot| slot.get() < first + share) {
+            next = slot.get() + 1;
+            // A block that was left belongs to another look at the place.
+            if self.visible.is_marked(slot) || self.is_left(slot) {
+                continue;
+            }
+            let seen = self.current_coord(slot).and_then(|coord| sight.pixel(coord));
+            // By its middle alone: its other parts are seen in later frames.
+            let is_through = seen.is_some_and(|([u, v], z_m)| {
+                let observed_m = depth_m.get(u, v).map_or(0.0, f64::from);
+                z_m + sight.block_m < observed_m * (1.0 - f64::from(BEFORE_FAR))
+            });
+            if is_through {
+                self.list(slot, report);
+            }
+        }
+    }
+
+    /// Coordinates of a block, if it belongs to the segment that the camera is in: blocks of
+    /// another lie in a lattice of their own.
+    fn current_coord(&self, slot: Slot) -> Option<BlockCoord> {
+        let key = self.blocks.key(slot)?;
+        (key.segment == self.segment).then_some(key.coord)
+    }
+}
+
+/// A camera before the lattice of blocks.
+struct Sight {
+    camera_from_world: Rotation3<f64>,
+    camera: Point3<f64>,
+    rig: StereoRig,
+    size: [f64; 2],
+    voxel_m: f64,
+    block_m: f64,
+    farthest_m: f64,
+}
+
+impl Sight {
+    fn new(config: &VolumeConfig, view: &Viewpoint) -> Self {
+        let (camera_from_world, camera) = view.camera_from_world();
+        let voxel_m = f64::from(config.voxel_size_m);
+        Self {
+            camera_from_world,
+            camera,
+            rig: view.rig,
+            size: [view.width as f64, view.height as f64],
+            voxel_m,
+            block_m: voxel_m * BLOCK_SIDE as f64,
+            // Behind the farthest surface the band is observed as well.
+            farthest_m: f64::from(config.far_m + config.truncation_m),
+        }
+    }
+
+    /// The pixel of a block's middle and its depth, m, if it lies in the picture.
+    fn pixel(&self, coord: BlockCoord) -> Option<([usize; 2], f64)> {
+        let center = Vector3::from(coord.origin().map(|c| (f64::from(c) + 3.5) * self.voxel_m));
+        let at = self.camera_from_world * (center - self.camera.coords);
+        let u = self.rig.focal_px * at.x + self.rig.center_u_px * at.z;
+        let v = self.rig.focal_px * at.y + self.rig.center_v_px * at.z;
+        let [width, height] = self.size;
+        // Inside the picture, without dividing by a depth that may be 0.
+        let inside = at.z > 0.0
+            && at.z <= self.farthest_m
+            && u >= 0.0
+            && v >= 0.0
+            && u < width * at.z
+            && v < height * at.z;
+        inside.then(|| ([(u / at.z) as usize, (v / at.z) as usize], at.z))
     }
 }
 

@@ -41,6 +41,7 @@ pub use allocate::AllocationReport;
 pub(crate) use allocate::is_within_map;
 pub use block::{BLOCK_SIDE, BLOCK_VOXELS, BlockCoord, BlockKey, Blocks};
 pub use config::{CLASS_COUNT, DistanceAlong, ObservationWeight, PruneBy, VolumeConfig, WhenFull};
+use fuse::BEFORE_FAR;
 pub(crate) use fuse::FusedBlocks;
 pub use fuse::Observation;
 pub use history::VisibleHistory;

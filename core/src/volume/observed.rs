@@ -57,12 +57,13 @@ impl ObservedDepth<'_> {
         // `BLOCK` pixels of a row at a time, so that vectors are filled.
         let surroundings = Surroundings { disparity_q8: self.disparity_q8 };
         let here = surroundings.tap(first, v, [0, 0]);
-        let range = DepthRange::new(self.rig, self.config.near_m, self.config.far_m);
+        // Beyond the farthest depth fused as well: what is before it is free.
+        let range = DepthRange::new(self.rig, self.config.near_m, f32::MAX);
         let mut within = [0.0; BLOCK];
         for (within, &disparity) in within.iter_mut().zip(&here) {
             *within = range.depth_m(disparity);
         }
-        // In half of an image nothing is: sky, and what is too far.
+        // In much of an image nothing is: sky, and what is too near.
         if within.iter().fold(0, |any, value| any | value.to_bits()) == 0 {
             depths.fill(NotedDepth::NONE);
             return;
@@ -272,12 +273,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_fused_where_all_is_too_far() {
-        assert!(
-            observed(&VolumeConfig::default(), |_, _| 256)
-                .iter()
-                .all(|&depth| depth == NotedDepth::NONE)
-        );
+    fn what_is_too_far_to_be_fused_keeps_its_depth() {
+        let config = VolumeConfig::default();
+        let too_far = observed(&config, |_, _| 256);
+        assert!(too_far.iter().all(|depth| (depth.m() - 100.0).abs() < 1e-3));
+        let too_near = observed(&config, |_, _| u16::MAX);
+        assert!(too_near.iter().all(|depth| *depth == NotedDepth::NONE));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::{
     image::View,
     slices::{clipped, clipped_mut},
     volume::{
-        BLOCK_SIDE, CLASS_COUNT, NotedDepth,
+        BEFORE_FAR, BLOCK_SIDE, CLASS_COUNT, NotedDepth,
         block::{LAYER_VOXELS, Layer},
     },
 };
@@ -245,6 +245,7 @@ impl Fusion<'_> {
     fn measure(&self, scratch: &mut Scratch) -> bool {
         let (truncation_m, behind_m, scale, is_noted) =
             (self.config.truncation_m, self.behind_m, self.scale, self.is_noted);
+        let far_m = self.config.far_m;
         let mut any = 0;
         for i in 0..LAYER_VOXELS {
             let observed_m = scratch.observed_m[i];
@@ -255,10 +256,12 @@ impl Fusion<'_> {
             } else {
                 along_z_m
             };
+            // A surface too far to be fused tells only what is well before it.
+            let least_m = if observed_m > far_m { observed_m * BEFORE_FAR } else { -truncation_m };
             let hit = -i16::from(
                 // Behind a surface nothing is known beyond the truncation, nor beyond `behind_m`
                 // across it.
-                (observed_m > 0.0) & (along_z_m >= -truncation_m) & (distance_m >= -behind_m),
+                (observed_m > 0.0) & (along_z_m >= least_m) & (distance_m >= -behind_m),
             );
             scratch.hit[i] = hit;
             scratch.distance_m[i] = distance_m;

@@ -14,6 +14,9 @@
 //! where `v / (p + v)` is a 15-bit fraction from a table. Colour is averaged likewise within
 //! [`COLOUR_BAND`] of the surface, with a weight of at most 5, so that its 8 bits keep following.
 //!
+//! A surface farther than `far_m` is not fused. It says that what is before it is free, up to
+//! [`BEFORE_FAR`] of its depth: so what stood there and has gone is cleared.
+//!
 //! Blocks behind all that is observed where they can fall are left out (`horizon`); of the others
 //! 64 voxels are fused at a time (`layer`).
 //!
@@ -48,6 +51,9 @@ use nalgebra::{Point3, Rotation3, Vector3};
 const NEAREST_CULLED_M: f32 = 0.1;
 /// Share of the truncation on either side of the surface within which colour is averaged.
 pub(super) const COLOUR_BAND: f32 = 0.25;
+/// Share of its depth before a surface farther than `far_m` within which it tells nothing: its
+/// depth is known too badly.
+pub(super) const BEFORE_FAR: f32 = 0.25;
 /// Corners of a block.
 const CORNERS: usize = 8;
 

@@ -341,3 +341,38 @@ fn a_surface_made_by_noise_becomes_free_space() {
         assert!(volume.sampler().voxel([0, 0, 42]).unwrap().sdf > 20_000);
     });
 }
+
+#[test]
+fn what_stood_before_a_surface_too_far_to_be_fused_is_cleared() {
+    let grey = vec![50; WIDTH * HEIGHT];
+    let config = VolumeConfig { truncation_m: 0.3, far_m: 4.0, ..VolumeConfig::default() };
+    with_volume(&CAPACITY, &config, |volume| {
+        let ahead = view([0.0; 3], [0.0; 3]);
+        fuse_once(volume, &ahead, &vec![2.0; WIDTH * HEIGHT], &grey);
+        fuse_once(volume, &ahead, &vec![3.9; WIDTH * HEIGHT], &grey);
+        let behind = |volume: &Volume<'_>, z| volume.sampler().voxel([0, 0, z]).unwrap();
+        let (near, far) = (behind(volume, 42), behind(volume, 80));
+        for _ in 0..8 {
+            let report = fuse_once(volume, &ahead, &vec![5.0; WIDTH * HEIGHT], &grey);
+            assert_eq!((report.made, report.requests), (0, 0), "it is not fused itself");
+        }
+        assert!(near.sdf < 20_000 && behind(volume, 42).sdf > 25_000, "{near:?}");
+        assert_eq!(behind(volume, 80), far, "within a quarter of its depth it tells nothing");
+    });
+}
+
+#[test]
+fn what_has_gone_while_the_camera_looked_away_is_cleared() {
+    let grey = vec![50; WIDTH * HEIGHT];
+    let config = VolumeConfig { truncation_m: 0.3, ..VolumeConfig::default() };
+    with_volume(&CAPACITY, &config, |volume| {
+        let (ahead, back) = (view([0.0; 3], [0.0; 3]), view([0.0, 3.0, 0.0], [0.0; 3]));
+        fuse_once(volume, &ahead, &vec![2.0; WIDTH * HEIGHT], &grey);
+        fuse_once(volume, &back, &vec![6.0; WIDTH * HEIGHT], &grey);
+        assert!(volume.sampler().voxel([0, 0, 42]).unwrap().sdf < 0);
+        for _ in 0..12 {
+            fuse_once(volume, &ahead, &vec![8.0; WIDTH * HEIGHT], &grey);
+        }
+        assert!(volume.sampler().voxel([0, 0, 42]).unwrap().sdf > 20_000);
+    });
+}

@@ -88,7 +88,8 @@ fn fuse_slowly(
         let (u, v) = (column as usize, row as usize);
         let depth = seen.depth.depth_m().get(u, v).unwrap();
         let distance = depth - at.z;
-        if depth <= 0.0 || distance < -config.truncation_m {
+        let least_m = if depth > config.far_m { depth * BEFORE_FAR } else { -config.truncation_m };
+        if depth <= 0.0 || distance < least_m {
             continue;
         }
         // The lowest five bits: sixteenths less one, and whether the colour is another's.
@@ -137,6 +138,8 @@ fn equals_the_plain_twin(observation_weight: ObservationWeight) {
     let mut config = VolumeConfig {
         max_weight: 7,
         behind_m: 0.4,
+        // Some of the depths lie beyond.
+        far_m: 5.0,
         observation_weight,
         ..VolumeConfig::default()
     };
