@@ -35,7 +35,7 @@ use core::fmt::{self, Write};
 /// First bytes of a snapshot.
 pub const MAGIC: [u8; 8] = *b"DVXSTATE";
 /// Version of the layout. Another one is refused: there is no conversion.
-pub const VERSION: u32 = 12;
+pub const VERSION: u32 = 13;
 
 /// Reason that a mapper cannot be restored. There is no mapper then; the slab may be used again.
 ///

@@ -8,7 +8,7 @@ use crate::{
     image::ViewMut,
     memory::{Carver, region_bytes},
     places::Places,
-    segmentation::MotionSegmenter,
+    segmentation::{MotionSegmenter, Present},
     state::Visitor,
     tracking::{CameraMotion, Tracked},
     view::{RaycastError, RaycastReport, Raycaster},
@@ -108,6 +108,18 @@ impl<'s> StaticMap<'s> {
         // After all pixels have depth: objects are removed from it, and not allocated.
         let mut depth_m = depths.peeled_mut();
         executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
+    }
+
+    /// Removes from the depth that was taken what stands where earlier frames saw through. Returns
+    /// how many pixels that are.
+    pub fn remove_come(
+        &mut self,
+        present: &Present<'_>,
+        segmenter: &mut MotionSegmenter<'_>,
+    ) -> u32 {
+        let (width, height) = (present.disparity_q8.width(), present.disparity_q8.height());
+        ViewMut::new(self.depth_m, width, height)
+            .map_or(0, |mut depth_m| segmenter.remove_come(present, &mut depth_m))
     }
 
     /// Moves the map's submaps where loops moved keyframes in this frame.

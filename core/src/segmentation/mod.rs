@@ -24,12 +24,16 @@
 //!    matches that do not move (`lattice`), nor over surfaces that the map held before (`known`);
 //!    the ground plane is lent by the mapper.
 //!
+//! What has no motion of its own, such as a person's limbs, is kept out of the static map where
+//! earlier frames saw through (`seen_through`).
+//!
 //! Matches assigned to an instance of the detector are left out: an object is not found twice.
 //!
 //! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match,
 //! 6 bytes for each 4 x 4 px of the image, 96 bytes for each of 64 hypotheses, 80 for each of 32
-//! supposed objects. Time: a triangulation and projection a match, a comparison for each pair of
-//! candidates and of far matches, the cells of each mask, and at most 384 patches a frame.
+//! supposed objects, 7 bytes for each 8 x 8 px of the image. Time: a triangulation and projection
+//! a match, a comparison for each pair of candidates and of far matches, the cells of each mask,
+//! and at most 384 patches a frame.
 //!
 //! # What can go wrong
 //!
@@ -52,17 +56,19 @@ mod observe;
 mod patches;
 mod residual;
 mod seed;
+mod seen_through;
 mod settings;
 #[cfg(test)]
 mod tests;
 mod trail;
 
 pub use config::SegmentationConfig;
+pub(crate) use seen_through::Present;
 pub(crate) use trail::Trail;
 
 use crate::{
     geometry::{GroundPlane, StereoRig, Transform},
-    image::View,
+    image::{View, ViewMut},
     memory::{Capacity, Carver, region_bytes},
     state::Visitor,
     tracking::{Added, Assigned, CameraMotion, GuidedMatching},
@@ -80,6 +86,7 @@ use observe::Contradictions;
 use patches::{MAX_PATCHES, PatchSearch};
 use residual::StaticModel;
 use seed::{MAX_SEEDS, Seed};
+use seen_through::SeenThrough;
 
 /// Score of an instance found by its motion.
 const SCORE: f32 = 0.9;
@@ -137,6 +144,7 @@ pub(crate) struct MotionSegmenter<'s> {
     seed_count: usize,
     patches: &'s mut [Candidate],
     hypotheses: Hypotheses<'s>,
+    seen_through: SeenThrough<'s>,
 }
 
 /// Cells of the largest image.
@@ -156,6 +164,7 @@ impl<'s> MotionSegmenter<'s> {
             + region_bytes::<Seed>(MAX_SEEDS)
             + region_bytes::<Candidate>(MAX_PATCHES)
             + region_bytes::<Hypothesis>(MAX_HYPOTHESES)
+            + SeenThrough::bytes(capacity)
     }
 
     /// Allocates its regions.
@@ -172,6 +181,7 @@ impl<'s> MotionSegmenter<'s> {
             seed_count: 0,
             patches: carver.alloc("segmentation.patch", MAX_PATCHES),
             hypotheses: Hypotheses::new(carver.alloc("segmentation.hypothesis", MAX_HYPOTHESES)),
+            seen_through: SeenThrough::new_in(capacity, carver),
         }
     }
 
@@ -190,13 +200,26 @@ impl<'s> MotionSegmenter<'s> {
             seed_count: _,
             patches: _,
             hypotheses,
+            seen_through,
         } = self;
         hypotheses.visit(visitor);
+        seen_through.visit(visitor);
     }
 
     /// Forgets all groups, whose positions lie in a frame of reference that the camera has left.
     pub(crate) fn forget(&mut self) {
         self.hypotheses.clear();
+        self.seen_through.forget();
+    }
+
+    /// Sets the depth of what stands where earlier frames saw through to 0. Returns how many pixels
+    /// that are.
+    pub(crate) fn remove_come(
+        &mut self,
+        present: &Present<'_>,
+        depth_m: &mut ViewMut<'_, f32>,
+    ) -> u32 {
+        self.seen_through.remove(present, depth_m)
     }
 
     /// Visits where objects were before they were known to move.

@@ -133,6 +133,11 @@ impl<'s> Tracked<'_, 's> {
         self.tracker.mask_dynamic_depth(depth_m);
     }
 
+    /// Counts pixels of what moves that were removed besides.
+    pub(crate) fn add_masked(&mut self, pixels: u32) {
+        self.tracker.report.pixels_masked += pixels;
+    }
+
     /// The tracks with their instances and masks.
     pub(crate) fn tracker(&self) -> &Tracker<'s> {
         self.tracker
