@@ -60,7 +60,7 @@ use crate::{
     memory::{Carver, SlabError, Slabs, TwoSlabs},
     objects::{NoSink, Object, ObjectSink, ObjectSummary, Objects},
     planning::Planning,
-    rectify::{AlignedImage, RawCamera, RectifiedImages, Rectifier},
+    rectify::{AlignedImage, RawCamera, Rectification, RectifiedImages, Rectifier},
     scene_flow::FlowMatcher,
     segmentation::MotionSegmenter,
     stereo::StereoMatcher,
@@ -392,6 +392,16 @@ impl<'s> Mapper<'s> {
         }
         self.size = Some(size);
         Ok(())
+    }
+
+    /// Returns true for a size that rectified images may have, within the capacity.
+    fn takes_size(&self, [width, height]: [usize; 2]) -> bool {
+        let is_theirs = |raw: &Rectification| {
+            [raw.width, raw.height].map(|side| side as usize) == [width, height]
+        };
+        width >= MIN_WIDTH
+            && height >= MIN_HEIGHT
+            && self.rectifier.rectification().is_none_or(is_theirs)
     }
 
     /// Ends a run: prunes what is still in the window. Objects are lost; see

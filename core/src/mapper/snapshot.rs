@@ -295,7 +295,7 @@ impl<'s> Mapper<'s> {
         clock.visit(visitor);
         visitor.count(&mut width, capacity.image_width);
         visitor.count(&mut height, capacity.image_height);
-        *size = (width * height > 0).then_some([width, height]);
+        *size = (width + height > 0).then_some([width, height]);
         ignored.visit([width, height], visitor);
         attached.visit(visitor);
         scene_flow.visit(visitor);
@@ -312,6 +312,10 @@ impl<'s> Mapper<'s> {
 
     /// Rebuilds what is not in a snapshot. Whether what was read can be.
     fn rebuild(&mut self) -> bool {
+        // No frame could follow one of a size that steps refuse.
+        if !self.size.is_none_or(|size| self.takes_size(size)) {
+            return false;
+        }
         self.static_map.volume.enter_segment(self.localization.camera.segment());
         self.tracker.set_frame_interval_s(self.clock.interval_s());
         let unused = self.ignored.pair(self.size.unwrap_or_default(), self.rectifier.invalid());

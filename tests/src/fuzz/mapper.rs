@@ -3,7 +3,7 @@
 use dynvox_clip::{Clip, replay};
 use dynvox_core::geometry::StereoRig;
 use dynvox_core::image::View;
-use dynvox_core::{Capacity, Config, Mapper, Serial, StereoFrame};
+use dynvox_core::{Capacity, Config, Mapper, Report, Serial, StepError, StereoFrame};
 
 use crate::HeapSlab;
 
@@ -39,17 +39,15 @@ fn pair(frame: usize) -> [Vec<u8>; 2] {
 }
 
 fn step(mapper: &mut Mapper<'_>, frame: usize) {
-    assert_eq!(faults(mapper, frame), 0, "frame {frame}");
+    let report = stepped(mapper, frame).expect("the pair is sound");
+    assert_eq!(report.internal_faults, 0, "frame {frame}");
 }
 
-/// Steps, and returns the internal faults of the frame.
-fn faults(mapper: &mut Mapper<'_>, frame: usize) -> u32 {
+fn stepped(mapper: &mut Mapper<'_>, frame: usize) -> Result<Report, StepError> {
     let images = pair(frame);
-    let [Some(left), Some(right)] = [0, 1].map(|side| View::new(&images[side], 64, 48)) else {
-        return 0;
-    };
-    let report = mapper.step(&StereoFrame::pair(left, right), &Serial).expect("the pair is sound");
-    report.internal_faults
+    let [left, right] =
+        [0, 1].map(|side| View::new(&images[side], 64, 48).expect("as many pixels as that"));
+    mapper.step(&StereoFrame::pair(left, right), &Serial)
 }
 
 pub fn clip(bytes: &[u8]) -> bool {
@@ -126,9 +124,13 @@ pub fn sealed_snapshot(bytes: &[u8]) -> bool {
     else {
         return false;
     };
-    // A state that no run has may count as a fault, but must not panic.
-    faults(&mut mapper, FRAMES);
-    true
+    // A state that no run has may count as a fault, and one that was told another size of its
+    // frames refuses this one. Neither may panic.
+    match stepped(&mut mapper, FRAMES) {
+        Ok(_) => true,
+        Err(StepError::SizeChanged) => false,
+        Err(error) => panic!("a sound pair is refused: {error}"),
+    }
 }
 
 /// Settings as lines of `key=value`; a mapper with what they make, where it is usable.

@@ -186,6 +186,26 @@ fn frames_of_another_size_are_refused_after_resuming_as_before() {
 }
 
 #[test]
+fn a_size_that_no_frame_can_have_is_refused_with_its_checksum_right() {
+    let walk = Walk::new(2);
+    let [width, height] = [WIDTH, HEIGHT];
+    let of = |size| {
+        let forge = |mapper: &mut Mapper<'_>, _: &[Report]| {
+            mapper.size = size;
+            saved(mapper)
+        };
+        restored(&CAPACITY, &Walk::config(), &with_mapper(&walk, 2, forge), |_| ())
+    };
+    for size in [[0, height], [width, 0], [MIN_WIDTH - 1, height], [width, MIN_HEIGHT - 1]] {
+        assert_eq!(of(Some(size)), Err(RestoreError::Damaged), "{size:?}");
+    }
+    // Other frames may be what comes next.
+    for size in [Some([MIN_WIDTH, MIN_HEIGHT]), Some([width, height]), None] {
+        assert_eq!(of(size), Ok(()), "{size:?}");
+    }
+}
+
+#[test]
 fn what_is_no_snapshot_of_this_mapper_is_refused_by_name() {
     let walk = Walk::new(3);
     let bytes = with_mapper(&walk, 3, |mapper, _| saved(mapper));
