@@ -10,7 +10,7 @@
 //! | memory to decode one picture | [`MAX_DECODE_BYTES`] |
 //! | scans of a progressive JPEG | [`MAX_JPEG_SCANS`] |
 //! | chunk or record of an MCAP file, packed or not | [`MAX_BAG_RECORD_BYTES`] |
-//! | index of an MCAP file | [`MAX_BAG_INDEX_BYTES`] |
+//! | index of an MCAP file; a text in it | [`MAX_BAG_INDEX_BYTES`]; its record |
 //! | indexes of all files of a recording; files | [`MAX_BAG_INDEXES_BYTES`], [`MAX_BAG_FILES`] |
 //! | unpacked chunks for each byte of an MCAP file | [`MAX_BAG_RATIO`] |
 //! | images of a topic; image topics | [`MAX_BAG_IMAGES`], [`MAX_BAG_TOPICS`] |

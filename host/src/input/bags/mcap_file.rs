@@ -1,15 +1,13 @@
 //! MCAP: read through its index, a chunk at a time.
 
 use super::container::{Container, Message, TakeMessage, Topic};
+use super::index::summary;
 use super::messages::Encoding;
-use crate::formats::bounds::{
-    MAX_BAG_INDEX_BYTES, MAX_BAG_RATIO, MAX_BAG_RECORD_BYTES, bytes_text, check_bytes,
-};
+use crate::formats::bounds::{MAX_BAG_RATIO, MAX_BAG_RECORD_BYTES, bytes_text, check_bytes};
 use crate::input::source::InputError;
 use mcap::sans_io::indexed_reader::{
     IndexedReadEvent, IndexedReader, IndexedReaderOptions, ReadOrder,
 };
-use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{McapError, Summary};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -33,8 +31,7 @@ impl McapFile {
             refuse(format!("it is cut off or has no index ({reason}). Repair it with {recover}"))
         };
         let mut file = File::open(path).map_err(crate::input::source::read_failed(path))?;
-        let (summary, index_bytes) =
-            summary(&mut file).map_err(|error| broken(error.to_string()))?;
+        let (summary, index_bytes) = summary(&mut file).map_err(broken)?;
         let summary = summary.ok_or_else(|| broken("no summary".to_owned()))?;
         if summary.chunk_indexes.is_empty() {
             let messages = summary.stats.as_ref().map_or(0, |stats| stats.message_count);
@@ -165,29 +162,4 @@ fn check_chunks(summary: &Summary, file_bytes: u64) -> Result<(), String> {
         ));
     }
     Ok(())
-}
-
-/// Reads the index at the file's end, within its bound; with its length, bytes.
-fn summary(file: &mut File) -> Result<(Option<Summary>, u64), McapError> {
-    let options = SummaryReaderOptions::default()
-        .with_file_size(file.metadata()?.len())
-        .with_record_length_limit(MAX_BAG_INDEX_BYTES as usize);
-    let mut reader = SummaryReader::new_with_options(options);
-    let mut bytes = 0;
-    while let Some(event) = reader.next_event() {
-        match event? {
-            SummaryReadEvent::ReadRequest(need) => {
-                if bytes > MAX_BAG_INDEX_BYTES {
-                    let most = bytes_text(MAX_BAG_INDEX_BYTES);
-                    let error = format!("its index is longer than the {most} that are read");
-                    return Err(McapError::Io(std::io::Error::other(error)));
-                }
-                let read = file.read(reader.insert(need.min(MAX_BAG_INDEX_BYTES as usize)))?;
-                bytes += read as u64;
-                reader.notify_read(read);
-            }
-            SummaryReadEvent::SeekRequest(to) => reader.notify_seeked(file.seek(to)?),
-        }
-    }
-    Ok((reader.finish(), bytes))
 }

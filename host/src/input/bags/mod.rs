@@ -7,6 +7,7 @@
 mod cameras;
 mod container;
 mod images;
+mod index;
 mod inertial;
 mod listing;
 mod mcap_file;

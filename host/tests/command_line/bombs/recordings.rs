@@ -37,6 +37,11 @@ pub const KINDS: &[Bomb] = &[
         make: many_files,
     },
     Bomb { name: "MCAP with a long index", bound: "mcap recover", make: index },
+    Bomb {
+        name: "MCAP whose index has a long text",
+        bound: "ends beyond its record",
+        make: long_text,
+    },
 ];
 
 /// `sensor_msgs/Image` in CDR.
@@ -202,6 +207,18 @@ fn index(root: &Path, random: &mut Random) -> Call {
     footer[17..25].copy_from_slice(&0u64.to_le_bytes());
     footer[25..29].copy_from_slice(&[0; 4]);
     file.extend(&footer);
+    fs::write(root.join("m.mcap"), file).unwrap();
+    call(random)
+}
+
+/// A topic of the index that says it is billions of bytes long.
+fn long_text(root: &Path, random: &mut Random) -> Call {
+    recording(root, "sensor_msgs/msg/Image", 2, &image([2, 2], 2, &[1; 4]));
+    let mut file = fs::read(root.join("m.mcap")).unwrap();
+    let topic = b"/right/image_rect";
+    // The chunk that has it too is packed.
+    let at = file.windows(topic.len()).rposition(|text| text == topic).unwrap();
+    file[at - 4..at].copy_from_slice(&above(400_000_000, random).to_le_bytes());
     fs::write(root.join("m.mcap"), file).unwrap();
     call(random)
 }
