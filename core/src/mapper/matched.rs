@@ -3,11 +3,10 @@
 use super::{Config, StereoFrame};
 use crate::{
     attached::{AttachedCells, AttachedInput},
-    geometry::{GroundPlane, StereoRig, Transform},
+    geometry::{StereoRig, Transform},
     image::View,
     objects::{ObjectFrame, Picture},
     scene_flow::{FlowMatcher, FlowStatus, Match},
-    segmentation::Present,
     tracking::{Assigned, FrameMatches, GuidedMatching, MatchOwner},
     volume::Viewpoint,
 };
@@ -103,22 +102,6 @@ impl<'f, 's> MatchedFrame<'f, 's> {
             picture: Picture { grey: self.frame.left, colour: self.frame.colour },
             disparity_q8: self.disparity_q8,
         }
-    }
-
-    /// The frame as segmentation compares it with earlier ones, if moving objects are searched for.
-    pub fn present<'p>(
-        &self,
-        rig: &'p StereoRig,
-        t_world_camera: &'p Transform,
-        ground: Option<&'p GroundPlane>,
-    ) -> Option<Present<'p>>
-    where
-        'f: 'p,
-    {
-        let far_m = self.config.volume.far_m.into();
-        let present =
-            Present { rig, t_world_camera, disparity_q8: self.disparity_q8, ground, far_m };
-        (self.config.tracking.dynamic && self.config.segmentation.enabled).then_some(present)
     }
 
     /// Matches that bucketing selected, refined.

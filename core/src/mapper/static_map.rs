@@ -4,7 +4,7 @@ use super::{Config, matched::MatchedFrame};
 use crate::{
     Capacity, Executor, Stage,
     egomotion::icp::{self, IcpConfig, IcpReport, MapPicture, MeasuredDepth},
-    geometry::MapSegment,
+    geometry::{GroundPlane, MapSegment, Transform},
     image::ViewMut,
     memory::{Carver, region_bytes},
     places::Places,
@@ -110,16 +110,30 @@ impl<'s> StaticMap<'s> {
         executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
     }
 
-    /// Removes from the depth that was taken what stands where earlier frames saw through. Returns
-    /// how many pixels that are.
+    /// Removes from the depth that was taken what stands where earlier frames saw through, if moving
+    /// objects are searched for. Returns how many pixels that are.
+    // Never inlined: its locals must not stay in a step's frame.
+    #[inline(never)]
     pub fn remove_come(
         &mut self,
-        present: &Present<'_>,
+        seen: &MatchedFrame<'_, '_>,
+        t_world_camera: &Transform,
+        ground: Option<&GroundPlane>,
         segmenter: &mut MotionSegmenter<'_>,
     ) -> u32 {
-        let (width, height) = (present.disparity_q8.width(), present.disparity_q8.height());
-        ViewMut::new(self.depth_m, width, height)
-            .map_or(0, |mut depth_m| segmenter.remove_come(present, &mut depth_m))
+        let config = seen.config;
+        let [width, height] = seen.size();
+        let depth_m = ViewMut::new(self.depth_m, width, height);
+        let searches = config.tracking.dynamic && config.segmentation.enabled;
+        let Some(mut depth_m) = depth_m.filter(|_| searches) else { return 0 };
+        let present = Present {
+            rig: &config.scaled_rig(),
+            t_world_camera,
+            disparity_q8: seen.disparity_q8,
+            ground,
+            far_m: config.volume.far_m.into(),
+        };
+        segmenter.remove_come(&present, &mut depth_m)
     }
 
     /// Moves the map's submaps where loops moved keyframes in this frame.

@@ -206,10 +206,9 @@ impl Mapper<'_> {
                 static_map.advance_submaps(&seen, &camera, &localization.places);
             }
             static_map.take_depth(&seen, &mut tracked, executor);
-            if let Some(present) = seen.present(&rig, &camera.t_world_camera, ground.as_ref()) {
-                let remove_come = || static_map.remove_come(&present, segmenter);
-                tracked.add_masked(executor.stage(Stage::Segmentation, remove_come));
-            }
+            let (pose, ground) = (&camera.t_world_camera, ground.as_ref());
+            let remove_come = || static_map.remove_come(&seen, pose, ground, segmenter);
+            tracked.add_masked(executor.stage(Stage::Segmentation, remove_come));
             shows_depth = static_map.has_depth(frame.left.width() * frame.left.height());
             allocation =
                 static_map.fuse(&seen, &camera, executor, &mut Watched { planning, store });

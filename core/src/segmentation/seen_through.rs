@@ -12,7 +12,7 @@
 //! Unknown is never free: where a kept frame saw nothing, or not that place, it says nothing. What
 //! walks away from the camera comes out of its own shadow and is not found.
 //!
-//! Memory: 7 bytes for each cell. Time: two projections a cell, and the pixels of one frame of
+//! Memory: 3 bytes for each cell. Time: two projections a cell, and the pixels of one frame of
 //! [`KEPT_EVERY`].
 
 use crate::{
@@ -56,13 +56,6 @@ const fn cells(pixels: usize) -> usize {
     pixels.div_ceil(CELL_PX)
 }
 
-/// A frame that is kept: nearest disparities by cell, in whole px, rounded up; 0 unknown.
-#[derive(Debug)]
-struct Kept<'s> {
-    nearest_px: &'s mut [u8],
-    t_world_camera: Transform,
-}
-
 /// The present frame.
 #[derive(Clone, Copy)]
 pub(crate) struct Present<'a> {
@@ -81,53 +74,52 @@ pub(crate) struct Present<'a> {
 /// Frames that are kept, and what has come since.
 #[derive(Debug)]
 pub(crate) struct SeenThrough<'s> {
-    kept: [Kept<'s>; KEPT],
-    /// Frames taken since the last that was kept, and frames kept, up to all.
+    /// Nearest disparities of the frames that are kept, by cell, in whole px, rounded up; 0
+    /// unknown.
+    nearest_px: &'s mut [u8],
+    /// Poses of the camera in them.
+    poses: &'s mut [Transform],
+    /// Frames taken since the last that was kept, and frames that were kept.
     since: u32,
     count: u32,
-    /// Cells of the present frame: [`COME`] or 0.
+    /// Cells of the present frame: [`FILLED`], [`COME`] or 0.
     come: &'s mut [u8],
-    queue: &'s mut [u32],
 }
 
 /// Marks of cells: where what was free is filled, and of those what shows enough surface.
 const FILLED: u8 = 1;
 const COME: u8 = 2;
 
+/// Cells of the largest image.
+const fn most_cells(capacity: &Capacity) -> usize {
+    cells(capacity.image_width) * cells(capacity.image_height)
+}
+
 impl<'s> SeenThrough<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        let cells = cells(capacity.image_width) * cells(capacity.image_height);
-        (KEPT + 1) * region_bytes::<u8>(cells) + region_bytes::<u32>(cells)
+        region_bytes::<u8>(KEPT * most_cells(capacity))
+            + region_bytes::<Transform>(KEPT)
+            + region_bytes::<u8>(most_cells(capacity))
     }
 
     /// Allocates its regions.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
-        let cells = cells(capacity.image_width) * cells(capacity.image_height);
-        let mut kept = || Kept {
-            nearest_px: carver.alloc("segmentation.nearest", cells),
-            t_world_camera: Transform::IDENTITY,
-        };
         Self {
-            kept: [kept(), kept()],
+            nearest_px: carver.alloc("segmentation.nearest", KEPT * most_cells(capacity)),
+            poses: carver.alloc("segmentation.kept_pose", KEPT),
             since: 0,
             count: 0,
-            come: carver.alloc("segmentation.come", cells),
-            queue: carver.alloc("segmentation.come_queue", cells),
+            come: carver.alloc("segmentation.come", most_cells(capacity)),
         }
     }
 
     /// Visits what outlives a frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { kept, since, count, come: _, queue: _ } = self;
-        visitor.u32s([&mut *since, &mut *count]);
-        if *count > KEPT as u32 {
-            visitor.refuse();
-        }
-        for Kept { nearest_px, t_world_camera } in kept {
-            visitor.transform(t_world_camera);
-            visitor.bytes(nearest_px);
-        }
+        let Self { nearest_px, poses, since, count, come: _ } = self;
+        visitor.u32s([since, count]);
+        visitor.bytes(nearest_px);
+        poses.iter_mut().for_each(|pose| visitor.transform(pose));
     }
 
     /// Forgets all frames, whose poses lie in a frame of reference that the camera has left.
@@ -135,14 +127,19 @@ impl<'s> SeenThrough<'s> {
         (self.since, self.count) = (0, 0);
     }
 
-    /// Sets the depth of what has come since the frames that are kept to 0. Returns how many pixels
-    /// that are.
+    /// Sets the depth of what has come since the frames that are kept to 0; `queue` is memory for
+    /// as many cells. Returns how many pixels that are.
     // Never inlined: its locals must not stay in a step's frame.
     #[inline(never)]
-    pub fn remove(&mut self, present: &Present<'_>, depth_m: &mut ViewMut<'_, f32>) -> u32 {
+    pub fn remove(
+        &mut self,
+        present: &Present<'_>,
+        queue: &mut [u32],
+        depth_m: &mut ViewMut<'_, f32>,
+    ) -> u32 {
         let size = [present.disparity_q8.width(), present.disparity_q8.height()].map(cells);
         let removed = if self.mark(present, size) {
-            self.keep_large(present, size);
+            Marks { come: self.come, queue, size }.keep_large(present);
             self.clear(present, size, depth_m)
         } else {
             0
@@ -153,102 +150,26 @@ impl<'s> SeenThrough<'s> {
 
     /// Marks the cells that have come. Whether there are any.
     fn mark(&mut self, present: &Present<'_>, [columns, rows]: [usize; 2]) -> bool {
-        let Self { kept, count, come, .. } = self;
-        let kept = clipped(kept, ..*count as usize);
-        let t_kept_camera = |kept: &Kept<'_>| {
-            let t_kept_world = kept.t_world_camera.inverse();
-            t_kept_world * *present.t_world_camera
-        };
-        // As many poses as frames; those that are not kept are not asked.
-        let [first, second] =
-            [0, 1].map(|at| kept.get(at).map_or(Transform::IDENTITY, t_kept_camera));
+        let Self { nearest_px, poses, count, come, .. } = self;
+        // As many as were kept, and each half of the memory.
+        let kept = (*count as usize).min(KEPT);
+        let half = (nearest_px.len() / KEPT).max(1);
         let mut any = false;
-        for (row, marks) in (0..rows).zip(come.chunks_exact_mut(columns.max(1))) {
-            for (column, mark) in marks.iter_mut().enumerate() {
-                let has_come = present.point([column, row]).is_some_and(|point| {
-                    kept.iter().zip([&first, &second]).any(|(kept, t_kept_camera)| {
+        clipped_mut(come, ..columns * rows).fill(0);
+        for (nearest_px, pose) in nearest_px.chunks_exact(half).zip(poses.iter()).take(kept) {
+            let t_kept_camera = pose.inverse() * *present.t_world_camera;
+            for (row, marks) in (0..rows).zip(come.chunks_exact_mut(columns.max(1))) {
+                for (column, mark) in marks.iter_mut().enumerate() {
+                    let has_come = present.point([column, row]).is_some_and(|point| {
                         let seen = t_kept_camera.transform_point(point);
-                        is_free(present.rig, kept.nearest_px, [columns, rows], seen)
-                    })
-                });
-                *mark = if has_come { FILLED } else { 0 };
-                any |= has_come;
+                        is_free(present.rig, nearest_px, [columns, rows], seen)
+                    });
+                    *mark |= if has_come { FILLED } else { 0 };
+                    any |= has_come;
+                }
             }
         }
         any
-    }
-
-    /// Marks what lies together and shows enough of a surface, and what is joined to it.
-    fn keep_large(&mut self, present: &Present<'_>, [columns, rows]: [usize; 2]) {
-        for first in 0..columns * rows {
-            if self.come.get(first) != Some(&FILLED) {
-                continue;
-            }
-            // A cell is taken up once: while it waits in the queue its mark is 0.
-            let (mut len, mut next, mut surface_m2) = (0, 0, 0.0);
-            let mut extent = Extent::NOTHING;
-            self.enqueue(first, 0, &mut len);
-            while let Some(cell) = self.queued(len, next, columns) {
-                next += 1;
-                let Some(point) = present.point(cell) else { continue };
-                let side_m = CELL_PX as f64 * point[2] / present.rig.focal_px;
-                surface_m2 += side_m * side_m;
-                extent.add(point);
-                for beside in present.joined(cell, [columns, rows]) {
-                    let at = beside[1] * columns + beside[0];
-                    if self.come.get(at) == Some(&FILLED) {
-                        self.enqueue(at, 0, &mut len);
-                    }
-                }
-            }
-            // A few cells may be an error of the matcher, which fusion averages away.
-            if len >= CELLS_MIN && surface_m2 >= SURFACE_MIN_M2 {
-                self.spread(present, [columns, rows], &extent, len);
-            }
-        }
-    }
-
-    /// Marks the first `len` cells of the queue, and what is joined to them.
-    fn spread(
-        &mut self,
-        present: &Present<'_>,
-        [columns, rows]: [usize; 2],
-        extent: &Extent,
-        mut len: usize,
-    ) {
-        for at in clipped(self.queue, ..len) {
-            self.come.get_mut(*at as usize).into_iter().for_each(|mark| *mark = COME);
-        }
-        // Feet stand on the ground, which is no part of who walks on it.
-        let is_own = |point: [f64; 3]| {
-            extent.reaches(point)
-                && present.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
-        };
-        let mut next = 0;
-        while let Some(cell) = self.queued(len, next, columns) {
-            next += 1;
-            for beside in present.joined(cell, [columns, rows]) {
-                let at = beside[1] * columns + beside[0];
-                let is_new = self.come.get(at).is_some_and(|mark| *mark != COME);
-                if is_new && present.point(beside).is_some_and(is_own) {
-                    self.enqueue(at, COME, &mut len);
-                }
-            }
-        }
-    }
-
-    /// The cell at a position of a queue of that length.
-    fn queued(&self, len: usize, position: usize, columns: usize) -> Option<[usize; 2]> {
-        let at = *clipped(self.queue, ..len).get(position)? as usize;
-        Some([at % columns.max(1), at / columns.max(1)])
-    }
-
-    /// Takes a cell up, with a mark.
-    fn enqueue(&mut self, at: usize, with: u8, len: &mut usize) {
-        if let (Some(mark), Some(slot)) = (self.come.get_mut(at), self.queue.get_mut(*len)) {
-            (*mark, *slot) = (with, at as u32);
-            *len += 1;
-        }
     }
 
     /// Sets the depth of pixels in and beside the cells to 0. Returns how many they are.
@@ -302,18 +223,102 @@ impl<'s> SeenThrough<'s> {
         if self.count > 0 && self.since < KEPT_EVERY {
             return;
         }
-        // The oldest makes room: its memory is the first one's now.
-        self.kept.rotate_right(1);
-        let Some(kept) = self.kept.first_mut() else { return };
-        kept.t_world_camera = *present.t_world_camera;
-        let cells = clipped_mut(kept.nearest_px, ..columns * rows);
+        // The older one makes room.
+        let slot = self.count as usize % KEPT;
+        let half = (self.nearest_px.len() / KEPT).max(1);
+        let (Some(pose), Some(nearest_px)) =
+            (self.poses.get_mut(slot), self.nearest_px.chunks_exact_mut(half).nth(slot))
+        else {
+            return;
+        };
+        *pose = *present.t_world_camera;
+        let cells = clipped_mut(nearest_px, ..columns * rows);
         for (row, cells) in (0..rows).zip(cells.chunks_exact_mut(columns.max(1))) {
             for (column, cell) in cells.iter_mut().enumerate() {
                 *cell = present.nearest_px([column, row]);
             }
         }
         self.since = 0;
-        self.count = (self.count + 1).min(KEPT as u32);
+        self.count = self.count.wrapping_add(1);
+    }
+}
+
+/// Marks of a frame's cells, and a queue for those that are taken up.
+struct Marks<'m> {
+    come: &'m mut [u8],
+    queue: &'m mut [u32],
+    size: [usize; 2],
+}
+
+impl Marks<'_> {
+    /// Marks what lies together and shows enough of a surface, and what is joined to it.
+    fn keep_large(&mut self, present: &Present<'_>) {
+        let [columns, rows] = self.size;
+        for first in 0..columns * rows {
+            if self.come.get(first) != Some(&FILLED) {
+                continue;
+            }
+            // A cell is taken up once: while it waits in the queue its mark is 0.
+            let (mut len, mut next, mut surface_m2) = (0, 0, 0.0);
+            let mut extent = Extent::NOTHING;
+            self.enqueue(first, 0, &mut len);
+            while let Some(cell) = self.queued(len, next) {
+                next += 1;
+                let Some(point) = present.point(cell) else { continue };
+                let side_m = CELL_PX as f64 * point[2] / present.rig.focal_px;
+                surface_m2 += side_m * side_m;
+                extent.add(point);
+                for beside in present.joined(cell, [columns, rows]) {
+                    let at = beside[1] * columns + beside[0];
+                    if self.come.get(at) == Some(&FILLED) {
+                        self.enqueue(at, 0, &mut len);
+                    }
+                }
+            }
+            // A few cells may be an error of the matcher, which fusion averages away.
+            if len >= CELLS_MIN && surface_m2 >= SURFACE_MIN_M2 {
+                self.spread(present, &extent, len);
+            }
+        }
+    }
+
+    /// Marks the first `len` cells of the queue, and what is joined to them.
+    fn spread(&mut self, present: &Present<'_>, extent: &Extent, mut len: usize) {
+        let [columns, rows] = self.size;
+        for at in clipped(self.queue, ..len) {
+            self.come.get_mut(*at as usize).into_iter().for_each(|mark| *mark = COME);
+        }
+        // Feet stand on the ground, which is no part of who walks on it.
+        let is_own = |point: [f64; 3]| {
+            extent.reaches(point)
+                && present.ground.is_none_or(|ground| ground.above_m(point) > CLEARANCE_M)
+        };
+        let mut next = 0;
+        while let Some(cell) = self.queued(len, next) {
+            next += 1;
+            for beside in present.joined(cell, [columns, rows]) {
+                let at = beside[1] * columns + beside[0];
+                let is_new = self.come.get(at).is_some_and(|mark| *mark != COME);
+                if is_new && present.point(beside).is_some_and(is_own) {
+                    self.enqueue(at, COME, &mut len);
+                }
+            }
+        }
+    }
+
+    /// The cell at a position of a queue of that length.
+    fn queued(&self, len: usize, position: usize) -> Option<[usize; 2]> {
+        let [columns, _] = self.size;
+        let at = *clipped(self.queue, ..len).get(position)? as usize;
+        Some([at % columns.max(1), at / columns.max(1)])
+    }
+
+    /// Takes a cell up, with a mark.
+    fn enqueue(&mut self, at: usize, with: u8, len: &mut usize) {
+        if let (Some(mark), Some(slot)) = (self.come.get_mut(at), self.queue.get_mut(*len)) {
+            (*mark, *slot) = (with, at as u32);
+            *len += 1;
+        }
     }
 }
 
