@@ -110,8 +110,8 @@ impl<'s> StaticMap<'s> {
         executor.stage(Stage::Tracking, || tracked.mask_dynamic_depth(&mut depth_m));
     }
 
-    /// Removes from the depth that was taken what stands where earlier frames saw through, if moving
-    /// objects are searched for. Returns how many pixels that are.
+    /// Removes from the depth that was taken what stands where earlier frames saw through, if
+    /// moving objects are searched for. Returns how many pixels that are.
     // Never inlined: its locals must not stay in a step's frame.
     #[inline(never)]
     pub fn remove_come(

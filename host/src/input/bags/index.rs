@@ -96,13 +96,13 @@ fn check(kind: u8, body: &[u8]) -> Result<(), &'static str> {
     whole.map(|_| ()).ok_or("a text or list of its index ends beyond its record")
 }
 
-/// What follows a length and as many bytes.
+/// The bytes behind a length and as many bytes.
 fn behind_text(bytes: &[u8]) -> Option<&[u8]> {
     let (&len, rest) = bytes.split_first_chunk()?;
     rest.get(u32::from_le_bytes(len) as usize..)
 }
 
-/// What follows the bytes of a list of texts.
+/// The bytes behind a list of texts.
 fn behind_texts(bytes: &[u8]) -> Option<&[u8]> {
     let behind = behind_text(bytes)?;
     let mut texts = bytes.get(4..bytes.len() - behind.len())?;
@@ -112,8 +112,7 @@ fn behind_texts(bytes: &[u8]) -> Option<&[u8]> {
     Some(behind)
 }
 
-/// What follows the bytes of a list of channels and offsets, which are read as long as there are
-/// any.
+/// The bytes behind a list of channels and offsets, which the parser reads by whole entries.
 fn behind_offsets(bytes: &[u8]) -> Option<&[u8]> {
     const ENTRY: usize = 2 + 8;
     let (&len, rest) = bytes.split_first_chunk()?;
@@ -153,7 +152,7 @@ mod tests {
         u64::from_le_bytes(recording[at..at + 8].try_into().unwrap()) as usize
     }
 
-    /// What is read of a file of these bytes.
+    /// Reads the index of a file of these bytes.
     fn read(bytes: &[u8]) -> Result<Option<Summary>, String> {
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(bytes).unwrap();
@@ -184,8 +183,8 @@ mod tests {
         let index = &bytes[start(&bytes)..bytes.len() - 8];
         for len in 1..index.len() {
             let mut records = Records::default();
-            assert!(index.chunks(len).all(|piece| records.take(piece).is_ok()), "pieces of {len}");
-            assert!(records.bytes.is_empty(), "pieces of {len}");
+            assert!(index.chunks(len).all(|part| records.take(part).is_ok()), "{len} at once");
+            assert!(records.bytes.is_empty(), "{len} at once");
         }
     }
 
