@@ -31,7 +31,7 @@
 //!
 //! Memory: 44 bytes for each of 1,024 candidates, 48 for each of 1,024 far matches, a byte a match,
 //! 6 bytes for each 4 x 4 px of the image, 96 bytes for each of 64 hypotheses, 80 for each of 32
-//! supposed objects, 3 bytes for each 8 x 8 px of the image. Time: a triangulation and projection
+//! supposed objects, 2 bytes for each 8 x 8 px of the image. Time: a triangulation and projection
 //! a match, a comparison for each pair of candidates and of far matches, the cells of each mask,
 //! and at most 384 patches a frame.
 //!
@@ -86,7 +86,7 @@ use observe::Contradictions;
 use patches::{MAX_PATCHES, PatchSearch};
 use residual::StaticModel;
 use seed::{MAX_SEEDS, Seed};
-use seen_through::SeenThrough;
+use seen_through::{Scratch, SeenThrough};
 
 /// Score of an instance found by its motion.
 const SCORE: f32 = 0.9;
@@ -219,7 +219,9 @@ impl<'s> MotionSegmenter<'s> {
         present: &Present<'_>,
         depth_m: &mut ViewMut<'_, f32>,
     ) -> u32 {
-        self.seen_through.remove(present, self.queue, depth_m)
+        // What masks grow in is free by then.
+        let scratch = Scratch { marks: self.cells, queue: self.queue };
+        self.seen_through.remove(present, scratch, depth_m)
     }
 
     /// Visits where objects were before they were known to move.

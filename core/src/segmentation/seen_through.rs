@@ -12,7 +12,7 @@
 //! Unknown is never free: where a kept frame saw nothing, or not that place, it says nothing. What
 //! walks away from the camera comes out of its own shadow and is not found.
 //!
-//! Memory: 3 bytes for each cell. Time: two projections a cell, and the pixels of one frame of
+//! Memory: 2 bytes for each cell. Time: two projections a cell, and the pixels of one frame of
 //! [`KEPT_EVERY`].
 
 use crate::{
@@ -25,13 +25,14 @@ use crate::{
     slices::{clipped, clipped_mut},
     state::Visitor,
 };
+use bytemuck::{Pod, Zeroable};
 
 /// Side of a cell, px.
 const CELL_PX: usize = 8;
 /// Pixels of a cell that are read along each axis, from the first on.
 const READ_EVERY: usize = 2;
 /// Frames from one that is kept to the next.
-const KEPT_EVERY: u32 = 8;
+const KEPT_EVERY: u64 = 8;
 /// Frames kept.
 const KEPT: usize = 2;
 /// Least excess of a disparity over all that was seen there, px and as a share of it.
@@ -71,19 +72,29 @@ pub(crate) struct Present<'a> {
     pub far_m: f64,
 }
 
-/// Frames that are kept, and what has come since.
+/// Memory for a frame's cells, of any content.
+pub(crate) struct Scratch<'m> {
+    pub marks: &'m mut [u8],
+    pub queue: &'m mut [u32],
+}
+
+/// A frame that is kept.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Kept {
+    /// Pose of the camera.
+    t_world_camera: Transform,
+    /// Frames taken since, and one; 0 without a frame.
+    age: u64,
+}
+
+/// Frames that are kept. In the slab but for two slices: a mapper is moved about on the stack.
 #[derive(Debug)]
 pub(crate) struct SeenThrough<'s> {
     /// Nearest disparities of the frames that are kept, by cell, in whole px, rounded up; 0
     /// unknown.
     nearest_px: &'s mut [u8],
-    /// Poses of the camera in them.
-    poses: &'s mut [Transform],
-    /// Frames taken since the last that was kept, and frames that were kept.
-    since: u32,
-    count: u32,
-    /// Cells of the present frame: [`FILLED`], [`COME`] or 0.
-    come: &'s mut [u8],
+    kept: &'s mut [Kept],
 }
 
 /// Marks of cells: where what was free is filled, and of those what shows enough surface.
@@ -98,49 +109,48 @@ const fn most_cells(capacity: &Capacity) -> usize {
 impl<'s> SeenThrough<'s> {
     /// Bytes of the slab.
     pub const fn bytes(capacity: &Capacity) -> usize {
-        region_bytes::<u8>(KEPT * most_cells(capacity))
-            + region_bytes::<Transform>(KEPT)
-            + region_bytes::<u8>(most_cells(capacity))
+        region_bytes::<u8>(KEPT * most_cells(capacity)) + region_bytes::<Kept>(KEPT)
     }
 
     /// Allocates its regions.
     pub fn new_in(capacity: &Capacity, carver: &mut Carver<'s>) -> Self {
         Self {
             nearest_px: carver.alloc("segmentation.nearest", KEPT * most_cells(capacity)),
-            poses: carver.alloc("segmentation.kept_pose", KEPT),
-            since: 0,
-            count: 0,
-            come: carver.alloc("segmentation.come", most_cells(capacity)),
+            kept: carver.alloc("segmentation.kept", KEPT),
         }
     }
 
     /// Visits what outlives a frame.
     pub fn visit(&mut self, visitor: &mut impl Visitor) {
-        let Self { nearest_px, poses, since, count, come: _ } = self;
-        visitor.u32s([since, count]);
+        let Self { nearest_px, kept } = self;
         visitor.bytes(nearest_px);
-        poses.iter_mut().for_each(|pose| visitor.transform(pose));
+        for Kept { t_world_camera, age } in kept.iter_mut() {
+            visitor.transform(t_world_camera);
+            visitor.u64(age);
+        }
     }
 
     /// Forgets all frames, whose poses lie in a frame of reference that the camera has left.
     pub fn forget(&mut self) {
-        (self.since, self.count) = (0, 0);
+        self.kept.iter_mut().for_each(|kept| kept.age = 0);
     }
 
-    /// Sets the depth of what has come since the frames that are kept to 0; `queue` is memory for
-    /// as many cells. Returns how many pixels that are.
+    /// Sets the depth of what has come since the frames that are kept to 0. Returns how many pixels
+    /// that are.
     // Never inlined: its locals must not stay in a step's frame.
     #[inline(never)]
     pub fn remove(
         &mut self,
         present: &Present<'_>,
-        queue: &mut [u32],
+        scratch: Scratch<'_>,
         depth_m: &mut ViewMut<'_, f32>,
     ) -> u32 {
         let size = [present.disparity_q8.width(), present.disparity_q8.height()].map(cells);
-        let removed = if self.mark(present, size) {
-            Marks { come: self.come, queue, size }.keep_large(present);
-            self.clear(present, size, depth_m)
+        let Scratch { marks: come, queue } = scratch;
+        let mut marks = Marks { come, queue, size };
+        let removed = if self.mark(present, &mut marks) {
+            marks.keep_large(present);
+            marks.clear(present, depth_m)
         } else {
             0
         };
@@ -149,15 +159,16 @@ impl<'s> SeenThrough<'s> {
     }
 
     /// Marks the cells that have come. Whether there are any.
-    fn mark(&mut self, present: &Present<'_>, [columns, rows]: [usize; 2]) -> bool {
-        let Self { nearest_px, poses, count, come, .. } = self;
-        // As many as were kept, and each half of the memory.
-        let kept = (*count as usize).min(KEPT);
+    fn mark(&self, present: &Present<'_>, marks: &mut Marks<'_>) -> bool {
+        let Self { nearest_px, kept } = self;
+        let (come, [columns, rows]) = (&mut *marks.come, marks.size);
+        // Each frame has its half of the memory.
         let half = (nearest_px.len() / KEPT).max(1);
         let mut any = false;
         clipped_mut(come, ..columns * rows).fill(0);
-        for (nearest_px, pose) in nearest_px.chunks_exact(half).zip(poses.iter()).take(kept) {
-            let t_kept_camera = pose.inverse() * *present.t_world_camera;
+        let frames = nearest_px.chunks_exact(half).zip(kept.iter());
+        for (nearest_px, kept) in frames.filter(|(_, kept)| kept.age > 0) {
+            let t_kept_camera = kept.t_world_camera.inverse() * *present.t_world_camera;
             for (row, marks) in (0..rows).zip(come.chunks_exact_mut(columns.max(1))) {
                 for (column, mark) in marks.iter_mut().enumerate() {
                     let has_come = present.point([column, row]).is_some_and(|point| {
@@ -172,78 +183,29 @@ impl<'s> SeenThrough<'s> {
         any
     }
 
-    /// Sets the depth of pixels in and beside the cells to 0. Returns how many they are.
-    fn clear(
-        &self,
-        present: &Present<'_>,
-        [columns, rows]: [usize; 2],
-        depth_m: &mut ViewMut<'_, f32>,
-    ) -> u32 {
-        let width = depth_m.width();
-        let mut cleared = 0;
-        for (v, pixels) in depth_m.pixels_mut().chunks_exact_mut(width.max(1)).enumerate() {
-            for (column, pixels) in pixels.chunks_mut(CELL_PX).enumerate() {
-                let cell = [column, v / CELL_PX];
-                let Some([least_px, most_px]) = self.own_px(present, cell, [columns, rows]) else {
-                    continue;
-                };
-                for (pixel, depth_m) in pixels.iter_mut().enumerate() {
-                    // A pixel of the wall behind in the same cell stays.
-                    let px = present.pixel_px([column * CELL_PX + pixel, v]).unwrap_or(0.0);
-                    if px >= least_px && px <= most_px && *depth_m > 0.0 {
-                        *depth_m = 0.0;
-                        cleared += 1;
-                    }
-                }
-            }
-        }
-        cleared
-    }
-
-    /// Disparities of what has come in a cell and those beside it, px; `None` where nothing has.
-    fn own_px(
-        &self,
-        present: &Present<'_>,
-        cell: [usize; 2],
-        size: [usize; 2],
-    ) -> Option<[f64; 2]> {
-        let has_come =
-            |[column, row]: &[usize; 2]| self.come.get(row * size[0] + column) == Some(&COME);
-        let here = core::iter::once(cell).chain(beside(cell, size));
-        here.filter(has_come).filter_map(|cell| present.disparity_px(cell)).fold(None, |own, px| {
-            let [least, most] = OWN.map(|share| share * px);
-            let [least_px, most_px]: [f64; 2] = own.unwrap_or([least, most]);
-            Some([if least < least_px { least } else { least_px }, max_f64(most, most_px)])
-        })
-    }
-
     /// Keeps the frame, if it is its turn.
     fn keep(&mut self, present: &Present<'_>, [columns, rows]: [usize; 2]) {
-        self.since += 1;
-        if self.count > 0 && self.since < KEPT_EVERY {
+        let aged = self.kept.iter_mut().filter(|kept| kept.age > 0);
+        aged.for_each(|kept| kept.age = kept.age.saturating_add(1));
+        if self.kept.iter().any(|kept| kept.age > 0 && kept.age <= KEPT_EVERY) {
             return;
         }
-        // The older one makes room.
-        let slot = self.count as usize % KEPT;
+        // The older one makes room, or there is room yet.
         let half = (self.nearest_px.len() / KEPT).max(1);
-        let (Some(pose), Some(nearest_px)) =
-            (self.poses.get_mut(slot), self.nearest_px.chunks_exact_mut(half).nth(slot))
-        else {
-            return;
-        };
-        *pose = *present.t_world_camera;
+        let frames = self.kept.iter_mut().zip(self.nearest_px.chunks_exact_mut(half));
+        let oldest = frames.max_by_key(|(kept, _)| kept.age.wrapping_sub(1));
+        let Some((kept, nearest_px)) = oldest else { return };
+        *kept = Kept { t_world_camera: *present.t_world_camera, age: 1 };
         let cells = clipped_mut(nearest_px, ..columns * rows);
         for (row, cells) in (0..rows).zip(cells.chunks_exact_mut(columns.max(1))) {
             for (column, cell) in cells.iter_mut().enumerate() {
                 *cell = present.nearest_px([column, row]);
             }
         }
-        self.since = 0;
-        self.count = self.count.wrapping_add(1);
     }
 }
 
-/// Marks of a frame's cells, and a queue for those that are taken up.
+/// Marks of a frame's cells, [`FILLED`], [`COME`] or 0, and a queue for those that are taken up.
 struct Marks<'m> {
     come: &'m mut [u8],
     queue: &'m mut [u32],
@@ -319,6 +281,42 @@ impl Marks<'_> {
             (*mark, *slot) = (with, at as u32);
             *len += 1;
         }
+    }
+
+    /// Sets the depth of pixels in and beside the cells to 0. Returns how many they are.
+    fn clear(&self, present: &Present<'_>, depth_m: &mut ViewMut<'_, f32>) -> u32 {
+        let width = depth_m.width();
+        let mut cleared = 0;
+        for (v, pixels) in depth_m.pixels_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            for (column, pixels) in pixels.chunks_mut(CELL_PX).enumerate() {
+                let cell = [column, v / CELL_PX];
+                let Some([least_px, most_px]) = self.own_px(present, cell) else {
+                    continue;
+                };
+                for (pixel, depth_m) in pixels.iter_mut().enumerate() {
+                    // A pixel of the wall behind in the same cell stays.
+                    let px = present.pixel_px([column * CELL_PX + pixel, v]).unwrap_or(0.0);
+                    if px >= least_px && px <= most_px && *depth_m > 0.0 {
+                        *depth_m = 0.0;
+                        cleared += 1;
+                    }
+                }
+            }
+        }
+        cleared
+    }
+
+    /// Disparities of what has come in a cell and those beside it, px; `None` where nothing has.
+    fn own_px(&self, present: &Present<'_>, cell: [usize; 2]) -> Option<[f64; 2]> {
+        let size = self.size;
+        let has_come =
+            |[column, row]: &[usize; 2]| self.come.get(row * size[0] + column) == Some(&COME);
+        let here = core::iter::once(cell).chain(beside(cell, size));
+        here.filter(has_come).filter_map(|cell| present.disparity_px(cell)).fold(None, |own, px| {
+            let [least, most] = OWN.map(|share| share * px);
+            let [least_px, most_px]: [f64; 2] = own.unwrap_or([least, most]);
+            Some([if least < least_px { least } else { least_px }, max_f64(most, most_px)])
+        })
     }
 }
 

@@ -42,7 +42,9 @@ fn removed(seen_through: &mut SeenThrough<'_>, pixels: &[u16], t: &Transform) ->
     let present = Present { rig: &RIG, t_world_camera: t, disparity_q8, ground: None, far_m: 5.0 };
     let mut depth_m: Vec<f32> = pixels.iter().map(|q8| f32::from(*q8)).collect();
     let mut view = ViewMut::new(&mut depth_m, WIDTH, HEIGHT).unwrap();
-    let count = seen_through.remove(&present, &mut [0; WIDTH * HEIGHT / 64], &mut view);
+    let (mut marks, mut queue) = ([7; WIDTH * HEIGHT / 64], [7; WIDTH * HEIGHT / 64]);
+    let scratch = Scratch { marks: &mut marks, queue: &mut queue };
+    let count = seen_through.remove(&present, scratch, &mut view);
     let at: Vec<usize> =
         (0..pixels.len()).filter(|&at| depth_m[at] == 0.0 && pixels[at] > 0).collect();
     assert_eq!(at.len(), count as usize);

@@ -47,6 +47,19 @@ fn put_digest(name: &str, digest: u64) {
     platform::put(&Line::new().str(name).hex(digest).str("\n"));
 }
 
+/// Prints how much was taken of the stack, bytes. Never inlined, for the same reason.
+#[inline(never)]
+fn put_stack(step: u32, most: u32) {
+    platform::put(
+        &Line::new()
+            .str("stack of a step ")
+            .decimal(step)
+            .str(", of everything ")
+            .decimal(most)
+            .str("\n"),
+    );
+}
+
 /// Replays; returns the exit code: 0, or what of a digest (1), the fixture (2), the stack (3) was
 /// wrong.
 fn run() -> u8 {
@@ -90,14 +103,7 @@ fn run() -> u8 {
         put_digest("snapshot ", snapshot);
         wrong += u32::from(snapshot == 0);
     }
-    platform::put(
-        &Line::new()
-            .str("stack of a step ")
-            .decimal(step)
-            .str(", of everything ")
-            .decimal(most)
-            .str("\n"),
-    );
+    put_stack(step, most);
     #[cfg(any(feature = "faults", feature = "forbidden_panic_fault"))]
     platform::put(&Line::new().hex(faults::all(fixture::CLIP.len())).str("\n"));
     match (done, wrong + missing) {
