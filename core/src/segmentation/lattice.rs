@@ -46,7 +46,7 @@ const BLOCK_PX: f64 = 0.4;
 /// Beyond that, by what depth errs, m for each m^2 of squared depth.
 const DEPTH_MARGIN: f64 = 0.0012;
 /// Height above the ground below which pixels belong to the ground, m.
-const CLEARANCE_M: f64 = 0.12;
+pub(super) const CLEARANCE_M: f64 = 0.12;
 
 /// The lattice of a frame.
 pub(super) struct Lattice<'a> {

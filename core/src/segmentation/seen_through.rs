@@ -15,6 +15,7 @@
 //! Memory: 2 bytes for each cell. Time: two projections a cell, and the pixels of one frame of
 //! [`KEPT_EVERY`].
 
+use super::lattice::CLEARANCE_M;
 use crate::{
     geometry::{
         GroundPlane, StereoRig, Transform,
@@ -47,8 +48,6 @@ const STEP_SHARE: f64 = 0.06;
 /// Distance beyond the cells that have come within which others belong to them, m: to the side,
 /// above and below, along the depth.
 const JOINED_M: [f64; 3] = [0.5, 0.5, 0.3];
-/// Height above the ground from which on they do, m.
-const CLEARANCE_M: f64 = 0.12;
 /// Shares of a cell's disparity between which pixels in and beside it belong to it.
 const OWN: [f64; 2] = [0.85, 1.3];
 

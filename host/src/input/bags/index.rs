@@ -10,7 +10,7 @@ use std::io::{self, Read, Seek};
 /// Reads the index, within its bound; with its length, bytes.
 ///
 /// # Errors
-/// What is wrong with it, as the rest of a sentence.
+/// The fault of the index, as the rest of a sentence.
 pub fn summary(file: &mut File) -> Result<(Option<Summary>, u64), String> {
     let failed = |error: io::Error| error.to_string();
     let options = SummaryReaderOptions::default()
@@ -53,7 +53,7 @@ impl Records {
     /// Takes the next bytes, and looks at the records that end in them.
     ///
     /// # Errors
-    /// What is wrong with a record, as the rest of a sentence.
+    /// The fault of a record, as the rest of a sentence.
     fn take(&mut self, bytes: &[u8]) -> Result<(), &'static str> {
         self.bytes.extend_from_slice(bytes);
         let mut rest = &self.bytes[..];
