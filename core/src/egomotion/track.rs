@@ -133,7 +133,7 @@ impl Egomotion {
         let found = self.hold_weak_directions(found);
         let mut estimate = MotionEstimate { right_ahead, ..found };
         // After lost frames the motion spans several: the share of one is checked.
-        let frames = self.since_reference + 1;
+        let frames = self.since_reference.saturating_add(1);
         let motion = estimate
             .t_current_previous
             .map(|motion| if frames == 1 { motion } else { motion.part_of(frames) });
@@ -184,7 +184,7 @@ impl Egomotion {
     /// Holds the camera where the time since the reference is counted already.
     fn hold_from_reference(&mut self) {
         self.extrapolated = self.extrapolated.saturating_add(1);
-        self.since_reference += 1;
+        self.since_reference = self.since_reference.saturating_add(1);
         self.t_current_previous = self.next_motion();
         self.extrapolate();
         if self.is_lost() {
@@ -274,7 +274,7 @@ impl Egomotion {
             self.can_accelerate_to(
                 config,
                 motion,
-                self.reference_s / f64::from(self.since_reference + 1),
+                self.reference_s / f64::from(self.since_reference.saturating_add(1)),
             )
         };
         if !estimate.right_ahead.is_none_or(is_synchronous) {

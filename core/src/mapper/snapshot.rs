@@ -27,6 +27,7 @@ use super::{Mapper, NewError};
 use crate::{
     Capacity, Config,
     digest::Digest,
+    invariants::Invariants,
     memory::{Carver, Slabs},
     state::{ReadError, Reader, Visitor, Writer},
 };
@@ -266,7 +267,7 @@ impl<'s> Mapper<'s> {
     }
 
     /// Visits what lives from frame to frame; [`Mapper::rebuild`] must follow a reading.
-    fn visit(&mut self, visitor: &mut impl Visitor) {
+    pub(super) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self {
             scene_flow,
             localization,
@@ -321,7 +322,10 @@ impl<'s> Mapper<'s> {
         let unused = self.ignored.pair(self.size.unwrap_or_default(), self.rectifier.invalid());
         let flow = self.config.scene_flow_within(&self.capacity);
         self.scene_flow.rebuild(&flow, unused.as_ref());
-        self.objects.rebuild() && self.static_map.volume.rebuild()
+        let is_rebuilt = self.objects.rebuild() && self.static_map.volume.rebuild();
+        let mut invariants = Invariants::of_foreign();
+        self.check_kept(&mut invariants);
+        is_rebuilt && self.tracker.can_be(self.frame) && invariants.faults() == 0
     }
 }
 

@@ -337,7 +337,7 @@ impl Mapper<'_> {
             digests,
             digest: digests.whole(self.frame),
         };
-        self.frame += 1;
+        self.frame = self.frame.saturating_add(1);
         report
     }
 
@@ -360,15 +360,20 @@ impl Mapper<'_> {
     /// Number of conditions that must hold after a frame and do not.
     fn check_invariants(&self) -> u32 {
         let mut invariants = Invariants::default();
+        self.scene_flow.check_invariants(&mut invariants);
+        self.tracker.check_invariants(&mut invariants);
+        self.check_kept(&mut invariants);
+        invariants.faults()
+    }
+
+    /// Says what must hold of what a snapshot keeps.
+    pub(super) fn check_kept(&self, invariants: &mut Invariants) {
         invariants.require(
             self.localization.camera.t_world_camera().is_finite(),
             "the camera's pose is finite",
         );
-        self.scene_flow.check_invariants(&mut invariants);
-        self.tracker.check_invariants(&mut invariants);
-        self.objects.check_invariants(&mut invariants);
-        self.static_map.volume.check_invariants(&mut invariants);
-        invariants.faults()
+        self.objects.check_invariants(invariants);
+        self.static_map.volume.check_invariants(invariants);
     }
 
     fn block_count(&self) -> BlockCount {

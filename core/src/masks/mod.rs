@@ -12,6 +12,7 @@ mod store;
 mod tests;
 mod two_frames;
 
+pub(crate) use pixel_box::MAX_SIDE;
 pub use pixel_box::PixelBox;
 pub(crate) use scaled::ScaledMask;
 pub(crate) use store::{MaskHandle, MaskStore};

@@ -3,6 +3,12 @@
 use crate::state::Visitor;
 use bytemuck::{Pod, Zeroable};
 
+/// Largest side of the box of a detection, px.
+pub(crate) const MAX_SIDE: u32 = 1 << 15;
+/// Farthest that a side of a box lies from the image's corner, px: more than a track's box moves
+/// while it is not seen.
+const BOX_FARTHEST_PX: i32 = 1 << 29;
+
 /// A box of pixels: it holds columns `left .. left + width` and rows `top .. top + height`. It may
 /// lie partly or wholly beside the image.
 ///
@@ -29,10 +35,16 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
-    /// Visits every field.
+    /// Visits every field. What is read lies near enough that no sum of sides overflows.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { left, top, width, height } = self;
-        visitor.i32s([left, top, width, height]);
+        let mut sides = [left, top, width, height];
+        visitor.i32s(sides.iter_mut().map(|side| &mut **side));
+        let most = BOX_FARTHEST_PX;
+        if sides.iter().any(|side| !(-most..=most).contains(*side)) {
+            visitor.refuse();
+            *self = Self::default();
+        }
     }
 
     /// Pixels in the box.

@@ -1,7 +1,7 @@
 //! A bounded buffer of masks: a box each and, for each of its rows, words of 64 pixels that begin
 //! at multiples of 64 columns of the image, so that two masks meet word by word.
 
-use super::{PixelBox, pixel_box::share};
+use super::{MAX_SIDE, PixelBox, pixel_box::share};
 use crate::{
     slices::{clipped, clipped_mut},
     state::Visitor,
@@ -29,12 +29,17 @@ impl MaskHandle {
         Self { pixels, start: 0, stride: 0 }
     }
 
-    /// Visits every field.
+    /// Visits every field. [`MaskStore::holds`] tells whether what was read can be.
     pub(crate) fn visit(&mut self, visitor: &mut impl Visitor) {
         let Self { pixels, start, stride } = self;
         pixels.visit(visitor);
         visitor.u32(start);
         visitor.u32(stride);
+    }
+
+    /// Words of a row of its box.
+    fn words_of_row(&self) -> u32 {
+        ((self.pixels.left + self.pixels.width - self.origin() + WORD - 1) / WORD) as u32
     }
 
     /// Returns true if the box stands for the mask.
@@ -89,7 +94,7 @@ impl<'s> MaskStore<'s> {
     pub(crate) fn alloc(&mut self, pixels: PixelBox) -> Option<MaskHandle> {
         // Whole words a row, from the word that holds the box's first column on.
         let mut mask = MaskHandle { pixels, start: self.used as u32, stride: 0 };
-        mask.stride = ((pixels.left + pixels.width - mask.origin() + WORD - 1) / WORD) as u32;
+        mask.stride = mask.words_of_row();
         let end =
             self.used.checked_add(mask.stride as usize * usize::try_from(pixels.height).ok()?)?;
         self.words.get_mut(self.used..end)?.fill(0);
@@ -98,6 +103,19 @@ impl<'s> MaskStore<'s> {
             self.peak = end;
         }
         Some(mask)
+    }
+
+    /// Returns true if a mask's box can lie in an image, and its words among those in use.
+    pub(crate) fn holds(&self, mask: &MaskHandle) -> bool {
+        let PixelBox { left, top, width, height } = mask.pixels;
+        let lies =
+            |first: i32, side: i32| first >= 0 && side >= 0 && first + side <= MAX_SIDE as i32;
+        lies(left, width)
+            && lies(top, height)
+            && (mask.is_box()
+                || mask.stride == mask.words_of_row()
+                    && u64::from(mask.start) + u64::from(mask.stride) * height as u64
+                        <= self.used as u64)
     }
 
     /// Gives back the space allocated last.

@@ -245,7 +245,7 @@ impl<'s> Places<'s> {
         if segment != self.segment {
             (self.segment, self.frames, self.pending) = (segment, 0, Pending::default());
         }
-        self.frames += 1;
+        self.frames = self.frames.saturating_add(1);
         if self.frames > FIRST_FRAMES + INTERVAL {
             self.frames -= INTERVAL;
         }

@@ -49,12 +49,12 @@ impl Pending {
                 *self = Self {
                     t_world_camera: found.pose.t_world_camera,
                     segment: found.pose.segment,
-                    frames: if goes_on { self.frames + 1 } else { 1 },
+                    frames: if goes_on { self.frames.saturating_add(1) } else { 1 },
                     misses: 0,
                 };
             }
             None => {
-                self.misses += 1;
+                self.misses = self.misses.saturating_add(1);
                 if self.misses > MISSES_MAX {
                     *self = Self::default();
                 }

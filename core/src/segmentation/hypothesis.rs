@@ -160,7 +160,7 @@ impl Hypothesis {
     /// A frame without a group: it moves on.
     pub(super) fn miss(&mut self) {
         self.history <<= 1;
-        self.missed += 1;
+        self.missed = self.missed.saturating_add(1);
         self.center_m = (self.center() + Vector3::from(self.motion_m)).into();
     }
 }

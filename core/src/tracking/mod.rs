@@ -269,6 +269,11 @@ impl<'s> Tracker<'s> {
         tracks.visit(visitor);
     }
 
+    /// Returns true if what was read can be, `frames` frames after the first.
+    pub(crate) fn can_be(&self, frames: u32) -> bool {
+        self.tracks.can_be(frames, self.masks.current())
+    }
+
     /// Adds what is in use to a footprint.
     pub(crate) fn note_use(&self, footprint: &mut Footprint) {
         let tracks = self.tracks.all().len();

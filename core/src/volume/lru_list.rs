@@ -3,7 +3,7 @@
 //!
 //! Memory: 8 bytes a block.
 
-use super::Slot;
+use super::{Slot, SlotPool};
 use crate::state::Visitor;
 use crate::{
     memory::{Carver, region_bytes},
@@ -68,6 +68,23 @@ impl<'s> LruList<'s> {
         self.set(older, NEWER, newer);
         self.set(newer, OLDER, older);
         self.link(link(slot), [0; 2]);
+    }
+
+    /// Returns true if the list leads once through the slots in use, and no other has neighbours.
+    pub(super) fn is_whole(&self, pool: &SlotPool<'_>) -> bool {
+        let (mut before, mut entry) = (0, self.ends[OLDER]);
+        for _ in 0..pool.len() {
+            let slot = entry.checked_sub(1).map(Slot::new).filter(|&slot| pool.is_live(slot));
+            let links = slot.and_then(|slot| self.links.get(slot.index()));
+            match links {
+                // Each names the one before: none is met twice.
+                Some(&[older, newer]) if older == before => (before, entry) = (entry, newer),
+                _ => return false,
+            }
+        }
+        let given_out = (0..).zip(self.links.iter().take(pool.high_water()));
+        let mut others = given_out.filter(|(slot, _)| !pool.is_live(Slot::new(*slot)));
+        entry == 0 && before == self.ends[NEWER] && others.all(|(_, links)| *links == [0; 2])
     }
 
     /// Visits every field, in a pool that gave out `slots` slots at most.

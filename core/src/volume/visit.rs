@@ -60,9 +60,9 @@ impl Volume<'_> {
     }
 
     /// Inserts the blocks that were read into the index, in slot order, and sums their digests.
-    /// Returns true if the blocks can be in one map: no key twice, space for all. Nothing that
-    /// comes later depends on the order of insertion: the index answers for one block, and nothing
-    /// walks it.
+    /// Returns true if the blocks can be in one map: no key twice, space for all, and each in the
+    /// LRU list. Nothing that comes later depends on the order of insertion: the index answers for
+    /// one block, and nothing walks it.
     pub(crate) fn rebuild(&mut self) -> bool {
         for slot in self.pool.live() {
             let Some(key) = self.blocks.key(slot) else { return false };
@@ -75,6 +75,6 @@ impl Volume<'_> {
                 self.blocks.header.get(slot.index()).map_or(0, |header| header.digest),
             );
         }
-        true
+        self.lru.is_whole(&self.pool)
     }
 }

@@ -1,5 +1,6 @@
 //! A thousand short runs through random scenes, each stopped somewhere and resumed.
 
+mod forged;
 mod scene;
 
 use super::{

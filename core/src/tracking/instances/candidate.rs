@@ -1,11 +1,11 @@
 //! Selection: which of a frame's detections can be used, and the best of them.
 
 use super::{Class, Detection, DetectionCount, InstancesConfig, MAX_DETECTIONS, Treatment};
-use crate::{digest::Digest, masks::PixelBox};
+use crate::{
+    digest::Digest,
+    masks::{MAX_SIDE, PixelBox},
+};
 use heapless::Vec;
-
-/// Largest side of a box, px.
-const MAX_SIDE: u32 = 1 << 15;
 
 /// Reason why a detection that can be used is not.
 // No function that borrows the count: a call through a pointer would defy the proofs of firmware.

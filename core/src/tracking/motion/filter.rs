@@ -220,7 +220,7 @@ impl MotionFilter {
                 }
                 let change = rate - predicted;
                 if self.frames > 0 && change.dot(&(information * change)) > CONTRADICTION {
-                    self.contradictions += 1;
+                    self.contradictions = self.contradictions.saturating_add(1);
                     return false;
                 }
                 self.covariance = symmetric(&covariance).into();
@@ -230,7 +230,7 @@ impl MotionFilter {
         }
         self.rate = rate.into();
         self.center_world = t_world_camera.transform_point(center.into());
-        self.frames += 1;
+        self.frames = self.frames.saturating_add(1);
         true
     }
 }

@@ -90,10 +90,8 @@ impl<'s> TrackTable<'s> {
         );
         for track in self.all() {
             invariants.require(track.id != 0, "a track has a number");
-            invariants.require(
-                track.first_frame <= track.last_frame && track.last_frame <= frame,
-                "a track was seen before it was seen last",
-            );
+            invariants
+                .require(track.was_seen_until(frame), "a track was seen before it was seen last");
             invariants.require(
                 track.instance.get().is_none_or(|index| index < instances),
                 "a track's instance is one of this frame",
@@ -107,6 +105,18 @@ impl<'s> TrackTable<'s> {
         visitor.count(len, tracks.len());
         visitor.u32(next_id);
         self.all_mut().iter_mut().for_each(|track| track.visit(visitor));
+    }
+
+    /// Returns true if what was read can be, `frames` frames after the first: tracks with numbers
+    /// that were seen in these frames, and whose masks are in `masks`.
+    pub fn can_be(&self, frames: u32, masks: &MaskStore<'_>) -> bool {
+        self.next_id != 0
+            && self.all().iter().all(|track| {
+                track.id != 0
+                    && track.last_frame < frames
+                    && track.was_seen_until(track.last_frame)
+                    && masks.holds(&track.mask)
+            })
     }
 
     pub fn all(&self) -> &[Track] {
@@ -164,7 +174,7 @@ impl<'s> TrackTable<'s> {
             *slot = Track::begun(self.next_id, frame, index, &instance);
             begun.track = OptionalIndex::some(self.len);
             self.len += 1;
-            self.next_id = self.next_id.wrapping_add(1);
+            self.next_id = self.next_id.wrapping_add(1).max(1);
             (count.begun, count.detected) = (count.begun + 1, count.detected + 1);
         }
         count.tracks = self.len as u32;

@@ -98,9 +98,14 @@ impl Track {
         self.vote_class(instance.class);
         self.score = instance.score;
         self.last_frame = frame;
-        self.sightings += 1;
+        self.sightings = self.sightings.saturating_add(1);
         self.instance = OptionalIndex::some(index);
         self.tracked_only = instance.tracked_only;
+    }
+
+    /// Returns true if it was seen first and last in this order, up to frame `frame`.
+    pub fn was_seen_until(&self, frame: u32) -> bool {
+        self.first_frame <= self.last_frame && self.last_frame <= frame
     }
 
     /// Forgets motion, state and poses, and ends the trajectory segment.
@@ -160,10 +165,10 @@ impl Track {
             let advanced = (self.motion_world(interval_s) * self.t_world_object).normalized();
             let is_new_static = state == MotionState::Static && !was_known;
             self.t_world_object = if is_new_static { self.t_world_origin } else { advanced };
-            self.segment_len += 1;
+            self.segment_len = self.segment_len.saturating_add(1);
         } else if self.instance.is_some() {
             (self.t_world_origin, self.t_world_object) = (*t_world_camera, *t_world_camera);
-            (self.segment_len, self.segment_id) = (1, self.segment_id + 1);
+            (self.segment_len, self.segment_id) = (1, self.segment_id.wrapping_add(1));
         } else {
             self.segment_len = 0;
         }
@@ -173,7 +178,7 @@ impl Track {
     fn vote_class(&mut self, class: u32) {
         let by_motion = Class::MovingObject.code();
         if class == self.class {
-            self.class_margin += 1;
+            self.class_margin = self.class_margin.saturating_add(1);
         } else if class == by_motion {
             // That it moves says nothing about its class.
         } else if self.class == by_motion {
