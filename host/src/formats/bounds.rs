@@ -11,6 +11,7 @@
 //! | scans of a progressive JPEG | [`MAX_JPEG_SCANS`] |
 //! | chunk or record of an MCAP file, packed or not | [`MAX_BAG_RECORD_BYTES`] |
 //! | index of an MCAP file; a text in it | [`MAX_BAG_INDEX_BYTES`]; its record |
+//! | entries of the channels in an index | [`MAX_BAG_CHANNEL_ENTRIES`] |
 //! | indexes of all files of a recording; files | [`MAX_BAG_INDEXES_BYTES`], [`MAX_BAG_FILES`] |
 //! | unpacked chunks for each byte of an MCAP file | [`MAX_BAG_RATIO`] |
 //! | images of a topic; image topics | [`MAX_BAG_IMAGES`], [`MAX_BAG_TOPICS`] |
@@ -45,6 +46,9 @@ pub const MAX_JPEG_SCANS: usize = 100;
 pub const MAX_BAG_RECORD_BYTES: usize = 48 * MIB as usize;
 /// Length of the index of an MCAP file, bytes.
 pub const MAX_BAG_INDEX_BYTES: u64 = 24 * MIB;
+/// Entries of all channels in the index of an MCAP file, such as a topic's quality of service. One
+/// takes about 170 bytes.
+pub const MAX_BAG_CHANNEL_ENTRIES: usize = 100_000;
 /// Length of the indexes of all files of a recording, bytes.
 pub const MAX_BAG_INDEXES_BYTES: u64 = 96 * MIB;
 /// Files of a recording.

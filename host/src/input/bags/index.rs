@@ -1,6 +1,6 @@
 //! The index at the end of an MCAP file, whose records are looked at before they are parsed.
 
-use crate::formats::bounds::{MAX_BAG_INDEX_BYTES, bytes_text};
+use crate::formats::bounds::{MAX_BAG_CHANNEL_ENTRIES, MAX_BAG_INDEX_BYTES, bytes_text, thousands};
 use mcap::Summary;
 use mcap::records::op;
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
@@ -47,6 +47,8 @@ pub fn summary(file: &mut File) -> Result<(Option<Summary>, u64), String> {
 struct Records {
     /// Bytes of the record that is not there as a whole yet.
     bytes: Vec<u8>,
+    /// Entries of the channels so far.
+    entries: usize,
 }
 
 impl Records {
@@ -54,11 +56,17 @@ impl Records {
     ///
     /// # Errors
     /// The fault of a record, as the rest of a sentence.
-    fn take(&mut self, bytes: &[u8]) -> Result<(), &'static str> {
+    fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         self.bytes.extend_from_slice(bytes);
         let mut rest = &self.bytes[..];
         while let Some((kind, body, behind)) = record(rest) {
-            check(kind, body)?;
+            self.entries += check(kind, body)?;
+            if self.entries > MAX_BAG_CHANNEL_ENTRIES {
+                let most = thousands(MAX_BAG_CHANNEL_ENTRIES);
+                return Err(format!(
+                    "its channels have more than the {most} entries that are read"
+                ));
+            }
             rest = behind;
         }
         let looked_at = self.bytes.len() - rest.len();
@@ -75,13 +83,19 @@ fn record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((kind, body, behind))
 }
 
-/// Refuses a record that belongs elsewhere, or with a text that ends beyond it.
-fn check(kind: u8, body: &[u8]) -> Result<(), &'static str> {
+/// Refuses a record that belongs elsewhere, or with a text that ends beyond it. Returns the number
+/// of entries of a channel.
+fn check(kind: u8, body: &[u8]) -> Result<usize, &'static str> {
+    let mut entries = 0;
     let whole = match kind {
         op::SCHEMA => body.get(2..).and_then(behind_text).and_then(behind_text),
         op::CHANNEL => {
             let names = body.get(4..).and_then(behind_text).and_then(behind_text);
-            names.and_then(behind_texts)
+            names.and_then(behind_texts).map(|(texts, behind)| {
+                // A key and its value.
+                entries = texts / 2;
+                behind
+            })
         }
         op::CHUNK_INDEX => {
             let offsets = body.get(32..).and_then(behind_offsets);
@@ -93,7 +107,7 @@ fn check(kind: u8, body: &[u8]) -> Result<(), &'static str> {
         op::STATISTICS | op::SUMMARY_OFFSET | op::FOOTER | 0 | 0x10.. => Some(body),
         _ => return Err("its index holds records that belong elsewhere"),
     };
-    whole.map(|_| ()).ok_or("a text or list of its index ends beyond its record")
+    whole.map(|_| entries).ok_or("a text or list of its index ends beyond its record")
 }
 
 /// The bytes behind a length and as many bytes.
@@ -102,14 +116,16 @@ fn behind_text(bytes: &[u8]) -> Option<&[u8]> {
     rest.get(u32::from_le_bytes(len) as usize..)
 }
 
-/// The bytes behind a list of texts.
-fn behind_texts(bytes: &[u8]) -> Option<&[u8]> {
+/// The number of texts in a list, and the bytes behind it.
+fn behind_texts(bytes: &[u8]) -> Option<(usize, &[u8])> {
     let behind = behind_text(bytes)?;
     let mut texts = bytes.get(4..bytes.len() - behind.len())?;
+    let mut count = 0;
     while !texts.is_empty() {
         texts = behind_text(texts)?;
+        count += 1;
     }
-    Some(behind)
+    Some((count, behind))
 }
 
 /// The bytes behind a list of channels and offsets, which the parser reads by whole entries.

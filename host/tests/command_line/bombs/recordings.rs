@@ -7,7 +7,7 @@ use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufWriter, Cursor};
 use std::path::Path;
 
 const SIDES: &str = "at most 8,192 px a side are read";
@@ -41,6 +41,11 @@ pub const KINDS: &[Bomb] = &[
         name: "MCAP whose index has a long text",
         bound: "ends beyond its record",
         make: long_text,
+    },
+    Bomb {
+        name: "MCAP whose channels have many entries",
+        bound: "more than the 100,000 entries",
+        make: entries,
     },
 ];
 
@@ -220,5 +225,17 @@ fn long_text(root: &Path, random: &mut Random) -> Call {
     let at = file.windows(topic.len()).rposition(|text| text == topic).unwrap();
     file[at - 4..at].copy_from_slice(&above(400_000_000, random).to_le_bytes());
     fs::write(root.join("m.mcap"), file).unwrap();
+    call(random)
+}
+
+/// Entries of a letter, which take a key, a value and memory of a map each.
+fn entries(root: &Path, random: &mut Random) -> Call {
+    let of_channel: BTreeMap<String, String> = (0..1_000_000 + random.below(500_000))
+        .map(|at| (format!("{at:x}"), "v".to_owned()))
+        .collect();
+    let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+    writer.add_channel(0, "/left", "cdr", &of_channel).unwrap();
+    writer.finish().unwrap();
+    fs::write(root.join("m.mcap"), writer.into_inner().into_inner()).unwrap();
     call(random)
 }
