@@ -83,7 +83,7 @@ pub fn browser(_: TokenStream, test: TokenStream) -> TokenStream {
 /// for more of it.
 fn too_long(asked: &[Option<OsString>]) -> Option<String> {
     let is_asked = asked.iter().flatten().any(|value| !value.is_empty() && value != "0");
-    (!is_asked).then(|| "long: .ci/run and DYNVOX_LONG=1 run it".to_owned())
+    (!is_asked).then(|| "long: .ci/long and DYNVOX_LONG=1 run it".to_owned())
 }
 
 /// `#[long]` above `#[test]`: the test takes long, and shorter ones ask most of the same.
