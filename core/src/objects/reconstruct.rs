@@ -169,7 +169,7 @@ impl<'s> Objects<'s> {
             summary.class = track.class();
             summary.state = track.motion_state.state();
             summary.last_frame = number;
-            summary.frames += 1;
+            summary.frames = summary.frames.saturating_add(1);
             summary.t_world_object = track.t_world_object;
             // Pruned whole every few frames: an object has no history of visible blocks.
             if self.config.prune_weight > 0
