@@ -86,16 +86,12 @@ fn record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
 /// Refuses a record that belongs elsewhere, or with a text that ends beyond it. Returns the number
 /// of entries of a channel.
 fn check(kind: u8, body: &[u8]) -> Result<usize, &'static str> {
-    let mut entries = 0;
+    const BEYOND: &str = "a text or list of its index ends beyond its record";
     let whole = match kind {
         op::SCHEMA => body.get(2..).and_then(behind_text).and_then(behind_text),
         op::CHANNEL => {
             let names = body.get(4..).and_then(behind_text).and_then(behind_text);
-            names.and_then(behind_texts).map(|(texts, behind)| {
-                // A key and its value.
-                entries = texts / 2;
-                behind
-            })
+            return names.and_then(entries).ok_or(BEYOND);
         }
         op::CHUNK_INDEX => {
             let offsets = body.get(32..).and_then(behind_offsets);
@@ -107,7 +103,7 @@ fn check(kind: u8, body: &[u8]) -> Result<usize, &'static str> {
         op::STATISTICS | op::SUMMARY_OFFSET | op::FOOTER | 0 | 0x10.. => Some(body),
         _ => return Err("its index holds records that belong elsewhere"),
     };
-    whole.map(|_| entries).ok_or("a text or list of its index ends beyond its record")
+    whole.map(|_| 0).ok_or(BEYOND)
 }
 
 /// The bytes behind a length and as many bytes.
@@ -116,8 +112,8 @@ fn behind_text(bytes: &[u8]) -> Option<&[u8]> {
     rest.get(u32::from_le_bytes(len) as usize..)
 }
 
-/// The number of texts in a list, and the bytes behind it.
-fn behind_texts(bytes: &[u8]) -> Option<(usize, &[u8])> {
+/// The number of entries in a list of keys and values.
+fn entries(bytes: &[u8]) -> Option<usize> {
     let behind = behind_text(bytes)?;
     let mut texts = bytes.get(4..bytes.len() - behind.len())?;
     let mut count = 0;
@@ -125,7 +121,7 @@ fn behind_texts(bytes: &[u8]) -> Option<(usize, &[u8])> {
         texts = behind_text(texts)?;
         count += 1;
     }
-    Some((count, behind))
+    Some(count / 2)
 }
 
 /// The bytes behind a list of channels and offsets, which the parser reads by whole entries.
