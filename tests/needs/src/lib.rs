@@ -130,7 +130,7 @@ mod tests {
             assert_eq!(too_long(&asked), None);
         }
         for not in [[None, None], [of(""), None], [of("0"), of("")]] {
-            assert!(too_long(&not).unwrap().contains(".ci/run"));
+            assert!(too_long(&not).unwrap().contains(".ci/long"));
         }
     }
 
