@@ -13,7 +13,7 @@
 //! lower half shows little road has no plane; callers say what they assume then.
 
 use super::StereoRig;
-use crate::image::{DISPARITY_ONE_PX, View};
+use crate::image::{View, disparity_px};
 
 /// Columns, and rows, from one pixel that votes to the next, px.
 const STEP_PX: usize = 8;
@@ -106,11 +106,7 @@ fn points_below_horizon<'a>(
     // A level camera sees ground below the horizon only.
     let rows = pixels(height).filter(move |&v| v as f64 > rig.center_v_px);
     rows.flat_map(move |v| {
-        pixels(width).filter_map(move |u| {
-            let q8 = disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
-            let per_px = rig.baseline_m / (f64::from(q8) / f64::from(DISPARITY_ONE_PX));
-            let [x, y] = [u as f64 - rig.center_u_px, v as f64 - rig.center_v_px];
-            Some([x * per_px, y * per_px, rig.focal_px * per_px])
-        })
+        pixels(width)
+            .filter_map(move |u| Some(rig.pixel_point([u, v], disparity_px(disparity_q8, [u, v])?)))
     })
 }

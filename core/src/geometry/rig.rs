@@ -170,6 +170,13 @@ impl StereoRig {
         Some([seen.u_left_px * per_px, seen.v_px * per_px, self.focal_px * per_px])
     }
 
+    /// The point of a pixel of the left image with a disparity, in the left camera's frame, m.
+    pub(crate) fn pixel_point(&self, [u, v]: [usize; 2], disparity_px: f64) -> [f64; 3] {
+        let per_px = self.baseline_m / disparity_px;
+        let [x, y] = [u as f64 - self.center_u_px, v as f64 - self.center_v_px];
+        [x * per_px, y * per_px, self.focal_px * per_px]
+    }
+
     /// Change of [`StereoRig::triangulate`] by the observation, m/px: columns left column, row,
     /// right column. Of use only where the observation triangulates.
     pub(crate) fn triangulate_jacobian(&self, seen: &StereoObservation) -> [[f64; 3]; 3] {

@@ -1,10 +1,17 @@
 //! One pixel of disparity.
 
+use super::View;
 use bytemuck::{Pod, TransparentWrapper, Zeroable};
 
 /// One pixel of disparity in the core's unit: 1/256 px in `u16`, as in KITTI's 16-bit PNGs. 0 means
 /// none.
 pub const DISPARITY_ONE_PX: u16 = 256;
+
+/// The disparity of a pixel of an image in 1/256 px, px; `None` where none is known.
+pub(crate) fn disparity_px(disparity_q8: View<'_, u16>, [u, v]: [usize; 2]) -> Option<f64> {
+    let q8 = disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
+    Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
+}
 
 /// A disparity in 1/256 px, 0 none, as it is stored in an image of `u16`.
 ///

@@ -5,7 +5,7 @@ mod growth;
 use super::{extent::Extent, known::KnownSurfaces};
 use crate::{
     geometry::{GroundPlane, StereoRig, scalar::max_f64},
-    image::{DISPARITY_ONE_PX, View},
+    image::{View, disparity_px},
     masks::PixelBox,
 };
 use growth::Growth;
@@ -97,9 +97,8 @@ impl<'a> Lattice<'a> {
     }
 
     /// Disparity of a pixel, px.
-    pub fn disparity_px(&self, [u, v]: [usize; 2]) -> Option<f64> {
-        let q8 = self.disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
-        Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
+    pub fn disparity_px(&self, pixel: [usize; 2]) -> Option<f64> {
+        disparity_px(self.disparity_q8, pixel)
     }
 
     /// The pixels in the middle of the marked cells.
@@ -128,10 +127,8 @@ impl<'a> Lattice<'a> {
     }
 
     /// The point of a pixel, in the camera, m.
-    fn point_at(&self, [u, v]: [usize; 2]) -> Option<[f64; 3]> {
-        let per_px = self.rig.baseline_m / self.disparity_px([u, v])?;
-        let [x, y] = [u as f64 - self.rig.center_u_px, v as f64 - self.rig.center_v_px];
-        Some([x * per_px, y * per_px, self.rig.focal_px * per_px])
+    fn point_at(&self, pixel: [usize; 2]) -> Option<[f64; 3]> {
+        Some(self.rig.pixel_point(pixel, self.disparity_px(pixel)?))
     }
 
     /// Marks the cells of an object, from those within its extent on, connected through cells that

@@ -21,7 +21,7 @@ use crate::{
         GroundPlane, StereoRig, Transform,
         scalar::{floor_i32, max_f64},
     },
-    image::{DISPARITY_ONE_PX, View, ViewMut},
+    image::{DISPARITY_ONE_PX, View, ViewMut, disparity_px},
     memory::{Capacity, Carver, region_bytes},
     slices::{clipped, clipped_mut},
     state::Visitor,
@@ -294,7 +294,8 @@ impl Marks<'_> {
                 };
                 for (pixel, depth_m) in pixels.iter_mut().enumerate() {
                     // A pixel of the wall behind in the same cell stays.
-                    let px = present.pixel_px([column * CELL_PX + pixel, v]).unwrap_or(0.0);
+                    let px = disparity_px(present.disparity_q8, [column * CELL_PX + pixel, v]);
+                    let px = px.unwrap_or(0.0);
                     if px >= least_px && px <= most_px && *depth_m > 0.0 {
                         *depth_m = 0.0;
                         cleared += 1;
@@ -387,12 +388,6 @@ fn beside(
 }
 
 impl Present<'_> {
-    /// Disparity of a pixel, px.
-    fn pixel_px(&self, [u, v]: [usize; 2]) -> Option<f64> {
-        let q8 = self.disparity_q8.get(u, v).filter(|q8| *q8 > 0)?;
-        Some(f64::from(q8) / f64::from(DISPARITY_ONE_PX))
-    }
-
     /// The pixel in the middle of a cell, within the image.
     fn middle(&self, [column, row]: [usize; 2]) -> [usize; 2] {
         let size = [self.disparity_q8.width(), self.disparity_q8.height()];
@@ -403,7 +398,7 @@ impl Present<'_> {
 
     /// Disparity in the middle of a cell, px.
     fn disparity_px(&self, cell: [usize; 2]) -> Option<f64> {
-        self.pixel_px(self.middle(cell))
+        disparity_px(self.disparity_q8, self.middle(cell))
     }
 
     /// The cells beside one that show the same surface.
@@ -421,11 +416,8 @@ impl Present<'_> {
 
     /// The point in the middle of a cell, in the camera, m, if it is near enough to be fused.
     fn point(&self, cell: [usize; 2]) -> Option<[f64; 3]> {
-        let [u, v] = self.middle(cell);
-        let per_px = self.rig.baseline_m / self.pixel_px([u, v])?;
-        let z = self.rig.focal_px * per_px;
-        let [x, y] = [u as f64 - self.rig.center_u_px, v as f64 - self.rig.center_v_px];
-        (z <= self.far_m).then_some([x * per_px, y * per_px, z])
+        let point = self.rig.pixel_point(self.middle(cell), self.disparity_px(cell)?);
+        (point[2] <= self.far_m).then_some(point)
     }
 
     /// The nearest disparity of a cell, whole px, rounded up; 0 where half of it has none.

@@ -110,13 +110,10 @@ impl<'s> TrackTable<'s> {
     /// Returns true if what was read can be, `frames` frames after the first: tracks with numbers
     /// that were seen in these frames, and whose masks are in `masks`.
     pub fn can_be(&self, frames: u32, masks: &MaskStore<'_>) -> bool {
-        self.next_id != 0
-            && self.all().iter().all(|track| {
-                track.id != 0
-                    && track.last_frame < frames
-                    && track.was_seen_until(track.last_frame)
-                    && masks.holds(&track.mask)
-            })
+        let seen =
+            |track: &Track| frames.checked_sub(1).is_some_and(|last| track.was_seen_until(last));
+        let holds = |track: &Track| track.id != 0 && seen(track) && masks.holds(&track.mask);
+        self.next_id != 0 && self.all().iter().all(holds)
     }
 
     pub fn all(&self) -> &[Track] {
