@@ -262,6 +262,10 @@ mod tests {
         let bytes = check_bytes("a table", 5 << 30, 32 * MIB).unwrap_err();
         assert_eq!(bytes, "it has 5,120 MiB; at most 32 MiB of a table are read");
         assert_eq!(check_sides(MAX_SIDE_PX, MAX_SIDE_PX), Ok(()));
+        assert_eq!(check_output(&[1, 84, 8_400]), Ok(705_600));
+        let output = check_output(&[1, 3, 100_000, 100_000]).unwrap_err();
+        assert!(output.starts_with("an output has the shape [1, 3, 100000, 100000]; at most"));
+        assert!(check_output(&[usize::MAX, 2]).is_err(), "more than can be counted");
     }
 
     #[test]

@@ -188,6 +188,9 @@ mod tests {
             message.contains("baseline is -0.5") && message.contains("exchange the two cameras"),
             "{message}"
         );
+        let apart = GREY.replacen("718 0 607 -386.1", "728 0 607 -386.1", 1);
+        let apart = KittiCalibration::parse(&apart, path).unwrap().rig(0, 1).unwrap_err();
+        assert!(apart.to_string().contains("P0 and P1 differ in focal length"), "{apart}");
         let short = KittiCalibration::parse("P0: 1 2 3\n", path).unwrap_err().to_string();
         assert!(short.contains("line 1"), "{short}");
     }

@@ -124,3 +124,40 @@ pub fn shown(model: &LensModel, decimals: usize) -> String {
     });
     parts.join(if lists { "; " } else { ", " })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> LensTable {
+        toml::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn a_table_is_taken_whole_or_refused_by_the_key_at_fault() {
+        for (text, words) in [
+            ("model = 3", "`model` is not a name"),
+            ("xi = 0.1", "missing field `model`"),
+            ("model = \"pear\"", "there is no lens model pear: use one of"),
+            ("model = \"double_sphere\"\nxi = -0.2", "missing field `alpha`"),
+            ("model = \"double_sphere\"\nxi = -0.2\nalpha = \"x\"", "`alpha` has 0 numbers, not 1"),
+            ("model = \"double_sphere\"\nxi = -0.2\nalpha = 0.5\nbeta = 1", "unknown field `beta`"),
+            ("model = \"equidistant\"\nradial = [0.1, 0.2]", "`radial` has 2 numbers, not 4"),
+        ] {
+            let message = table(text).model().unwrap_err();
+            assert!(message.contains(words), "{text}: {message}");
+        }
+        let double = table("model = \"double_sphere\"\nxi = -0.2\nalpha = 0.5").model();
+        assert_eq!(double, Ok(LensModel::DoubleSphere { xi: -0.2, alpha: 0.5 }));
+        let typical = table("model = \"double_sphere\"\nxi = -0.1").model_or_typical();
+        assert!(matches!(typical, Ok(LensModel::DoubleSphere { xi: -0.1, .. })), "{typical:?}");
+    }
+
+    #[test]
+    fn parameters_are_shown_with_their_names() {
+        let double = LensModel::DoubleSphere { xi: -0.2, alpha: 0.5 };
+        assert!(shown(&double, 2).contains("-0.20, ") && shown(&double, 2).ends_with("0.50"));
+        let shown = shown(&LensModel::Equidistant { radial: [0.1, 0.2, 0.3, 0.4] }, 1);
+        assert!(shown.ends_with("0.1 0.2 0.3 0.4"), "{shown}");
+    }
+}

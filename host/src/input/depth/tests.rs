@@ -322,3 +322,18 @@ fn files_without_a_number_are_refused() {
     let reason = refusal_of(laid.unwrap().frame(0));
     assert!(reason.contains("none of its"), "{reason}");
 }
+
+#[test]
+fn sources_of_depth_are_named_and_saved() {
+    let choice = |text: &str| text.parse::<DepthChoice>();
+    for text in ["elas", "exact", "files:a/b", "disparity:c", "depth:d:e"] {
+        assert_eq!(choice(text).unwrap().to_string(), text);
+        let saved = serde_json::to_string(&choice(text).unwrap()).unwrap();
+        assert_eq!(serde_json::from_str::<DepthChoice>(&saved).unwrap(), choice(text).unwrap());
+    }
+    for (wrong, words) in [("other:a", "one of elas, files:DIR"), ("depth:", "names no folder")] {
+        assert!(choice(wrong).unwrap_err().contains(words), "{wrong}");
+    }
+    let other = serde_json::from_str::<DepthChoice>(r#"{"files": ["heights", "a"]}"#);
+    assert!(other.unwrap_err().to_string().contains("no folder of depth is named heights"));
+}

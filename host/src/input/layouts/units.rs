@@ -50,3 +50,66 @@ pub fn beside_images(folder: &Path) -> Option<OwnUnit> {
     }
     Some(OwnUnit { samples: UnitSamples::Files(samples), calibration })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use tempfile::TempDir;
+
+    /// A folder with empty files of these names.
+    fn folder(names: &[&str]) -> TempDir {
+        let root = TempDir::new().unwrap();
+        for name in names {
+            let path = root.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        root
+    }
+
+    /// Names of the samples and the calibration of a unit, below a folder.
+    fn names(root: &TempDir, unit: Option<OwnUnit>) -> Option<Vec<String>> {
+        let OwnUnit { samples: UnitSamples::Files(samples), calibration } = unit? else {
+            panic!("in files")
+        };
+        let files = std::iter::once(samples).chain(calibration);
+        let below = |file: PathBuf| file.strip_prefix(root.path()).unwrap().display().to_string();
+        Some(files.map(below).collect())
+    }
+
+    #[test]
+    fn a_table_beside_images_brings_its_mounting() {
+        for (files, expected) in [
+            (&["camchain.yaml"][..], None),
+            (&["imu.csv"], Some(&["imu.csv"][..])),
+            (&["imu.csv", "imu.yaml"], Some(&["imu.csv"])),
+            (
+                &["imu.csv", "imu.yaml", "camchain.yaml"],
+                Some(&["imu.csv", "camchain.yaml", "imu.yaml"]),
+            ),
+            (
+                &["imu0/data.csv", "imu0/sensor.yaml", "cam0/sensor.yaml"],
+                Some(&["imu0/data.csv", "imu0/sensor.yaml", "cam0/sensor.yaml"]),
+            ),
+        ] {
+            let root = folder(files);
+            let found = names(&root, beside_images(root.path()));
+            let expected = expected.map(|names| names.iter().map(|&name| name.into()).collect());
+            assert_eq!(found, expected, "{files:?}");
+        }
+    }
+
+    #[test]
+    fn kitti_raws_unit_lies_in_oxts() {
+        let root = folder(&["day/oxts/data/0.txt", "calib_cam_to_cam.txt"]);
+        let (recording, cameras) =
+            (root.path().join("day"), root.path().join("calib_cam_to_cam.txt"));
+        // Samples without a mounting are samples: the settings may have it.
+        let found = || names(&root, of_kitti_raw(&recording, &cameras)).unwrap();
+        assert_eq!(found(), ["day/oxts"]);
+        fs::write(root.path().join("calib_imu_to_velo.txt"), "").unwrap();
+        assert_eq!(found(), ["day/oxts", "calib_imu_to_velo.txt"]);
+        assert!(of_kitti_raw(root.path(), &cameras).is_none(), "no oxts");
+    }
+}

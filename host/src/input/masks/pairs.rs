@@ -41,3 +41,30 @@ pub fn label_pairs<'f>(
         Ok((name.trim_end_matches(".png").to_owned(), [found, truth]))
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageBuffer, Luma};
+    use tempfile::TempDir;
+
+    #[test]
+    fn pictures_of_one_name_are_pairs() {
+        let folders = [TempDir::new().unwrap(), TempDir::new().unwrap()];
+        let [found, truth] = folders.each_ref().map(|folder| folder.path());
+        let save = |folder: &Path, name: &str, value: u16| {
+            ImageBuffer::from_pixel(4, 3, Luma([value])).save(folder.join(name)).unwrap();
+        };
+        save(found, "1.png", 1_001);
+        let message = label_pairs(found, truth).err().unwrap().to_string();
+        assert!(message.contains("it shares no picture's name with"), "{message}");
+        save(truth, "1.png", 1_002);
+        save(truth, "2.png", 1_003);
+        let pairs: Vec<LabelPair> =
+            label_pairs(found, truth).unwrap().map(Result::unwrap).collect();
+        let [(name, [of_found, of_truth])] = pairs.as_slice() else { panic!("one pair") };
+        assert_eq!((&**name, of_found.get(0, 0)), ("1", Some(1_001)));
+        assert_eq!(of_truth.get(3, 2), Some(1_002));
+        assert!(label_pairs(found, Path::new("nowhere")).is_err());
+    }
+}

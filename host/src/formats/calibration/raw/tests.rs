@@ -1,5 +1,6 @@
 //! Each format contains_all the same rig; each way to damage a file is answered by a sentence.
 
+mod models;
 mod others;
 mod units;
 mod variants;

@@ -112,6 +112,26 @@ fn every_data_set_gives_the_same_frames_rig_and_times() {
 }
 
 #[test]
+fn camera_files_of_cityscapes_that_are_none_are_refused() {
+    let root = TempDir::new().unwrap();
+    write_cityscapes(root.path());
+    let camera = root.path().join("camera/train/aachen/aachen_000001_000002_camera.json");
+    let text = fs::read_to_string(&camera).unwrap();
+    let refused = || open(root.path(), &OpenOptions::default()).err().unwrap().to_string();
+    for (from, to, words) in [
+        ("\"baseline\": 0.5", "\"baseline\": 0", "not those of a stereo camera"),
+        ("\"fx\": 50,", "", "missing field `fx`"),
+    ] {
+        fs::write(&camera, text.replace(from, to)).unwrap();
+        let message = refused();
+        assert!(message.contains(words) && message.contains("--calibration"), "{message}");
+    }
+    fs::remove_file(&camera).unwrap();
+    let message = refused();
+    assert!(message.contains("it has no camera file of aachen_000001"), "{message}");
+}
+
+#[test]
 fn the_documentation_lists_every_data_set() {
     let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/inputs.md");
     let page = fs::read_to_string(page).unwrap();

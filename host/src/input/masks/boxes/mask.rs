@@ -275,6 +275,56 @@ mod tests {
     }
 
     #[test]
+    fn what_a_semantic_map_shows_and_no_box_is_a_mask_of_its_own() {
+        // A bus and a person at one depth, and a few pixels of a car.
+        let (bus, person) = ((70..130, 30..80), (140..160, 40..80));
+        let within = |(us, vs): &(std::ops::Range<usize>, std::ops::Range<usize>), u, v| {
+            us.contains(&u) && vs.contains(&v)
+        };
+        let disparity: Vec<u16> = (0..200 * 100)
+            .map(|at| (at % 200, at / 200))
+            .map(|(u, v)| if within(&bus, u, v) || within(&person, u, v) { 24 } else { 6 })
+            .map(|px: u16| px * 256)
+            .collect();
+        let class = |u: usize, v: usize| match (u, v) {
+            _ if within(&bus, u, v) => Class::Bus,
+            _ if within(&person, u, v) => Class::Person,
+            (20..30, 20..30) => Class::Car,
+            _ => Class::Other,
+        };
+        let codes = (0..200 * 100).map(|at| class(at % 200, at / 200).code() as u8).collect();
+        let regions = Image::new(200, 100, codes).unwrap();
+        let scene = Scene::new(&RIG, View::new(&disparity, 200, 100).unwrap(), Some(&regions));
+        let found = scene.uncovered(&[]);
+        let boxes: Vec<_> = found.iter().map(|mask| (mask.class, mask.pixels)).collect();
+        let pixels = |left, top, width, height| PixelBox { left, top, width, height };
+        let [of_bus, of_person] = [pixels(70, 30, 60, 50), pixels(140, 40, 20, 40)];
+        assert_eq!(boxes, [(Class::Bus, of_bus), (Class::Person, of_person)]);
+        // A mask that a box became counts as seen.
+        let rest = scene.uncovered(&found[..1]);
+        assert_eq!(rest.len(), 1, "the bus has a mask already");
+        let without = Scene::new(&RIG, View::new(&disparity, 200, 100).unwrap(), None);
+        assert!(without.uncovered(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_box_of_a_longer_class_reaches_deeper() {
+        let classes = [
+            Class::Person,
+            Class::Bicycle,
+            Class::Car,
+            Class::Van,
+            Class::Truck,
+            Class::Bus,
+            Class::Train,
+        ];
+        assert!(classes.map(length_m).is_sorted());
+        for class in classes {
+            assert!(mask(class, [60.0, 22.0, 140.0, 90.0]).is_some(), "{class:?}");
+        }
+    }
+
+    #[test]
     fn a_car_at_the_left_edge_keeps_columns_the_right_camera_misses() {
         // Disparity 24 px: the first 26 columns have none. Of a car inside the image, what is left
         // of it has none either: it hides that.

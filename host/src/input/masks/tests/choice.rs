@@ -17,6 +17,12 @@ fn sources_are_named_on_the_command_line() {
     for text in ["auto", "none", "motion", "files:a/b", "mots:c", "onnx:a,b", "exact", "noisy:7"] {
         assert_eq!(choice(text).unwrap().to_string(), text);
     }
+    for text in ["files:a/b", "noisy:7", "onnx:a,b"] {
+        let saved = serde_json::to_string(&choice(text).unwrap()).unwrap();
+        assert_eq!(serde_json::from_str::<MaskChoice>(&saved).unwrap(), choice(text).unwrap());
+    }
+    let other = serde_json::from_str::<MaskChoice>(r#"{"files": ["other", "a"]}"#).unwrap_err();
+    assert!(other.to_string().contains("no masks are named other"), "{other}");
     for wrong in ["", "files", "files:", "onnx:", "other:a", "noisy:x", "AUTO"] {
         assert!(choice(wrong).is_err(), "{wrong}");
     }
