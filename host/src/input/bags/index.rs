@@ -59,7 +59,10 @@ impl Records {
     fn take(&mut self, bytes: &[u8]) -> Result<(), String> {
         self.bytes.extend_from_slice(bytes);
         let mut rest = &self.bytes[..];
-        while let Some((kind, body, behind)) = record(rest) {
+        while let Some(&kind) = rest.first() {
+            // Before it is whole: of a chunk, the parser takes records as they come.
+            belongs(kind)?;
+            let Some((_, body, behind)) = record(rest) else { break };
             self.entries += check(kind, body)?;
             if self.entries > MAX_BAG_CHANNEL_ENTRIES {
                 let most = thousands(MAX_BAG_CHANNEL_ENTRIES);
@@ -83,8 +86,25 @@ fn record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     Some((kind, body, behind))
 }
 
-/// Refuses a record that belongs elsewhere, or with a text that ends beyond it. Returns the number
-/// of entries of a channel.
+/// Refuses a kind of record that belongs elsewhere; those that are not known are passed over.
+fn belongs(kind: u8) -> Result<(), &'static str> {
+    let is_of_index = matches!(
+        kind,
+        op::SCHEMA
+            | op::CHANNEL
+            | op::CHUNK_INDEX
+            | op::ATTACHMENT_INDEX
+            | op::METADATA_INDEX
+            | op::STATISTICS
+            | op::SUMMARY_OFFSET
+            | op::FOOTER
+            | 0
+            | 0x10..
+    );
+    if is_of_index { Ok(()) } else { Err("its index holds records that belong elsewhere") }
+}
+
+/// Refuses a record with a text that ends beyond it. Returns the number of entries of a channel.
 fn check(kind: u8, body: &[u8]) -> Result<usize, &'static str> {
     const BEYOND: &str = "a text or list of its index ends beyond its record";
     let whole = match kind {
@@ -99,9 +119,8 @@ fn check(kind: u8, body: &[u8]) -> Result<usize, &'static str> {
         }
         op::ATTACHMENT_INDEX => body.get(40..).and_then(behind_text).and_then(behind_text),
         op::METADATA_INDEX => body.get(16..).and_then(behind_text),
-        // Without a text; those of kinds that are not known are passed over.
-        op::STATISTICS | op::SUMMARY_OFFSET | op::FOOTER | 0 | 0x10.. => Some(body),
-        _ => return Err("its index holds records that belong elsewhere"),
+        // Without a text.
+        _ => Some(body),
     };
     whole.map(|_| 0).ok_or(BEYOND)
 }
@@ -233,6 +252,14 @@ mod tests {
         // Without its checksum, a panic of the parser.
         let attachment = [&[op::ATTACHMENT, 32, 0, 0, 0, 0, 0, 0, 0][..], &[0; 32]].concat();
         let refusal = read(&[before, &attachment, index].concat()).unwrap_err();
+        assert!(refusal.contains("belong elsewhere"), "{refusal}");
+        // A chunk that is never whole, and in it a name of 1.4 GiB.
+        let head = [[0; 28].as_slice(), &[0; 4], &100u64.to_le_bytes()].concat();
+        let schema =
+            [&[op::SCHEMA, 12, 0, 0, 0, 0, 0, 0, 0, 1, 0][..], &[0x57; 4], &[0; 6]].concat();
+        let len = (bytes.len() as u64).to_le_bytes();
+        let chunk = [&[op::CHUNK][..], &len, &head, &schema].concat();
+        let refusal = read(&[before, &chunk, index].concat()).unwrap_err();
         assert!(refusal.contains("belong elsewhere"), "{refusal}");
         // One of a kind that is not known is passed over.
         let other = [0x80, 2, 0, 0, 0, 0, 0, 0, 0, 7, 7];
