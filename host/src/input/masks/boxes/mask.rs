@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_of_a_longer_class_reaches_deeper() {
+    fn every_class_has_a_length_and_a_mask() {
         let classes = [
             Class::Person,
             Class::Bicycle,

@@ -181,11 +181,11 @@ fn oaks_sockets_lenses_and_motions_are_told_apart() {
 fn opencvs_matrices_that_no_lens_has_are_refused() {
     let example = opencv::FORMAT.example[0].1;
     let matrix = "458.6, 0., 367.2, 0., 457.2, 248.3, 0., 0., 1.";
-    let with = |data: &str| refusal(&[("stereo.yml", &with(example, &[(matrix, data)]))]);
+    let refused = |data: &str| refusal(&[("stereo.yml", &with(example, &[(matrix, data)]))]);
     // `cameraParameters.IntrinsicMatrix` of MATLAB is the transpose of OpenCV's matrix.
-    let transposed = with("458.6, 0., 0., 0., 457.2, 0., 367.2, 248.3, 1.");
+    let transposed = refused("458.6, 0., 0., 0., 457.2, 0., 367.2, 248.3, 1.");
     contains_all(transposed, &["transposed, as MATLAB writes", "Transpose the camera matrices"]);
-    let skewed = with("458.6, 3.5, 367.2, 0., 457.2, 248.3, 0., 0., 1.");
+    let skewed = refused("458.6, 3.5, 367.2, 0., 457.2, 248.3, 0., 0., 1.");
     contains_all(skewed, &["has a skew of 3.5", "Calibrate without skew"]);
 }
 
@@ -291,13 +291,12 @@ fn cameras_a_millimetre_apart_are_asked_for_their_unit() {
 
 #[test]
 fn hints_are_told_as_options() {
-    let options = |hints: CalibrationHints| hints.options();
     for (unit, shown) in
         [("m", "m"), ("cm", "cm"), ("mm", "mm"), ("0.025", "0.025"), ("inch", "0.0254")]
     {
         let unit: LengthUnit = unit.parse().unwrap();
         let hints = CalibrationHints { unit: Some(unit), ..Default::default() };
-        assert_eq!(options(hints), format!(" --calibration-unit {shown}"));
+        assert_eq!(hints.options(), format!(" --calibration-unit {shown}"));
         assert_eq!(shown.parse(), Ok(unit), "and taken again");
     }
     for (swap, shown, calibration, images) in [
@@ -306,11 +305,12 @@ fn hints_are_told_as_options() {
         (Swap::Images, " --swap=images", false, true),
     ] {
         assert_eq!((swap.calibration(), swap.images()), (calibration, images));
-        assert_eq!(options(CalibrationHints { swap: Some(swap), ..Default::default() }), shown);
+        let hints = CalibrationHints { swap: Some(swap), ..Default::default() };
+        assert_eq!(hints.options(), shown);
     }
     let lens_model = Some(LensFamily::Fisheye.other());
     let hints = CalibrationHints { lens_model, vertical: true, ..Default::default() };
-    assert_eq!(options(hints), " --lens-model pinhole --vertical");
+    assert_eq!(hints.options(), " --lens-model pinhole --vertical");
     assert_eq!(LengthUnit(0.025).to_string(), "0.025 m");
 }
 
